@@ -31,9 +31,9 @@ law in three dimensions.)
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array, csr_array
 
-from ..packing.arrays import Floats, Indices, derive_frozen
+from ..packing.arrays import Floats, derive_frozen
 from ..packing.snapshot import LinearisedContacts, Snapshot
 
 
@@ -63,21 +63,56 @@ def contact_derivatives(contacts: LinearisedContacts, parting: ArrayLike = 0.5) 
 
 
 def assembled_stiffness(snapshot: Snapshot, parting: ArrayLike = 0.5) -> csr_array:
-    """K = -dF/dq of a snapshot; see :func:`~faultgouge.analysis.stiffness_matrix`."""
-    return _assemble(snapshot, snapshot.contacts, parting)
+    """K = -dF/dq of a snapshot; see :func:`~faultgouge.analysis.stiffness_matrix`.
+
+    Rows (F, T/R) and columns (translation, R theta) of both partners, from the blocks of each contact.
+    """
+    count, c, pair = len(snapshot), snapshot.contacts, ~snapshot.contacts.wall
+    force, torque, growth = contact_derivatives(c, parting)
+    partners = np.stack([c.i, np.where(pair, c.j, 0)])
+    radius = snapshot.radius[partners]
+    rolling, lever = c.slip_arm.T / radius, c.lever_arm.T / radius
+    takes_part = snapshot.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
+    # axes first: all that follows walks along contacts
+    force, torque, growth = (np.ascontiguousarray(np.moveaxis(each, 0, -1)) for each in (force, torque, growth))
+    blocks = np.empty((2, 2, 6, 6, len(c)))
+    for p, of in enumerate((-1.0, 1.0)):  # the partner whose force changes, and the sign of -F
+        for q, by in enumerate((1.0, -1.0)):  # the partner that moves
+            both = (takes_part[p] & takes_part[q]).astype(np.float64)
+            blocks[p, q, :3, :3] = (of * by * both) * force[0]
+            blocks[p, q, :3, 3:] = (of * both * rolling[q]) * force[1]
+            # -T/R = (l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
+            blocks[p, q, 3:, :3] = (by * both * lever[p]) * torque[0] - (by * both * c.lever_slope / radius[p]) * growth
+            blocks[p, q, 3:, 3:] = (both * lever[p] * rolling[q]) * torque[1]
+    if snapshot.dimension == 2:
+        in_plane = np.array([0, 1, 5])
+        blocks = blocks[:, :, in_plane[:, None], in_plane]
+    diagonal = np.zeros((*blocks.shape[2:4], count))
+    for row, column in np.ndindex(*diagonal.shape[:2]):
+        for p in (0, 1):
+            diagonal[row, column] += np.bincount(partners[p], blocks[p, p, row, column], count)
+    first, second = partners[:, pair].astype(np.int32)  # half the memory of what the sparse format sorts
+    every, axis = np.arange(count, dtype=np.int32), np.arange(0, len(diagonal) * count, count, dtype=np.int32)
+    values = np.concatenate([diagonal, blocks[0, 1][..., pair], blocks[1, 0][..., pair]], axis=2)
+    rows = axis[:, None, None] + np.concatenate([every, first, second])
+    columns = axis[:, None] + np.concatenate([every, second, first])
+    where = tuple(np.broadcast_to(index, values.shape).ravel() for index in (rows, columns))
+    # two particles that touch through two images have two contacts, which are added
+    matrix = coo_array((values.ravel(), where), shape=(snapshot.coordinates, snapshot.coordinates)).tocsr()
+    matrix.eliminate_zeros()
+    return matrix
 
 
 def assembled_damping(snapshot: Snapshot) -> csr_array:
     """C = -dF/d(dq/dt) of a snapshot; see :func:`~faultgouge.analysis.damping_matrix`."""
     c = snapshot.contacts
     none, still = np.zeros(len(c)), np.zeros((len(c), 3))
-    # the direction in which a contact slides is that of its tangential force, which has no part in C but for this
-    sliding = np.divide(c.tangential_force, 1.0, out=still.copy(), where=c.sliding[:, None])
+    # where no normal rotates the tangential force is but the direction in which a contact slides
     dashpots = derive_frozen(
-        c, normal_force=none, tangential_force=sliding, closing=still, parting=still, distance=np.full(len(c), np.inf),
-        normal_stiffness=c.normal_dashpot, tangential_stiffness=c.tangential_dashpot, lever_slope=none,
+        c, normal_force=none, closing=still, parting=still, distance=np.full(len(c), np.inf), lever_slope=none,
+        normal_stiffness=c.normal_dashpot, tangential_stiffness=c.tangential_dashpot,
     )  # fmt: skip
-    return _assemble(snapshot, dashpots, 0.5)
+    return assembled_stiffness(derive_frozen(snapshot, contacts=dashpots))
 
 
 def rescaling_operators(snapshot: Snapshot) -> tuple[csr_array, csr_array]:
@@ -108,75 +143,10 @@ def rescaling_operators(snapshot: Snapshot) -> tuple[csr_array, csr_array]:
     return n, csr_array(b.T)
 
 
-def _assemble(snapshot: Snapshot, contacts: LinearisedContacts, parting: ArrayLike) -> csr_array:
-    """-dF/dq: rows (F, T/R) and columns (translation, R theta) of both partners, from the blocks of each contact."""
-    count, c, pair = len(snapshot), contacts, ~contacts.wall
-    force, torque, growth = contact_derivatives(c, parting)
-    partners = np.stack([c.i, np.where(pair, c.j, 0)])
-    radius = snapshot.radius[partners]
-    rolling, lever = c.slip_arm.T / radius, c.lever_arm.T / radius
-    takes_part = snapshot.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
-    # axes first: all that follows walks along contacts
-    force, torque, growth = (np.ascontiguousarray(np.moveaxis(each, 0, -1)) for each in (force, torque, growth))
-    blocks = np.empty((2, 2, 6, 6, len(c)))
-    for p, of in enumerate((-1.0, 1.0)):  # the partner whose force changes, and the sign of -F
-        for q, by in enumerate((1.0, -1.0)):  # the partner that moves
-            both = (takes_part[p] & takes_part[q]).astype(np.float64)
-            blocks[p, q, :3, :3] = (of * by * both) * force[0]
-            blocks[p, q, :3, 3:] = (of * both * rolling[q]) * force[1]
-            # -T/R = (l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
-            blocks[p, q, 3:, :3] = (by * both * lever[p]) * torque[0] - (by * both * c.lever_slope / radius[p]) * growth
-            blocks[p, q, 3:, 3:] = (both * lever[p] * rolling[q]) * torque[1]
-    if snapshot.dimension == 2:
-        in_plane = np.array([0, 1, 5])
-        blocks = blocks[:, :, in_plane[:, None], in_plane]
-    diagonal = np.zeros((*blocks.shape[2:4], count))
-    for row, column in np.ndindex(*diagonal.shape[:2]):
-        for p in (0, 1):
-            diagonal[row, column] += np.bincount(partners[p], blocks[p, p, row, column], count)
-    first, second = partners[:, pair]
-    every = np.arange(count)
-    rows, columns = np.concatenate([every, first, second]), np.concatenate([every, second, first])
-    return _from_blocks(
-        rows, columns, np.concatenate([diagonal, blocks[0, 1][..., pair], blocks[1, 0][..., pair]], axis=2), count
-    )
-
-
-def _from_blocks(rows: Indices, columns: Indices, blocks: Floats, count: int) -> csr_array:
-    """A matrix in the order of axes, from blocks of particles; those of the same place, of two images, are added."""
-    key = rows * count + columns
-    order = np.argsort(key, kind="stable")
-    begins = np.flatnonzero(np.diff(key[order], prepend=-1))
-    rows, columns = rows[order][begins], columns[order][begins]
-    values = blocks[..., order]
-    if len(begins) < len(order):
-        values = np.add.reduceat(values, begins, axis=2)
-    axes = len(blocks)
-    # a row of an axis has its neighbours once for each axis of the columns
-    neighbours = np.bincount(rows, minlength=count)
-    starts = np.concatenate([[0], np.cumsum(neighbours)])
-    inside = np.arange(len(rows)) - starts[rows]
-    data = np.empty((axes, axes * len(rows)))
-    indices = np.empty(axes * len(rows), dtype=np.int32)
-    for axis in range(axes):
-        place = axes * starts[rows] + axis * neighbours[rows] + inside
-        indices[place] = axis * count + columns
-        data[:, place] = values[:, axis]
-    pointers = (axes * starts[:-1] + np.arange(axes)[:, None] * axes * len(rows)).ravel()
-    pointers = np.append(pointers, axes * axes * len(rows)).astype(indices.dtype)  # else all indices take 8 bytes
-    size = axes * count
-    matrix = csr_array((data.ravel(), np.tile(indices, axes), pointers), shape=(size, size))
-    matrix.eliminate_zeros()
-    return matrix
-
-
 def _outer(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[:, :, None] * b[:, None, :])
 
 
 def _cross_matrix(a: Floats) -> Floats:
     """[a] with [a] x = a x x, shape (C, 3, 3)."""
-    found = np.zeros((len(a), 3, 3))
-    found[:, 0, 1], found[:, 0, 2], found[:, 1, 2] = -a[:, 2], a[:, 1], -a[:, 0]
-    found[:, 1, 0], found[:, 2, 0], found[:, 2, 1] = a[:, 2], -a[:, 1], a[:, 0]
-    return found
+    return np.asarray(np.cross(np.eye(3), a[:, None, :]))

@@ -9,9 +9,9 @@ particles, and :mod:`~faultgouge.analysis.operators.linearised_contacts` assembl
 have three components; those of disks lie in the plane, and disks turn about z.
 
 **Two derivatives.** For some laws (LAMMPS's mindlin_rescale) the derivative :math:`b = \partial \mathbf f_t / \partial
-\delta` differs between a growing and a falling overlap. Both are stored; every operator takes the weight of opening
-contacts (:mod:`~faultgouge.analysis.packing.law`). A contact at Coulomb's bound sticks if the motion reverses, and
-slides if the motion continues. `sliding` chooses.
+\delta` differs between a growing and a falling overlap; every operator takes the weight of opening contacts
+(:mod:`~faultgouge.analysis.packing.law`). A contact at Coulomb's bound sticks if the motion reverses, and slides if the
+motion continues: `sliding` chooses.
 """
 
 from dataclasses import dataclass
@@ -117,8 +117,8 @@ class LinearisedContacts:
     def __init__(self, **given: ArrayLike) -> None:
         if given.keys() != PER_CONTACT.keys():
             raise ValueError(f"Contacts need {', '.join(PER_CONTACT)}; these are {', '.join(given)}.")
-        count = len(np.atleast_1d(np.asarray(given["i"])))
         values: dict[str, NDArray] = {name: integers(name, given[name]) for name in ("i", "j")}
+        count = len(values["i"])
         values["sliding"] = booleans("sliding", given["sliding"], count)
         for name in ("distance", "friction"):  # may be infinite
             values[name] = np.array(given[name], dtype=np.float64)
@@ -369,10 +369,7 @@ class Snapshot:
     @cached_property
     def rattlers(self) -> Indices:
         """Indices of the particles that touch nothing."""
-        alone = np.ones(len(self), dtype=np.bool_)
-        alone[self.contacts.i] = False
-        alone[self.contacts.j[~self.contacts.wall]] = False
-        return frozen(np.flatnonzero(alone))
+        return frozen(np.setdiff1d(np.arange(len(self)), [self.contacts.i, self.contacts.j]))
 
     @cached_property
     def net_force(self) -> Floats:
@@ -409,15 +406,17 @@ class Snapshot:
         kept = self.contacts.normal_force > least
         return self if np.all(kept) else derive_frozen(self, contacts=self.contacts.chosen(kept))
 
-    def loaded_by(self, load: ArrayLike) -> "Snapshot":
-        """The snapshot with other forces and torques besides those of contacts, shape (N, 2, 3)."""
-        return derive_frozen(self, load=floats("load", load, self.load.shape))
+    def vectors(self, coordinates: NDArray) -> tuple[NDArray, NDArray]:
+        """Translations and rotations R theta, shape (N, 3) each, of values of the coordinates, shape (axes N,)."""
+        d, parts = self.dimension, coordinates.reshape(self.axes, -1)
+        translation, rotation = np.zeros((2, len(self), 3), dtype=parts.dtype)
+        translation[:, :d], rotation[:, d - self.axes :] = parts[:d].T, parts[d:].T
+        return translation, rotation
 
-    def with_sliding(self, sliding: ArrayLike | None = None) -> "Snapshot":
-        """The snapshot with other contacts that slide, by a mask, shape (C,); those at Coulomb's bound by default."""
-        c = self.contacts
-        which = np.array(c.at_bound) if sliding is None else booleans("sliding", sliding, len(c))
-        return derive_frozen(self, contacts=derive_frozen(c, sliding=which))
+    def join_vectors(self, translation: NDArray, rotation: NDArray) -> NDArray:
+        """The reverse of `vectors`."""
+        d = self.dimension
+        return np.concatenate([translation[:, :d].T.ravel(), rotation[:, d - self.axes :].T.ravel()])
 
 
 Configuration = TypeVar("Configuration", bound=Packing | Snapshot)

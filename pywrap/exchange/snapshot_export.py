@@ -5,9 +5,8 @@ The motion of a mode, growth left out, is a film of frames: an .xyz of many fram
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -19,28 +18,15 @@ from ...analysis.packing.arrays import Floats
 from .vtp import write_frame_list, write_poly_data, write_xml
 
 
-@dataclass(frozen=True, eq=False)
-class SnapshotMode:
+class SnapshotMode(NamedTuple):
     """A mode of a snapshot: its name, its eigenvalue, 1 / time^2, and q, shape (axes N,)."""
 
     name: str
     eigenvalue: complex
     vector: NDArray[np.complex128]
 
-    def fields(self, snapshot: Snapshot) -> dict[str, Floats]:
-        """Translations and rotations R theta, shape (N, 3), by the names that they have in a file."""
-        d = snapshot.dimension
-        found: dict[str, Floats] = {}
-        parts = self.vector.reshape(snapshot.axes, -1)
-        for part, moved in (("", parts.real), ("_imag", parts.imag)):
-            if not part or np.any(moved):
-                translation, rotation = np.zeros((2, len(snapshot), 3))
-                translation[:, :d], rotation[:, 3 - len(moved[d:]) :] = moved[:d].T, moved[d:].T
-                found |= {f"{self.name}{part}": translation, f"{self.name}{part}_rotation": rotation}
-        return found
 
-
-def modes_of_snapshot(snapshot: Snapshot, which: str) -> list[SnapshotMode]:
+def mode_of_snapshot(snapshot: Snapshot, which: str) -> SnapshotMode:
     """The fastest growing pair, or the mode of a number, counted by eigenvalue from 0.
 
     Raises
@@ -61,7 +47,7 @@ def modes_of_snapshot(snapshot: Snapshot, which: str) -> list[SnapshotMode]:
     else:
         raise BadInputError(f"--mode {which}: give pair, or a number from 0 to {len(modes.values) - 1}")
     vector = modes.right[:, number] / np.sqrt(snapshot.coordinate_mass)
-    return [SnapshotMode(f"mode_{number}", complex(modes.values[number]), vector / np.abs(vector).max())]
+    return SnapshotMode(f"mode_{number}", complex(modes.values[number]), vector / np.abs(vector).max())
 
 
 def write_snapshot_for_others(path: Path, snapshot: Snapshot, modes: Sequence[SnapshotMode] = ()) -> str:
@@ -74,23 +60,17 @@ def write_snapshot_for_others(path: Path, snapshot: Snapshot, modes: Sequence[Sn
     OutputError
         If the file cannot be written.
     """
-    writers = {".vtp": _write_vtp, ".xyz": _write_xyz}
-    if path.suffix not in writers:
-        raise BadInputError(f"-o {path}: a snapshot goes into {', '.join(writers)}; give it one of these suffixes.")
-    writers[path.suffix](path, snapshot, modes)
+    if path.suffix == ".vtp":
+        write_xml(path, _poly_data(snapshot, _in_space(snapshot), modes))
+    elif path.suffix == ".xyz":
+        _write_xyz(path, snapshot, [(_in_space(snapshot), modes)])
+    else:
+        raise BadInputError(f"-o {path}: a snapshot goes into .vtp, .xyz; give it one of these suffixes.")
     return f"{len(snapshot)} particles, {len(snapshot.contacts)} contacts, {len(modes)} modes"
 
 
 FARTHEST = 0.5
 """Longest displacement in a film of a mode, in units of the smallest radius: particles stay beside their neighbours."""
-
-
-def check_mode_frames(path: Path) -> None:
-    """Refuse a film whose name has another suffix than .xyz and .pvd."""
-    if path.suffix not in (".xyz", ".pvd"):
-        raise BadInputError(
-            f"-o {path}: a mode of spheres moves in OVITO (.xyz) or ParaView (.pvd); give one of these."
-        )
 
 
 def write_mode_frames(path: Path, snapshot: Snapshot, mode: SnapshotMode, count: int, periods: int = 1) -> None:
@@ -105,12 +85,9 @@ def write_mode_frames(path: Path, snapshot: Snapshot, mode: SnapshotMode, count:
 
     Raises
     ------
-    BadInputError
-        If the suffix is another one.
     OutputError
         If a file cannot be written.
     """
-    check_mode_frames(path)
     # the phase at which the two moments a quarter of a period apart are the largest and the smallest displacement
     vector = mode.vector * np.exp(-0.5j * np.angle(np.sum(mode.vector**2)))
     translation = np.abs(vector.reshape(snapshot.axes, -1)[: snapshot.dimension])
@@ -119,14 +96,11 @@ def write_mode_frames(path: Path, snapshot: Snapshot, mode: SnapshotMode, count:
     for k in range(count):
         moved = np.real(reach * vector * np.exp(2j * np.pi * periods * k / count))
         there = SnapshotMode("displacement", mode.eigenvalue, moved.astype(np.complex128))
-        frames.append((_in_space(snapshot) + there.fields(snapshot)["displacement"], there))
+        frames.append((_in_space(snapshot) + snapshot.vectors(moved)[0], [there]))
     if path.suffix == ".xyz":
-        with replace_whole(path) as new, new.open("w") as stream:
-            for position, there in frames:
-                _write_xyz_frame(stream, snapshot, position, [there])
-        return
-    pages = ((float(k), _poly_data(snapshot, position, [there])) for k, (position, there) in enumerate(frames))
-    write_frame_list(path, pages)
+        _write_xyz(path, snapshot, frames)
+    else:
+        write_frame_list(path, ((float(k), _poly_data(snapshot, *frame)) for k, frame in enumerate(frames)))
 
 
 def _in_space(snapshot: Snapshot) -> Floats:
@@ -152,12 +126,10 @@ def _of_particles(snapshot: Snapshot, modes: Sequence[SnapshotMode]) -> dict[str
         "coordination": count.astype(np.float64),
     }
     for mode in modes:
-        values |= mode.fields(snapshot)
+        for name, moved in ((mode.name, mode.vector.real), (f"{mode.name}_imag", mode.vector.imag)):
+            if name == mode.name or np.any(moved):
+                values[name], values[f"{name}_rotation"] = snapshot.vectors(moved)
     return values
-
-
-def _write_vtp(path: Path, snapshot: Snapshot, modes: Sequence[SnapshotMode]) -> None:
-    write_xml(path, _poly_data(snapshot, _in_space(snapshot), modes))
 
 
 def _poly_data(snapshot: Snapshot, position: Floats, modes: Sequence[SnapshotMode]) -> ElementTree.Element:
@@ -182,18 +154,16 @@ def _poly_data(snapshot: Snapshot, position: Floats, modes: Sequence[SnapshotMod
     return write_poly_data(position, ends, numbers, _of_particles(snapshot, modes), on_contacts)
 
 
-def _write_xyz(path: Path, snapshot: Snapshot, modes: Sequence[SnapshotMode]) -> None:
-    with replace_whole(path) as new, new.open("w") as stream:
-        _write_xyz_frame(stream, snapshot, _in_space(snapshot), modes)
-
-
-def _write_xyz_frame(stream: TextIO, snapshot: Snapshot, position: Floats, modes: Sequence[SnapshotMode]) -> None:
-    columns = {"pos": position} | _of_particles(snapshot, modes)
-    columns = {("forces" if name == "net_force" else name): value for name, value in columns.items()}
-    properties = ":".join(f"{name}:R:{1 if value.ndim == 1 else value.shape[1]}" for name, value in columns.items())
-    lattice = " ".join(repr(float(value)) for value in snapshot.box.ravel())
+def _write_xyz(path: Path, snapshot: Snapshot, frames: Sequence[tuple[Floats, Sequence[SnapshotMode]]]) -> None:
+    """Frames, each of positions and modes."""
+    lattice, origin = (" ".join(map(repr, each.ravel().tolist())) for each in (snapshot.box, snapshot.origin))
     sides = " ".join("T" if each else "F" for each in snapshot.periodic)
-    origin = " ".join(repr(float(value)) for value in snapshot.origin)
-    rows = np.column_stack([value if value.ndim == 2 else value[:, None] for value in columns.values()])
-    stream.write(f'{len(snapshot)}\nLattice="{lattice}" Origin="{origin}" pbc="{sides}" Properties={properties}\n')
-    stream.writelines(" ".join(map(repr, row)) + "\n" for row in rows.tolist())
+    with replace_whole(path) as new, new.open("w") as stream:
+        for position, modes in frames:
+            columns = {"pos": position} | _of_particles(snapshot, modes)
+            columns = {("forces" if name == "net_force" else name): value for name, value in columns.items()}
+            sizes = [f"{name}:R:{1 if value.ndim == 1 else value.shape[1]}" for name, value in columns.items()]
+            rows = np.column_stack([value if value.ndim == 2 else value[:, None] for value in columns.values()])
+            box = f'Lattice="{lattice}" Origin="{origin}" pbc="{sides}"'
+            stream.write(f"{len(snapshot)}\n{box} Properties={':'.join(sizes)}\n")
+            stream.writelines(" ".join(map(repr, row)) + "\n" for row in rows.tolist())

@@ -6,18 +6,15 @@ From rest with the velocities :math:`\mathbf v_0` small motion is
     G = \begin{pmatrix} 0 & 1 \\ -M^{-1} K & -M^{-1} C \end{pmatrix} .
 
 LAMMPS runs twice, with :math:`\pm \mathbf v_0`, in copies of the process, without drag. Half of the difference has
-neither the motion of what was out of balance nor terms of second order in :math:`\mathbf v_0`. Three errors are left.
-That of the time step falls as its square without dashpots, and in proportion to it with them, since LAMMPS takes the
-velocity of the half step for them. That of the forces' cubic terms falls as the square of the amplitude. And LAMMPS
-turns the history of `granular` only where it has left the contact's plane by 1e-10 of Coulomb's bound: forces are wrong
-by as much, and their share in the motion grows as the inverse of the amplitude. At the best amplitude the last two are
-together 1e-7 to 1e-5, more where overlaps are small. Two amplitudes and three time steps, extrapolated to zero, leave
-less than 1e-6 of the motion of all laws with one derivative (`tests/pywrap/granular/test_from_lammps.py`): the cubic
-terms go, so that the amplitude can be as large as contacts bear that must not open.
+neither the motion of what was out of balance nor terms of second order in :math:`\mathbf v_0`. Three errors are left:
+of the time step, of its second order, or with dashpots of its first, since LAMMPS takes the velocity of the half step
+for them; of the forces' cubic terms, of the second order of the amplitude; and of `granular`, which turns a history
+only where it has left the contact's plane by 1e-10 of Coulomb's bound. The last one grows as the inverse of the
+amplitude. At the best amplitude the last two are together 1e-7 to 1e-5, more where overlaps are small.
 
 Laws with two derivatives (mindlin_rescale) have other forces while a contact closes than while it parts. With the mean
-K of both, rates :math:`N \dot q` of the overlaps, and half of their difference B
-(:func:`~faultgouge.analysis.operators.linearised_contacts.rescaling_operators`), the motion is that of
+K of both, and N and B of :func:`~faultgouge.analysis.operators.linearised_contacts.rescaling_operators`, the motion is
+that of
 
 .. math:: M \dot{\mathbf v} = \mathbf F - C \mathbf v, \qquad
     \dot{\mathbf F} = -K \mathbf v + B\, |N \mathbf v| ,
@@ -38,6 +35,7 @@ from ...analysis.operators.linearised_contacts import rescaling_operators
 from ...analysis.packing.arrays import Floats, Indices
 from ...analysis.spectrum.spectrum import active_coordinates, mass_weighted
 from .granular_commands import SnapshotError
+from .lammps_arrays import owned_array, rows_of, set_velocity
 from .look_in_a_copy import can_copy, in_a_copy, quieten
 
 ACCURACY = 1e-10
@@ -123,58 +121,38 @@ def _velocity(snapshot: Snapshot, stiffness: csr_array, active: Indices, start: 
     g = mass_weighted(damping_matrix(snapshot), snapshot)[active][:, active]
     # displacements or forces over omega, so that both halves weigh as much
     omega = float(np.sqrt(np.abs(a).sum(axis=1).max()))
+    still = np.zeros_like(start)
     rates, forces = rescaling_operators(snapshot)
-    if forces.data.any():
-        weight = diags_array(1.0 / np.sqrt(snapshot.coordinate_mass[active]))
-        n, b = csr_array(rates[:, active] @ weight), csr_array(weight @ forces[active])
-        there, back = (_piecewise_velocity(a, g, n, b, omega, sign * start, time) for sign in (1, -1))
-        return np.asarray(0.5 * (there - back))
-    system = csr_array(block_array([[None, omega * diags_array(np.ones(len(start)))], [-a / omega, -g]]))
-    return np.asarray(expm_multiply(time * system, np.concatenate([np.zeros_like(start), start])))[len(start) :]
-
-
-def _piecewise_velocity(
-    a: csr_array, g: csr_array, n: csr_array, b: csr_array, omega: float, start: Floats, time: float
-) -> Floats:
-    """Velocities of v' = F - G v, F' = -A v + B |N v| from F = 0, each contact with its own derivative."""
+    if not forces.data.any():
+        system = csr_array(block_array([[None, omega * diags_array(np.ones(len(start)))], [-a / omega, -g]]))
+        return np.asarray(expm_multiply(time * system, np.concatenate([still, start])))[len(start) :]
     from scipy.integrate import solve_ivp
 
+    weight = diags_array(1.0 / np.sqrt(snapshot.coordinate_mass[active]))
+    n, b = csr_array(rates[:, active] @ weight), csr_array(weight @ forces[active])
+
     def slope(_: float, state: Floats) -> Floats:
+        """F' = -A v + B |N v| and v' = F - G v: each contact has its own derivative."""
         force, velocity = np.split(state, 2)
         return np.concatenate([(b @ np.abs(n @ velocity) - a @ velocity) / omega, omega * force - g @ velocity])
 
-    found = solve_ivp(
-        slope, (0, time), np.concatenate([np.zeros_like(start), start]), method="DOP853", t_eval=[time],
-        rtol=ACCURACY, atol=ACCURACY * np.abs(start).max(),
-    )  # fmt: skip
-    if not found.success:
-        raise SnapshotError(f"The predicted motion was not found: {found.message} Compare over a shorter time.")
-    return np.asarray(found.y[len(start) :, 0])
+    ends = []
+    for sign in (1, -1):
+        begin, error = np.concatenate([still, sign * start]), ACCURACY * np.abs(start).max()
+        found = solve_ivp(slope, (0, time), begin, method="DOP853", t_eval=[time], rtol=ACCURACY, atol=error)
+        if not found.success:
+            raise SnapshotError(f"The predicted motion was not found: {found.message} Compare over a shorter time.")
+        ends.append(found.y[len(start) :, 0])
+    return np.asarray(0.5 * (ends[0] - ends[1]))
 
 
 def _run(lmp: Any, snapshot: Snapshot, velocity: Floats, step: float, steps: int) -> Floats:
     """Velocities of the coordinates after some steps of LAMMPS."""
     lmp.command("log none")
     quieten(lmp, drag=True)
-    d, parts = snapshot.dimension, velocity.reshape(snapshot.axes, -1)
-    spin = parts[d:] / snapshot.radius
-
-    def places() -> Floats:
-        ids = lmp.numpy.extract_atom("id")[: lmp.extract_setting("nlocal")]
-        found = np.minimum(np.searchsorted(snapshot.ids, ids), len(snapshot) - 1)
-        if len(ids) != len(snapshot) or np.any(snapshot.ids[found] != ids):
-            raise SnapshotError("The instance has other particles than the snapshot: take a new one.")
-        return found
-
-    place = places()
-    v, omega = (lmp.numpy.extract_atom(name)[: len(place)] for name in ("v", "omega"))
-    v[:] = omega[:] = 0.0
-    v[:, :d] = parts[:d, place].T
-    omega[:, 3 - len(spin) :] = spin[:, place].T
+    set_velocity(lmp, snapshot, velocity)
     lmp.command(f"timestep {step:.17g}")
     lmp.command(f"run {steps} post no")
-    place, found = places(), np.zeros_like(parts)
-    v, omega = (lmp.numpy.extract_atom(name)[: len(place)] for name in ("v", "omega"))
-    found[:d, place] = v[:, :d].T
-    found[d:, place] = (omega[:, 3 - len(spin) :] * snapshot.radius[place, None]).T
-    return found.ravel()
+    rows = rows_of(lmp, snapshot)
+    rotation = owned_array(lmp, "omega")[rows] * snapshot.radius[:, None]
+    return snapshot.join_vectors(owned_array(lmp, "v")[rows], rotation)

@@ -17,16 +17,16 @@ multiples of 1/4; whatever has others is refused. A push is a rotation for one s
 nothing moves, and the slip is known to the last digit.
 """
 
-from collections.abc import Iterable
+from contextlib import closing
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 
 from ...analysis.packing.arrays import Floats
 from ..lammps.instance import lammps_instance
-from .granular_commands import Commands, SnapshotError, wall_plane
+from .granular_commands import Commands, SnapshotError
 
 EXACT = 1e-6
 """Distance of a measured exponent from a multiple of 1/4: rounding of forces and overlaps leaves 1e-9 or less."""
@@ -74,10 +74,8 @@ class MeasuredLaw:
 
     Attributes
     ----------
-    exponent : float
-        p of f_n.
     stiffness, tangential, normal_dashpot, tangential_dashpot : PowerOfOverlap
-        f_n/delta, k_t', c_n and c_t.
+        f_n/delta, whose exponent is p - 1, k_t', c_n and c_t.
     closing, parting : float
         d ln f_t / d ln delta at constant slip.
     mu : float
@@ -86,7 +84,6 @@ class MeasuredLaw:
         l': 0, or 1/2 of an arm that ends in the middle of the overlap.
     """
 
-    exponent: float
     stiffness: PowerOfOverlap
     tangential: PowerOfOverlap
     normal_dashpot: PowerOfOverlap
@@ -98,35 +95,33 @@ class MeasuredLaw:
 
 
 class TwoParticleLammps:
-    """A LAMMPS with two particles, or one and a wall, that knows the pair styles and walls of a deck."""
+    """A LAMMPS with two particles of some types, or one and the wall of a fix, and the commands of a deck."""
 
-    def __init__(self, commands: Commands, units: str, types: int, size: float, wall: str | None = None) -> None:
+    def __init__(self, lmp: Any, commands: Commands, name: tuple[int, int] | str, size: float) -> None:
         self.lammps = lammps_instance(MPI.COMM_SELF, None)
-        self.axis, self.sign, self.place, self.wall = 0, 1.0, 0.0, wall
-        if wall is not None:
-            self.axis, low, high = wall_plane(wall)
-            if low is None and high is None:
-                raise SnapshotError(f"{wall!r} has no plane.")
-            self.sign, self.place = (1.0, low) if low is not None else (-1.0, high or 0.0)
-        across = {0: 1, 1: 2, 2: 0}
-        self.across, self.about = across[self.axis], across[across[self.axis]]
+        words = commands.fixes[name].split() if isinstance(name, str) else []
+        self.wall, self.types = bool(words), (1, 1) if isinstance(name, str) else name
+        self.axis, self.sign, self.place = 0, 1.0, 0.0
+        if self.wall:
+            at = next(k for k, word in enumerate(words) if word in ("xplane", "yplane", "zplane"))
+            self.axis = "xyz".index(words[at][0])
+            self.sign, plane = (1.0, words[at + 1]) if words[at + 1] != "NULL" else (-1.0, words[at + 2])
+            self.place = float(plane)
+        self.across, self.about = (self.axis + 1) % 3, (self.axis + 2) % 3
         middle = np.zeros(3)
         middle[self.axis] = self.place
         edges = " ".join(f"{m - 40 * size:.17g} {m + 40 * size:.17g}" for m in middle)
+        create = f"create_atoms 1 single {' '.join(f'{m:.17g}' for m in middle)} units box"
         self.run(
-            f"units {units}", "atom_style sphere", "atom_modify map yes sort 0 0", "boundary f f f", "newton on",
-            "comm_modify vel yes", f"neighbor {size:.17g} bin", "neigh_modify every 1 delay 0 check no",
-            f"region box block {edges} units box", f"create_box {types} box", "thermo_modify lost ignore norm no",
+            f"units {lmp.extract_global('units')}", "atom_style sphere", "atom_modify map yes sort 0 0",
+            "boundary f f f", "newton on", "comm_modify vel yes", f"neighbor {size:.17g} bin",
+            "neigh_modify every 1 delay 0 check no", f"region box block {edges} units box",
+            f"create_box {lmp.extract_setting('ntypes')} box", "thermo_modify lost ignore norm no",
+            *[create] * (1 if self.wall else 2), f"set group all diameter {2 * size:.17g}", "set group all density 1",
+            "run_style verlet", "group one id 1", *commands.pair,
         )  # fmt: skip
-        corner = " ".join(f"{m:.17g}" for m in middle)
-        for _ in range(1 if wall else 2):
-            self.run(f"create_atoms 1 single {corner} units box")
-        self.run(f"set group all diameter {2 * size:.17g}", "set group all density 1", "run_style verlet")
-        self.run(*commands.pair)
-        if wall is not None:
-            words = wall.split()
-            words[2] = "all"
-            self.run(" ".join(words))
+        if self.wall:
+            self.run(" ".join([*words[:2], "all", *words[3:]]))
         self.run("timestep 1")
 
     def run(self, *lines: str) -> None:
@@ -138,58 +133,40 @@ class TwoParticleLammps:
         """An array of the particles, as LAMMPS has it."""
         return np.asarray(self.lammps.numpy.extract_atom(name))[: 1 if self.wall else 2]
 
-    def place_at(self, state: State, types: tuple[int, int] = (1, 1)) -> State:
+    def place_at(self, state: State) -> State:
         """Put the particles into a fresh contact, at rest; the state with the overlap to the last digit."""
+        count = 1 if self.wall else 2
         for away in (True, False):
-            if self.wall is None:
-                self.array("radius")[:], self.array("rmass")[:] = state.radii, state.masses
-                self.array("type")[:] = types
-            else:
-                self.array("radius")[:], self.array("rmass")[:] = state.radii[0], state.masses[0]
+            self.array("radius")[:], self.array("rmass")[:] = state.radii[:count], state.masses[:count]
+            self.array("type")[:] = self.types[:count]
             x = self.array("x")
             x[:] = 0.0
             x[:, self.axis] = self.place
-            distance = sum(state.radii) - state.overlap + away * state.radii[0]
-            x[0, self.axis] += self.sign * distance
-            self.move((0.0, 0.0))
-            self.run("run 0 post no")
+            x[0, self.axis] += self.sign * (sum(state.radii) - state.overlap + away * state.radii[0])
+            self.rest()
         x = self.array("x")
         other = self.place if self.wall else x[1, self.axis]
         return state._replace(overlap=sum(state.radii) - abs(x[0, self.axis] - other))
 
-    def move(self, speed: tuple[float, float]) -> None:
+    def move(self, closing: float = 0.0, slipping: float = 0.0) -> None:
         """Give the first particle a velocity towards the other one, and a rotation, as the speed of its surface."""
         self.array("v")[:] = self.array("omega")[:] = 0.0
-        self.array("v")[0, self.axis] = -self.sign * speed[0]
-        self.array("omega")[0, self.about] = speed[1] / self.array("radius")[0]
+        self.array("v")[0, self.axis] = -self.sign * closing
+        self.array("omega")[0, self.about] = slipping / self.array("radius")[0]
+
+    def rest(self) -> None:
+        """Stop the particles, and compute their forces at rest."""
+        self.move()
+        self.run("run 0 post no")
 
     def force(self) -> tuple[float, float]:
         """f_n on the first particle, and the size of f_t."""
         f = self.array("f")[0]
         return float(self.sign * f[self.axis]), float(abs(f[self.across]))
 
-    def lever(self) -> float:
-        """Torque over tangential force of the first particle, length."""
-        return float(abs(self.array("torque")[0, self.about] / self.array("f")[0, self.across]))
 
-    def close(self) -> None:
-        """End LAMMPS."""
-        self.lammps.close()
-
-
-def measure_law(bench: TwoParticleLammps, state: State, types: tuple[int, int], who: str) -> MeasuredLaw:
-    """The law of a contact, from its own overlap, radii and masses, and from others.
-
-    Parameters
-    ----------
-    bench : TwoParticleLammps
-        LAMMPS with the law.
-    state : State
-        A contact of the packing; its law is measured at an overlap that is neither minute nor large.
-    types : tuple of (int, int)
-        Types of the two particles.
-    who : str
-        Whose law it is, for messages.
+def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state: State, who: str) -> MeasuredLaw:
+    """The law of two types, or of the wall of a fix, from a contact of the packing and from others that are like it.
 
     Raises
     ------
@@ -198,46 +175,42 @@ def measure_law(bench: TwoParticleLammps, state: State, types: tuple[int, int], 
     """
     least, most = (share * state.radii[0] for share in OVERLAP_RANGE)
     state = state._replace(overlap=min(max(state.overlap, least), most))
-    heavy = (3 * state.masses[0], state.masses[1] if bench.wall else 2 * state.masses[1])
-    small = State((0.5 * state.radii[0], 0.8 * state.radii[1]), state.masses, state.overlap)
-    states = [state, state._replace(overlap=0.5 * state.overlap), state._replace(masses=heavy), small]
-    found = [_measure(bench, each, types) for each in states]
-    here, shallow, heavier, smaller = (values for _, values in found)
-    depth = np.log(found[1][0].overlap / found[0][0].overlap)
-    size = np.log(states[3].radius / states[0].radius)
-    weight = np.log(states[2].mass / states[0].mass)
+    wanted = (
+        state,
+        state._replace(overlap=0.5 * state.overlap),
+        state._replace(masses=(3 * state.masses[0], 2 * state.masses[1])),
+        state._replace(radii=(0.5 * state.radii[0], 0.8 * state.radii[1])),
+    )
+    bench = TwoParticleLammps(lmp, commands, name, max(state.radii))
+    with closing(bench.lammps):
+        states, found = zip(*(_measure(bench, each) for each in wanted), strict=True)
+    first, here = states[0], found[0]
+    depth, weight, size = np.log(
+        [states[1].overlap / first.overlap, states[2].mass / first.mass, states[3].radius / first.radius]
+    )
 
     def power(name: str) -> PowerOfOverlap:
-        values = [getattr(each, name) for each in (here, shallow, heavier, smaller)]
-        if values[0] == 0 and not any(values):
+        what = f"{name.replace('_', ' ')} of the {who}"
+        values = [each[name] for each in found]
+        if not any(values):
             return PowerOfOverlap(0.0)
         if min(values) <= 0:
-            raise SnapshotError(
-                f"{who} has a {name.replace('_', ' ')} that changes its sign, which no contact law does."
-            )
+            raise SnapshotError(f"The {what} changes its sign, which that of no contact law does.")
         by_depth, by_mass, by_size = (
-            quarter(np.log(value / values[0]) / scale, f"{name.replace('_', ' ')} of {who}")
+            quarter(np.log(value / values[0]) / scale, what)
             for value, scale in zip(values[1:], (depth, weight, size), strict=True)
         )
         if by_depth != by_size:
-            raise SnapshotError(f"The {name.replace('_', ' ')} of {who} is no power of its contact radius.")
-        first = found[0][0]
-        return PowerOfOverlap(
-            values[0] / (first.mass**by_mass * (first.radius * first.overlap) ** by_depth), by_depth, by_mass
-        )
+            raise SnapshotError(f"The {what} is no power of its contact radius.")
+        factor = values[0] / (first.mass**by_mass * (first.radius * first.overlap) ** by_depth)
+        return PowerOfOverlap(factor, by_depth, by_mass)
 
-    stiffness = power("stiffness")
-    exponents = here.closing, here.parting
     return MeasuredLaw(
-        exponent=1 + stiffness.overlap,
-        stiffness=stiffness,
-        tangential=power("tangential"),
-        normal_dashpot=power("normal_dashpot"),
-        tangential_dashpot=power("tangential_dashpot"),
-        closing=quarter(exponents[0], f"tangential force of {who}"),
-        parting=quarter(exponents[1], f"tangential force of {who}"),
-        mu=here.mu,
-        lever=quarter(here.lever, f"lever arm of {who}"),
+        **{name: power(name) for name in ("stiffness", "tangential", "normal_dashpot", "tangential_dashpot")},
+        closing=quarter(here["closing"], f"tangential force of the {who}"),
+        parting=quarter(here["parting"], f"tangential force of the {who}"),
+        mu=here["mu"],
+        lever=quarter(here["lever"], f"lever arm of the {who}"),
     )
 
 
@@ -251,79 +224,67 @@ def quarter(value: float, what: str) -> float:
     return nearest
 
 
-class _Values(NamedTuple):
-    stiffness: float
-    tangential: float
-    normal_dashpot: float
-    tangential_dashpot: float
-    closing: float
-    parting: float
-    mu: float
-    lever: float
-
-
-def _measure(bench: TwoParticleLammps, wanted: State, types: tuple[int, int]) -> tuple[State, _Values]:
-    """Forces of one contact at rest and in motion."""
-    state = bench.place_at(wanted, types)
+def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, float]]:
+    """What one contact has of a MeasuredLaw's fields, by its forces at rest and in motion."""
+    state = bench.place_at(wanted)
     fn, delta = bench.force()[0], state.overlap
     # a time step so long that dashpots are weak beside slips
     step = 1e3 * np.sqrt(state.mass * delta / fn)
     bench.run(f"timestep {step:.17g}")
-    normal_dashpot = _dashpot(bench, (1.0, 0.0), fn, 0.1 * delta / step)
-    slip = 1e3 * delta  # far beyond Coulomb's bound
-    bench.place_at(wanted, types)
-    bench.move((0.0, slip / step))
+    normal_dashpot = _dashpot(bench, "closing", fn, 0.1 * delta / step)
+    bench.place_at(wanted)
+    bench.move(slipping=1e3 * delta / step)  # far beyond Coulomb's bound
     bench.run("run 1 post no")
     mu = bench.force()[1] / fn  # while the contact slides: a dashpot has its share of it
     if mu == 0:
-        return state, _Values(fn / delta, 0.0, normal_dashpot, 0.0, 0.0, 0.0, 0.0, 0.0)
+        none = dict.fromkeys(("tangential", "tangential_dashpot", "closing", "parting", "mu", "lever"), 0.0)
+        return state, {"stiffness": fn / delta, "normal_dashpot": normal_dashpot} | none
     slip = 0.01 * min(mu, 1.0) * delta
-    ft = _push_contact(bench, wanted, types, slip / step)[1]
+    ft = _push_contact(bench, wanted, slip / step)
     if ft > 0.1 * mu * fn:  # a stiff spring: once more, with less
         slip *= 0.1 * mu * fn / ft / 10
-        ft = _push_contact(bench, wanted, types, slip / step)[1]
+        ft = _push_contact(bench, wanted, slip / step)
     if ft == 0:
         raise SnapshotError("A contact law has friction without a tangential stiffness: use one with a history.")
-    lever = (state.radii[0] - bench.lever()) / delta
+    arm = abs(bench.array("torque")[0, bench.about] / bench.array("f")[0, bench.across])
+    lever = float(state.radii[0] - arm) / delta
     # the exponents at constant slip, in steps of a tenth of the overlap
     forces, overlaps = [ft], [delta]
     for direction in (-1.0, 1.0):
-        speed = direction * 0.1 * delta / step
         x = bench.array("x")[0, bench.axis]
-        velocity = np.zeros(3)
-        velocity[bench.axis] = -bench.sign * speed
-        bench.run("group one id 1", "fix go one move linear " + " ".join(f"{v:.17g}" for v in velocity) + " units box")
-        bench.run("run 1 post no", "unfix go", "group one delete")
-        bench.move((0.0, 0.0))
-        bench.run("run 0 post no")
+        velocity = ["0", "0", "0"]
+        velocity[bench.axis] = f"{-bench.sign * direction * 0.1 * delta / step:.17g}"
+        bench.run(f"fix go one move linear {' '.join(velocity)} units box", "run 1 post no", "unfix go")
+        bench.rest()
         forces.append(bench.force()[1])
         overlaps.append(overlaps[-1] + bench.sign * (x - bench.array("x")[0, bench.axis]))
     parting, closing = np.log(np.array(forces[1:]) / forces[:-1]) / np.log(np.array(overlaps[1:]) / overlaps[:-1])
-    bench.place_at(wanted, types)
-    tangential_dashpot = _dashpot(bench, (0.0, 1.0), mu * fn, slip / step)
-    return state, _Values(fn / delta, ft / slip, normal_dashpot, tangential_dashpot, closing, parting, mu, lever)
+    bench.place_at(wanted)
+    tangential_dashpot = _dashpot(bench, "slipping", mu * fn, slip / step)
+    return state, {
+        "stiffness": fn / delta, "tangential": ft / slip, "normal_dashpot": normal_dashpot,
+        "tangential_dashpot": tangential_dashpot, "closing": closing, "parting": parting, "mu": mu, "lever": lever,
+    }  # fmt: skip
 
 
-def _push_contact(bench: TwoParticleLammps, state: State, types: tuple[int, int], speed: float) -> tuple[float, float]:
-    """Forces at rest of a fresh contact that has slipped at a speed for one step."""
-    bench.place_at(state, types)
-    bench.move((0.0, speed))
+def _push_contact(bench: TwoParticleLammps, state: State, speed: float) -> float:
+    """Tangential force at rest of a fresh contact that has slipped at a speed for one step."""
+    bench.place_at(state)
+    bench.move(slipping=speed)
     bench.run("run 1 post no")
-    bench.move((0.0, 0.0))
-    bench.run("run 0 post no")
-    return bench.force()
+    bench.rest()
+    return bench.force()[1]
 
 
-def _dashpot(bench: TwoParticleLammps, direction: tuple[float, float], scale: float, speed: float) -> float:
+def _dashpot(bench: TwoParticleLammps, direction: Literal["closing", "slipping"], scale: float, speed: float) -> float:
     """Force per velocity of a contact without slip: first at some speed, then where the force is a tenth of scale."""
-    tangential = int(direction[1])
-    bench.move((0.0, 0.0))
-    bench.run("run 0 post no")
-    rest, found = bench.force()[tangential], 0.0
+    component = 0 if direction == "closing" else 1
+    bench.rest()
+    rest, found = bench.force()[component], 0.0
     for _ in range(6):  # a speed whose force is lost in rounding, or is cut at the bound, comes nearer
-        bench.move((speed * direction[0], speed * direction[1]))
+        bench.move(**{direction: speed})
         bench.run("run 0 post no")
-        force = bench.force()[tangential] - rest
+        force = bench.force()[component] - rest
         found = force / speed
         if 0.01 * scale < abs(force) < 0.5 * scale:
             break
@@ -331,24 +292,3 @@ def _dashpot(bench: TwoParticleLammps, direction: tuple[float, float], scale: fl
         if abs(force) <= 1e-9 * scale and speed > 1e30:
             break
     return found if abs(found) * speed > 1e-12 * scale else 0.0
-
-
-def measure_laws(
-    commands: Commands, units: str, types: int, pairs: dict[tuple[int, int], State], walls: Iterable[tuple[str, State]]
-) -> dict[Any, MeasuredLaw]:
-    """The laws of pairs of types, by these, and of walls, by the IDs of their fixes."""
-    found: dict[Any, MeasuredLaw] = {}
-    if pairs:
-        bench = TwoParticleLammps(commands, units, types, max(max(state.radii) for state in pairs.values()))
-        try:
-            for kinds, state in pairs.items():
-                found[kinds] = measure_law(bench, state, kinds, f"the contact of types {kinds[0]} and {kinds[1]}")
-        finally:
-            bench.close()
-    for name, state in walls:
-        bench = TwoParticleLammps(commands, units, types, state.radii[0], commands.fixes[name])
-        try:
-            found[name] = measure_law(bench, state, (1, 1), f"the wall of fix {name}")
-        finally:
-            bench.close()
-    return found

@@ -4,6 +4,7 @@ LAMMPS hands out neither kn, kt and mu of its granular styles nor the words of i
 variables filled in: a command with a $ stands there twice, as it was written and as LAMMPS understood it.
 """
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -14,8 +15,14 @@ HISTORY = ("gran/hooke/history", "gran/hertz/history", "granular")
 
 OWN = "mindlin/smooth"
 
+WALLS = ("wall/gran", "wall/mindlin/smooth")
+
+INTEGRATORS = ("nve/sphere", "nve/disc", "overdamped/disc")
+"""Fixes that move particles and turn them."""
+
+GIVE_LINES = "give the lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the deck as commands=[...]"
+
 COHESIVE = ("jkr", "dmt", "mdr")
-SUFFIXES = ("/omp", "/kk", "/intel", "/gpu", "/opt")
 UNSUPPORTED_SUBMODELS = {"twisting": "twisting friction", "rolling": "rolling friction", "heat": "heat conduction"}
 TANGENTIAL = (
     "linear_history", "linear_history_classic", "mindlin", "mindlin_classic", "mindlin/force", "mindlin_rescale",
@@ -29,15 +36,7 @@ class SnapshotError(FaultgougeError):
 
 @dataclass(frozen=True)
 class Commands:
-    """What a deck says of contacts and of motion.
-
-    Attributes
-    ----------
-    pair : tuple of str
-        The line of pair_style and those of pair_coeff that hold.
-    fixes : dict
-        Lines of all fixes by their IDs.
-    """
+    """What a deck says of contacts and of motion: pair_style with the pair_coeff that hold, and fixes by their IDs."""
 
     pair: tuple[str, ...]
     fixes: dict[str, str]
@@ -50,9 +49,7 @@ class Commands:
 
 def without_suffix(style: str) -> str:
     """A style as LAMMPS's manual names it."""
-    for suffix in SUFFIXES:
-        style = style.removesuffix(suffix)
-    return style
+    return re.sub("/(omp|kk|intel|gpu|opt)$", "", style)
 
 
 def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
@@ -66,7 +63,8 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
     style = ""
     coefficients: list[str] = []
     fixes: dict[str, str] = {}
-    for line in _whole(lines):
+    whole = re.sub(r"&[ \t]*\n", " ", "\n".join(lines))
+    for line in whole.splitlines():
         words = line.split("#")[0].split()
         if not words:
             continue
@@ -88,35 +86,12 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
             fixes.pop(words[1], None)
     if not style:
         where = "The log of this LAMMPS has" if log else "The commands have"
-        raise SnapshotError(
-            f"{where} no pair_style: give the lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the "
-            "deck as commands=[...]."
-        )
+        raise SnapshotError(f"{where} no pair_style: {GIVE_LINES}.")
     return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes)
 
 
-def _whole(lines: Iterable[str]) -> Iterable[str]:
-    """Lines with those joined that end with an &."""
-    begun = ""
-    for line in lines:
-        part = line.rstrip()
-        if part.endswith("&"):
-            begun += part[:-1] + " "
-            continue
-        yield begun + part
-        begun = ""
-
-
 def check_pair(commands: Commands, styles: Iterable[str]) -> None:
-    """Refuse pair styles and models of contacts that have no linearised contacts here.
-
-    Parameters
-    ----------
-    commands : Commands
-        Of the deck.
-    styles : iterable of str
-        All pair styles that this LAMMPS knows.
-    """
+    """Refuse pair styles and models without linearised contacts here; `styles` are all that this LAMMPS knows."""
     words, known = commands.pair[0].split(), set(styles)
     used = [without_suffix(words[1])]
     if used[0].startswith("hybrid"):
@@ -151,13 +126,7 @@ def _check_model(words: list[str], line: str) -> None:
 
 
 def check_fixes(styles: dict[str, str], commands: Commands) -> None:
-    """Refuse fixes that move or hold particles, walls or the box in ways that contacts do not tell.
-
-    Parameters
-    ----------
-    styles : dict
-        Styles of the fixes of the instance, by their IDs.
-    """
+    """Refuse fixes, by ID and style, that move or hold particles, walls or the box as contacts do not tell."""
     refused = {
         "rigid": "holds particles together in bodies, whose modes are not those of particles: leave it out",
         "poems": "holds particles together in bodies, whose modes are not those of particles: leave it out",
@@ -169,18 +138,21 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
     for name, style in styles.items():
         plain = without_suffix(style)
         for begin, says in refused.items():
-            if plain == begin or (begin in ("rigid", "poems", "wall/gran/region") and plain.startswith(begin)):
+            if plain.startswith(begin):
                 raise SnapshotError(f"fix {name} {style} {says}.")
-        if plain.startswith("wall/") and plain not in ("wall/gran", "wall/mindlin/smooth"):
+        if plain.startswith("wall/") and plain not in WALLS:
             raise SnapshotError(f"fix {name} {style} is no wall of contacts: use planes of fix wall/gran.")
-        if plain.startswith("wall/"):
-            line = commands.fixes.get(name)
-            if line is None or without_suffix(line.split()[3]) != plain:
-                raise SnapshotError(
-                    f"The commands have no line of fix {name} {style}: give the line that the deck has among commands."
-                )
-            if plain == "wall/gran":
-                _check_wall(name, line)
+        if plain.startswith(("nve", "nvt", "npt", "nph")) and plain not in INTEGRATORS:
+            raise SnapshotError(f"fix {name} {style} does not turn particles by their contacts: use fix nve/sphere.")
+        if plain not in (*WALLS, *INTEGRATORS, "freeze"):
+            continue
+        line = commands.fixes.get(name)
+        if line is None or without_suffix(line.split()[3]) != plain:
+            raise SnapshotError(
+                f"The commands have no line of fix {name} {style}: give the line that the deck has among commands."
+            )
+        if plain == "wall/gran":
+            _check_wall(name, line)
 
 
 def _check_wall(name: str, line: str) -> None:
@@ -200,11 +172,3 @@ def _check_wall(name: str, line: str) -> None:
         raise SnapshotError(f"fix {name} wall/gran hooke has no tangential history: use hooke/history.")
     if words[4] == "granular":
         _check_model(words[5:], line)
-
-
-def wall_plane(line: str) -> tuple[int, float | None, float | None]:
-    """Axis, lower and upper position of the planes of a fix wall/gran."""
-    words = line.split()
-    at = next(k for k, word in enumerate(words) if word in ("xplane", "yplane", "zplane"))
-    low, high = (None if word == "NULL" else float(word) for word in words[at + 1 : at + 3])
-    return "xyz".index(words[at][0]), low, high

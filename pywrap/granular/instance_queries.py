@@ -5,7 +5,7 @@ import os
 import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 from mpi4py import MPI
 
@@ -17,26 +17,26 @@ def communicator(lmp: Any) -> MPI.Comm:
     return getattr(lmp, "comm", None) or MPI.COMM_WORLD
 
 
-def styles_of(lmp: Any) -> tuple[str, dict[str, str], str, str]:
-    """Pair style, styles of the fixes by ID, units and atom style, as LAMMPS's `info` says them."""
+class Styles(NamedTuple):
+    """Pair style, styles of the fixes by ID, and atom style of an instance."""
+
+    pair: str
+    fixes: dict[str, str]
+    atom: str
+
+
+def styles_of(lmp: Any) -> Styles:
+    """The styles of an instance, as LAMMPS's `info` says them."""
     world = communicator(lmp)
     with TemporaryDirectory(prefix="faultgouge") as folder:
         path = world.bcast(f"{folder}/info", root=0)
         lmp.command(f'info fixes system out overwrite "{path}"')
         said = world.bcast(Path(path).read_text() if world.rank == 0 else None, root=0)
         world.barrier()
-    fixes, values = {}, {"Pair style": "none", "Units": "lj", "Atom style": ""}
-    for line in said.splitlines():
-        left, _, right = line.partition("=")
-        if left.strip() in values:
-            values[left.strip()] = right.strip()
-        if left.strip() == "Atoms":  # Atoms = N, types = T, style = that of the pairs
-            values["Pair style"] = line.rpartition("style =")[2].strip()
-        if line.strip().startswith("Fix["):
-            # Fix[  0]: NAME,  style = STYLE,  group = GROUP
-            name, style, *_ = (part.strip() for part in line.partition("]:")[2].split(","))
-            fixes[name] = style.partition("=")[2].strip()
-    return values["Pair style"], fixes, values["Units"], values["Atom style"]
+    fixes = dict(re.findall(r"^Fix\[ *\d+\]: *(\w+), *style = ([^,\s]+)", said, re.MULTILINE))
+    values = dict(re.findall(r"^(Atoms|Atom style) *= *(.*?) *$", said, re.MULTILINE))
+    # Atoms = N, types = T, style = that of the pairs
+    return Styles(values["Atoms"].rpartition("style = ")[2], fixes, values["Atom style"])
 
 
 def explain_error(error: Exception) -> str:

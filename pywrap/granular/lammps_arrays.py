@@ -1,57 +1,26 @@
-"""Particles, forces and contacts of a LAMMPS instance as arrays."""
+"""Particles, forces and contacts of a LAMMPS instance as arrays.
 
+On several ranks, or with threads, the process cannot be copied, and LAMMPS itself runs the zero steps in which contacts
+are handed out. These may move particles to other ranks, wrap or round coordinates, and change histories. `given_back`
+restores coordinates, velocities and forces to the bit, and by fix keep/histories of the plugin the histories, too.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
-from ...analysis.packing.arrays import Floats
+from ...analysis import Snapshot
+from ...analysis.packing.arrays import Floats, Indices
+from ..lammps.instance import load_plugin
+from .granular_commands import SnapshotError
+from .instance_queries import communicator
 
 Arrays = dict[str, Any]
 
-
-def arrays_at_rest(lmp: Any, groups: dict[str, str], walls: tuple[str, ...], columns: str) -> Arrays:
-    """Particles, forces and contacts of this rank after zero steps at rest.
-
-    Parameters
-    ----------
-    groups : dict
-        Names of what is to be found, and groups of particles.
-    walls : tuple of str
-        Fixes whose contacts are handed out.
-    columns : str
-        What compute pair/local is to give.
-    """
-    for name in ("v", "omega"):
-        owned_array(lmp, name)[:] = 0.0
-    lmp.command(f"compute faultgouge_c all pair/local {columns} cutoff radius")
-    lmp.command("compute faultgouge_i all property/local patom1 patom2 cutoff radius")
-    for name, group in groups.items():
-        lmp.command(f"variable faultgouge_{name} atom gmask({group})")
-    lmp.command("run 0 post no")
-    found: dict[str, np.ndarray] = {
-        name: np.array(owned_array(lmp, name)) for name in ("id", "type", "x", "f", "torque", "radius", "rmass")
-    }
-    for name, key in (("c", "contacts"), ("i", "partners")):
-        local = lmp.numpy.extract_compute(f"faultgouge_{name}", 2, 2)
-        found[key] = np.zeros((0, 1)) if local is None else np.array(local)
-    count = len(found["id"])
-    for name in groups:
-        members = np.array(lmp.numpy.extract_variable(f"faultgouge_{name}", "all", 1))[:count]
-        found[name] = members > 0
-    for wall in walls:
-        rows = lmp.numpy.extract_fix(wall, 1, 2)
-        found[f"wall {wall}"] = np.zeros((0, 8)) if count == 0 else np.array(rows)[:count]
-    return found
-
-
-def remove_computes(lmp: Any, groups: dict[str, str]) -> None:
-    """Remove the computes and variables with which arrays were read."""
-    for name in ("faultgouge_c", "faultgouge_i"):
-        if lmp.has_id("compute", name):
-            lmp.command(f"uncompute {name}")
-    for name in groups:
-        if lmp.has_id("variable", f"faultgouge_{name}"):
-            lmp.command(f"variable faultgouge_{name} delete")
+ATOM_ARRAYS = ("x", "image", "v", "omega", "f", "torque")
+"""What `given_back` restores."""
 
 
 def owned_array(lmp: Any, name: str) -> Floats:
@@ -59,3 +28,67 @@ def owned_array(lmp: Any, name: str) -> Floats:
     count = lmp.extract_setting("nlocal")
     values = lmp.numpy.extract_atom(name)
     return np.zeros((0, 3)) if values is None else values[:count]
+
+
+def rows_of(lmp: Any, snapshot: Snapshot) -> Indices:
+    """Rows of LAMMPS's arrays on one rank, in the order of the particles of a snapshot."""
+    ids = owned_array(lmp, "id")
+    rows = np.argsort(ids)
+    if not np.array_equal(ids[rows], snapshot.ids):
+        raise SnapshotError("The instance has other particles than the snapshot: take a new one.")
+    return rows
+
+
+def set_velocity(lmp: Any, snapshot: Snapshot, velocity: Floats) -> None:
+    """Give the particles the velocities of their coordinates, shape (axes N,)."""
+    rows = rows_of(lmp, snapshot)
+    translation, rotation = snapshot.vectors(velocity)
+    owned_array(lmp, "v")[rows] = translation
+    owned_array(lmp, "omega")[rows] = rotation / snapshot.radius[:, None]
+
+
+def arrays_at_rest(lmp: Any, groups: dict[str, str], walls: list[str], columns: str) -> Arrays:
+    """Particles, forces and contacts of this rank after zero steps at rest; who is in the groups of some fixes, and
+    contacts with the walls of others."""
+    for name in ("v", "omega"):
+        owned_array(lmp, name)[:] = 0.0
+    lmp.command(f"compute faultgouge_c all pair/local {columns} cutoff radius")
+    lmp.command("compute faultgouge_i all property/local patom1 patom2 cutoff radius")
+    try:
+        lmp.command("run 0 post no")
+        names = ("id", "type", "x", "f", "torque", "radius", "rmass")
+        found: Arrays = {name: np.array(owned_array(lmp, name)) for name in names}
+        for name, key in (("c", "contacts"), ("i", "partners")):
+            local = lmp.numpy.extract_compute(f"faultgouge_{name}", 2, 2)
+            found[key] = np.zeros((0, 1)) if local is None else np.array(local)
+        count = len(found["id"])
+        for fix, group in groups.items():
+            lmp.command(f"variable faultgouge_g atom gmask({group})")
+            found[f"group {fix}"] = np.array(lmp.numpy.extract_variable("faultgouge_g", "all", 1))[:count] > 0
+            lmp.command("variable faultgouge_g delete")
+        for wall in walls:
+            rows = lmp.numpy.extract_fix(wall, 1, 2)
+            found[f"wall {wall}"] = np.zeros((0, 8)) if count == 0 else np.array(rows)[:count]
+        return found
+    finally:
+        for name in ("faultgouge_c", "faultgouge_i"):
+            lmp.command(f"uncompute {name}")
+
+
+@contextmanager
+def given_back(lmp: Any) -> Iterator[None]:
+    """Give all that moves, and histories, back to the instance at the end of a with block."""
+    load_plugin(lmp)
+    kept = {name: np.array(owned_array(lmp, name)) for name in ("id", *ATOM_ARRAYS)}
+    world = communicator(lmp)
+    whole = {name: np.concatenate(world.allgather(values)) for name, values in kept.items()}
+    order = np.argsort(whole["id"])
+    lmp.command("fix faultgouge_h all keep/histories")
+    try:
+        yield
+    finally:
+        place = order[np.searchsorted(whole["id"][order], owned_array(lmp, "id"))] if len(order) else order
+        for name in ATOM_ARRAYS:
+            owned_array(lmp, name)[:] = whole[name][place]
+        lmp.command("fix_modify faultgouge_h restore")
+        lmp.command("unfix faultgouge_h")

@@ -7,30 +7,26 @@ the user stays as it was.
 
 **Newton's method.** A step of the load in which no contact slides moves particles by :math:`K^{-1}` times what is out
 of balance. LAMMPS moves them in one long step, in which slips advance, and gives the forces; some iterations with the K
-of the last equilibrium do. All is tried in a copy, and done in earnest if nothing slides, nothing has a negative
-eigenvalue, and the balance is that of a relaxation. Loads of 50 and 200 spheres then take 0.6 and 0.7
-of the time, and stand where a relaxation leaves them to 1e-6 of their way.
+of the last equilibrium do. The copy that has done so is kept if nothing slides, nothing has a negative eigenvalue, and
+the balance is that of a relaxation. Else another copy relaxes.
 
 **Relaxation.** Otherwise the load jumps, and the drag takes what the jump sets free. Motion ends soonest at the
-critical damping of the slowest mode, where the force that is out of balance is half of the drag. Where it is more than
-twice the drag, the rate of the drag is doubled. Where it is less than a quarter, since the packing creeps or a loose
-sphere rolls away, it is halved.
-
-The error of the path itself is not known: of increments half as large some contacts slide otherwise
-(:class:`~faultgouge.analysis.Onset` has None for it), and a second path with smaller increments tells it.
+critical damping of the slowest mode, where the force that is out of balance is half of the drag: the rate of the drag
+is doubled where the force is more than twice the drag, and halved where it is less than a quarter, since the packing
+creeps or a loose sphere rolls away.
 """
 
-import ctypes
 import os
 import shutil
-import signal
 import weakref
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from multiprocessing.connection import Client, Connection, Listener
+from dataclasses import dataclass, field
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from multiprocessing.reduction import recv_handle, send_handle
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import TracebackType
 from typing import Any, NoReturn
 
 import numpy as np
@@ -39,11 +35,12 @@ from scipy.sparse import csc_array, eye_array
 from ...analysis import NoEquilibriumError, Snapshot, negative_eigenvalues, stiffness_matrix
 from ...analysis.errors import FaultgougeError
 from ...analysis.factors.sparse_lu import general_lu
-from ...analysis.packing.arrays import Floats, derive_frozen
-from .from_lammps import INTEGRATORS, KnownLaws, take_snapshot
-from .granular_commands import SnapshotError, read_commands, without_suffix
+from ...analysis.packing.arrays import derive_frozen
+from .from_lammps import KnownLaws, take_snapshot
+from .granular_commands import INTEGRATORS, SnapshotError, read_commands, without_suffix
 from .instance_queries import explain_error, log_of, log_path
-from .look_in_a_copy import can_copy, in_a_copy, quieten
+from .lammps_arrays import owned_array, rows_of, set_velocity
+from .look_in_a_copy import can_copy, in_a_copy, quieten, silent_copy
 
 REST = 1e-8
 """Residual over the mean contact force at rest: far below the couplings of 1e-3 that make complex pairs, and far above
@@ -114,14 +111,14 @@ class LammpsPath:
 
     def __init__(self, relaxation: "_Relaxation") -> None:
         folder = TemporaryDirectory(prefix="faultgouge")
-        self._listener = Listener(f"{folder.name}/path", "AF_UNIX")
-        self._kept: list[Kept] = []
-        ctypes.CDLL(None).fflush(None)  # what is buffered would be written twice
-        root = os.fork()
-        if root == 0:
-            _be_start(relaxation, Path(folder.name))
-        self._end = weakref.finalize(self, _end, self._kept, root, os.getpid(), self._listener, folder)
-        self._kept.append((-np.inf, self._listener.accept(), None))
+        here, there = Pipe()
+        first = silent_copy()
+        if first == 0:
+            here.close()
+            _wait_for_loads(relaxation, there, Path(folder.name))
+        there.close()
+        self._kept: list[Kept] = [(-np.inf, here, None)]
+        self._end = weakref.finalize(self, _end, self._kept, first, os.getpid(), folder)
 
     def __call__(self, value: float) -> Snapshot:
         """The packing in equilibrium at a value."""
@@ -129,21 +126,20 @@ class LammpsPath:
         below, there, snapshot = next(each for each in reversed(self._kept) if each[0] <= value or each[0] == -np.inf)
         if snapshot is not None and below == value:
             return snapshot
-        there.send(value)
-        if not there.recv():
-            raise SnapshotError(f"LAMMPS ended without a word while it relaxed at {value:g}.")
-        copy = self._listener.accept()
-        found = copy.recv()
+        here, found = _ask(there, value, relaxes=False)
+        if found is None:
+            here.close()
+            here, found = _ask(there, value, relaxes=True)
         if isinstance(found, FaultgougeError):
-            copy.close()
+            here.close()
             try:
                 raise found
             finally:
                 del found  # its traceback has this frame, and so this path
         if value > self._kept[-1][0]:
-            self._kept.append((value, copy, found))
+            self._kept.append((value, here, found))
         else:
-            copy.close()
+            here.close()
         return found
 
     def close(self) -> None:
@@ -153,13 +149,23 @@ class LammpsPath:
     def __enter__(self) -> "LammpsPath":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 
-def _end(kept: list[Kept], root: int, owner: int, listener: Listener, folder: "TemporaryDirectory[str]") -> None:
+def _ask(there: Connection, value: float, *, relaxes: bool) -> tuple[Connection, Any]:
+    """Have a copy of the process copy itself and go to a load; the new copy, and what it finds."""
+    here, end = Pipe()
+    there.send((value, relaxes))
+    send_handle(there, end.fileno(), 0)
+    end.close()
+    try:
+        return here, here.recv()
+    except EOFError:
+        return here, SnapshotError(f"LAMMPS ended without a word while it relaxed at {value:g}.")
+
+
+def _end(kept: list[Kept], first: int, owner: int, folder: "TemporaryDirectory[str]") -> None:
     """End the copies of this process, which have this path, too, and must not end it."""
     if os.getpid() != owner:
         return
@@ -168,37 +174,24 @@ def _end(kept: list[Kept], root: int, owner: int, listener: Listener, folder: "T
             copy.send(None)  # another copy of this process may keep the connection open
         copy.close()
     kept.clear()
-    os.kill(root, signal.SIGKILL)  # it may wait for a copy whose result nobody wants
-    os.waitpid(root, 0)
-    listener.close()
+    os.waitpid(first, 0)
     folder.cleanup()
 
 
-def _be_start(relaxation: "_Relaxation", folder: Path) -> NoReturn:
-    """The life of the first copy of the process, and of all copies of it."""
+def _wait_for_loads(relaxation: "_Relaxation", there: Connection, folder: Path) -> NoReturn:
+    """The life of the first copy of the process, and of all copies of it, each of which relaxes at one load."""
     try:
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, 1)
-        os.dup2(nowhere, 2)
         _own_log(relaxation.lmp, folder)
         quieten(relaxation.lmp)
-        there = Client(str(folder / "path"), "AF_UNIX")
-        while (value := there.recv()) is not None:
-            source, sink = os.pipe()
-            child = os.fork()
-            if child:
-                os.close(sink)
-                there.send(os.read(source, 1) != b"")  # nothing comes from a copy that has died
-                os.close(source)
-                continue
-            there.close()
-            os.close(source)
-            _own_log(relaxation.lmp, folder)
-            found = relaxation.result(value)
-            os.write(sink, b"x")
-            os.close(sink)
-            there = Client(str(folder / "path"), "AF_UNIX")
-            there.send(found)
+        while (load := there.recv()) is not None:
+            end = Connection(recv_handle(there))
+            if silent_copy() == 0:
+                there.close()
+                there = end
+                _own_log(relaxation.lmp, folder)
+                there.send(relaxation.result(*load))
+            else:
+                end.close()  # else nobody sees that the copy has died
     except (EOFError, OSError):  # the path is closed
         pass
     finally:
@@ -214,40 +207,40 @@ def _own_log(lmp: Any, folder: Path) -> None:
         lmp.command(f'log "{own}" append')
 
 
+@dataclass
 class _Relaxation:
-    """LAMMPS and how it comes to rest."""
+    """LAMMPS and how it comes to rest; fields as of `lammps_path`, and what copies of this process have, too."""
 
-    def __init__(
-        self,
-        lmp: Any,
-        apply: Callable[[Any, float], object] | str,
-        commands: list[str] | None,
-        slides: bool,
-        balance: float,
-        steps: int,
-    ) -> None:
-        self.lmp, self.apply, self.commands = lmp, apply, commands
-        self.slides, self.balance, self.steps = slides, balance, steps
-        self.laws: KnownLaws = {}  # copies of this process have them, too
-        self.found: Snapshot | None = None  # the equilibrium where LAMMPS stands
-        self.rate = 0.01  # of the drag, per time step: critical for a mode of 1000 steps
+    lmp: Any
+    apply: Callable[[Any, float], object] | str
+    commands: list[str] | None
+    slides: bool
+    balance: float
+    steps: int
+    laws: KnownLaws = field(default_factory=dict)
+    found: Snapshot | None = None  # the equilibrium where LAMMPS stands
+    rate: float = 0.01  # of the drag, per time step: critical for a mode of 1000 steps
 
-    def result(self, value: float) -> Snapshot | FaultgougeError:
-        """The equilibrium at a value, or why there is none."""
+    def result(self, value: float, relaxes: bool) -> Snapshot | FaultgougeError | None:
+        """The equilibrium at a value, or why there is none; None if Newton's method, when asked for, cannot serve."""
         try:
             self.set(value)
-            found = self.displace_to_balance() or self.relax(value)
+            found = self.relax(value) if relaxes else self.displace_to_balance()
+            if found is None:
+                return None
             self.found = found
             change = in_a_copy(lambda: self.force_change(value))
-            if change == 0.0:
-                return SnapshotError(
-                    f"No force changes with the load at {value:g}: does apply set it, or a fix read the variable?"
-                )
-            return derive_frozen(found, fx=value, load_error=found.residual / change)
-        except FaultgougeError as error:
-            return error
         except Exception as error:  # LAMMPS, and a user's function, raise what they choose
-            return SnapshotError(f"At {value:g}: {explain_error(error)}")
+            if not relaxes:
+                return None  # particles that nothing holds fly off: the relaxation has its own words for it
+            return (
+                error if isinstance(error, FaultgougeError) else SnapshotError(f"At {value:g}: {explain_error(error)}")
+            )
+        if change == 0.0:
+            return SnapshotError(
+                f"No force changes with the load at {value:g}: does apply set it, or a fix read the variable?"
+            )
+        return derive_frozen(found, fx=value, load_error=found.residual / change)
 
     def set(self, value: float) -> None:
         """Set the load."""
@@ -267,131 +260,78 @@ class _Relaxation:
         for each in (value, value + step):
             self.set(each)
             self.lmp.command("run 0 post no")
-            count = self.lmp.extract_setting("nlocal")
-            order = np.argsort(self.lmp.numpy.extract_atom("id")[:count])
-            forces.append(np.array(self.lmp.numpy.extract_atom("f")[:count][order]))
+            forces.append(owned_array(self.lmp, "f")[np.argsort(owned_array(self.lmp, "id"))])
         change = float(np.linalg.norm(forces[1] - forces[0], axis=1).max())
         # forces have a rounding of 1e-16 of themselves, and of 1e-12 where overlaps are small beside coordinates
         return change / step if change > 1e-11 * np.abs(forces[0]).max() else 0.0
 
     def displace_to_balance(self) -> Snapshot | None:
-        """Newton's method from the equilibrium where LAMMPS stands; None, with nothing changed, if it cannot serve."""
-        start = self.found
-        if start is None or not np.array_equal(start.contacts.closing, start.contacts.parting):
+        """Newton's method from the equilibrium where LAMMPS stands; None if it cannot serve."""
+        start, lmp = self.found, self.lmp
+        if start is None or start.contacts.at_bound.any():
             return None
-        if start.contacts.at_bound.any():
+        if not np.array_equal(start.contacts.closing, start.contacts.parting):
             return None
-        try:
-            moves, found = in_a_copy(lambda: self._try_newton(start))
-            if found is None:
-                return None
-        except SnapshotError:  # particles that nothing holds fly off: the relaxation has its own words for it
-            return None
-        again = iter(moves)
-        self._displace(start, lambda _: next(again, None))
-        return found
-
-    def _try_newton(self, start: Snapshot) -> tuple[list[Floats], Snapshot | None]:
-        """Newton's method with a log of its own, which has commands that this process has not given."""
-        with TemporaryDirectory(prefix="faultgouge") as folder:
-            _own_log(self.lmp, Path(folder))
-            return self._newton(start)
-
-    def _newton(self, start: Snapshot) -> tuple[list[Floats], Snapshot | None]:
-        """Displacements to the balance, and the packing there, if it is an equilibrium like that of a relaxation."""
         stiffness = stiffness_matrix(start)
         # what no contact feels has zero rows, and stays where it is
         solver = general_lu(csc_array(stiffness + 1e-9 * abs(stiffness).max() * eye_array(start.coordinates)))
         allowed = self.balance * float(start.contacts.normal_force.mean())
-        moves: list[Floats] = []
+        given = self.commands or in_a_copy(lambda: log_of(lmp)) or []
+        fixes = read_commands(given, log=self.commands is None).fixes
+        moving = {name: line for name, line in fixes.items() if without_suffix(line.split()[3]) in INTEGRATORS}
+        for name in moving:
+            lmp.command(f"unfix {name}")
+        lmp.command("fix faultgouge_moves all nve/noforce")
+        step = float(lmp.extract_global("dt"))
+        lmp.command(f"timestep {LONG * step:.17g}")
         sizes: list[float] = []
-
-        def next_move(forces: Floats) -> Floats | None:
+        while True:
+            set_velocity(lmp, start, np.zeros(start.coordinates))
+            lmp.command("run 0 post no")
+            rows = rows_of(lmp, start)
+            torque = owned_array(lmp, "torque")[rows] / start.radius[:, None]
+            forces = np.where(
+                np.tile(start.free, start.axes), start.join_vectors(owned_array(lmp, "f")[rows], torque), 0.0
+            )
             sizes.append(float(np.linalg.norm(forces.reshape(start.axes, -1), axis=0).max()))
             slow = len(sizes) > 1 and sizes[-1] > 0.5 * sizes[-2]
             if sizes[-1] <= 1e-4 * allowed or slow or len(sizes) > ITERATIONS:
-                return None
-            moves.append(np.asarray(solver.solve(forces)))
-            return moves[-1]
-
-        self._displace(start, next_move)
+                break
+            set_velocity(lmp, start, np.asarray(solver.solve(forces)) / (LONG * step))
+            lmp.command("run 1 post no")
+        for line in ("unfix faultgouge_moves", *moving.values(), f"timestep {step:.17g}"):
+            lmp.command(line)
         if sizes[-1] > allowed:
-            return moves, None
+            return None
         found = self.look()
         good = found.residual <= self.balance * found.contacts.normal_force.mean()
         good = good and not found.contacts.at_bound.any() and len(negative_eigenvalues(found)) == 0
-        return moves, found if good else None
-
-    def _displace(self, start: Snapshot, next_move: Callable[[Floats], Floats | None]) -> None:
-        """Displace particles as the forces on those that are free say, with slips that advance, until none is said."""
-        lmp, d = self.lmp, start.dimension
-        step = float(lmp.extract_global("dt"))
-        lines = [line for name, line in self._integrators() if lmp.has_id("fix", name)]
-        for line in lines:
-            lmp.command(f"unfix {line.split()[1]}")
-        lmp.command("fix faultgouge_moves all nve/noforce")
-        lmp.command(f"timestep {LONG * step:.17g}")
-
-        def arrays(*names: str) -> list[Floats]:
-            count = lmp.extract_setting("nlocal")
-            return [lmp.numpy.extract_atom(name)[:count] for name in names]
-
-        while True:
-            v, omega = arrays("v", "omega")
-            v[:] = omega[:] = 0.0
-            lmp.command("run 0 post no")
-            ids, f, torque, v, omega = arrays("id", "f", "torque", "v", "omega")
-            place = np.searchsorted(start.ids, ids)
-            turns = start.axes - d
-            forces = np.zeros((start.axes, len(start)))
-            forces[:d, place] = f[:, :d].T
-            forces[d:, place] = torque[:, 3 - turns :].T / start.radius[place]
-            moved = next_move(np.where(start.free, forces, 0.0).ravel())
-            if moved is None:
-                break
-            parts = moved.reshape(start.axes, -1) / (LONG * step)
-            v[:, :d] = parts[:d, place].T
-            omega[:, 3 - turns :] = (parts[d:, place] / start.radius[place]).T
-            lmp.command("run 1 post no")
-        lmp.command("unfix faultgouge_moves")
-        for line in lines:
-            lmp.command(line)
-        lmp.command(f"timestep {step:.17g}")
-
-    def _integrators(self) -> list[tuple[str, str]]:
-        """IDs and lines of the fixes that move particles."""
-        given = self.commands or in_a_copy(lambda: log_of(self.lmp)) or []
-        fixes = read_commands(given, log=self.commands is None).fixes
-        return [(name, line) for name, line in fixes.items() if without_suffix(line.split()[3]) in INTEGRATORS]
+        return found if good else None
 
     def relax(self, value: float) -> Snapshot:
         """Run with drag until the packing rests."""
         lmp, dt = self.lmp, float(self.lmp.extract_global("dt"))
         found, way = self.look(), 0.0
         moving, mass = found.ids[found.free], float(found.mass[found.free].mean())
+        turning = lmp.has_style("fix", "viscous/sphere")  # else the dashpots of contacts damp rotation
         for _ in range(0, self.steps, CHUNK):
             drag = mass * self.rate / dt
-            lmp.command(f"fix faultgouge_drag all viscous {drag:.17g}")
-            turning = lmp.has_style("fix", "viscous/sphere")  # else the dashpots of contacts damp rotation
             spin = drag * float(np.mean(found.radius**2)) if turning else 0.0
+            lmp.command(f"fix faultgouge_drag all viscous {drag:.17g}")
             if turning:
                 lmp.command(f"fix faultgouge_spin all viscous/sphere {spin:.17g}")
             lmp.command(f"run {CHUNK} post no")
-            count = lmp.extract_setting("nlocal")
-            free = np.isin(lmp.numpy.extract_atom("id")[:count], moving)
-            radius = lmp.numpy.extract_atom("radius")[:count, None]
-            f, torque, v, omega = (lmp.numpy.extract_atom(name)[:count] for name in ("f", "torque", "v", "omega"))
-            forces = np.hstack([f, torque / radius])[free]
-            drags = np.hstack([drag * v, spin * omega / radius])[free]
+            free = np.isin(owned_array(lmp, "id"), moving)
+            radius = owned_array(lmp, "radius")[free, None]
+            f, torque, v, omega = (owned_array(lmp, name)[free] for name in ("f", "torque", "v", "omega"))
+            forces, drags = np.hstack([f, torque / radius]), np.hstack([drag * v, spin * omega / radius])
             # both: the forces of a vibration vanish together at times, and those on a sphere that rolls away always
             residual = float(np.linalg.norm(np.hstack([forces, drags]), axis=1).max())
-            way += CHUNK * dt * float(np.linalg.norm(v[free], axis=1).mean())
-            contact = found.contacts.normal_force
-            if residual <= self.balance * (contact.mean() if len(contact) else np.inf):
+            way += CHUNK * dt * float(np.linalg.norm(v, axis=1).mean())
+            if len(found.contacts) == 0 or residual <= self.balance * found.contacts.normal_force.mean():
                 found = self.look()
                 if found.residual <= self.balance * found.contacts.normal_force.mean():
-                    for array in (v, omega):
-                        array[:] = 0.0
+                    set_velocity(lmp, found, np.zeros(found.coordinates))
                     lmp.command("unfix faultgouge_drag")
                     if turning:
                         lmp.command("unfix faultgouge_spin")

@@ -8,20 +8,13 @@ from mpi4py import MPI
 
 from ...analysis import BadInputError, Snapshot
 from ..lammps.instance import lammps_instance
-from .from_lammps import BALANCE, from_lammps
+from .from_lammps import from_lammps
 from .granular_commands import SnapshotError, check_fixes, check_pair, read_commands
 from .instance_queries import explain_error
 
 
-def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE) -> Snapshot:
-    """Run a deck in its own folder, as `lmp -in` there, and take its last state.
-
-    Parameters
-    ----------
-    path : Path
-        The deck.
-    slides, balance
-        As of :func:`~faultgouge.pywrap.from_lammps`.
+def run_deck(path: Path, *, slides: bool = False) -> Snapshot:
+    """Run a deck in its own folder, as `lmp -in` there, and take its last state as `from_lammps` does.
 
     Raises
     ------
@@ -45,7 +38,7 @@ def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE) -> S
             raise SnapshotError(f"{path}: {explain_error(error)}") from error
         finally:
             os.chdir(here)
-        found = from_lammps(lmp, slides=slides, balance=balance)
+        found = from_lammps(lmp, slides=slides)
         lmp.close()
         world.barrier()
     return found
@@ -70,13 +63,11 @@ def _check_deck(path: Path) -> None:
             )
     if any(line[0] in BRANCHES for line in words if line):
         return
-    pairs = [line for line in words if line[:1] == ["pair_style"]]
-    known = bool(pairs) and not any("$" in word for line in pairs for word in line)
-    commands = read_commands(lines if known else ["pair_style none", *lines], log=True)
-    styles = {name: line.split()[3] for name, line in commands.fixes.items()}
+    commands = read_commands(["pair_style none", *lines], log=True)
+    varies = any("$" in word for line in words if line[:1] == ["pair_style"] for word in line)
     try:
-        if known:
+        if commands.style != "none" and not varies:
             check_pair(commands, [])
-        check_fixes({name: style for name, style in styles.items() if "$" not in style}, commands)
+        check_fixes({name: line.split()[3] for name, line in commands.fixes.items()}, commands)
     except SnapshotError as error:
         raise BadInputError(f"{path}: {error}") from error

@@ -179,9 +179,9 @@ def export(
     snapshot = stored_snapshot(file)
     if snapshot is not None:
         if is_root():
-            from faultgouge.pywrap.exchange.snapshot_export import modes_of_snapshot, write_snapshot_for_others
+            from faultgouge.pywrap.exchange.snapshot_export import mode_of_snapshot, write_snapshot_for_others
 
-            found = [] if mode is None else modes_of_snapshot(snapshot, mode)
+            found = [] if mode is None else [mode_of_snapshot(snapshot, mode)]
             print_line(f"{write_snapshot_for_others(output, snapshot, found)}; written to {output}")
         return
     check_writer(output, mode is not None)

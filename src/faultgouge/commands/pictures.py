@@ -225,12 +225,16 @@ def _frames_of_spheres(
     context: typer.Context, snapshot: Snapshot, which: str, output: Path, count: int, periods: int
 ) -> None:
     """The motion of a mode of spheres, for programs that show spheres."""
-    from faultgouge.pywrap.exchange.snapshot_export import check_mode_frames, modes_of_snapshot, write_mode_frames
+    from faultgouge.analysis import BadInputError
+    from faultgouge.pywrap.exchange.snapshot_export import mode_of_snapshot, write_mode_frames
 
-    check_mode_frames(output)
+    if output.suffix not in (".xyz", ".pvd"):
+        raise BadInputError(
+            f"-o {output}: a mode of spheres moves in OVITO (.xyz) or ParaView (.pvd); give one of these."
+        )
     lock_output(context, output)
     if is_root():
-        (mode,) = modes_of_snapshot(snapshot, which)
+        mode = mode_of_snapshot(snapshot, which)
         write_mode_frames(output, snapshot, mode, count, periods)
         print_line(f"{count} frames of {mode.name}, lambda = {mode.eigenvalue:.8g}; written to {output}")
 

@@ -66,13 +66,7 @@ def stored_snapshot(file: Path) -> Snapshot | None:
 
 
 def snapshot_of_disks(file: Path) -> Snapshot | None:
-    """The snapshot of a run.h5 that holds one of disks; None of all other files.
-
-    Raises
-    ------
-    BadInputError
-        If it is one of spheres: what shows these.
-    """
+    """The snapshot of a run.h5 that holds one of disks; None of all other files; spheres are refused."""
     from faultgouge.analysis import BadInputError
 
     snapshot = stored_snapshot(file)

@@ -1,5 +1,7 @@
 """Equilibria of a LAMMPS of one's own along a load: a slope that is tilted, a force on a layer, and what goes wrong."""
 
+import os
+
 import numpy as np
 import pytest
 from granular_packings import instance
@@ -142,6 +144,8 @@ def test_force_on_a_layer(tmp_path):
     with lammps_path(lmp, lambda *_: None) as path, pytest.raises(SnapshotError, match=r"No force changes .* at 0\.1"):
         path(0.1)
     with lammps_path(lmp, "tilt") as path, pytest.raises(SnapshotError, match=r"At 0\.1: LAMMPS stopped: .*tilt"):
+        path(0.1)
+    with lammps_path(lmp, lambda *_: os._exit(1)) as path, pytest.raises(SnapshotError, match="ended without a word"):
         path(0.1)
     lmp.close()
 
