@@ -93,7 +93,7 @@ def test_same_trajectory(trajectory, unchanged, changes):
         (1, None),
         pytest.param(2, None, marks=pytest.mark.long),
         (1, "layer"),
-        (1, "floor"),
+        pytest.param(1, "floor", marks=pytest.mark.long),
         pytest.param(1, "weaken", marks=pytest.mark.long),
         (2, "weaken"),
     ],

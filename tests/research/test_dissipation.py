@@ -29,7 +29,7 @@ def ramp():
         yield found
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_weak_normal_dashpots_lower_the_onset_and_drag_raises_it_to_its_crossover(ramp):
     """From 0.0150098 to between 0.0148 and 0.0149, for C_N = 0.1 and 1 alike, and to 0.0150163."""
     weak, stronger = over_strength(ramp, "cn", [0.1, 1.0], start=0.0139)

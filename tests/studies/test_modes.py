@@ -122,7 +122,7 @@ def test_loads_beyond_the_last_equilibrium_are_left_out():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "seed"), [("force 50", 6), ("force 100", 25)])
+@pytest.mark.parametrize(("name", "seed"), [("force 50", 6), pytest.param("force 100", 25, marks=pytest.mark.long)])
 def test_displacements_that_lammps_would_refuse_end_no_ramp(name, seed):
     """On the way Newton's method tries displacements with which the centre of a disk lies in another disk."""
     (point,) = (point for point in sets()[name].points if point.values["packing.seed"] == seed)

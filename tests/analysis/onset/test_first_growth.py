@@ -50,7 +50,9 @@ def search(path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["weak", pytest.param("medium", marks=pytest.mark.long), "drag"])
+@pytest.mark.parametrize(
+    "kind", [pytest.param("weak", marks=pytest.mark.long), pytest.param("medium", marks=pytest.mark.long), "drag"]
+)
 def test_the_window_is_that_among_all_modes(path, search, kind):
     expected = damped_windows(without_dissipation(path, **KINDS[kind]), path.grid[18:], first=True)[0]
     found, doubtful = search(kind)()
@@ -61,7 +63,7 @@ def test_the_window_is_that_among_all_modes(path, search, kind):
     assert found.error < 1e-9
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_search_goes_on_to_the_bit_on_two_ranks(search, tmp_path):
     expected = search("weak", PASSING)()
     cut_off(search("weak", PASSING), 8, tmp_path)
@@ -76,7 +78,7 @@ def test_ranks_find_the_same_with_bases_that_are_kept(search):
         assert each.result() == expected
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_windows_are_the_same_to_the_bit_in_another_unit_of_time(path):
     """One in which single precision does not hold the squares of eigenvalues."""
     damped, loads, unit = without_dissipation(path, cn=10.0), np.array(path.grid[21:24]), 2.0**36

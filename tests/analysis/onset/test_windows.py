@@ -169,7 +169,7 @@ def test_no_onset_is_said_so(path, disks):
         find_onset(path, path.grid[:4], limits=Limits(all_windows=disks))
 
 
-@pytest.mark.parametrize("mu", [1.0, 0.8])
+@pytest.mark.parametrize("mu", [1.0, pytest.param(0.8, marks=pytest.mark.long)])
 @pytest.mark.slow
 def test_what_nothing_happens_on_is_not_decomposed(ramp, mu, monkeypatch):
     """The same windows as from all modes at every load, which are computed next to the edges alone."""
