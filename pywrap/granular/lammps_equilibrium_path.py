@@ -36,6 +36,7 @@ from ...analysis import NoEquilibriumError, Snapshot, negative_eigenvalues, stif
 from ...analysis.errors import FaultgougeError
 from ...analysis.factors.sparse_lu import general_lu
 from ...analysis.packing.arrays import derive_frozen
+from ...parent_death import end_with
 from .from_lammps import KnownLaws, take_snapshot
 from .granular_commands import INTEGRATORS, SnapshotError, read_commands, without_suffix
 from .instance_queries import explain_error, log_of, log_path
@@ -184,8 +185,9 @@ def _wait_for_loads(relaxation: "_Relaxation", there: Connection, folder: Path) 
         _own_log(relaxation.lmp, folder)
         quieten(relaxation.lmp)
         while (load := there.recv()) is not None:
-            end = Connection(recv_handle(there))
+            end, this = Connection(recv_handle(there)), os.getpid()
             if silent_copy() == 0:
+                end_with(this)  # which ends with the path, also while this copy relaxes
                 there.close()
                 there = end
                 _own_log(relaxation.lmp, folder)

@@ -1,6 +1,9 @@
 """Equilibria of a LAMMPS of one's own along a load: a slope that is tilted, a force on a layer, and what goes wrong."""
 
 import os
+import signal
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -173,3 +176,34 @@ def test_a_law_that_the_load_changes_is_measured_again(tmp_path):
     # a force over a slip, at an overlap that is a difference and has lost some six digits
     assert factors[0] == pytest.approx(3e4, rel=1e-9)
     assert factors[1] == pytest.approx(3.3e4, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_copy_that_relaxes_ends_with_the_path(tmp_path):
+    """However the program ends; a relaxation may take minutes."""
+    from faultgouge.pywrap import lammps_path
+
+    lmp, copy = layer(tmp_path), tmp_path / "copy"
+
+    def stand_still(_, value):
+        if value > 0:
+            copy.with_suffix(".new").write_text(str(os.getpid()))
+            copy.with_suffix(".new").rename(copy)
+            time.sleep(100)
+
+    program = os.fork()
+    if program == 0:
+        try:
+            lammps_path(lmp, stand_still)(1.0)
+        finally:
+            os._exit(1)
+    deadline = time.monotonic() + 60
+    while not copy.exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    os.kill(program, signal.SIGKILL)
+    os.waitpid(program, 0)
+    while Path(f"/proc/{copy.read_text()}").exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    lmp.close()
