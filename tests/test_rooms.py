@@ -165,8 +165,8 @@ SLOW_OF_SCIPY = {"scipy.optimize", "scipy.interpolate", "scipy.stats"}
 
 
 @pytest.mark.slow
-def test_analysis_needs_numpy_scipy_and_h5py_alone():
-    """And h5py where a file is read or written."""
+def test_analysis_loads_numpy_and_scipy_alone():
+    """H5py comes with the first file, and what else of SciPy is slow with the function that needs it."""
     assert loaded_by("import faultgouge.analysis") & (HEAVY | SLOW_OF_SCIPY) == {"numpy", "scipy"}
     others = {"rich", "typer", "jinja2", "PIL", "threadpoolctl"}
     assert loaded_by("import faultgouge.analysis.onset, faultgouge.analysis.motion.response") & others == set()

@@ -33,8 +33,8 @@ def styles_of(lmp: Any) -> Styles:
         lmp.command(f'info fixes system out overwrite "{path}"')
         said = world.bcast(Path(path).read_text() if world.rank == 0 else None, root=0)
         world.barrier()
-    fixes = dict(re.findall(r"^Fix\[ *\d+\]: *(\w+), *style = ([^,\s]+)", said, re.MULTILINE))
-    values = dict(re.findall(r"^(Atoms|Atom style) *= *(.*?) *$", said, re.MULTILINE))
+    fixes = dict(re.findall(r"^ *Fix\[ *\d+\]: *(\w+), *style = ([^,\s]+)", said, re.MULTILINE))
+    values = dict(re.findall(r"^ *(Atoms|Atom style) *= *(.*?) *$", said, re.MULTILINE))
     # Atoms = N, types = T, style = that of the pairs
     return Styles(values["Atoms"].rpartition("style = ")[2], fixes, values["Atom style"])
 

@@ -101,8 +101,8 @@ class _Shared:
         """Hand out again what killed workers had in hand."""
         if isinstance(self._pool, Processes) and not self._pool.began:
             raise WorkerError(
-                "the workers end as they start, as each reads the script anew: a script calls run_sweep with several "
-                'workers below the line `if __name__ == "__main__":`'
+                "the workers end as they start; each reads a script anew that calls run_sweep with several workers, "
+                'and the call stands below the line `if __name__ == "__main__":`'
             )
         if deaths > TRIES or not isinstance(self._pool, Processes):
             raise WorkerError(

@@ -114,21 +114,32 @@ def test_windows_of_spheres_are_those_of_all_eigenvalues(tmp_path):
 
 @pytest.mark.slow
 def test_where_drag_leaves_it(tmp_path):
-    """A step in which nothing slides ends where LAMMPS's own run with drag ends, contact by contact."""
+    """A step in which nothing slides ends where LAMMPS's own run with drag ends, contact by contact.
+
+    Newton's method serves: the load is set once, and a relaxation in another copy does not set it again.
+    """
     from faultgouge.pywrap import from_lammps, lammps_path
 
-    lmp = layer(tmp_path)
-    with lammps_path(lmp, "slope") as path:
-        first, last = path(0.0), path(0.01)
+    lmp, loads = layer(tmp_path), tmp_path / "loads"
+
+    def tilt(lmp, value):
+        with loads.open("a") as file:
+            file.write(f"{value}\n")
+        lmp.command(f"variable slope equal {value}")
+
+    with lammps_path(lmp, tilt) as path:
+        first, last = path(0.0), path(0.001)
+    set_to = loads.read_text().split()
+    assert (set_to.count("0.0"), set_to.count("0.001")) == (3, 2)  # and once each to see which forces change
     assert not last.contacts.at_bound.any()
-    for line in ("variable slope equal 0.01", "fix drag all viscous 1.0", "run 60000 post no"):
+    for line in ("variable slope equal 0.001", "fix drag all viscous 1.0", "run 60000 post no"):
         lmp.command(line)
     found = from_lammps(lmp)
     way = np.abs(last.position - first.position).max()
-    # both ways of the slips differ to second order, and the way is 1e-4 of a radius
-    assert np.abs(found.position - last.position).max() < 1e-4 * way
+    # both ways of the slips differ to second order, and the way is 3e-4 of a radius
+    assert np.abs(found.position - last.position).max() < 1e-5 * way
     one, other = (np.sort(np.linalg.norm(each.contacts.tangential_force, axis=1)) for each in (found, last))
-    assert one == pytest.approx(other, abs=1e-6 * found.contacts.normal_force.mean())
+    assert one == pytest.approx(other, abs=1e-7 * found.contacts.normal_force.mean())
     lmp.close()
 
 
