@@ -5,8 +5,7 @@ the packing is stable. It becomes unstable where one of them crosses the axis: a
 where Re s goes through zero along a straight line, at a steady one otherwise. No two eigenvalues meet there, and the
 crossing is the simple root of a smooth function of the load. **Dashpots may destabilise**: the load of the crossing is
 in general below the undamped onset, however weak the dashpots are (Ziegler, Ing.-Arch. 20, 49 (1952); Bottema, Indag.
-Math. 18, 403 (1956); Kirillov and Verhulst, arXiv:0906.1650;
-:mod:`~faultgouge.analysis.damped_onset.weak_dissipation`).
+Math. 18, 403 (1956); Kirillov and Verhulst, arXiv:0906.1650).
 
 **Most increments** are done with the few modes that may grow (:mod:`~faultgouge.analysis.damped_onset.all_windows`).
 Where these leave doubt, all modes tell.

@@ -1,7 +1,7 @@
 r"""What dissipation does to the onset of packings, and to the transient gain below it.
 
 As :math:`C \to 0` with a fixed ratio :math:`C_N : C_T` the damped onset tends to a load below the undamped one
-(:mod:`~faultgouge.analysis.damped_onset.weak_dissipation`), and as the dashpots get stronger it rises, in the end
+(:mod:`~research.dissipation.weak_limit`), and as the dashpots get stronger it rises, in the end
 beyond. Drag alone raises it from the beginning. Below the onset the transient gain
 (:mod:`~faultgouge.analysis.motion.transient`) grows as a power of the distance, and dissipation limits it.
 
@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from faultgouge.analysis import OnsetError, Packing, Window
-from faultgouge.analysis.damped_onset.weak_dissipation import drag_onset, weak_limit
 from faultgouge.analysis.damped_onset.windows import damped_windows, without_dissipation
 from faultgouge.analysis.motion.transient import NoGainError, transient_gain
 from faultgouge.pywrap.onset.damped import RampPath
+from research.dissipation.weak_limit import drag_onset, weak_limit
 
 Row = dict[str, Any]
 

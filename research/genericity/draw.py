@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ from faultgouge.analysis.packing.packing import Floats
 from faultgouge.figures.style import INK, styled
 from faultgouge.studies.result_rows import row_columns
 from faultgouge.studies.statistics import course
-from faultgouge.studies.sweep.draw import draw_pairs
 from research.genericity.numbers import STEPS
 from research.genericity.sets import FRICTION
 from research.genericity.table import Table
@@ -39,7 +39,7 @@ def onsets_figure(onsets: Table, predicted: Floats) -> Figure:
         left.legend(fontsize=7)
     strong, weak = STEPS[0]
     pairs = onsets.where(law_mu=strong).at_rest.beside(onsets.where(law_mu=weak).at_rest, "packing.seed")
-    draw_pairs(right, [(a, b, bool(b["ancestors"]) and a["ancestors"] == b["ancestors"]) for a, b in pairs], ms=3.5)
+    _draw_pairs(right, [(a, b, bool(b["ancestors"]) and a["ancestors"] == b["ancestors"]) for a, b in pairs])
     for marker, face, label in (
         ("o", "C0", "the same two modes"),
         ("o", "none", "other modes"),
@@ -128,3 +128,18 @@ def _survival(axes: Axes, reach: Floats, found: Any, label: str, color: str) -> 
         return
     places, levels = course(reach, found)
     axes.step(places, 1 - levels, where="post", color=color, label=label)
+
+
+def _draw_pairs(axes: Axes, packings: Iterable[tuple[dict[str, Any], dict[str, Any], bool]]) -> None:
+    """Onsets with a smaller friction coefficient over those with a larger one; triangles where one lies beyond.
+
+    Of each packing: how the ramps with the larger and the smaller one end, "ends" and "reach", and whether its marker
+    is filled.
+    """
+    for strong, weak, filled in packings:
+        known = [end["ends"] == "onset" for end in (strong, weak)]
+        if any(known):
+            marker, face = "o" if all(known) else "^" if known[0] else ">", "C0" if filled else "none"
+            axes.plot(strong["reach"], weak["reach"], marker, color="C0", markerfacecolor=face, ms=3.5)
+    axes.axline((0, 0), slope=1, color=INK, linewidth=0.6, linestyle=":")
+    axes.set_aspect("equal")

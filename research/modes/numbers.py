@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -216,12 +216,17 @@ HISTORIES = {"total": "force 100", "rescaled": "rescaled history"}
 """The set of each history of the slip."""
 
 
+def _of_seeds(table: Table, seeds: Collection[int]) -> Table:
+    """The packings of these seeds."""
+    return Table(table.name, tuple(row for row in table.rows if row["seed"] in seeds))
+
+
 def histories(tables: Mapping[str, Table]) -> dict[str, Any]:
     """Packings of the same seeds with total and with rescaled slips, at each load; nothing where a set is missing."""
     if not all(name in tables for name in HISTORIES.values()):
         return {}
     seeds = set.intersection(*({row["seed"] for row in tables[name].rows} for name in HISTORIES.values()))
-    matched = {law: tables[name].with_seeds(seeds) for law, name in HISTORIES.items()}
+    matched = {law: _of_seeds(tables[name], seeds) for law, name in HISTORIES.items()}
     return {
         law: medians_over_load(table, ("share", "least_q"))
         | {"with_pairs": [int(np.sum(table.at(load, "pairs") > 0)) for load in table.loads]}
@@ -231,7 +236,7 @@ def histories(tables: Mapping[str, Table]) -> dict[str, Any]:
 
 def against_random(table: Table, by_size: Mapping[int, Table]) -> dict[str, Any]:
     """Shares of complex modes: measured, of random matrices, and by the formula, of the same packings at each load."""
-    own = by_size[table.disks].with_seeds({row["seed"] for row in table.rows})
+    own = _of_seeds(by_size[table.disks], {row["seed"] for row in table.rows})
     return {
         "packings": len(table.rows),
         "loads": table.loads,

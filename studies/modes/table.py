@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,10 +47,6 @@ class Table:
     def at(self, fx_over_fy: float, key: str) -> Floats:
         """A number of every packing that has borne a load, shape (n,): least Q is inf where there is no pair."""
         return np.array([np.inf if load[key] is None else load[key] for load in self.borne(fx_over_fy)], dtype=float)
-
-    def with_seeds(self, seeds: Collection[int]) -> Table:
-        """The packings of these seeds."""
-        return Table(self.name, tuple(row for row in self.rows if row["seed"] in seeds))
 
 
 def medians_over_load(table: Table, names: Sequence[str] = QUANTITIES) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...figures.style import INK, report_failure, save, styled
+from ...figures.style import report_failure, save, styled
 from ..statistics import course
 from .table import Row
 
@@ -46,21 +46,6 @@ def reach_of(row: Row) -> Reach | None:
 def _dicts(value: Any) -> list[dict[str, Any]]:
     """The dicts of a list; rows of a user's function may have anything under any name."""
     return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
-
-
-def draw_pairs(axes: Axes, packings: Iterable[tuple[Row, Row, bool]], **style: Any) -> None:
-    """Onsets with a smaller friction coefficient over those with a larger one; triangles where one lies beyond.
-
-    Of each packing: how the ramps with the larger and the smaller one end, "ends" and "reach", and whether its marker,
-    which has this style, is filled.
-    """
-    for strong, weak, filled in packings:
-        known = [end["ends"] == "onset" for end in (strong, weak)]
-        if any(known):
-            marker, face = "o" if all(known) else "^" if known[0] else ">", "C0" if filled else "none"
-            axes.plot(strong["reach"], weak["reach"], marker, color="C0", markerfacecolor=face, **style)
-    axes.axline((0, 0), slope=1, color=INK, linewidth=0.6, linestyle=":")
-    axes.set_aspect("equal")
 
 
 @styled

@@ -6,9 +6,8 @@ from linearised import motion_matrix
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array
 
-from faultgouge.analysis import NoEquilibriumError, find_onset, stiffness_matrix
+from faultgouge.analysis import NoEquilibriumError
 from faultgouge.analysis.damped_onset.modes import Pencil
-from faultgouge.analysis.damped_onset.weak_dissipation import balancing_ratio, drag_onset, weak_limit
 from faultgouge.analysis.damped_onset.windows import damped_windows, growing_windows, without_dissipation
 
 RNG = np.random.default_rng(11)
@@ -138,50 +137,6 @@ def test_reference_packing_with_normal_dashpots(path, cn, onset, digits):
     root = brentq(largest_growth, window.fx_onset - near, window.fx_onset + near, xtol=1e-13)
     assert window.fx_onset == pytest.approx(root, abs=1e-9)
     assert window.error < 1e-9
-
-
-@pytest.fixture(scope="module")
-def undamped(path):
-    """The first window without dissipation."""
-    return find_onset(path, [0.021, 0.022]).windows[0]
-
-
-@pytest.mark.parametrize(("cn", "ct"), [(1.0, 0.0), (0.0, 1.0)])
-@pytest.mark.slow
-def test_limit_of_weak_dashpots(path, undamped, cn, ct):
-    """From the undamped pair, and from dashpots of 1e-3."""
-    predicted = weak_limit(without_dissipation(path, cn, ct), [0.019, 0.02, 0.021], undamped)
-    assert predicted.fx < undamped.fx_onset
-    weak = without_dissipation(path, 1e-3 * cn, 1e-3 * ct)
-    measured = damped_windows(weak, [0.021, undamped.fx_onset + 1e-6])[0]
-    # what dashpots of 1e-3 do beyond the first order is of relative size 1e-6
-    assert predicted.fx == pytest.approx(measured.fx_onset, rel=1e-6)
-    assert predicted.frequency == pytest.approx(measured.frequency, rel=1e-6)
-
-
-@pytest.mark.slow
-def test_balanced_dashpots_leave_the_onset_alone(path, undamped):
-    ratio = balancing_ratio(path(undamped.fx_onset), undamped)
-    assert ratio > 0
-    balanced = weak_limit(without_dissipation(path, 1.0, ratio), [0.02, 0.021], undamped)
-    assert balanced.fx == pytest.approx(undamped.fx_onset, rel=1e-8)
-    off = [
-        weak_limit(without_dissipation(path, 1.0, share * ratio), [0.02, 0.021], undamped).fx for share in (0.5, 2.0)
-    ]
-    assert max(off) < undamped.fx_onset - 1e-10
-
-
-@pytest.mark.slow
-def test_drag_shifts_the_onset_to_where_the_growth_exceeds_it(path, undamped):
-    """The closed form of the pair against all modes; 2 |Im omega| = 1/tau to second order."""
-    tau = 100.0
-    predicted = drag_onset(path, [0.022, 0.0224], undamped, tau)
-    assert predicted > undamped.fx_onset
-    measured = damped_windows(without_dissipation(path, drag_time=tau), [0.0218, 0.022])[0]
-    assert predicted == pytest.approx(measured.fx_onset, rel=1e-9)
-    rates = np.linalg.eigvals(stiffness_matrix(path(predicted)).toarray())
-    fastest = np.abs(np.sqrt(rates.astype(complex)).imag).max()
-    assert 2 * fastest == pytest.approx(1 / tau, rel=1e-4)
 
 
 @pytest.mark.parametrize(

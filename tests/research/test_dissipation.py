@@ -3,14 +3,18 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from reference_layer import SMALL, UNITS, toml
 
+from faultgouge.analysis import damped_windows, stiffness_matrix
+from faultgouge.analysis.damped_onset.windows import without_dissipation
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.onset.damped import damped_onset_run, ramp_scene
 from faultgouge.pywrap.scenes.units import real_units
 from faultgouge.studies.packing_tools import with_seed
 from research.dissipation.compute import RATIOS, over_distance, over_strength, weak_cases
+from research.dissipation.weak_limit import balancing_ratio, drag_onset, weak_limit
 
 TABLES = Path(__file__).parents[2] / "research" / "dissipation" / "tables"
 
@@ -50,6 +54,49 @@ def test_the_limit_of_weak_dashpots_is_predicted(ramp):
         assert case["predicted"] == pytest.approx(case["measured"], rel=1e-3)
         assert case["predicted"] < case["undamped"]
         assert case["measured"] == pytest.approx(known[case["cn"], case["ct"]]["measured"], rel=1e-8)
+
+
+@pytest.fixture(scope="module")
+def window(ramp):
+    """The first window without dissipation."""
+    return ramp.first_window()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("cn", "ct"), [(1.0, 0.0), (0.0, 1.0)])
+def test_the_limit_of_weak_dashpots_and_its_frequency(ramp, window, cn, ct):
+    predicted = weak_limit(without_dissipation(ramp.path, cn, ct), ramp.forces, window)
+    assert predicted.fx < window.fx_onset
+    weak = without_dissipation(ramp.path, 1e-4 * cn, 1e-4 * ct)
+    (found, *_) = damped_windows(weak, [0.014, window.fx_onset + 1e-6])
+    # the onset is that of the table within what weak dashpots leave: 1e-12 of 0.0149 there
+    assert predicted.fx == pytest.approx(found.fx_onset, rel=1e-9)
+    assert predicted.frequency == pytest.approx(found.frequency, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_balanced_dashpots_leave_the_onset_alone(ramp, window):
+    ratio = balancing_ratio(ramp.path(window.fx_onset), window)
+    assert ratio == pytest.approx(0.1987, abs=5e-5)
+    limits = {
+        share: weak_limit(without_dissipation(ramp.path, 1.0, share * ratio), ramp.forces, window).fx
+        for share in (0.5, 1.0, 2.0)
+    }
+    assert limits[1.0] == pytest.approx(window.fx_onset, rel=1e-8)
+    assert max(limits[0.5], limits[2.0]) < window.fx_onset - 1e-10
+
+
+@pytest.mark.slow
+def test_drag_shifts_the_onset_to_where_the_growth_exceeds_it(ramp, window):
+    """The closed form of the pair against all modes; 2 |Im omega| = 1/tau to second order."""
+    tau, path = 100.0, without_dissipation(ramp.path)
+    predicted = drag_onset(path, ramp.forces, window, tau)
+    assert predicted > window.fx_onset
+    (found, *_) = damped_windows(without_dissipation(ramp.path, drag_time=tau), [0.0149, predicted + 1e-5])
+    assert predicted == pytest.approx(found.fx_onset, rel=1e-9)
+    rates = np.linalg.eigvals(stiffness_matrix(path(predicted)).toarray())
+    fastest = np.abs(np.sqrt(rates.astype(complex)).imag).max()
+    assert 2 * fastest == pytest.approx(1 / tau, rel=1e-4)
 
 
 @pytest.mark.slow

@@ -33,11 +33,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import NoEquilibriumError
-from ..onset import Family, LostPairError, Pair, Window, force_bearing, full_operator
-from ..operators.damping import damping_matrix
-from ..packing.packing import Floats, Packing
-from ..spectrum.spectrum import mass_weighted
+from faultgouge.analysis import NoEquilibriumError, Packing, Window, damping_matrix
+from faultgouge.analysis.onset import Family, LostPairError, Pair, force_bearing, full_operator
+from faultgouge.analysis.packing.arrays import Floats
+from faultgouge.analysis.spectrum.spectrum import mass_weighted
 
 DIGITS = 1e-12
 """Width to which the limit is bracketed, in units of the load."""
