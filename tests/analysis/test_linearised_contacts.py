@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from packing_snapshot import snapshot_of
 from scipy.linalg import expm
 
 from faultgouge.analysis import (
@@ -130,7 +131,7 @@ def test_operators_of_disks(cluster, share):
 
     rescaled = cluster.law.exponent == 1.5
     packing = replace(cluster, law=replace(cluster.law, cn=1.3, ct=0.4, rescaled=rescaled), inertia_factor=0.5)
-    snapshot = Snapshot.of_packing(packing)
+    snapshot = snapshot_of(packing)
     for one, other in (
         (stiffness_matrix(packing, parting=share), stiffness_matrix(snapshot, parting=share)),
         (damping_matrix(packing), damping_matrix(snapshot)),
@@ -302,7 +303,7 @@ def test_onset_of_a_family_of_snapshots():
 
 def test_gain_of_a_snapshot(path):
     packing = path(0.0215)
-    one, other = transient_gain(packing), transient_gain(Snapshot.of_packing(packing))
+    one, other = transient_gain(packing), transient_gain(snapshot_of(packing))
     assert (other.gain, other.time) == pytest.approx((one.gain, one.time), rel=1e-6)
     assert other.disk == one.disk
 

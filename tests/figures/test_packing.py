@@ -9,12 +9,12 @@ from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
+from packing_snapshot import snapshot_of
 
 from faultgouge.analysis import (
     Contacts,
     MindlinLaw,
     Packing,
-    Snapshot,
     closest_to_meeting,
     normal_modes,
     spectrum,
@@ -68,7 +68,7 @@ def test_bars_are_as_wide_as_their_force(packing):
 
 def test_a_snapshot_is_drawn_as_its_packing(packing):
     """Disks, bars and their colours are the same, whether slips or forces are known."""
-    snapshot = Snapshot.of_packing(packing)
+    snapshot = snapshot_of(packing)
     one, other = draw_packing(packing), draw_packing(snapshot)
     disks, drawn = (find_labelled(each, EllipseCollection, "disks") for each in (one, other))
     assert drawn.get_offsets() == pytest.approx(disks.get_offsets(), abs=1e-14)
@@ -80,7 +80,7 @@ def test_a_snapshot_is_drawn_as_its_packing(packing):
 
 def test_a_sheared_box_is_full_of_images(packing):
     """Of disks in a box that is periodic along both edges, every place of the picture repeats along the edges."""
-    snapshot = Snapshot.of_packing(packing)
+    snapshot = snapshot_of(packing)
     low, high = packing.position.min(axis=0), packing.position.max(axis=0)
     box = np.array([[packing.box_length, 0, 0], [3.0, high[1] - low[1] + 1, 0], [0, 0, 1]])
     sheared = derive_frozen(

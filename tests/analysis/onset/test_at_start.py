@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from packing_snapshot import snapshot_of
 
-from faultgouge.analysis import Contacts, Snapshot, find_onset, spectrum
+from faultgouge.analysis import Contacts, find_onset, spectrum
 from faultgouge.analysis.errors import TurningPointError
 from faultgouge.analysis.onset import LIMITS
 
@@ -31,7 +32,7 @@ def ending(path, last):
 @pytest.mark.parametrize("limits", [LIMITS, FEW], ids=["small", "large"])
 def test_a_packing_that_is_unstable_from_the_start(path, limits, of_lammps):
     loads, pairs = [0.022, 0.0221], spectrum(path(0.022)).pairs
-    equilibrium = (lambda fx: Snapshot.of_packing(path(fx))) if of_lammps else path
+    equilibrium = (lambda fx: snapshot_of(path(fx))) if of_lammps else path
     onset = find_onset(equilibrium, loads, first=True, limits=limits)
     assert (onset.fx_c, onset.windows[0].kind) == (0.022, "start")
     unstable = onset.as_dict()["unstable_at_start"]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from granular_packings import ALMOST_NONE, LAWS, RESCALED, command, instance, start, with_law
+from packing_snapshot import snapshot_of
 
 from faultgouge.analysis import damping_matrix, spectrum, stiffness_matrix
 
@@ -246,7 +247,7 @@ def test_our_own_style():
     """A packing of mindlin/smooth is the Packing that the decks' own way gives."""
     from dataclasses import replace
 
-    from faultgouge.analysis import Contacts, MindlinLaw, Packing, Snapshot
+    from faultgouge.analysis import Contacts, MindlinLaw, Packing
     from faultgouge.pywrap import from_lammps
 
     lmp = instance()
@@ -277,7 +278,7 @@ def test_our_own_style():
     # x on a grid of 1e-5, to second order
     assert abs(one - other).max() < 1e-8 * abs(one).max()
     calm = replace(packing, law=replace(law, cn=0, ct=0))
-    assert abs(stiffness_matrix(Snapshot.of_packing(calm)) - one).max() < 1e-14 * abs(one).max()
+    assert abs(stiffness_matrix(snapshot_of(calm)) - one).max() < 1e-14 * abs(one).max()
     assert abs(damping_matrix(packing) - damping_matrix(found)).max() < 1e-8 * abs(damping_matrix(packing)).max()
     lmp.close()
 
