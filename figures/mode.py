@@ -30,6 +30,9 @@ SYMMETRIC = 1e-6
 """Cosine of two modes up to which they are taken for orthogonal: far above rounding, and an epsilon that no coalescence
 is near."""
 
+PURE_ROTATION = 1e-9
+"""Displacements that are smaller than this share of the rotations are rounding: a sphere spins about its contact."""
+
 
 class ModeError(BadInputError):
     """A mode that a packing does not have, in one sentence."""
@@ -45,9 +48,9 @@ class Mode:
         Which, counted by the real part of the eigenvalue from 0.
     eigenvalue : complex
         lambda, 1 / time^2.
-    displacement : ndarray of complex, shape (3, N)
-        x, y and R theta of every disk, the longest displacement in the plane one; its phase is turned as the module
-        says.
+    displacement : ndarray of complex, shape (axes, N)
+        x, y and R theta of every disk, or all coordinates of every sphere. The longest displacement in space is one,
+        or the largest rotation where nothing is displaced; its phase is turned as the module says.
     participation, rotation : float
         Participation ratio, and share of rotation in the kinetic energy.
     """
@@ -100,12 +103,13 @@ class Mode:
 
 
 def displacement(packing: Packing | Snapshot, vector: Complexes) -> Complexes:
-    """A mass-weighted vector, shape (3N,), as of :class:`Mode`: x, y and R theta of every disk, shape (3, N)."""
+    """A mass-weighted vector, shape (axes N,), as of :class:`Mode`: the coordinates of every particle, (axes, N)."""
     vector = vector / np.sqrt(packing.coordinate_mass)
     vector = vector * np.exp(-0.5j * np.angle(np.sum(vector**2)))
-    moved = vector.reshape(3, -1)
-    largest = np.sqrt(np.sum(np.abs(moved[:2]) ** 2, axis=0)).max()
-    return np.asarray(moved / largest)
+    moved = vector.reshape(packing.axes, -1)
+    largest = np.sqrt(np.sum(np.abs(moved[: packing.dimension]) ** 2, axis=0)).max()
+    rotation = np.abs(moved).max()
+    return np.asarray(moved / (largest if largest > PURE_ROTATION * rotation else rotation))
 
 
 def unstable_pair(

@@ -34,7 +34,7 @@ class ModeVectors:
     eigenvalue : complex
         lambda, 1 / time^2.
     displacement : ndarray of complex, shape (3, N)
-        x, y and R theta.
+        x, y and R theta; of a Snapshot all its coordinates, shape (axes, N).
     """
 
     name: str

@@ -6,51 +6,24 @@ The motion of a mode, growth left out, is a film of frames: an .xyz of many fram
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis import BadInputError, Snapshot
 from ...analysis.files.atomic_write import replace_whole
 from ...analysis.packing.arrays import Floats
+from .export_quantities import ModeVectors
 from .vtp import write_frame_list, write_poly_data, write_xml
 
 
-class SnapshotMode(NamedTuple):
-    """A mode of a snapshot: its name, its eigenvalue, 1 / time^2, and q, shape (axes N,)."""
-
-    name: str
-    eigenvalue: complex
-    vector: NDArray[np.complex128]
+def check_snapshot_writer(path: Path) -> None:
+    """Refuse a suffix that is neither .vtp nor .xyz, before work begins."""
+    if path.suffix not in (".vtp", ".xyz"):
+        raise BadInputError(f"-o {path}: a snapshot goes into .vtp, .xyz; give it one of these suffixes.")
 
 
-def mode_of_snapshot(snapshot: Snapshot, which: str) -> SnapshotMode:
-    """The fastest growing pair, or the mode of a number, counted by eigenvalue from 0.
-
-    Raises
-    ------
-    BadInputError
-        If there is none.
-    """
-    from ...analysis import normal_modes, spectrum
-
-    modes = normal_modes(snapshot)
-    if which == "pair":
-        pairs = spectrum(snapshot).pairs
-        if not pairs:
-            raise BadInputError("--mode pair: the packing has no complex pair; give the number of a mode, from 0")
-        number = int(np.argmin(np.abs(modes.values - pairs[0].eigenvalue)))
-    elif which.isdecimal() and int(which) < len(modes.values):
-        number = int(which)
-    else:
-        raise BadInputError(f"--mode {which}: give pair, or a number from 0 to {len(modes.values) - 1}")
-    vector = modes.right[:, number] / np.sqrt(snapshot.coordinate_mass)
-    return SnapshotMode(f"mode_{number}", complex(modes.values[number]), vector / np.abs(vector).max())
-
-
-def write_snapshot_for_others(path: Path, snapshot: Snapshot, modes: Sequence[SnapshotMode] = ()) -> str:
+def write_snapshot_for_others(path: Path, snapshot: Snapshot, modes: Sequence[ModeVectors] = ()) -> str:
     """Write a .vtp or an .xyz; what is in it, in words.
 
     Raises
@@ -60,12 +33,11 @@ def write_snapshot_for_others(path: Path, snapshot: Snapshot, modes: Sequence[Sn
     OutputError
         If the file cannot be written.
     """
+    check_snapshot_writer(path)
     if path.suffix == ".vtp":
         write_xml(path, _poly_data(snapshot, _in_space(snapshot), modes))
-    elif path.suffix == ".xyz":
-        _write_xyz(path, snapshot, [(_in_space(snapshot), modes)])
     else:
-        raise BadInputError(f"-o {path}: a snapshot goes into .vtp, .xyz; give it one of these suffixes.")
+        _write_xyz(path, snapshot, [(_in_space(snapshot), modes)])
     return f"{len(snapshot)} particles, {len(snapshot.contacts)} contacts, {len(modes)} modes"
 
 
@@ -73,7 +45,7 @@ FARTHEST = 0.5
 """Longest displacement in a film of a mode, in units of the smallest radius: particles stay beside their neighbours."""
 
 
-def write_mode_frames(path: Path, snapshot: Snapshot, mode: SnapshotMode, count: int, periods: int = 1) -> None:
+def write_mode_frames(path: Path, snapshot: Snapshot, mode: ModeVectors, count: int, periods: int = 1) -> None:
     """Write the motion of a mode, growth left out: frames with displaced particles, their displacement and rotation.
 
     Parameters
@@ -88,14 +60,11 @@ def write_mode_frames(path: Path, snapshot: Snapshot, mode: SnapshotMode, count:
     OutputError
         If a file cannot be written.
     """
-    # the phase at which the two moments a quarter of a period apart are the largest and the smallest displacement
-    vector = mode.vector * np.exp(-0.5j * np.angle(np.sum(mode.vector**2)))
-    translation = np.abs(vector.reshape(snapshot.axes, -1)[: snapshot.dimension])
-    reach = FARTHEST * snapshot.radius.min() / max(np.sqrt(np.sum(translation**2, axis=0)).max(), np.abs(vector).max())
+    reach = FARTHEST * snapshot.radius.min() / max(1.0, np.abs(mode.displacement).max())
     frames = []
     for k in range(count):
-        moved = np.real(reach * vector * np.exp(2j * np.pi * periods * k / count))
-        there = SnapshotMode("displacement", mode.eigenvalue, moved.astype(np.complex128))
+        moved = np.real(reach * mode.displacement * np.exp(2j * np.pi * periods * k / count))
+        there = ModeVectors("displacement", mode.eigenvalue, moved.astype(np.complex128))
         frames.append((_in_space(snapshot) + snapshot.vectors(moved)[0], [there]))
     if path.suffix == ".xyz":
         _write_xyz(path, snapshot, frames)
@@ -107,7 +76,7 @@ def _in_space(snapshot: Snapshot) -> Floats:
     return np.pad(snapshot.position, ((0, 0), (0, 3 - snapshot.dimension)))
 
 
-def _of_particles(snapshot: Snapshot, modes: Sequence[SnapshotMode]) -> dict[str, Floats]:
+def _of_particles(snapshot: Snapshot, modes: Sequence[ModeVectors]) -> dict[str, Floats]:
     c, pair = snapshot.contacts, ~snapshot.contacts.wall
     count, pressure = (
         np.bincount(c.i, weight, len(snapshot)) + np.bincount(c.j[pair], weight[pair], len(snapshot))
@@ -126,13 +95,16 @@ def _of_particles(snapshot: Snapshot, modes: Sequence[SnapshotMode]) -> dict[str
         "coordination": count.astype(np.float64),
     }
     for mode in modes:
-        for name, moved in ((mode.name, mode.vector.real), (f"{mode.name}_imag", mode.vector.imag)):
+        for name, moved in (
+            (mode.name, mode.displacement.real),
+            (f"{mode.name}_imag", mode.displacement.imag),
+        ):
             if name == mode.name or np.any(moved):
                 values[name], values[f"{name}_rotation"] = snapshot.vectors(moved)
     return values
 
 
-def _poly_data(snapshot: Snapshot, position: Floats, modes: Sequence[SnapshotMode]) -> ElementTree.Element:
+def _poly_data(snapshot: Snapshot, position: Floats, modes: Sequence[ModeVectors]) -> ElementTree.Element:
     """Particles where they have been moved to, with the contacts that they have at rest."""
     c = snapshot.contacts
     first, rest = position[c.i], _in_space(snapshot)
@@ -154,7 +126,7 @@ def _poly_data(snapshot: Snapshot, position: Floats, modes: Sequence[SnapshotMod
     return write_poly_data(position, ends, numbers, _of_particles(snapshot, modes), on_contacts)
 
 
-def _write_xyz(path: Path, snapshot: Snapshot, frames: Sequence[tuple[Floats, Sequence[SnapshotMode]]]) -> None:
+def _write_xyz(path: Path, snapshot: Snapshot, frames: Sequence[tuple[Floats, Sequence[ModeVectors]]]) -> None:
     """Frames, each of positions and modes."""
     lattice, origin = (" ".join(map(repr, each.ravel().tolist())) for each in (snapshot.box, snapshot.origin))
     sides = " ".join("T" if each else "F" for each in snapshot.periodic)

@@ -59,11 +59,14 @@ def test_deck(faultgouge_here, tmp_path, shape):
     faultgouge_here("export", "pile.h5", "-o", "pile.xyz")
     rows = np.loadtxt((tmp_path / "pile.xyz").read_text().splitlines()[2:])
     assert np.array_equal(rows[:, : snapshot.dimension], snapshot.position)
+    assert "goes into .vtp, .xyz" in faultgouge_here("export", "pile.h5", "-o", "pile.data", code=2).stderr
     assert "nothing moves in it" in faultgouge_here("movie", "pile.h5", code=None).stderr
     if shape is ROUND:
         for command in ("draw", "view"):
             assert "`faultgouge export pile.h5 --mode 0" in faultgouge_here(command, "pile.h5", code=2).stderr
         assert "(.xyz) or ParaView (.pvd)" in faultgouge_here("movie", "pile.h5", "--mode", "0", code=2).stderr
+        too_large = faultgouge_here("export", "pile.h5", "--mode", "99", "-o", "pile.vtp", code=2).stderr
+        assert "15 modes, counted from 0" in too_large
         _check_film_of_spheres(faultgouge_here, tmp_path, snapshot)
         return
     assert "3 contacts (3 with walls)" in faultgouge_here("draw", "pile.h5", "-o", "pile.png").stdout

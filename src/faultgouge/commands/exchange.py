@@ -167,8 +167,10 @@ def export(
     needs pip install 'faultgouge[export]'. With --frames the file is a film of
     displacements; a .pvd for ParaView comes with a folder of .vtp.
     """
+    from faultgouge.analysis import Snapshot
     from faultgouge.pywrap.exchange import ModeVectors
     from faultgouge.pywrap.exchange.formats import check_writer, write_packing
+    from faultgouge.pywrap.exchange.snapshot_export import check_snapshot_writer, write_snapshot_for_others
 
     lock_output(context, output, file)
     if frames is not None:
@@ -177,21 +179,20 @@ def export(
         _export_frames(file, frames, output)
         return
     snapshot = stored_snapshot(file)
-    if snapshot is not None:
-        if is_root():
-            from faultgouge.pywrap.exchange.snapshot_export import mode_of_snapshot, write_snapshot_for_others
-
-            found = [] if mode is None else [mode_of_snapshot(snapshot, mode)]
-            print_line(f"{write_snapshot_for_others(output, snapshot, found)}; written to {output}")
-        return
-    check_writer(output, mode is not None)
-    packing = stored_packing(file, frame)
+    if snapshot is None:
+        check_writer(output, mode is not None)
+    else:
+        check_snapshot_writer(output)
+    packing = snapshot or stored_packing(file, frame)
     if not is_root():
         return
     modes = [] if mode is None else modes_of(packing, mode)[0]
     vectors = [ModeVectors(f"mode_{each.number}", each.eigenvalue, each.displacement) for each in modes]
-    words = write_packing(output, packing, vectors)
-    print_line(f"F_x = {packing.fx:g}: {words}; written to {output}")
+    if isinstance(packing, Snapshot):
+        words = write_snapshot_for_others(output, packing, vectors)
+    else:
+        words = f"F_x = {packing.fx:g}: {write_packing(output, packing, vectors)}"
+    print_line(f"{words}; written to {output}")
 
 
 def _export_frames(file: Path, says: str, output: Path) -> None:

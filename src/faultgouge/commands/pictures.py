@@ -226,7 +226,8 @@ def _frames_of_spheres(
 ) -> None:
     """The motion of a mode of spheres, for programs that show spheres."""
     from faultgouge.analysis import BadInputError
-    from faultgouge.pywrap.exchange.snapshot_export import mode_of_snapshot, write_mode_frames
+    from faultgouge.pywrap.exchange import ModeVectors
+    from faultgouge.pywrap.exchange.snapshot_export import write_mode_frames
 
     if output.suffix not in (".xyz", ".pvd"):
         raise BadInputError(
@@ -234,9 +235,12 @@ def _frames_of_spheres(
         )
     lock_output(context, output)
     if is_root():
-        mode = mode_of_snapshot(snapshot, which)
-        write_mode_frames(output, snapshot, mode, count, periods)
-        print_line(f"{count} frames of {mode.name}, lambda = {mode.eigenvalue:.8g}; written to {output}")
+        (mode, *others), _ = modes_of(snapshot, which)
+        if others:
+            raise BadInputError("--mode pair: the packing has no complex pair; give the number of a mode, from 0")
+        vectors = ModeVectors(f"mode_{mode.number}", mode.eigenvalue, mode.displacement)
+        write_mode_frames(output, snapshot, vectors, count, periods)
+        print_line(f"{count} frames of {mode.plain}; written to {output}")
 
 
 def _cycle(file: Path) -> list[Packing]:
