@@ -25,7 +25,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis.packing.arrays import Floats
-from ..lammps.instance import lammps_instance
+from ..lammps.instance import start_lammps
 from .granular_commands import Commands, SnapshotError
 
 EXACT = 1e-6
@@ -98,7 +98,7 @@ class TwoParticleLammps:
     """A LAMMPS with two particles of some types, or one and the wall of a fix, and the commands of a deck."""
 
     def __init__(self, lmp: Any, commands: Commands, name: tuple[int, int] | str, size: float) -> None:
-        self.lammps = lammps_instance(MPI.COMM_SELF, None)
+        self.lammps = start_lammps(MPI.COMM_SELF, None)
         words = commands.fixes[name].split() if isinstance(name, str) else []
         self.wall, self.types = bool(words), (1, 1) if isinstance(name, str) else name
         self.axis, self.sign, self.place = 0, 1.0, 0.0

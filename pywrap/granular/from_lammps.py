@@ -173,14 +173,15 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> S
     free, frozen, factor = _mobility(commands, found)
     low, high, xy, yz, xz, periodic, _ = lmp.extract_box()
     size = np.subtract(high, low)
+    box = np.array([[size[0], 0, 0], [xy, size[1], 0], [xz, yz, size[2]]])
     made = Snapshot(
         dimension=dimension,
         position=found["x"][:, :dimension],
         radius=found["radius"],
         mass=found["rmass"],
         inertia=factor * found["rmass"] * found["radius"] ** 2,
-        contacts=_contacts(lmp, commands, found, frozen, laws),
-        box=np.array([[size[0], 0, 0], [xy, size[1], 0], [xz, yz, size[2]]]),
+        contacts=_contacts(lmp, commands, found, frozen, laws, box),
+        box=box,
         origin=np.array(low),
         periodic=np.array(periodic, dtype=bool),
         load=np.zeros((count, 2, 3)),
@@ -231,10 +232,10 @@ class _OneLaw(NamedTuple):
 
 
 def _contacts(
-    lmp: Any, commands: Commands, found: Arrays, frozen: NDArray[np.bool_], laws: KnownLaws
+    lmp: Any, commands: Commands, found: Arrays, frozen: NDArray[np.bool_], laws: KnownLaws, box: Floats
 ) -> LinearisedContacts:
     """Contacts between particles, then those with each wall."""
-    pairs, walls = _pairs(found), [name.removeprefix("wall ") for name in found if name.startswith("wall ")]
+    pairs, walls = _pairs(found, box), [name.removeprefix("wall ") for name in found if name.startswith("wall ")]
     parts = []
     if commands.style == OWN:
         parts.append(_linearise_smooth(_smooth_law(commands.pair[0].split()[2:]), pairs))
@@ -267,7 +268,7 @@ def _geometry(
     return {"i": i, "j": j, "normal": normal, "distance": distance, "overlap": overlap, "slip_arm": arms}
 
 
-def _pairs(found: Arrays) -> _OneLaw:
+def _pairs(found: Arrays, box: Floats) -> _OneLaw:
     """All contacts between particles, of whatever types."""
     rows, partners = found["contacts"], found["partners"]
     if not len(rows):
@@ -277,10 +278,19 @@ def _pairs(found: Arrays) -> _OneLaw:
         raise SnapshotError(
             f"Particle {int(partners[i == j][0, 0])} touches its own periodic image: take a box that is wider."
         )
-    distance = np.linalg.norm(rows[:, :3], axis=1)
+    branch = _towards_first(rows[:, :3], found["x"][i] - found["x"][j], box)
+    distance = np.linalg.norm(branch, axis=1)
     overlap = found["radius"][i] + found["radius"][j] - distance
-    geometry = _geometry(found, i, j, rows[:, :3] / distance[:, None], distance, overlap)
+    geometry = _geometry(found, i, j, branch / distance[:, None], distance, overlap)
     return _OneLaw("contacts of mindlin/smooth", geometry, rows[:, 3:])
+
+
+def _towards_first(branch: Floats, between: Floats, box: Floats) -> Floats:
+    """Branch vectors with the sign of another vector but for periods of the box: in LAMMPS of 2024 dx, dy and dz may
+    point to the second of the partners."""
+    beside = [(between - sign * branch) @ np.linalg.inv(box) for sign in (1, -1)]
+    right, wrong = (np.abs(each - np.round(each)).max(axis=1) for each in beside)
+    return np.where((right <= wrong)[:, None], branch, -branch)
 
 
 def _by_types(pairs: _OneLaw, kind: Indices) -> dict[Any, _OneLaw]:

