@@ -191,7 +191,22 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> S
     )
     total = np.stack([found["f"], found["torque"]], axis=1)
     load = np.where(free[:, None, None], total - made.contact_force, -made.contact_force)
+    _check_torques(load[free, 1] / made.radius[free, None], made.contacts)
     return derive_frozen(made, load=load)
+
+
+def _check_torques(others: Floats, contacts: LinearisedContacts) -> None:
+    """Refuse torques besides those of the contacts: in all that is taken here contacts alone turn particles."""
+    forces = (
+        AGREES * np.abs(contacts.tangential_force).max(initial=0.0),
+        ROUNDING * contacts.normal_force.max(initial=0.0),
+    )
+    if np.abs(others).max() > sum(forces):
+        raise SnapshotError(
+            "The torques on particles are not those of their contacts: either something else turns them, which is not "
+            "linearised here, or this release of LAMMPS hands out contacts in a way that is not known here; releases "
+            "of 29 Aug 2024 to 22 Jul 2025 are."
+        )
 
 
 def _mobility(commands: Commands, found: Arrays) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:

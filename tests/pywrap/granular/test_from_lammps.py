@@ -229,8 +229,11 @@ def test_spheres_that_barely_touch(law):
 
 
 def test_branch_vectors_that_point_to_either_partner(beds, monkeypatch):
-    """Releases of LAMMPS differ in the sign of dx, dy and dz; here in a sheared box, across its sides, too."""
-    from faultgouge.pywrap import from_lammps
+    """Releases of LAMMPS differ in the sign of dx, dy and dz; here in a sheared box, across its sides, too.
+
+    Forces of the other sign, which no known release has, are noticed by the torques.
+    """
+    from faultgouge.pywrap import SnapshotError, from_lammps
     from faultgouge.pywrap.granular import from_lammps as module
 
     lmp = beds("gran/hertz/history", 3, True)
@@ -245,6 +248,15 @@ def test_branch_vectors_that_point_to_either_partner(beds, monkeypatch):
 
     monkeypatch.setattr(module, "arrays_at_rest", turned)
     assert from_lammps(lmp) == found
+
+    def reversed_forces(*arguments):
+        arrays = look(*arguments)
+        arrays["contacts"][::2, 4:] *= -1
+        return arrays
+
+    monkeypatch.setattr(module, "arrays_at_rest", reversed_forces)
+    with pytest.raises(SnapshotError, match="torques on particles are not those of their contacts"):
+        from_lammps(lmp)
 
 
 PLAIN = '''
