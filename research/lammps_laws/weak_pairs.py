@@ -1,0 +1,114 @@
+r"""The weak complex pairs of mindlin/force followed in LAMMPS: does what the spectrum says of them hold?
+
+With the right and left vectors x and y of an eigenvalue :math:`\lambda`, the coordinate :math:`c = y^H M^{1/2} q` of
+small motion obeys :math:`\ddot c = -\lambda c`, so that
+
+.. math:: \dot c = a e^{st} + b e^{-st}, \qquad s = i \sqrt\lambda, \qquad \mathrm{Re}\, s > 0 .
+
+The part that grows turns in the complex plane against the part that decays. Averages over many periods, after the turn
+of one of them is taken out, leave this one alone. Its amplitude tells the rate, long before the motion as a whole
+grows.
+
+A packing is let go without any dashpot with the velocities of x.
+"""
+
+import json
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eig
+
+from faultgouge.analysis import Snapshot, spectrum, stiffness_matrix
+from faultgouge.analysis.packing.arrays import Floats
+from faultgouge.analysis.spectrum.spectrum import active_coordinates, mass_weighted
+from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of, set_velocity
+from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
+from research.lammps_laws.compute import MU, NONE, STEP, TILTS, describe, pour, read, rest
+
+LAW, D, COUNT, SEEDS = "granular hertz, mindlin/force", 3, 200, 60
+"""Law, dimension, particles, and the last seed; every pair that is found at any tilt is followed."""
+
+DISPLACEMENT = 3e-9
+"""Largest displacement of the mode that is set going: a thousandth of the smallest overlaps, and far above the 1e-10 of
+the bound by which a history must have left its plane before LAMMPS turns it."""
+
+TIME, STEPS = 2000.0, 97
+"""How long, and steps between two looks: five looks a period."""
+
+WINDOWS, FIRST = 40, 8
+"""Windows that the run is divided into, and the one from which on amplitudes are fitted: contacts at the bound slide a
+little at first."""
+
+
+def rows(seed: int) -> list[dict[str, Any]]:
+    """A packing at all tilts; the rates of its fastest pair by the spectrum and in LAMMPS where it has one."""
+    found = []
+    with TemporaryDirectory() as folder:
+        lmp = pour(LAW, D, COUNT, MU, seed, Path(folder) / "log", NONE)
+        for tilt in TILTS:
+            begin = time.process_time()
+            lmp.command(f"variable slope equal {tilt}")
+            row: dict[str, Any] = {"seed": seed, "tilt": tilt, "rests": False}
+            snapshot = rest(lmp)
+            if snapshot is not None:
+                row |= {"rests": True} | {name: describe(snapshot)[name] for name in ("pairs", "at_bound", "residual")}
+                row |= follow(lmp, snapshot) if row["pairs"] else {}
+            found.append(row | {"cpu_seconds": time.process_time() - begin})
+            if snapshot is None:
+                break
+        lmp.close()
+    return found
+
+
+def follow(lmp: Any, snapshot: Snapshot) -> dict[str, float]:
+    """Rates of D of the fastest pair: "predicted", and "grows" and "decays" as its two parts do in LAMMPS."""
+    a = mass_weighted(stiffness_matrix(snapshot), snapshot)
+    active, root = active_coordinates(a), np.sqrt(snapshot.coordinate_mass)
+    values, left, right = eig(a[active][:, active].toarray(), left=True)
+    number = int(np.argmin(np.abs(values - spectrum(snapshot).pairs[0].eigenvalue)))
+    s = 1j * np.sqrt(values[number])
+    s = s if s.real > 0 else -s
+    x = np.real(right[:, number] * np.exp(-0.5j * np.angle(np.sum(right[:, number] ** 2))))
+    start = np.zeros(snapshot.coordinates)
+    start[active] = DISPLACEMENT * abs(s) * x / np.abs(x).max() / root[active]
+    velocities = in_a_copy(lambda: _run(lmp, snapshot, start))
+    coordinate = (velocities * root)[:, active] @ left[:, number].conj()
+    times = STEPS * STEP * np.arange(1, len(coordinate) + 1, dtype=np.float64)
+    grows, decays = (_rate(times, coordinate * np.exp(-1j * turn * times)) for turn in (s.imag, -s.imag))
+    return {"predicted": 2 * s.real, "grows": grows, "decays": decays}
+
+
+def _run(lmp: Any, snapshot: Snapshot, start: Floats) -> Floats:
+    """Velocities of all coordinates at every look, without drag."""
+    lmp.commands_list(["log none", "unfix drag", "unfix spin", f"timestep {STEP}"])
+    set_velocity(lmp, snapshot, start)
+    looks = []
+    for _ in range(round(TIME / (STEPS * STEP))):
+        lmp.command(f"run {STEPS} post no")
+        order = rows_of(lmp, snapshot)
+        rotation = owned_array(lmp, "omega")[order] * snapshot.radius[:, None]
+        looks.append(snapshot.join_vectors(owned_array(lmp, "v")[order], rotation))
+    return np.array(looks)
+
+
+def _rate(times: Floats, part: NDArray[np.complex128]) -> float:
+    """Twice the rate of the slow part of a coordinate."""
+    windows = np.array_split(np.arange(len(times)), WINDOWS)
+    size = [np.abs(np.average(part[each], weights=np.hanning(len(each)))) for each in windows]
+    middle = [times[each].mean() for each in windows]
+    return 2 * float(np.polyfit(middle[FIRST:], np.log(size[FIRST:]), 1)[0])
+
+
+def compute(table: Path, seeds: range, watch: Any = print) -> None:
+    """Add the packings that a table lacks."""
+    known = {row["seed"] for row in read(table)}
+    for seed in seeds:
+        if seed not in known:
+            made = rows(seed)
+            with table.open("a") as file:
+                file.writelines(json.dumps(row) + "\n" for row in made)
+            watch(made, flush=True)
