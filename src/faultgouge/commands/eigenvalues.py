@@ -37,6 +37,9 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
+MOST_PAIRS = 20
+"""Lines of complex pairs: a packing of a thousand has hundreds."""
+
 Slices = Annotated[
     Path | None,
     typer.Option(
@@ -161,11 +164,13 @@ def _print_growing_motions(result: Spectrum) -> None:
 
     for value in result.negative:
         print(f"negative eigenvalue {value:.10g}: D grows as exp({growth_rate(value):.6g} t), without oscillation")
-    for pair in result.pairs:
+    for pair in result.pairs[:MOST_PAIRS]:
         print(
             f"complex pair {pair.eigenvalue.real:.10g} +- {pair.eigenvalue.imag:.10g} i: "
             f"D grows as exp({pair.growth_rate:.6g} t), |y^H x| = {pair.overlap:.2g}"
         )
+    if len(result.pairs) > MOST_PAIRS:
+        print(f"and {len(result.pairs) - MOST_PAIRS} more: --json has all {len(result.pairs)}")
     if len(result.negative):
         print(f"unstable, like a column that buckles: {len(result.negative)} negative eigenvalues")
     if result.pairs:
