@@ -1,6 +1,7 @@
 """Run a LAMMPS deck and take its last state as it stands."""
 
 import os
+import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -38,10 +39,23 @@ def run_deck(path: Path, *, slides: bool = False) -> Snapshot:
             raise SnapshotError(f"{path}: {explain_error(error)}") from error
         finally:
             os.chdir(here)
-        found = from_lammps(lmp, slides=slides)
+        lmp.command("log none")
+        commands = world.bcast(_commands_run(log, path.parent) if world.rank == 0 else None, root=0)
+        found = from_lammps(lmp, commands, slides=slides)
         lmp.close()
         world.barrier()
     return found
+
+
+def _commands_run(log: Path, folder: Path) -> list[str]:
+    """The commands with variables filled in, from the log and from those to which the deck turns by `log`."""
+    text, read = "", set()
+    while log not in read and log.is_file():
+        read.add(log)
+        text += log.read_text(errors="replace")
+        last = text.rstrip().rpartition("\n")[2].split()
+        log = folder / last[1] if last[:1] == ["log"] and len(last) > 1 else log
+    return [line for line in re.sub(r"&[ \t]*\n", " ", text).splitlines() if "$" not in line]
 
 
 BRANCHES = ("if", "include", "jump", "next", "python", "shell")
@@ -53,20 +67,35 @@ def _check_deck(path: Path) -> None:
 
     What is seen here is looked at again after the run, when all lines have numbers.
     """
-    lines = path.read_text(errors="replace").replace("&\n", " ").splitlines()
+    lines = re.sub(r"&[ \t]*\n", " ", path.read_text(errors="replace")).splitlines()
     words = [line.split("#")[0].split() for line in lines]
-    gone = {line[1] for line in words if line[:1] == ["unfix"] and len(line) > 1}
     for line in words:
-        if line[:1] == ["fix"] and line[3:4] == ["wall/gran"] and "contacts" not in line and line[1] not in gone:
+        if line[:2] in (["echo", "none"], ["echo", "screen"], ["log", "none"]):
             raise BadInputError(
-                f"{path}: fix {line[1]} wall/gran does not hand out its contacts: write contacts at its end."
+                f"{path}: {' '.join(line[:2])} keeps commands out of the log, from which they are read: leave it out."
             )
-    if any(line[0] in BRANCHES for line in words if line):
+    gone = {line[1] for line in words if line[:1] == ["unfix"] and len(line) > 1}
+    if any("$" in name for name in gone):
         return
-    commands = read_commands(["pair_style none", *lines], log=True)
+    fixes = {line[1]: line for line in words if line[:1] == ["fix"] and len(line) > 3 and line[1] not in gone}
+    for name, line in fixes.items():
+        if line[3] == "wall/gran" and "contacts" not in line:
+            raise BadInputError(
+                f"{path}: fix {name} wall/gran does not hand out its contacts: write contacts at its end."
+            )
+    first = {line[0] for line in words if line}
+    if first.intersection(BRANCHES):
+        return
+    if "quit" in first:
+        raise BadInputError(f"{path}: quit ends this program, too, before the packing is taken: leave it out.")
+    if "pair_style" not in first:
+        raise BadInputError(f"{path} has no pair_style: write it, behind read_restart, too.")
     varies = any("$" in word for line in words if line[:1] == ["pair_style"] for word in line)
+    # but of walls, the words behind a style, which may be variables, do not matter
+    plain = [" ".join(line[:4] if line[:1] == ["fix"] and line[3:4] != ["wall/gran"] else line) for line in words]
     try:
-        if commands.style != "none" and not varies:
+        commands = read_commands([*plain, *["pair_style none"] * varies], log=True)
+        if not varies:
             check_pair(commands, [])
         check_fixes({name: line.split()[3] for name, line in commands.fixes.items()}, commands)
     except SnapshotError as error:

@@ -208,6 +208,17 @@ def test_commands_that_are_not_those_of_the_instance():
     lmp.close()
 
 
+def test_commands_of_a_log_that_a_deck_has_begun(tmp_path):
+    """A log of the command `log` does not begin with the version of LAMMPS."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp, told = two(HERTZ, "* *", MOVES.strip())
+    lmp.command(f'log "{tmp_path}/own.log"')
+    command(lmp, "\n".join(told))
+    assert len(from_lammps(lmp, balance=np.inf).contacts) == 1
+    lmp.close()
+
+
 @pytest.mark.parametrize("law", ["mindlin", "gran/hertz/history"])
 def test_spheres_that_barely_touch(law):
     """An overlap of 1e-12 has lost twelve digits, from which no law can be measured."""
