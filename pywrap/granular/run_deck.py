@@ -58,8 +58,8 @@ def _commands_run(log: Path, folder: Path) -> list[str]:
     return [line for line in re.sub(r"&[ \t]*\n", " ", text).splitlines() if "$" not in line]
 
 
-BRANCHES = ("if", "include", "jump", "next", "python", "shell")
-"""Commands after which the lines of a deck are not those that LAMMPS runs."""
+BRANCHES = ("if", "include", "jump", "next", "python")
+"""Commands with which LAMMPS runs other lines than those of a deck, one after the other."""
 
 
 def _check_deck(path: Path) -> None:
@@ -69,7 +69,8 @@ def _check_deck(path: Path) -> None:
     """
     lines = re.sub(r"&[ \t]*\n", " ", path.read_text(errors="replace")).splitlines()
     words = [line.split("#")[0].split() for line in lines]
-    for line in words:
+    at = next((k for k, line in enumerate(words) if line[:1] == ["pair_style"]), 0)
+    for line in {line[0]: line for line in words[:at] if line[:1] in (["echo"], ["log"])}.values():
         if line[:2] in (["echo", "none"], ["echo", "screen"], ["log", "none"]):
             raise BadInputError(
                 f"{path}: {' '.join(line[:2])} keeps commands out of the log, from which they are read: leave it out."
@@ -83,14 +84,21 @@ def _check_deck(path: Path) -> None:
             raise BadInputError(
                 f"{path}: fix {name} wall/gran does not hand out its contacts: write contacts at its end."
             )
-    first = {line[0] for line in words if line}
-    if first.intersection(BRANCHES):
+    # lines before the first jump are run; what is named behind it, or after `if`, may be different in the end
+    leaves = (re.search(r"\b(clear|include|jump|next|python|quit)\b", line) for line in lines)
+    jumps = [k for k, found in enumerate(leaves) if found and words[k] and words[k][0] in BRANCHES]
+    at = jumps[0] if jumps else len(lines)
+    rest = " ".join([*lines[at:], *(line for line in lines[:at] if line.split()[:1] == ["if"])])
+    if re.search(r"\b(clear|include|python)\b|\bunfix\s+\S*\$", rest):
         return
+    names = set(re.findall(r"[^\s\"']+", rest))
+    words = [line for line in words[:at] if line[:1] != ["fix"] or names.isdisjoint(line[1:2])]
+    first = {line[0] for line in words if line}
     if "quit" in first:
         raise BadInputError(f"{path}: quit ends this program, too, before the packing is taken: leave it out.")
-    if "pair_style" not in first:
+    if "pair_style" not in first and "pair_style" not in rest:
         raise BadInputError(f"{path} has no pair_style: write it, behind read_restart, too.")
-    varies = any("$" in word for line in words if line[:1] == ["pair_style"] for word in line)
+    varies = "pair_" in rest or any("$" in word for line in words if line[:1] == ["pair_style"] for word in line)
     # but of walls, the words behind a style, which may be variables, do not matter
     plain = [" ".join(line[:4] if line[:1] == ["fix"] and line[3:4] != ["wall/gran"] else line) for line in words]
     try:

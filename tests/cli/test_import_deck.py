@@ -135,12 +135,38 @@ def test_fixes_with_variables_are_refused_before_the_run(faultgouge_here, tmp_pa
         assert re.search(f"long.in: {says}", faultgouge_here("import", "long.in", code=2).stderr)
 
 
+LOOP = """fix start all deform 1 x erate 0.0
+label again
+variable i loop 3
+run 1000
+if "$i == 2" then "unfix start"
+next i
+jump SELF again
+run 6000"""
+
+
+def test_deck_with_a_loop(faultgouge_here, tmp_path):
+    """What stands before the loop, and is not named in it, is refused before the run."""
+    deck = DECK.format(**FLAT, word="contacts")
+    fine = deck.replace("run 6000", LOOP).replace("boundary f f", "boundary p f")
+    (tmp_path / "fine.in").write_text(fine)
+    assert "3 disks, " in faultgouge_here("import", "fine.in", "-o", "fine.h5").stdout
+    (tmp_path / "long.in").write_text(fine.replace("unfix start", "unfix other").replace("loop 3", "loop 1000000000"))
+    assert "long.in: fix start deform moves the box" in faultgouge_here("import", "long.in", code=2).stderr
+    hertz = "gran/hertz/history ${kn} NULL 10 NULL 0.9 1"
+    either = deck.replace(
+        f"pair_style {hertz}", f"pair_style gran/hooke 1 NULL 1 NULL 1 1\nif '1 > 0' then 'pair_style {hertz}'"
+    )
+    (tmp_path / "either.in").write_text(either)
+    assert "3 disks, " in faultgouge_here("import", "either.in", "-o", "either.h5").stdout
+
+
 def test_deck_with_logs_of_its_own(faultgouge_here, tmp_path):
     """Commands are in three logs, one after the other."""
     deck = DECK.format(**FLAT, word="contacts").replace(
         "pair_style", "variable name string my\nlog ${name}_1.log\npair_style"
     )
-    (tmp_path / "own.in").write_text(deck.replace("fix move", "log second.log\nfix move"))
+    (tmp_path / "own.in").write_text(deck.replace("fix move", "log second.log\nfix move") + "log none\n")
     assert "3 disks, " in faultgouge_here("import", "own.in", "-o", "own.h5").stdout
     assert "fix move" in (tmp_path / "second.log").read_text()
 
