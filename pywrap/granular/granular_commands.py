@@ -139,6 +139,11 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
         "nph": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
         "npt": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
         "setforce": "holds some coordinates: use fix freeze, or leave the particles out of fix nve/sphere",
+        "lineforce": "holds some coordinates: leave it out",
+        "planeforce": "holds some coordinates: leave it out",
+        "aveforce": "shares forces among particles: leave it out",
+        "spring": "pulls at particles as contacts do not tell: leave it out",
+        "indent": "pushes particles as contacts do not tell: leave it out",
         "wall/gran/region": "has curved walls: use planes of fix wall/gran",
     }
     for name, style in styles.items():

@@ -40,6 +40,7 @@ def run_deck(path: Path, *, slides: bool = False) -> Snapshot:
         finally:
             os.chdir(here)
         lmp.command("log none")
+        lmp.command("timer timeout unlimited")  # else `run 0` is skipped where fix halt has ended the deck
         commands = world.bcast(_commands_run(log, path.parent) if world.rank == 0 else None, root=0)
         found = from_lammps(lmp, commands, slides=slides)
         lmp.close()
@@ -99,8 +100,7 @@ def _check_deck(path: Path) -> None:
     if "pair_style" not in first and "pair_style" not in rest:
         raise BadInputError(f"{path} has no pair_style: write it, behind read_restart, too.")
     varies = "pair_" in rest or any("$" in word for line in words if line[:1] == ["pair_style"] for word in line)
-    # but of walls, the words behind a style, which may be variables, do not matter
-    plain = [" ".join(line[:4] if line[:1] == ["fix"] and line[3:4] != ["wall/gran"] else line) for line in words]
+    plain = [_without_variables(line) for line in words]
     try:
         commands = read_commands([*plain, *["pair_style none"] * varies], log=True)
         if not varies:
@@ -108,3 +108,10 @@ def _check_deck(path: Path) -> None:
         check_fixes({name: line.split()[3] for name, line in commands.fixes.items()}, commands)
     except SnapshotError as error:
         raise BadInputError(f"{path}: {error}") from error
+
+
+def _without_variables(line: list[str]) -> str:
+    """A line as far as variables do not matter: a fix up to its style, and a wall with what moves or bends it."""
+    if line[:1] != ["fix"] or line[4:5] == ["granular"]:
+        return " ".join(line)
+    return " ".join([*line[:4], *(word.replace("$", "") for word in line[4:])])

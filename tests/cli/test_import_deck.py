@@ -128,6 +128,10 @@ def test_fixes_with_variables_are_refused_before_the_run(faultgouge_here, tmp_pa
             "fix drum all wall/gran/region hertz/history ${kn} NULL 10 NULL 0.9 1 region r",
             "fix drum .* has curved walls",
         ),
+        (
+            "fix top all wall/gran hertz/history ${kn} 1 1 1 1 1 zplane NULL 4 shear x ${kn} contacts",
+            "The wall .* moves",
+        ),
         ("fix push all nph/sphere iso 0.0 ${kn} 10.0", "fix push nph/sphere moves the box"),
         ("fix push all press/berendsen iso 0.0 ${kn} 10.0", "fix push press/berendsen moves the box"),
     ):
@@ -159,6 +163,13 @@ def test_deck_with_a_loop(faultgouge_here, tmp_path):
     )
     (tmp_path / "either.in").write_text(either)
     assert "3 disks, " in faultgouge_here("import", "either.in", "-o", "either.h5").stdout
+
+
+def test_deck_that_fix_halt_ends(faultgouge_here, tmp_path):
+    """The kinetic energy falls to 1e-20 long before the last step."""
+    halt = "variable slow equal ke\nfix stop all halt 100 v_slow < 1e-20 message no\nrun 100000000"
+    (tmp_path / "halt.in").write_text(DECK.format(**FLAT, word="contacts").replace("run 6000", f"run 3000\n{halt}"))
+    assert "3 disks, " in faultgouge_here("import", "halt.in", "-o", "halt.h5").stdout
 
 
 def test_deck_with_logs_of_its_own(faultgouge_here, tmp_path):
