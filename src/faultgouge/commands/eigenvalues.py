@@ -40,6 +40,9 @@ app = typer.Typer()
 MOST_PAIRS = 20
 """Lines of complex pairs: a packing of a thousand has hundreds."""
 
+LARGE = 6000
+"""Coordinates from which a spectrum takes minutes, and a gigabyte or more."""
+
 Slices = Annotated[
     Path | None,
     typer.Option(
@@ -65,6 +68,10 @@ def spectrum(
     from faultgouge.analysis.spectrum.spectrum import in_balance
 
     packing = stored_snapshot(file) or stored_packing(file, frame)
+    size = packing.coordinates
+    if size > LARGE:
+        # four matrices of doubles; 18000 coordinates took 10.2 GB
+        say(f"{size} coordinates: their spectrum needs {32e-9 * size**2:.2g} GB, and a time that grows as their cube")
     if values:
         _values(packing, as_json)
         return
