@@ -90,7 +90,7 @@ FILMS = {each.suffixes[0]: each for each in FORMATS if each.film}
 def list_formats() -> str:
     """All formats that are read, in words."""
     listed = [f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS if each.reader]
-    return ", ".join([*listed, "each text also as .gz", "run.h5", f"and {OTHER.words}"])
+    return ", ".join([*listed, "each text also as .gz", "run.h5", "LAMMPS decks (.in, in.NAME)", f"and {OTHER.words}"])
 
 
 def is_hdf5(path: Path) -> bool:

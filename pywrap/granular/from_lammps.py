@@ -113,7 +113,8 @@ def take_snapshot(
     if snapshot.residual > balance * force:
         raise SnapshotError(
             f"The packing moves: its residual is {snapshot.residual / force:.3g} of the mean contact force, and "
-            f"{balance:g} is allowed; run on with drag (fix viscous) until it rests, or allow more by balance."
+            f"{balance:g} is allowed; run on with drag (fix viscous, and fix viscous/sphere for rotation) until it "
+            "rests, or allow more by from_lammps(lmp, balance=...)."
         )
     if slides:
         return derive_frozen(snapshot, contacts=derive_frozen(contacts, sliding=contacts.at_bound))

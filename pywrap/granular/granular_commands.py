@@ -20,7 +20,10 @@ WALLS = ("wall/gran", "wall/mindlin/smooth")
 INTEGRATORS = ("nve/sphere", "nve/disc", "overdamped/disc")
 """Fixes that move particles and turn them."""
 
-GIVE_LINES = "give the lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the deck as commands=[...]"
+GIVE_LINES = (
+    "give the lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the deck as "
+    "from_lammps(lmp, commands=[...])"
+)
 
 COHESIVE = ("jkr", "dmt", "mdr")
 UNSUPPORTED_SUBMODELS = {"twisting": "twisting friction", "rolling": "rolling friction", "heat": "heat conduction"}
@@ -132,7 +135,15 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
         "poems": "holds particles together in bodies, whose modes are not those of particles: leave it out",
         "move": "moves particles: unfix it, and let the packing come to rest",
         "deform": "moves the box: unfix it, and let the packing come to rest",
+        "press/berendsen": "moves the box: unfix it, and let the packing come to rest",
+        "nph": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
+        "npt": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
         "setforce": "holds some coordinates: use fix freeze, or leave the particles out of fix nve/sphere",
+        "lineforce": "holds some coordinates: leave it out",
+        "planeforce": "holds some coordinates: leave it out",
+        "aveforce": "shares forces among particles: leave it out",
+        "spring": "pulls at particles as contacts do not tell: leave it out",
+        "indent": "pushes particles as contacts do not tell: leave it out",
         "wall/gran/region": "has curved walls: use planes of fix wall/gran",
     }
     for name, style in styles.items():
@@ -142,7 +153,7 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
                 raise SnapshotError(f"fix {name} {style} {says}.")
         if plain.startswith("wall/") and plain not in WALLS:
             raise SnapshotError(f"fix {name} {style} is no wall of contacts: use planes of fix wall/gran.")
-        if plain.startswith(("nve", "nvt", "npt", "nph")) and plain not in INTEGRATORS:
+        if plain.startswith(("nve", "nvt")) and plain not in INTEGRATORS:
             raise SnapshotError(f"fix {name} {style} does not turn particles by their contacts: use fix nve/sphere.")
         if plain not in (*WALLS, *INTEGRATORS, "freeze"):
             continue

@@ -3,6 +3,7 @@
 import ctypes
 import os
 import re
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -48,9 +49,9 @@ def explain_error(error: Exception) -> str:
 
 def log_path(lmp: Any) -> Path | None:
     """An instance's log, which is closed by the question; None without a log."""
-    before = _open_logs()
+    before = _open_files()  # a log of the command `log` does not begin as others do
     lmp.command("log none")
-    closed = [path for descriptor, path in before.items() if descriptor not in _open_logs()]
+    closed = [path for descriptor, path in before.items() if descriptor not in _open_files()]
     return Path(closed[0]) if len(closed) == 1 else None
 
 
@@ -68,14 +69,24 @@ def only_log() -> list[str] | None:
 
 def _open_logs() -> dict[str, str]:
     """Open files that begin as a log of LAMMPS does, by their descriptors."""
+    return {name: path for name, path in _open_files().items() if _begins_as_log(path)}
+
+
+def _begins_as_log(path: str) -> bool:
+    try:
+        with open(path, "rb") as stream:
+            return stream.read(8) == b"LAMMPS ("
+    except OSError:
+        return False
+
+
+def _open_files() -> dict[str, str]:
+    """Open files by their descriptors."""
     ctypes.CDLL(None).fflush(None)
     found, listed = {}, Path("/proc/self/fd")
     for each in listed.iterdir() if listed.is_dir() else ():
-        try:
+        with suppress(OSError):
             path = os.readlink(each)
-            with open(path, "rb") as stream:
-                if path.startswith("/") and os.path.isfile(path) and stream.read(8) == b"LAMMPS (":
-                    found[each.name] = path
-        except OSError:
-            continue
+            if path.startswith("/") and os.path.isfile(path):
+                found[each.name] = path
     return found

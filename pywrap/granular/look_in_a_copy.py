@@ -75,6 +75,7 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
 def quieten(lmp: Any, *, drag: bool = False) -> None:
     """Close dumps, averages and restarts of a copy; drag too, if asked."""
     lmp.command("restart 0")
+    lmp.command("timer timeout unlimited")  # fix halt, too, has runs skipped
     for name in lmp.available_ids("dump"):
         lmp.command(f"undump {name}")
     for name, style in styles_of(lmp).fixes.items():

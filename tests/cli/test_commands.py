@@ -157,6 +157,17 @@ def test_spectrum_of_a_run_file_is_that_of_the_packing_and_says_how_far_it_moves
 
 
 @pytest.mark.slow
+def test_spectrum_of_a_large_packing(faultgouge_here, beyond, monkeypatch):
+    pairs = json.loads(faultgouge_here("spectrum", beyond / "ramp.h5", "--json").stdout)["pair_count"]
+    monkeypatch.setattr("faultgouge.commands.eigenvalues.MOST_PAIRS", pairs - 1)
+    monkeypatch.setattr("faultgouge.commands.eigenvalues.LARGE", 0)
+    done = faultgouge_here("spectrum", beyond / "ramp.h5")
+    assert "coordinates: their spectrum needs" in done.stderr
+    said = done.stdout
+    assert said.count("D grows as") == pairs - 1
+    assert f"and 1 more: --json has all {pairs}" in said
+
+
 def test_spectrum_says_that_contacts_at_the_bound_stick(faultgouge_here, tmp_path):
     """With the standard law, whose contacts slide on or stick there; the smoothed law has one derivative."""
     scene = SMALL | {"law": {"kn": 2e5, "mu": 0.4}, "ramp": {"step": 5e-2, "until": 0.6}}

@@ -109,9 +109,99 @@ def test_refused_before_the_run(faultgouge_here, tmp_path):
     (tmp_path / "glue.in").write_text(glue.replace("run 6000", "run 1000000000"))
     assert "jkr is cohesive" in faultgouge_here("import", "glue.in", code=2).stderr
     assert "leave all options" in faultgouge_here("import", "pile.in", "--kn", "3", code=2).stderr
-    (tmp_path / "in.wrong").write_text("units nothing\n")
+    (tmp_path / "in.wrong").write_text("units nothing\npair_style granular\n")
     assert "LAMMPS stopped: " in faultgouge_here("import", "in.wrong", code=1).stderr
     assert not (tmp_path / "packing.h5").exists()
+
+
+def test_what_variables_hide_is_not_refused(faultgouge_here, tmp_path):
+    """The fix of a variable's name is gone in the end, which no line of the deck says as it stands."""
+    deck = DECK.format(**FLAT, word="contacts").replace(
+        "fix move",
+        "fix start all nve/limit 0.01\nvariable name string start\nrun 10\nunfix ${name}\nfix move",
+    )
+    (tmp_path / "start.in").write_text(deck)
+    assert "3 disks, " in faultgouge_here("import", "start.in", "-o", "start.h5").stdout
+
+
+def test_fixes_with_variables_are_refused_before_the_run(faultgouge_here, tmp_path):
+    deck = DECK.format(**ROUND, word="contacts").replace("run 6000", "run 1000000000")
+    for lines, says in (
+        (
+            "fix drum all wall/gran/region hertz/history ${kn} NULL 10 NULL 0.9 1 region r",
+            "fix drum .* has curved walls",
+        ),
+        (
+            "fix top all wall/gran hertz/history ${kn} 1 1 1 1 1 zplane NULL 4 shear x ${kn} contacts",
+            "The wall .* moves",
+        ),
+        ("fix push all nph/sphere iso 0.0 ${kn} 10.0", "fix push nph/sphere moves the box"),
+        ("fix push all press/berendsen iso 0.0 ${kn} 10.0", "fix push press/berendsen moves the box"),
+    ):
+        (tmp_path / "long.in").write_text(deck.replace("timestep", f"{lines}\ntimestep"))
+        assert re.search(f"long.in: {says}", faultgouge_here("import", "long.in", code=2).stderr)
+
+
+LOOP = """fix start all deform 1 x erate 0.0
+label again
+variable i loop 3
+run 1000
+if "$i == 2" then "unfix start"
+next i
+jump SELF again
+run 6000"""
+
+
+def test_deck_with_a_loop(faultgouge_here, tmp_path):
+    """What stands before the loop, and is not named in it, is refused before the run."""
+    deck = DECK.format(**FLAT, word="contacts")
+    fine = deck.replace("run 6000", LOOP).replace("boundary f f", "boundary p f")
+    (tmp_path / "fine.in").write_text(fine)
+    assert "3 disks, " in faultgouge_here("import", "fine.in", "-o", "fine.h5").stdout
+    (tmp_path / "long.in").write_text(fine.replace("unfix start", "unfix other").replace("loop 3", "loop 1000000000"))
+    assert "long.in: fix start deform moves the box" in faultgouge_here("import", "long.in", code=2).stderr
+    hertz = "gran/hertz/history ${kn} NULL 10 NULL 0.9 1"
+    either = deck.replace(
+        f"pair_style {hertz}", f"pair_style gran/hooke 1 NULL 1 NULL 1 1\nif '1 > 0' then 'pair_style {hertz}'"
+    )
+    (tmp_path / "either.in").write_text(either)
+    assert "3 disks, " in faultgouge_here("import", "either.in", "-o", "either.h5").stdout
+
+
+def test_deck_that_fix_halt_ends(faultgouge_here, tmp_path):
+    """The kinetic energy falls to 1e-20 long before the last step."""
+    halt = "variable slow equal ke\nfix stop all halt 100 v_slow < 1e-20 message no\nrun 100000000"
+    (tmp_path / "halt.in").write_text(DECK.format(**FLAT, word="contacts").replace("run 6000", f"run 3000\n{halt}"))
+    assert "3 disks, " in faultgouge_here("import", "halt.in", "-o", "halt.h5").stdout
+
+
+def test_deck_with_logs_of_its_own(faultgouge_here, tmp_path):
+    """Commands are in three logs, one after the other."""
+    deck = DECK.format(**FLAT, word="contacts").replace(
+        "pair_style", "variable name string my\nlog ${name}_1.log\npair_style"
+    )
+    (tmp_path / "own.in").write_text(deck.replace("fix move", "log second.log\nfix move") + "log none\n")
+    assert "3 disks, " in faultgouge_here("import", "own.in", "-o", "own.h5").stdout
+    assert "fix move" in (tmp_path / "second.log").read_text()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "says"),
+    [
+        ("run 6000", "run 1000000000\nquit", "quit ends this program, too"),
+        ("units lj", "echo screen\nunits lj", "echo screen keeps commands out of the log"),
+        ("units lj", "log none\nunits lj", "log none keeps commands out of the log"),
+        ("pair_style", "#", "has no pair_style: write it, behind read_restart, too"),
+    ],
+)
+def test_decks_that_leave_no_commands(faultgouge_here, tmp_path, before, after, says):
+    (tmp_path / "mute.in").write_text(DECK.format(**FLAT, word="contacts").replace(before, after))
+    assert says in faultgouge_here("import", "mute.in", code=2).stderr
+
+
+def test_deck_of_another_name(faultgouge_here, tmp_path):
+    (tmp_path / "pile.lammps").write_text(DECK.format(**FLAT, word="contacts"))
+    assert "LAMMPS decks (.in, in.NAME)" in faultgouge_here("import", "pile.lammps", code=2).stderr
 
 
 def test_contacts_at_the_bound_stick_or_slide(faultgouge_here, tmp_path):

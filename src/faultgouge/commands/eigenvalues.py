@@ -37,6 +37,12 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
+MOST_PAIRS = 20
+"""Lines of complex pairs: a packing of a thousand has hundreds."""
+
+LARGE = 6000
+"""Coordinates from which a spectrum takes minutes, and a gigabyte or more."""
+
 Slices = Annotated[
     Path | None,
     typer.Option(
@@ -62,6 +68,10 @@ def spectrum(
     from faultgouge.analysis.spectrum.spectrum import in_balance
 
     packing = stored_snapshot(file) or stored_packing(file, frame)
+    size = packing.coordinates
+    if size > LARGE:
+        # four matrices of doubles; 18000 coordinates took 10.2 GB
+        say(f"{size} coordinates: their spectrum needs {32e-9 * size**2:.2g} GB, and a time that grows as their cube")
     if values:
         _values(packing, as_json)
         return
@@ -161,11 +171,13 @@ def _print_growing_motions(result: Spectrum) -> None:
 
     for value in result.negative:
         print(f"negative eigenvalue {value:.10g}: D grows as exp({growth_rate(value):.6g} t), without oscillation")
-    for pair in result.pairs:
+    for pair in result.pairs[:MOST_PAIRS]:
         print(
             f"complex pair {pair.eigenvalue.real:.10g} +- {pair.eigenvalue.imag:.10g} i: "
             f"D grows as exp({pair.growth_rate:.6g} t), |y^H x| = {pair.overlap:.2g}"
         )
+    if len(result.pairs) > MOST_PAIRS:
+        print(f"and {len(result.pairs) - MOST_PAIRS} more: --json has all {len(result.pairs)}")
     if len(result.negative):
         print(f"unstable, like a column that buckles: {len(result.negative)} negative eigenvalues")
     if result.pairs:

@@ -174,6 +174,8 @@ HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
         (HERTZ, "* *", "fix r all rigid/small molecule", "bodies"),
         (HERTZ, "* *", "fix n all nve", "use fix nve/sphere"),
         (HERTZ, "* *", "fix s all setforce 0 NULL NULL" + MOVES, "fix freeze"),
+        (HERTZ, "* *", "fix s all spring/self 1.0" + MOVES, "pulls at particles"),
+        (HERTZ, "* *", "fix s all aveforce NULL NULL NULL" + MOVES, "shares forces"),
         (HERTZ, "* *", "", "Nothing moves"),
         (HERTZ, "* *", MOVES, "The packing moves"),
     ],
@@ -210,6 +212,27 @@ def test_commands_that_are_not_those_of_the_instance():
         from_lammps(lmp, ["pair_style gran/hertz/history ${kn} 1 1 1 1 1"])
     with pytest.raises(SnapshotError, match="no pair_style"):
         from_lammps(lmp, told[2:])
+    lmp.close()
+
+
+def test_a_run_that_fix_halt_has_ended():
+    """Its runs are skipped from then on, but for those of a look."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp, told = two(HERTZ, "* *", MOVES.strip())
+    command(lmp, "variable one equal 1\nfix stop all halt 1 v_one > 0 message no\nrun 10")
+    assert len(from_lammps(lmp, told, balance=np.inf).contacts) == 1
+    lmp.close()
+
+
+def test_commands_of_a_log_that_a_deck_has_begun(tmp_path):
+    """A log of the command `log` does not begin with the version of LAMMPS."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp, told = two(HERTZ, "* *", MOVES.strip())
+    lmp.command(f'log "{tmp_path}/own.log"')
+    command(lmp, "\n".join(told))
+    assert len(from_lammps(lmp, balance=np.inf).contacts) == 1
     lmp.close()
 
 
