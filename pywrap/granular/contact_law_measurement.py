@@ -26,7 +26,8 @@ from mpi4py import MPI
 
 from ...analysis.packing.arrays import Floats
 from ..lammps.instance import start_lammps
-from .granular_commands import Commands, SnapshotError
+from .granular_commands import GIVE_LINES, Commands, SnapshotError
+from .instance_queries import explain_error
 
 EXACT = 1e-6
 """Distance of a measured exponent from a multiple of 1/4: rounding of forces and overlaps leaves 1e-9 or less."""
@@ -181,7 +182,12 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
         state._replace(masses=(3 * state.masses[0], 2 * state.masses[1])),
         state._replace(radii=(0.5 * state.radii[0], 0.8 * state.radii[1])),
     )
-    bench = TwoParticleLammps(lmp, commands, name, max(state.radii))
+    try:
+        bench = TwoParticleLammps(lmp, commands, name, max(state.radii))
+    except Exception as error:  # whatever LAMMPS says of the commands
+        raise SnapshotError(
+            f"The commands of the {who} do not stand alone ({explain_error(error)}): {GIVE_LINES}."
+        ) from error
     with closing(bench.lammps):
         states, found = zip(*(_measure(bench, each) for each in wanted), strict=True)
     first, here = states[0], found[0]
@@ -233,16 +239,17 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
     bench.run(f"timestep {step:.17g}")
     normal_dashpot = _dashpot(bench, "closing", fn, 0.1 * delta / step)
     bench.place_at(wanted)
-    bench.move(slipping=1e3 * delta / step)  # far beyond Coulomb's bound
+    bench.move(slipping=1e12 * delta / step)  # far beyond Coulomb's bound, of soft springs too
     bench.run("run 1 post no")
     mu = bench.force()[1] / fn  # while the contact slides: a dashpot has its share of it
     if mu == 0:
         none = dict.fromkeys(("tangential", "tangential_dashpot", "closing", "parting", "mu", "lever"), 0.0)
         return state, {"stiffness": fn / delta, "normal_dashpot": normal_dashpot} | none
-    slip = 0.01 * min(mu, 1.0) * delta
+    # far below the bound: LAMMPS's classic models forget most of a slip that was cut there
+    slip = 1e-8 * min(mu, 1.0) * delta
     ft = _push_contact(bench, wanted, slip / step)
-    if ft > 0.1 * mu * fn:  # a stiff spring: once more, with less
-        slip *= 0.1 * mu * fn / ft / 10
+    while ft > 0.1 * mu * fn:  # a stiff spring: once more, with less
+        slip *= 0.01 * mu * fn / ft
         ft = _push_contact(bench, wanted, slip / step)
     if ft == 0:
         raise SnapshotError("A contact law has friction without a tangential stiffness: use one with a history.")
@@ -260,7 +267,7 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
         overlaps.append(overlaps[-1] + bench.sign * (x - bench.array("x")[0, bench.axis]))
     parting, closing = np.log(np.array(forces[1:]) / forces[:-1]) / np.log(np.array(overlaps[1:]) / overlaps[:-1])
     bench.place_at(wanted)
-    tangential_dashpot = _dashpot(bench, "slipping", mu * fn, slip / step)
+    tangential_dashpot = _dashpot(bench, "slipping", mu * fn, 0.01 * min(mu, 1.0) * delta / step)
     return state, {
         "stiffness": fn / delta, "tangential": ft / slip, "normal_dashpot": normal_dashpot,
         "tangential_dashpot": tangential_dashpot, "closing": closing, "parting": parting, "mu": mu, "lever": lever,

@@ -111,10 +111,16 @@ def take_snapshot(
     contacts = snapshot.contacts
     force = contacts.normal_force.mean() if len(contacts) else 0.0
     if snapshot.residual > balance * force:
+        pairs = np.sort(np.column_stack([contacts.i, contacts.j])[~contacts.wall], axis=1)
+        advice = (
+            "run on with drag (fix viscous, and fix viscous/sphere for rotation) until it rests, or allow more by "
+            "from_lammps(lmp, balance=...)"
+        )
+        if len(np.unique(pairs, axis=0)) < len(pairs):
+            advice = "particles touch each other twice, of which LAMMPS mixes the histories: take a box that is wider"
         raise SnapshotError(
             f"The packing moves: its residual is {snapshot.residual / force:.3g} of the mean contact force, and "
-            f"{balance:g} is allowed; run on with drag (fix viscous, and fix viscous/sphere for rotation) until it "
-            "rests, or allow more by from_lammps(lmp, balance=...)."
+            f"{balance:g} is allowed; {advice}."
         )
     if slides:
         return derive_frozen(snapshot, contacts=derive_frozen(contacts, sliding=contacts.at_bound))

@@ -66,12 +66,13 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
     style = ""
     coefficients: list[str] = []
     fixes: dict[str, str] = {}
-    whole = re.sub(r"&[ \t]*\n", " ", "\n".join(lines))
+    whole = re.sub(r"&[ \t]*\n", " ", lines if isinstance(lines, str) else "\n".join(lines))
     for line in whole.splitlines():
-        words = line.split("#")[0].split()
+        text = line.split("#")[0]
+        words = text.split()
         if not words:
             continue
-        if "$" in line and words[0] in ("pair_style", "pair_coeff", "fix"):
+        if "$" in text and words[0] in ("pair_style", "pair_coeff", "fix"):
             if log:
                 continue  # the line that follows has numbers
             raise SnapshotError(f"{line.strip()!r} has a variable: write its number, as a log of LAMMPS has it.")

@@ -212,6 +212,12 @@ def test_commands_that_are_not_those_of_the_instance():
         from_lammps(lmp, ["pair_style gran/hertz/history ${kn} 1 1 1 1 1"])
     with pytest.raises(SnapshotError, match="no pair_style"):
         from_lammps(lmp, told[2:])
+    with pytest.raises(SnapshotError, match=r"do not stand alone \(LAMMPS stopped: .*\): give the lines") as refusal:
+        from_lammps(lmp, [told[0], "pair_coeff A A", *told[2:]])
+    assert "\n" not in str(refusal.value)
+    # a comment is none of the command, and one text is as good as many lines
+    whole = from_lammps(lmp, "\n".join([*told[:-1], f"{told[-1]}  # ${{comment}}"]), balance=np.inf)
+    assert whole == from_lammps(lmp, told, balance=np.inf)
     lmp.close()
 
 
@@ -315,6 +321,49 @@ def test_a_lammps_without_the_plugin(tmp_path):
     words = [sys.executable, "-c", PLAIN]
     done = subprocess.run(words, cwd=tmp_path, env=outside, capture_output=True, text=True, timeout=300)
     assert done.stdout.split() == ["2"], done.stderr
+
+
+@pytest.mark.parametrize("kt", [10.0, 1e9])
+@pytest.mark.parametrize("model", ["mindlin", "mindlin_classic"])
+def test_soft_and_stiff_springs(model, kt):
+    """Coulomb's bound of a spring 1e4 times softer than the normal one, and stiffness of one 1e4 times stiffer."""
+    from faultgouge.pywrap import from_lammps
+
+    law = f"hertz 1e5 0 tangential {model} {kt} 0 0.5"
+    wall = f"fix w all wall/gran granular {law} zplane 0 NULL contacts"
+    lmp, told = two("granular", f"* * {law}", wall + MOVES)
+    c = from_lammps(lmp, told, balance=np.inf).contacts
+    assert len(c) == 2
+    radius = np.where(c.wall, 0.5, 0.25)
+    # roundings of forces
+    assert c.friction == pytest.approx(0.5 * c.normal_force, rel=1e-9)
+    assert c.tangential_stiffness == pytest.approx(kt * np.sqrt(radius * c.overlap), rel=1e-9)
+    lmp.close()
+
+
+def test_two_spheres_that_touch_twice():
+    """LAMMPS has one history for both contacts, so that no run brings such a packing to rest."""
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    lmp = instance()
+    told = [f"pair_style {HERTZ}", "pair_coeff * *", MOVES.strip()]
+    command(lmp, """
+units lj
+atom_style sphere
+boundary p f f
+newton off
+comm_modify vel yes
+region box block 0 1.9 -4 4 -4 4 units box
+create_box 1 box
+create_atoms 1 single 0.5 0 0 units box
+create_atoms 1 single 1.43 0 0 units box
+set group all diameter 1.0
+set group all density 1
+""" + "\n".join([*told, "run 0"]))  # fmt: skip
+    assert len(from_lammps(lmp, told, balance=np.inf).contacts) == 2
+    with pytest.raises(SnapshotError, match=r"touch each other twice.* take a box that is wider"):
+        from_lammps(lmp, told)
+    lmp.close()
 
 
 def test_frozen_particles_and_inertia():
