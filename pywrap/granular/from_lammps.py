@@ -15,12 +15,14 @@ style                                  p      q      beta, closing  beta, partin
 =====================================  =====  =====  =============  =============
 gran/hooke/history; linear_history     1      0      0              0
 gran/hertz/history; mindlin            3/2    1/2    1/2            1/2
+linear_history_classic                 1      1/2    1/2            1/2
 mindlin/force                          3/2    1/2    0              0
 mindlin_rescale                        3/2    1/2    1/2            1
 mindlin_rescale/force                  3/2    1/2    0              1/2
 =====================================  =====  =====  =============  =============
 
-and hooke with a mindlin model, or hertz with linear_history, are as their parts. A small vibration shakes a contact at
+and hooke with a mindlin model, or hertz with linear_history, are as their parts; the wall of fix wall/gran
+hooke/history is as linear_history_classic in the release of 22 Jul 2025. A small vibration shakes a contact at
 Coulomb's bound down to elastic, so that it sticks by default.
 """
 
