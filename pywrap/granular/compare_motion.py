@@ -49,18 +49,19 @@ class MotionComparison:
     Attributes
     ----------
     difference : float
-        |measured - predicted| / |predicted| of the velocities, weighted with the root of the masses.
+        |v - u| / |u| of the velocities v of LAMMPS and u of the linearised packing, with the root of the masses.
     time, timestep : float
         The time, a whole number of steps, and the step.
-    measured, predicted : ndarray, shape (E,)
-        Velocities times the root of the masses, of the coordinates that feel a force.
+    velocity, linear_velocity : ndarray, shape (E,)
+        Velocities of LAMMPS and of the linearised packing, times the root of the masses, of the coordinates that feel
+        a force.
     """
 
     difference: float
     time: float
     timestep: float
-    measured: Floats
-    predicted: Floats
+    velocity: Floats
+    linear_velocity: Floats
 
     def __float__(self) -> float:
         return self.difference
@@ -109,13 +110,13 @@ def compare_motion(
     start = np.zeros(snapshot.coordinates)
     start[active] = amplitude * np.random.Generator(np.random.PCG64(seed)).standard_normal(len(active))
     there, back = (in_a_copy(partial(_run, lmp, snapshot, sign * start, step, steps)) for sign in (1, -1))
-    measured = (0.5 * (there - back) * root)[active]
-    predicted = _velocity(snapshot, stiffness, active, (start * root)[active], step * steps)
-    difference = float(np.linalg.norm(measured - predicted) / np.linalg.norm(predicted))
-    return MotionComparison(difference, step * steps, step, measured, predicted)
+    velocity = (0.5 * (there - back) * root)[active]
+    linear = _linear_velocity(snapshot, stiffness, active, (start * root)[active], step * steps)
+    difference = float(np.linalg.norm(velocity - linear) / np.linalg.norm(linear))
+    return MotionComparison(difference, step * steps, step, velocity, linear)
 
 
-def _velocity(snapshot: Snapshot, stiffness: csr_array, active: Indices, start: Floats, time: float) -> Floats:
+def _linear_velocity(snapshot: Snapshot, stiffness: csr_array, active: Indices, start: Floats, time: float) -> Floats:
     """Velocities after some time; these and `start` are multiplied by the root of the masses."""
     a = stiffness[active][:, active]
     g = mass_weighted(damping_matrix(snapshot), snapshot)[active][:, active]
