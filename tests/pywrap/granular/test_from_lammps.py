@@ -80,8 +80,8 @@ def test_motion_of_lammps(beds, law, damped, d):
     # both signs are not opposite, and terms of second order stay in half of their difference, too
     weights = np.array([1, -12, 32]) / 3 if law in RESCALED else np.array([-1, 8]) / 3
     runs = [[compare_motion(lmp, snapshot, 0.2, large / 2**k, timestep=h) for k in range(len(weights))] for h in steps]
-    predicted = runs[0][0].predicted / large
-    linear = [sum(w * run.measured for w, run in zip(weights, each, strict=True)) / large for each in runs]
+    predicted = runs[0][0].linear_velocity / large
+    linear = [sum(w * run.velocity for w, run in zip(weights, each, strict=True)) / large for each in runs]
     size = np.linalg.norm(predicted)
     error = [np.linalg.norm(each - predicted) / size for each in linear]
     order = 1 if damped else 2
