@@ -29,6 +29,12 @@ HOOKE = 2e-2
 """Stiffness of the linear laws as a share of that of Hertz's: overlaps are alike, some thousandth of a diameter."""
 
 TILTS = (0.0, 0.1, 0.15)
+STEEP = (*TILTS, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6)
+"""Tangents of the slope: of large packings, and of small ones until they do not come to rest any more."""
+
+MOVES = 1e-3
+"""Speed of a particle that moves at the end: a particle that nothing holds rolls a hundred times faster."""
+
 BALANCE = 1e-8
 """Residual over the mean contact force of a packing at rest: far below the couplings that make pairs (1e-3)."""
 
@@ -62,20 +68,21 @@ LAWS = {
 
 
 class Cell(NamedTuple):
-    """Packings of one size and friction: with which laws, in which dimensions, and up to which seed."""
+    """Packings of one size and friction: with which laws, in which dimensions, up to which seed, at which tilts."""
 
     particles: int
     mu: float
     seeds: int
     laws: tuple[str, ...] = tuple(LAWS)
     dimensions: tuple[int, ...] = (2, 3)
+    tilts: tuple[float, ...] = TILTS
 
 
 HERTZ = tuple(f"granular hertz, {model}" for model in MODELS)
 CELLS = (
-    Cell(50, MU, 20),
-    Cell(50, 0.3, 20, HERTZ),
-    Cell(50, 0.9, 20, HERTZ),
+    Cell(50, MU, 20, tilts=STEEP),
+    Cell(50, 0.3, 20, HERTZ, tilts=STEEP),
+    Cell(50, 0.9, 20, HERTZ, tilts=STEEP),
     Cell(200, MU, 20, HERTZ),
     Cell(400, MU, 20, HERTZ),
 )
@@ -135,18 +142,22 @@ def rest(lmp: Any, most: int = 25) -> Snapshot | None:
     return None
 
 
-def rows(law: str, d: int, count: int, mu: float, seed: int) -> Iterator[dict[str, Any]]:
+def rows(
+    law: str, d: int, count: int, mu: float, seed: int, tilts: tuple[float, ...] = TILTS
+) -> Iterator[dict[str, Any]]:
     """One packing at all tilts, settled at none and tilted further and further."""
     looked_at = seed <= 4 and count <= 50
     with TemporaryDirectory() as folder:
         lmp = pour(law, d, count, mu, seed, Path(folder) / "log")
-        for tilt in TILTS:
+        for tilt in tilts:
             begin = time.process_time()
             lmp.command(f"variable slope equal {tilt}")
             row = {"law": law, "d": d, "count": count, "mu": mu, "seed": seed, "tilt": tilt}
             found = rest(lmp)
             if found is None:
-                yield row | {"rests": False, "cpu_seconds": time.process_time() - begin}
+                speed = np.linalg.norm(lmp.numpy.extract_atom("v")[: lmp.extract_setting("nlocal")], axis=1)
+                row |= {"rests": False, "moving": float(np.mean(speed > MOVES))}
+                yield row | {"cpu_seconds": time.process_time() - begin}
                 break
             row |= describe(found) | {"rests": True}
             if looked_at and not row["at_bound"]:
@@ -316,15 +327,15 @@ def compute(table: Path, cells: Iterable[Cell] = CELLS, watch: Any = print) -> N
     """Add the rows that a table lacks, seed by seed: all laws of a seed in all cells before the next."""
     known = {_key(row) for row in read(table)}
     wanted = [
-        (cell.particles > LARGE, seed, law, d, cell.particles, cell.mu)
+        (cell.particles > LARGE, seed, law, d, cell.particles, cell.mu, cell.tilts)
         for cell in cells
         for seed in range(1, cell.seeds + 1)
         for d in cell.dimensions
         for law in cell.laws
     ]
-    for _, seed, law, d, count, mu in sorted(wanted, key=itemgetter(0, 1)):
+    for _, seed, law, d, count, mu, tilts in sorted(wanted, key=itemgetter(0, 1)):
         if (law, d, count, mu, seed) not in known:
-            made = list(rows(law, d, count, mu, seed))
+            made = list(rows(law, d, count, mu, seed, tilts))
             with table.open("a") as file:
                 file.writelines(json.dumps(row) + "\n" for row in made)
             pairs = [row.get("pairs") for row in made]

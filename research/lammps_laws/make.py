@@ -2,6 +2,7 @@
 
 python -m research.lammps_laws.make compute    what the tables lack of all cells, on one core, resumable; hours
 python -m research.lammps_laws.make growth     the packings that are let go without loss; minutes
+python -m research.lammps_laws.make weak       the weak pairs of mindlin/force followed; half an hour
 python -m research.lammps_laws.make page       README.md from the tables
 python -m research.lammps_laws.make check      the first packings of 50 particles of each law once more, compared
 
@@ -23,6 +24,7 @@ from research.lammps_laws.compute import (
     CELLS,
     LAWS,
     MU,
+    STEEP,
     TILTS,
     TO,
     Cell,
@@ -32,10 +34,11 @@ from research.lammps_laws.compute import (
     read,
 )
 from research.lammps_laws.energy_cycle import energy_cycle
+from research.lammps_laws.weak_pairs import SEEDS, compute_weak
 
 HERE = Path(__file__).parent
 TABLES = HERE / "tables"
-PACKINGS, GROWTH = "packings.jsonl", "growth.jsonl"
+PACKINGS, GROWTH, WEAK = "packings.jsonl", "growth.jsonl", "weak_pairs.jsonl"
 
 USUAL = (50, MU)
 """Particles and friction of the packings of which most is known."""
@@ -94,16 +97,22 @@ def numbers(tables: Path = TABLES) -> dict[str, Any]:
                     "restitution": min((each["restitution"] for each in asked), default=None),
                 }
             )
+    steep = to_flow(every)
     return {
         "cells": cells,
         "laws": by_law,
         "others": other_cells(every),
+        "tilts": STEEP,
+        "steep": steep,
+        "shown": max(k + 1 for each in steep for k, count in enumerate(each["packings"]) if count),
         "rare": rare_pairs([row for row in every if row["law"] == STAYS and row["rests"]]),
         "seeds": full_seeds(rows),
         "rows": len(every),
         "restless": sum(not row["rests"] for row in every),
+        "flowing": sum(flows(row) for row in every),
         "negative": sum(row["negative"] > 0 for row in every if row["rests"]),
         "pushed": growth(read(tables / GROWTH)),
+        "weak": weak_pairs(read(tables / WEAK)),
         "cycles": [energy_cycle(law) for law in LAWS],
         "wall": wall_alone(),
     }
@@ -131,7 +140,7 @@ def full_seeds(rows: list[dict[str, Any]]) -> int:
 def other_cells(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The first and the last tilt of the cells of other sizes and other friction, as far as they have been computed."""
     found = []
-    for count, mu, _, laws, dimensions in CELLS:
+    for count, mu, _, laws, dimensions, _ in CELLS:
         for d in dimensions if (count, mu) != USUAL else ():
             for law in laws:
                 for tilt in (TILTS[0], TILTS[-1]):
@@ -139,6 +148,36 @@ def other_cells(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
                     own = [row for row in rows if tuple(row[k] for k in ("count", "mu", "d", "law", "tilt")) == key]
                     if own:
                         found.append({"count": count, "mu": mu, "d": d, "law": law, "tilt": tilt} | cell(own))
+    return found
+
+
+def flows(row: dict[str, Any]) -> bool:
+    """Whether most particles of a packing move at the end."""
+    return bool(row.get("moving", 0.0) > 0.5)
+
+
+def to_flow(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Packings that are tilted until they flow: how many have pairs, and of how many modes, at each tilt."""
+    found = []
+    for cell in (each for each in CELLS if each.tilts == STEEP):
+        for d in cell.dimensions:
+            for law in cell.laws:
+                key = (cell.particles, cell.mu, d, law)
+                own = [row for row in rows if tuple(row[k] for k in ("count", "mu", "d", "law")) == key]
+                at = [[row for row in own if row["tilt"] == tilt and row["rests"]] for tilt in STEEP]
+                flowing = [row["tilt"] for row in own if flows(row)]
+                found.append(
+                    {
+                        "mu": cell.mu,
+                        "d": d,
+                        "law": law,
+                        "packings": [len(each) for each in at],
+                        "with_pairs": [sum(row["pairs"] > 0 for row in each) for each in at],
+                        "share": [float(np.median([row["share"] for row in each])) if each else None for each in at],
+                        "flowing": len(flowing),
+                        "flows": float(np.median(flowing)) if flowing else None,
+                    }
+                )
     return found
 
 
@@ -158,6 +197,16 @@ def growth(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "free": len(free),
         "ratio": _middle(row["rate"] / row["linear"] for row in free),
         "late": _middle(row["late"] / row["predicted"] for row in good),
+    }
+
+
+def weak_pairs(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """How many packings have a weak pair, and the rates of each."""
+    good = [row for row in rows if row["rests"]]
+    return {
+        "seeds": max(row["seed"] for row in rows),
+        "rows": len(good),
+        "pairs": [row for row in good if row["pairs"]],
     }
 
 
@@ -222,7 +271,7 @@ def check(cells: Iterable[Cell] = CELLS) -> list[str]:
         again = Path(folder) / PACKINGS
         known = {_key(row): row for row in read(TABLES / PACKINGS)}
         there = {(count, mu) for _, _, count, mu, _, _ in known if count == USUAL[0]}
-        compute(again, [Cell(*cell[:2], 1, *cell[3:]) for cell in cells if cell[:2] in there])
+        compute(again, [cell._replace(seeds=1) for cell in cells if cell[:2] in there])
         new = [row for row in read(again) if _key(row) in known]
     wrong = [
         f"{row['law']}, d = {row['d']}, N = {row['count']}, mu = {row['mu']}, tilt {row['tilt']}"
@@ -246,6 +295,8 @@ if __name__ == "__main__":
             compute(TABLES / PACKINGS)
         case ["growth"]:
             compute_growth(TABLES / GROWTH)
+        case ["weak"]:
+            compute_weak(TABLES / WEAK, range(1, SEEDS + 1))
         case ["page"]:
             print(write_page())
         case ["check"]:

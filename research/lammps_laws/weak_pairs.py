@@ -30,7 +30,8 @@ from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
 from research.lammps_laws.compute import MU, NONE, STEP, TILTS, describe, pour, read, rest
 
 LAW, D, COUNT, SEEDS = "granular hertz, mindlin/force", 3, 200, 60
-"""Law, dimension, particles, and the last seed; every pair that is found at any tilt is followed."""
+"""Law, dimension, particles, and the last seed, which was set after the first pair had been seen. Every pair that is
+found at any tilt is followed."""
 
 DISPLACEMENT = 3e-9
 """Largest displacement of the mode that is set going: a thousandth of the smallest overlaps, and far above the 1e-10 of
@@ -103,7 +104,7 @@ def _rate(times: Floats, part: NDArray[np.complex128]) -> float:
     return 2 * float(np.polyfit(middle[FIRST:], np.log(size[FIRST:]), 1)[0])
 
 
-def compute(table: Path, seeds: range, watch: Any = print) -> None:
+def compute_weak(table: Path, seeds: range, watch: Any = print) -> None:
     """Add the packings that a table lacks."""
     known = {row["seed"] for row in read(table)}
     for seed in seeds:
