@@ -113,13 +113,12 @@ def take_snapshot(
     contacts = snapshot.contacts
     force = contacts.normal_force.mean() if len(contacts) else 0.0
     if snapshot.residual > balance * force:
-        pairs = np.sort(np.column_stack([contacts.i, contacts.j])[~contacts.wall], axis=1)
         advice = (
             "run on with drag (fix viscous, and fix viscous/sphere for rotation) until it rests, or allow more by "
             "from_lammps(lmp, balance=...)"
         )
-        if len(np.unique(pairs, axis=0)) < len(pairs):
-            advice = "particles touch each other twice, of which LAMMPS mixes the histories: take a box that is wider"
+        if _touch_twice(contacts):
+            advice = TWICE
         raise SnapshotError(
             f"The packing moves: its residual is {snapshot.residual / force:.3g} of the mean contact force, and "
             f"{balance:g} is allowed; {advice}."
@@ -205,6 +204,15 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> S
     return derive_frozen(made, load=load)
 
 
+TWICE = "particles touch each other twice, of which LAMMPS mixes the histories: take a box that is wider"
+
+
+def _touch_twice(contacts: LinearisedContacts) -> bool:
+    """Whether two particles touch each other through two periodic images."""
+    pairs = np.sort(np.column_stack([contacts.i, contacts.j])[~contacts.wall], axis=1)
+    return len(np.unique(pairs, axis=0)) < len(pairs)
+
+
 def _check_torques(others: Floats, contacts: LinearisedContacts) -> None:
     """Refuse torques besides those of the contacts: in all that is taken here contacts alone turn particles."""
     forces = (
@@ -212,11 +220,12 @@ def _check_torques(others: Floats, contacts: LinearisedContacts) -> None:
         ROUNDING * contacts.normal_force.max(initial=0.0),
     )
     if np.abs(others).max() > sum(forces):
-        raise SnapshotError(
-            "The torques on particles are not those of their contacts: either something else turns them, which is not "
-            "linearised here, or this release of LAMMPS hands out contacts in a way that is not known here; releases "
-            "of 29 Aug 2024 to 22 Jul 2025 are."
+        reason = (
+            "either something else turns them, which is not linearised here, or this release of LAMMPS hands out "
+            "contacts in a way that is not known here; releases of 29 Aug 2024 to 22 Jul 2025 are"
         )
+        reason = TWICE if _touch_twice(contacts) else reason
+        raise SnapshotError(f"The torques on particles are not those of their contacts: {reason}.")
 
 
 def _mobility(commands: Commands, found: Arrays) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
