@@ -165,6 +165,41 @@ def test_force_on_a_layer(tmp_path):
 
 
 @pytest.mark.slow
+def test_strain_of_a_periodic_box(tmp_path):
+    """By change_box, which moves the particles along; the shear stress of the contacts rises with the strain."""
+    from faultgouge.pywrap import lammps_path
+
+    lmp, rng = instance(tmp_path / "log.lammps"), np.random.default_rng(3)
+    places = np.array([(k % 6 + k // 6 % 2 / 2, 0.1 + 0.9 * (k // 6)) for k in range(36)]) + rng.uniform(
+        0, 0.1, (36, 2)
+    )
+    for line in [
+        "units lj", "dimension 2", "atom_style sphere", "boundary p p p", "newton off", "comm_modify vel yes",
+        "region box prism 0 6 0 5.5 -0.5 0.5 0 0 0", "create_box 2 box",
+        *(f"create_atoms {1 + k % 2} single {x:.17g} {y:.17g} 0" for k, (x, y) in enumerate(places)),
+        "set type 1 diameter 0.8", "set type 2 diameter 1.0", "set group all density/disc 1.0",
+        f"pair_style gran/{LAW}", "pair_coeff * *", "fix move all nve/sphere disc", "fix drag all viscous 1.0",
+        "timestep 1e-3", "change_box all x final 0 5.35 y final 0 4.9 remap", "run 20000 post no",
+    ]:  # fmt: skip
+        lmp.command(line)
+
+    def shear(lmp, strain: float) -> None:
+        lmp.command(f"change_box all xy final {4.9 * strain:.17g} remap")
+
+    stress = []
+    with lammps_path(lmp, shear) as path:
+        for strain in (0.0, 0.001, 0.002):
+            found = path(strain)
+            c = found.contacts
+            assert found.box[1, 0] == pytest.approx(4.9 * strain, abs=1e-15)
+            assert found.residual <= 1e-8 * c.normal_force.mean()
+            force = c.normal_force * c.normal[:, 0] + c.tangential_force[:, 0]
+            stress.append(-float(np.sum(force * c.distance * c.normal[:, 1])))
+    lmp.close()
+    assert stress[0] < stress[1] < stress[2]
+
+
+@pytest.mark.slow
 def test_a_law_that_the_load_changes_is_measured_again(tmp_path):
     """The laws that a path knows are those of the commands: here the load is the tangential stiffness."""
     from faultgouge.pywrap import lammps_path
