@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -93,7 +94,8 @@ def _try_without_runs(path: Path) -> None:
         return
     with TemporaryDirectory(prefix="faultgouge") as folder:
         for each in files:
-            shutil.copyfile(each, Path(folder) / each.name)
+            with suppress(OSError):  # a file that the deck does not read may be unreadable
+                shutil.copyfile(each, Path(folder) / each.name)
         alone = {name: value for name, value in os.environ.items() if not name.startswith(RANKS)}
         words = [sys.executable, "-m", __name__, path.name]
         try:
