@@ -93,11 +93,13 @@ def _try_without_runs(path: Path) -> None:
     if MPI.COMM_WORLD.size > 1 or sum(each.stat().st_size for each in files) > COPIED:
         return
     with TemporaryDirectory(prefix="faultgouge") as folder:
+        copy = Path(folder) / "deck"  # not where Python starts: it would take its modules from there
+        copy.mkdir()
         for each in files:
             with suppress(OSError):  # a file that the deck does not read may be unreadable
-                shutil.copyfile(each, Path(folder) / each.name)
+                shutil.copyfile(each, copy / each.name)
         alone = {name: value for name, value in os.environ.items() if not name.startswith(RANKS)}
-        words = [sys.executable, "-m", __name__, path.name]
+        words = [sys.executable, "-m", __name__, str(copy / path.name)]
         try:
             done = subprocess.run(
                 words, cwd=folder, env=alone, capture_output=True, text=True, timeout=TRIAL, check=False
@@ -110,12 +112,13 @@ def _try_without_runs(path: Path) -> None:
         raise BadInputError(f"{path}: {done.stdout.removeprefix(REFUSED).strip()}")
 
 
-def _skip_runs(deck: str) -> str:
-    """What is said of a deck in the folder of this process after it has run without its runs."""
-    log = Path("faultgouge.log")
+def _skip_runs(deck: Path) -> str:
+    """What is said of a deck after it has run without its runs."""
+    log = Path.cwd() / "log"
     lmp = lammps_instance(MPI.COMM_WORLD, log, "-skiprun")
+    os.chdir(deck.parent)
     try:
-        lmp.file(deck)
+        lmp.file(deck.name)
     except Exception:  # LAMMPS raises what its bindings choose, and will say it in the run
         return "stopped"
     lmp.command("log none")
@@ -127,4 +130,4 @@ def _skip_runs(deck: str) -> str:
 
 
 if __name__ == "__main__":
-    print(_skip_runs(sys.argv[1]))
+    print(_skip_runs(Path(sys.argv[1])))
