@@ -33,9 +33,9 @@ LAW, D, COUNT, SEEDS = "granular hertz, mindlin/force", 3, 200, 60
 """Law, dimension, particles, and the last seed, which was set after the first pair had been seen. Every pair that is
 found at any tilt is followed."""
 
-DISPLACEMENT = 3e-9
-"""Largest displacement of the mode that is set going: a thousandth of the smallest overlaps, and far above the 1e-10 of
-the bound by which a history must have left its plane before LAMMPS turns it."""
+DISPLACEMENTS = (3e-9, 3e-8)
+"""Largest displacements of the mode that is set going: a thousandth and a hundredth of the smallest overlaps, and above
+the 1e-10 of the bound by which a history must have left its plane before LAMMPS turns it."""
 
 TIME, STEPS = 2000.0, 97
 """How long, and steps between two looks: five looks a period."""
@@ -57,7 +57,7 @@ def rows(seed: int) -> list[dict[str, Any]]:
             snapshot = rest(lmp)
             if snapshot is not None:
                 row |= {"rests": True} | {name: describe(snapshot)[name] for name in ("pairs", "at_bound", "residual")}
-                row |= follow(lmp, snapshot) if row["pairs"] else {}
+                row |= {"runs": [follow(lmp, snapshot, size) for size in DISPLACEMENTS]} if row["pairs"] else {}
             found.append(row | {"cpu_seconds": time.process_time() - begin})
             if snapshot is None:
                 break
@@ -65,7 +65,7 @@ def rows(seed: int) -> list[dict[str, Any]]:
     return found
 
 
-def follow(lmp: Any, snapshot: Snapshot) -> dict[str, float]:
+def follow(lmp: Any, snapshot: Snapshot, displacement: float) -> dict[str, float]:
     """Rates of D of the fastest pair: "predicted", and "grows" and "decays" as its two parts do in LAMMPS."""
     a = mass_weighted(stiffness_matrix(snapshot), snapshot)
     active, root = active_coordinates(a), np.sqrt(snapshot.coordinate_mass)
@@ -75,12 +75,12 @@ def follow(lmp: Any, snapshot: Snapshot) -> dict[str, float]:
     s = s if s.real > 0 else -s
     x = np.real(right[:, number] * np.exp(-0.5j * np.angle(np.sum(right[:, number] ** 2))))
     start = np.zeros(snapshot.coordinates)
-    start[active] = DISPLACEMENT * abs(s) * x / np.abs(x).max() / root[active]
+    start[active] = displacement * abs(s) * x / np.abs(x).max() / root[active]
     velocities = in_a_copy(lambda: _run(lmp, snapshot, start))
     coordinate = (velocities * root)[:, active] @ left[:, number].conj()
     times = STEPS * STEP * np.arange(1, len(coordinate) + 1, dtype=np.float64)
     grows, decays = (_rate(times, coordinate * np.exp(-1j * turn * times)) for turn in (s.imag, -s.imag))
-    return {"predicted": 2 * s.real, "grows": grows, "decays": decays}
+    return {"displacement": displacement, "predicted": 2 * float(s.real), "grows": grows, "decays": decays}
 
 
 def _run(lmp: Any, snapshot: Snapshot, start: Floats) -> Floats:

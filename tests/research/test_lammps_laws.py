@@ -23,11 +23,17 @@ def test_the_page_is_what_the_tables_make(tmp_path):
     assert (rare["sizes"], rare["most"]) == ([200, 400], 1)
     assert 0 < rare["having"] < 0.05 * rare["rows"]
     assert rare["growth"] < 2e-3
-    # contacts at the bound slide a little, and LAMMPS does not turn histories by less than 1e-10
-    for row in found["weak"]["pairs"]:
-        assert row["grows"] / row["predicted"] == pytest.approx(1, abs=0.2)
-        assert row["decays"] / row["predicted"] == pytest.approx(-1, abs=0.2)
-    assert found["weak"]["pairs"]
+    for steep in found["steep"]:
+        if steep["law"] in NEVER:
+            assert not any(steep["with_pairs"])
+        elif "hertz" in steep["law"]:
+            last = max(k for k, count in enumerate(steep["packings"]) if count >= 5)
+            assert steep["share"][last] > steep["share"][0]
+    runs = [run for row in found["weak"]["pairs"] for run in row["runs"]]
+    assert runs
+    for run in runs:  # it grows, and more slowly than the spectrum says
+        assert 0.5 * run["predicted"] < run["grows"] < run["predicted"]
+        assert -run["predicted"] < run["decays"] < -0.5 * run["predicted"]
     assert found["wall"]["power"] == pytest.approx(0.5)
     pushed = found["pushed"]
     assert pushed["grown"] == pushed["pairs"] == pushed["packings"]
