@@ -120,12 +120,13 @@ def numbers(tables: Path = TABLES) -> dict[str, Any]:
 
 def rare_pairs(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """How seldom a law has complex pairs, and how weak these are."""
-    large = [row for row in rows if row["count"] > USUAL[0]]
+    small, large = ([row for row in rows if (row["count"] > USUAL[0]) == beyond] for beyond in (False, True))
     having = [row for row in rows if row["pairs"]]
     return {
         "rows": len(large),
-        "having": len(having),
-        "sizes": sorted({row["count"] for row in having}),
+        "having": sum(row["pairs"] > 0 for row in large),
+        "small_rows": len(small),
+        "small": [row for row in small if row["pairs"]],
         "most": max((row["pairs"] for row in having), default=0),
         "growth": max((row["growth_rate"] for row in having), default=0.0),
         "least_q": min((row["least_q"] for row in having), default=np.inf),
