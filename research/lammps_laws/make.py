@@ -34,7 +34,7 @@ from research.lammps_laws.compute import (
     read,
 )
 from research.lammps_laws.energy_cycle import energy_cycle
-from research.lammps_laws.weak_pairs import SEEDS, compute_weak
+from research.lammps_laws.weak_pairs import compute_weak
 
 HERE = Path(__file__).parent
 TABLES = HERE / "tables"
@@ -50,6 +50,9 @@ bit on one machine, and its rounding ends at the balance of forces, 1e-8."""
 
 STAYS = "granular hertz, mindlin/force"
 """The law of the large packings whose tangential force at constant slip does not follow the overlap."""
+
+FEWEST = 2
+"""Weak pairs of the packings with the fewest contacts at the bound: those with none and two, the next one has eight."""
 
 GROWTH_BOUND = TO / 10
 """D beyond which a packing that has been let go has grown: a decade below the end of a run, twelve above the push."""
@@ -185,30 +188,8 @@ def to_flow(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def growth(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Packings that are let go: growth in LAMMPS over that of the linearised packing, and beyond small motion."""
     good = [row for row in rows if row["rests"]]
-    free = [row for row in good if not row["at_bound"]]
-    return {
-        "law": rows[0]["law"],
-        "d": rows[0]["d"],
-        "tilt": rows[0]["tilt"],
-        "packings": len(good),
-        "restless": len(rows) - len(good),
-        "pairs": sum(row["pairs"] > 0 for row in good),
-        "grown": sum(row["last"] > GROWTH_BOUND for row in good),
-        "rows": good,
-        "free": len(free),
-        "ratio": _middle(row["rate"] / row["linear"] for row in free),
-        "late": _middle(row["late"] / row["predicted"] for row in good),
-    }
-
-
-def weak_pairs(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """How many packings have a weak pair, and the rates of each."""
-    good = [row for row in rows if row["rests"]]
-    return {
-        "seeds": max(row["seed"] for row in rows),
-        "rows": len(good),
-        "pairs": [row for row in good if row["pairs"]],
-    }
+    few = [run["grows"] / run["predicted"] for row in pairs[:FEWEST] for run in row["runs"]]
+    return {"samples": samples, "pairs": pairs, "few": [min(few), max(few)]}
 
 
 def _middle(values: Iterable[float]) -> list[float]:
@@ -297,7 +278,7 @@ if __name__ == "__main__":
         case ["growth"]:
             compute_growth(TABLES / GROWTH)
         case ["weak"]:
-            compute_weak(TABLES / WEAK, range(1, SEEDS + 1))
+            compute_weak(TABLES / WEAK)
         case ["page"]:
             print(write_page())
         case ["check"]:

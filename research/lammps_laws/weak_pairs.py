@@ -14,9 +14,10 @@ A packing is let go without any dashpot with the velocities of x.
 
 import json
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +28,23 @@ from faultgouge.analysis.packing.arrays import Floats
 from faultgouge.analysis.spectrum.spectrum import active_coordinates, mass_weighted
 from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of, set_velocity
 from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
-from research.lammps_laws.compute import MU, NONE, STEP, TILTS, describe, pour, read, rest
+from research.lammps_laws.compute import MU, NONE, STEEP, STEP, TILTS, describe, pour, read, rest
 
-LAW, D, COUNT, SEEDS = "granular hertz, mindlin/force", 3, 200, 60
-"""Law, dimension, particles, and the last seed, which was set after the first pair had been seen. Every pair that is
-found at any tilt is followed."""
+LAW, D = "granular hertz, mindlin/force", 3
+
+
+class Sample(NamedTuple):
+    """Packings: particles, friction, tilts, and the last seed."""
+
+    particles: int
+    mu: float
+    tilts: tuple[float, ...]
+    seeds: int
+
+
+SAMPLES = (Sample(200, MU, TILTS, 60), Sample(50, 0.9, STEEP, 160))
+"""Every pair that is found is followed. The last seed of the first sample was set after its pair had been seen, that of
+the second one by the hour: 40 seeds, which were to do, had no pair."""
 
 DISPLACEMENTS = (3e-9, 3e-8)
 """Largest displacements of the mode that is set going: a thousandth and a hundredth of the smallest overlaps, and above
@@ -45,15 +58,16 @@ WINDOWS, FIRST = 40, 8
 little at first."""
 
 
-def rows(seed: int) -> list[dict[str, Any]]:
+def rows(sample: Sample, seed: int) -> list[dict[str, Any]]:
     """A packing at all tilts; the rates of its fastest pair by the spectrum and in LAMMPS where it has one."""
     found = []
     with TemporaryDirectory() as folder:
-        lmp = pour(LAW, D, COUNT, MU, seed, Path(folder) / "log", NONE)
-        for tilt in TILTS:
+        lmp = pour(LAW, D, sample.particles, sample.mu, seed, Path(folder) / "log", NONE)
+        for tilt in sample.tilts:
             begin = time.process_time()
             lmp.command(f"variable slope equal {tilt}")
-            row: dict[str, Any] = {"seed": seed, "tilt": tilt, "rests": False}
+            row: dict[str, Any] = {"count": sample.particles, "mu": sample.mu, "seed": seed, "tilt": tilt}
+            row["rests"] = False
             snapshot = rest(lmp)
             if snapshot is not None:
                 row |= {"rests": True} | {name: describe(snapshot)[name] for name in ("pairs", "at_bound", "residual")}
@@ -104,12 +118,12 @@ def _rate(times: Floats, part: NDArray[np.complex128]) -> float:
     return 2 * float(np.polyfit(middle[FIRST:], np.log(size[FIRST:]), 1)[0])
 
 
-def compute_weak(table: Path, seeds: range, watch: Any = print) -> None:
+def compute_weak(table: Path, samples: Iterable[Sample] = SAMPLES, watch: Any = print) -> None:
     """Add the packings that a table lacks."""
-    known = {row["seed"] for row in read(table)}
-    for seed in seeds:
-        if seed not in known:
-            made = rows(seed)
+    known = {(row["count"], row["mu"], row["seed"]) for row in read(table)}
+    for sample, seed in ((each, seed) for each in samples for seed in range(1, each.seeds + 1)):
+        if (sample.particles, sample.mu, seed) not in known:
+            made = rows(sample, seed)
             with table.open("a") as file:
                 file.writelines(json.dumps(row) + "\n" for row in made)
             watch(made, flush=True)

@@ -30,11 +30,10 @@ def test_the_page_is_what_the_tables_make(tmp_path):
         elif "hertz" in steep["law"]:
             last = max(k for k, count in enumerate(steep["packings"]) if count >= 5)
             assert steep["share"][last] > steep["share"][0]
-    runs = [run for row in found["weak"]["pairs"] for run in row["runs"]]
-    assert runs
-    for run in runs:  # it grows, and more slowly than the spectrum says
-        assert 0.5 * run["predicted"] < run["grows"] < run["predicted"]
-        assert -run["predicted"] < run["decays"] < -0.5 * run["predicted"]
+    weak = found["weak"]
+    assert [row["at_bound"] for row in weak["pairs"]][:3] == [0, 2, 8]
+    # fits of amplitudes in which other modes beat
+    assert 0.95 < weak["few"][0] <= weak["few"][1] < 1.05
     assert found["wall"]["power"] == pytest.approx(0.5)
     pushed = found["pushed"]
     assert pushed["grown"] == pushed["pairs"] == pushed["packings"]
