@@ -2,7 +2,7 @@
 
 python -m research.lammps_laws.make compute    what the tables lack of all cells, on one core, resumable; hours
 python -m research.lammps_laws.make growth     the packings that are let go without loss; minutes
-python -m research.lammps_laws.make weak       the weak pairs of mindlin/force followed; half an hour
+python -m research.lammps_laws.make weak       the weak pairs of mindlin/force followed; an hour
 python -m research.lammps_laws.make page       README.md from the tables
 python -m research.lammps_laws.make check      the first packings of 50 particles of each law once more, compared
 
@@ -188,6 +188,30 @@ def to_flow(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def growth(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Packings that are let go: growth in LAMMPS over that of the linearised packing, and beyond small motion."""
     good = [row for row in rows if row["rests"]]
+    free = [row for row in good if not row["at_bound"]]
+    return {
+        "law": rows[0]["law"],
+        "d": rows[0]["d"],
+        "tilt": rows[0]["tilt"],
+        "packings": len(good),
+        "restless": len(rows) - len(good),
+        "pairs": sum(row["pairs"] > 0 for row in good),
+        "grown": sum(row["last"] > GROWTH_BOUND for row in good),
+        "rows": good,
+        "free": len(free),
+        "ratio": _middle(row["rate"] / row["linear"] for row in free),
+        "late": _middle(row["late"] / row["predicted"] for row in good),
+    }
+
+
+def weak_pairs(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """How many packings have a weak pair, and the rates of each."""
+    samples = []
+    for count, mu in sorted({(row["count"], row["mu"]) for row in rows}):
+        own = [row for row in rows if (row["count"], row["mu"]) == (count, mu)]
+        seeds, good = max(row["seed"] for row in own), sum(row["rests"] for row in own)
+        samples.append({"count": count, "mu": mu, "seeds": seeds, "rows": good})
+    pairs = sorted((row for row in rows if row.get("pairs")), key=lambda row: row["at_bound"])
     few = [run["grows"] / run["predicted"] for row in pairs[:FEWEST] for run in row["runs"]]
     return {"samples": samples, "pairs": pairs, "few": [min(few), max(few)]}
 
