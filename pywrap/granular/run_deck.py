@@ -63,22 +63,28 @@ def run_deck(path: Path, *, slides: bool = False) -> Snapshot:
             os.chdir(here)
         lmp.command("log none")  # which writes it
         lmp.command("timer timeout unlimited")  # else `run 0` is skipped where fix halt has ended the deck
-        commands = world.bcast(_commands_run(log, path.parent) if world.rank == 0 else None, root=0)
-        found = from_lammps(lmp, commands, slides=slides)
+        text = world.bcast(_logged_text(log, path.parent) if world.rank == 0 else None, root=0)
+        found = from_lammps(lmp, _commands_in(text), slides=slides)
         lmp.close()
         world.barrier()
     return found
 
 
-def _commands_run(log: Path, folder: Path) -> list[str]:
-    """The commands with variables filled in, from the log and from those to which the deck turns by `log`."""
+def _logged_text(log: Path, folder: Path) -> str:
+    """The log, and those to which the deck turns by `log`, one after the other."""
     text, read = "", set()
     while log not in read and log.is_file():
         read.add(log)
         text += log.read_text(errors="replace")
         last = text.rstrip().rpartition("\n")[2].split()
         log = folder / last[1] if last[:1] == ["log"] and len(last) > 1 else log
-    lines = [line for line in re.sub(r"&[ \t]*\n", " ", text).splitlines() if "$" not in line]
+    return text
+
+
+def _commands_in(text: str) -> list[str]:
+    """The commands of a log with variables filled in."""
+    lines = [line.split("#")[0] for line in re.sub(r"&[ \t]*\n", " ", text).splitlines()]
+    lines = [line for line in lines if "$" not in line]
     if not any(line.split()[:1] == ["pair_style"] for line in lines):
         raise SnapshotError(
             "No pair_style is in the log: write one, behind read_restart, too; and leave out log none and echo, which "
@@ -123,7 +129,7 @@ def _skip_runs(deck: Path) -> str:
         return "stopped"
     lmp.command("log none")
     try:
-        check_instance(lmp, styles_of(lmp), read_commands(_commands_run(log, Path()), log=True))
+        check_instance(lmp, styles_of(lmp), read_commands(_commands_in(_logged_text(log, Path())), log=True))
     except SnapshotError as error:
         return f"{REFUSED}{error}"
     return "fine"

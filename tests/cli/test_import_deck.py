@@ -179,6 +179,21 @@ def test_deck_that_fix_halt_ends(faultgouge_here, tmp_path):
     assert "3 disks, " in faultgouge_here("import", "halt.in", "-o", "halt.h5").stdout
 
 
+def test_comments_with_variables(faultgouge_here, tmp_path):
+    """LAMMPS fills in no variable of a comment, and logs such a command once."""
+    deck = DECK.format(**FLAT, word="contacts").replace("pair_coeff * *", "pair_coeff * *  # as ${kn} above")
+    deck = deck.replace("fix move all nve/sphere", "fix move all nve/sphere  # $x and $y")
+    (tmp_path / "said.in").write_text(deck)
+    assert "3 disks, " in faultgouge_here("import", "said.in", "-o", "said.h5").stdout
+
+
+@pytest.mark.ranks
+def test_deck_without_commands_on_two_ranks(faultgouge, tmp_path):
+    """Every rank refuses it, and none waits for another."""
+    (tmp_path / "mute.in").write_text("log none\n" + DECK.format(**FLAT, word="contacts"))
+    assert "No pair_style is in the log" in faultgouge("import", "mute.in", ranks=2, code=1).stderr
+
+
 def test_deck_with_logs_of_its_own(faultgouge_here, tmp_path):
     """Commands are in three logs, one after the other."""
     deck = DECK.format(**FLAT, word="contacts").replace(
