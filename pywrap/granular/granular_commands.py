@@ -7,6 +7,7 @@ variables filled in: a command with a $ stands there twice, as it was written an
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 from ...analysis import FaultgougeError
 
@@ -92,6 +93,29 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
         where = "The log of this LAMMPS has" if log else "The commands have"
         raise SnapshotError(f"{where} no pair_style: {GIVE_LINES}.")
     return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes)
+
+
+def logged_text(log: Path, folder: Path) -> str:
+    """The log, and those to which the deck turns by `log`, one after the other."""
+    text, read = "", set()
+    while log not in read and log.is_file():
+        read.add(log)
+        text += log.read_text(errors="replace")
+        last = text.rstrip().rpartition("\n")[2].split()
+        log = folder / last[1] if last[:1] == ["log"] and len(last) > 1 else log
+    return text
+
+
+def commands_in(text: str) -> list[str]:
+    """The commands of a log with variables filled in; a SnapshotError if no pair_style is among them."""
+    lines = [line.split("#")[0] for line in re.sub(r"&[ \t]*\n", " ", text).splitlines()]
+    lines = [line for line in lines if "$" not in line]
+    if not any(line.split()[:1] == ["pair_style"] for line in lines):
+        raise SnapshotError(
+            "No pair_style is in the log: write one, behind read_restart, too; and leave out log none and echo, which "
+            "keep commands out of the log."
+        )
+    return lines
 
 
 def check_pair(commands: Commands, styles: Iterable[str]) -> None:

@@ -189,7 +189,7 @@ def test_comments_with_variables(faultgouge_here, tmp_path):
 
 @pytest.mark.ranks
 def test_deck_without_commands_on_two_ranks(faultgouge, tmp_path):
-    """Every rank refuses it, and none waits for another."""
+    """It is refused after its run: several ranks have no trial."""
     (tmp_path / "mute.in").write_text("log none\n" + DECK.format(**FLAT, word="contacts"))
     assert "No pair_style is in the log" in faultgouge("import", "mute.in", ranks=2, code=1).stderr
 
