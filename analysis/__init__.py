@@ -1,12 +1,14 @@
 """The stability operator, spectrum, onset and growth of a packing of frictional disks.
 
-All functions take a :class:`Packing`; operators, spectra and functions based on these also take a :class:`Snapshot`.
+All functions take a :class:`Packing`; operators, spectra and functions based on these also take a
+:class:`Configuration`.
 The physics is in the docstrings of the modules: `law` (the contact law), `contacts`, `geometry`, `packing` (forces),
 `stiffness` and `linearised_contacts` (the stability operator), `spectrum` (its eigenvalues), `damping` (the damping
 matrix), `onset` (where eigenvalues become complex), `growth` (growth in a run). `runfile`, `dumps` and `files` read and
 write packings.
 """
 
+from .configuration import Configuration, LinearisedContacts
 from .damped_onset.windows import DampedOnsetError, DampedWindow, damped_windows
 from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
 from .files.dumps import read_dump
@@ -22,7 +24,6 @@ from .packing.contacts import FLOOR, Contacts
 from .packing.geometry import ContactGeometry, nearest_image, touching
 from .packing.law import MindlinLaw
 from .packing.packing import Packing
-from .packing.snapshot import LinearisedContacts, Snapshot
 from .packing.solid_fraction import solid_fraction
 from .spectrum.buckling import negative_eigenvalues
 from .spectrum.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
@@ -38,10 +39,14 @@ from .spectrum.spectrum import (
 )
 from .spectrum.stable_timestep import stable_timestep
 
+Snapshot = Configuration
+"""The name of `Configuration` until version 1."""
+
 __all__ = [
     "FLOOR",
     "BadInputError",
     "ComplexPair",
+    "Configuration",
     "ContactGeometry",
     "Contacts",
     "DampedOnsetError",

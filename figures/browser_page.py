@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.colors import to_hex
 
-from faultgouge.analysis import BadInputError, Packing, Snapshot
+from faultgouge.analysis import BadInputError, Configuration, Packing
+from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.analysis.motion.hysteresis import layer_displacement
-from faultgouge.analysis.packing.arrays import Floats
 
 from .browser_pair import LARGE, NEAREST, Progress, RampEigenvalues, follow_eigenvalues
 from .packing import LEAST_SHARE, PackingArtist, View
@@ -62,7 +62,7 @@ def loads_shown(disks: int) -> int:
 
 
 def write_view(
-    packings: Sequence[Packing | Snapshot],
+    packings: Sequence[Packing | Configuration],
     path: Path,
     title: str,
     series: dict[str, Any] | None = None,
@@ -72,7 +72,7 @@ def write_view(
 
     Parameters
     ----------
-    packings : sequence of Packing or Snapshot
+    packings : sequence of Packing or Configuration
         Equilibria in order of their load, all with the same disks.
     path : Path
         The page to write.
@@ -131,7 +131,7 @@ def write_view(
     write_text(path, page)
 
 
-def _frame(packing: Packing | Snapshot, course: RampEigenvalues, k: int) -> dict[str, Any]:
+def _frame(packing: Packing | Configuration, course: RampEigenvalues, k: int) -> dict[str, Any]:
     """The arrays of one load, in float32."""
     view, contacts = View.of(packing, margin=0.5 * packing.radius.max()), packing.contacts
     force = packing.normal_force
@@ -141,7 +141,7 @@ def _frame(packing: Packing | Snapshot, course: RampEigenvalues, k: int) -> dict
         "y": view.place[:, 1],
         "disk": view.disk,
         "radius": packing.radius[view.disk],
-        "angle": np.zeros(len(view.disk)) if isinstance(packing, Snapshot) else packing.angle[view.disk],
+        "angle": np.zeros(len(view.disk)) if isinstance(packing, Configuration) else packing.angle[view.disk],
         "x0": view.start[:, 0],
         "y0": view.start[:, 1],
         "x1": view.end[:, 0],
@@ -176,7 +176,7 @@ def _plot(name: str, x: str, y: str, **more: Any) -> "figure":
     return plot
 
 
-def _packing_plot(packings: Sequence[Packing | Snapshot], sources: dict[str, Any]) -> "figure":
+def _packing_plot(packings: Sequence[Packing | Configuration], sources: dict[str, Any]) -> "figure":
     """Disks and force chains; the floor."""
     from bokeh.models import BoxAnnotation, ColorBar, LogColorMapper
 
@@ -222,7 +222,9 @@ def _plane(course: RampEigenvalues, sources: dict[str, Any]) -> "figure":
     return plot
 
 
-def _curves(packings: Sequence[Packing | Snapshot], course: RampEigenvalues, sources: dict[str, Any]) -> list["figure"]:
+def _curves(
+    packings: Sequence[Packing | Configuration], course: RampEigenvalues, sources: dict[str, Any]
+) -> list["figure"]:
     """Real and imaginary parts of the pair over the load."""
     fx = np.array([packing.fx for packing in packings])
     plots: list[figure] = []
@@ -236,7 +238,7 @@ def _curves(packings: Sequence[Packing | Snapshot], course: RampEigenvalues, sou
     return plots
 
 
-def _cycle(packings: Sequence[Packing | Snapshot], moved: Floats, sources: dict[str, Any]) -> "figure":
+def _cycle(packings: Sequence[Packing | Configuration], moved: Floats, sources: dict[str, Any]) -> "figure":
     """F_x over the displacement of the upper layer."""
     plot = _plot("cycle", "displacement of the upper layer", "Fₓ")
     plot.line(moved, [packing.fx for packing in packings], line_color=OTHERS, line_width=2)

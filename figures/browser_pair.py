@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.linalg import eigs
 
-from faultgouge.analysis import Eigenpairs, Packing, Snapshot, closest_to_meeting, eigenvalues, growth_rate
+from faultgouge.analysis import Configuration, Eigenpairs, Packing, closest_to_meeting, eigenvalues, growth_rate
 from faultgouge.analysis.onset.eigenvalue_pair import Pair, continue_pair
 from faultgouge.analysis.onset.modes import Modes, force_bearing, full_operator
 
 from .mode import Complexes, ModeError, displacement
 
-Progress = Callable[[Sequence[Packing | Snapshot]], Iterable[Packing | Snapshot]]
+Progress = Callable[[Sequence[Packing | Configuration]], Iterable[Packing | Configuration]]
 
 LARGE = 300
 """Disks up to which the page has all eigenvalues of every load; 60 loads of so many take some 15 s."""
@@ -50,13 +50,13 @@ class RampEigenvalues:
 
 
 def follow_eigenvalues(
-    packings: Sequence[Packing | Snapshot], progress: Progress = iter, everything: bool | None = None
+    packings: Sequence[Packing | Configuration], progress: Progress = iter, everything: bool | None = None
 ) -> RampEigenvalues:
     """Eigenvalues of equilibria in order of their load.
 
     Parameters
     ----------
-    packings : sequence of Packing or Snapshot
+    packings : sequence of Packing or Configuration
         The equilibria, all with the same disks.
     progress : callable
         Wraps the packings while their eigenvalues are computed.
@@ -88,7 +88,7 @@ def follow_eigenvalues(
     return RampEigenvalues(values, found, modes)
 
 
-def seconds(packings: Sequence[Packing | Snapshot]) -> float:
+def seconds(packings: Sequence[Packing | Configuration]) -> float:
     """Seconds of `follow_eigenvalues` on one core: all modes of 1,000 disks take 18 s, their eigenvalues 8 s."""
     thousands = len(packings[0]) / 1000
     if len(packings[0]) > LARGE:
@@ -96,7 +96,7 @@ def seconds(packings: Sequence[Packing | Snapshot]) -> float:
     return 8 * thousands**3 * len(packings)
 
 
-def _first(packings: Sequence[Packing | Snapshot], values: Sequence[Complexes]) -> tuple[int, Pair]:
+def _first(packings: Sequence[Packing | Configuration], values: Sequence[Complexes]) -> tuple[int, Pair]:
     """The first load with a complex pair, and the pair; without one the last load, and two real modes."""
     for k, packing in enumerate(packings):
         if np.any(values[k].imag > 0):
@@ -106,7 +106,7 @@ def _first(packings: Sequence[Packing | Snapshot], values: Sequence[Complexes]) 
     return len(packings) - 1, _closest(packings[-1], Modes.of(packings[-1].fx, full_operator(packings[-1])))
 
 
-def _closest(packing: Packing | Snapshot, modes: Modes) -> Pair:
+def _closest(packing: Packing | Configuration, modes: Modes) -> Pair:
     """The two real modes that are closest to meeting."""
     try:
         first, second, _ = closest_to_meeting(Eigenpairs(modes.values, modes.right, modes.left, 0))
@@ -116,7 +116,7 @@ def _closest(packing: Packing | Snapshot, modes: Modes) -> Pair:
     return modes.pair((first, second))
 
 
-def _earliest(packings: Sequence[Packing | Snapshot]) -> dict[int, Pair]:
+def _earliest(packings: Sequence[Packing | Configuration]) -> dict[int, Pair]:
     """Of the pairs that are complex at the last load, the one that became complex first, at each load."""
     last = len(packings) - 1
     modes = Modes.of(packings[last].fx, full_operator(packings[last]))
@@ -134,12 +134,12 @@ def _complex_from(way: dict[int, Pair]) -> int:
     return first
 
 
-def _back(packings: Sequence[Packing | Snapshot], start: int, pair: Pair) -> dict[int, Pair]:
+def _back(packings: Sequence[Packing | Configuration], start: int, pair: Pair) -> dict[int, Pair]:
     """A pair at one load, and at all before where it is recognised."""
     return {start: pair} | _way(packings, range(start - 1, -1, -1), pair)
 
 
-def _way(packings: Sequence[Packing | Snapshot], loads: range, pair: Pair) -> dict[int, Pair]:
+def _way(packings: Sequence[Packing | Configuration], loads: range, pair: Pair) -> dict[int, Pair]:
     """A pair at loads one after the other, up to where it is not recognised."""
     way: dict[int, Pair] = {}
     for k in loads:
@@ -150,7 +150,7 @@ def _way(packings: Sequence[Packing | Snapshot], loads: range, pair: Pair) -> di
     return way
 
 
-def _next(pair: Pair, packing: Packing | Snapshot) -> Pair | None:
+def _next(pair: Pair, packing: Packing | Configuration) -> Pair | None:
     """The pair in a neighbouring equilibrium; None if it is not recognised."""
     matrix = full_operator(packing)
     image = continue_pair(pair, packing.fx, matrix)
@@ -160,7 +160,7 @@ def _next(pair: Pair, packing: Packing | Snapshot) -> Pair | None:
     return image if image is not None and image.same_planes(pair) else None
 
 
-def _nearest(packing: Packing | Snapshot, pairs: dict[int, Pair], k: int) -> Complexes:
+def _nearest(packing: Packing | Configuration, pairs: dict[int, Pair], k: int) -> Complexes:
     """The eigenvalues closest to the pair of this load, or of the closest one at which the pair is recognised."""
     pair = pairs[min(pairs, key=lambda known: abs(known - k))]
     # off the mean, which at a coalescence is an eigenvalue itself

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from faultgouge.analysis import Packing
+from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.motion.hysteresis import hysteresis, layer_displacement, turning_points
-from faultgouge.analysis.packing.arrays import Floats
 
 from .series import scientific
 from .style import figure_of, styled

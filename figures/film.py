@@ -21,9 +21,9 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from faultgouge.analysis import Packing, PackingFileError, RunFile, Snapshot, nearest_image
+from faultgouge.analysis import Configuration, Packing, PackingFileError, RunFile, nearest_image
+from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.motion.hysteresis import layer_displacement
-from faultgouge.analysis.packing.arrays import Floats
 
 from .cycle import in_powers_of_ten
 from .mode import Mode, ModeArtist, finish, side_by_side
@@ -218,7 +218,7 @@ class ModeFilm(Film):
 
     Parameters
     ----------
-    packing : Packing or Snapshot
+    packing : Packing or Configuration
         The packing.
     modes : sequence of Mode
         Which.
@@ -231,7 +231,7 @@ class ModeFilm(Film):
     @styled
     def __init__(
         self,
-        packing: Packing | Snapshot,
+        packing: Packing | Configuration,
         modes: Sequence[Mode],
         words: str,
         frames: int,

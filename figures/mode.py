@@ -15,8 +15,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from faultgouge.analysis import BadInputError, Eigenpairs, Packing, Snapshot, closest_to_meeting
-from faultgouge.analysis.packing.arrays import Floats
+from faultgouge.analysis import BadInputError, Configuration, Eigenpairs, Packing, closest_to_meeting
+from faultgouge.analysis.arrays import Floats
 
 from .packing import WIDTH, PackingArtist, View
 from .style import EDGE, INK, styled
@@ -62,7 +62,7 @@ class Mode:
     rotation: float
 
     @classmethod
-    def of(cls, packing: Packing | Snapshot, modes: Eigenpairs, number: int) -> "Mode":
+    def of(cls, packing: Packing | Configuration, modes: Eigenpairs, number: int) -> "Mode":
         """One of the modes of a packing."""
         moved = displacement(packing, modes.right[:, number])
         return cls(
@@ -102,7 +102,7 @@ class Mode:
         )
 
 
-def displacement(packing: Packing | Snapshot, vector: Complexes) -> Complexes:
+def displacement(packing: Packing | Configuration, vector: Complexes) -> Complexes:
     """A mass-weighted vector, shape (axes N,), as of :class:`Mode`: the coordinates of every particle, (axes, N)."""
     vector = vector / np.sqrt(packing.coordinate_mass)
     vector = vector * np.exp(-0.5j * np.angle(np.sum(vector**2)))
@@ -113,13 +113,13 @@ def displacement(packing: Packing | Snapshot, vector: Complexes) -> Complexes:
 
 
 def unstable_pair(
-    packing: Packing | Snapshot, modes: Eigenpairs, believed: Sequence[complex]
+    packing: Packing | Configuration, modes: Eigenpairs, believed: Sequence[complex]
 ) -> tuple[list[Mode], str]:
     """The modes that make a packing unstable, or are about to.
 
     Parameters
     ----------
-    packing : Packing or Snapshot
+    packing : Packing or Configuration
         The packing.
     modes : Eigenpairs
         All its modes.
@@ -164,7 +164,7 @@ class ModeArtist:
     ----------
     axes : Axes
         Where.
-    packing : Packing or Snapshot
+    packing : Packing or Configuration
         The packing at rest.
     mode : Mode
         The mode.
@@ -175,7 +175,7 @@ class ModeArtist:
     """
 
     def __init__(
-        self, axes: Axes, packing: Packing | Snapshot, mode: Mode, points: float | None = None, moves: bool = False
+        self, axes: Axes, packing: Packing | Configuration, mode: Mode, points: float | None = None, moves: bool = False
     ) -> None:
         self.mode, self.moves = mode, moves
         self.reach = LONGEST * packing.radius.max() * (0.3 if moves else 1.0)
@@ -216,12 +216,12 @@ class ModeArtist:
 
 
 @styled
-def draw_modes(packing: Packing | Snapshot, modes: Sequence[Mode], words: str) -> Figure:
+def draw_modes(packing: Packing | Configuration, modes: Sequence[Mode], words: str) -> Figure:
     """Modes side by side, with their numbers below.
 
     Parameters
     ----------
-    packing : Packing or Snapshot
+    packing : Packing or Configuration
         The packing.
     modes : sequence of Mode
         One or two.
@@ -246,7 +246,7 @@ def draw_modes(packing: Packing | Snapshot, modes: Sequence[Mode], words: str) -
     return figure
 
 
-def side_by_side(packing: Packing | Snapshot, count: int) -> tuple[Figure, list[Axes], float]:
+def side_by_side(packing: Packing | Configuration, count: int) -> tuple[Figure, list[Axes], float]:
     """A figure with axes for the same packing, and points per unit of length in them."""
     view = View.of(packing)
     across = WIDTH - 0.1
@@ -256,7 +256,7 @@ def side_by_side(packing: Packing | Snapshot, count: int) -> tuple[Figure, list[
     return figure, list(axes), 72 * across / (view.right - view.left)
 
 
-def finish(figure: Figure, axes: Sequence[Axes], packing: Packing | Snapshot, words: str) -> None:
+def finish(figure: Figure, axes: Sequence[Axes], packing: Packing | Configuration, words: str) -> None:
     """The line above and the scale of rotation below."""
     load = f"$F_x = {packing.fx:.6g}$: " if isinstance(packing, Packing) else ""
     figure.suptitle(f"{load}{words}", fontsize=8)

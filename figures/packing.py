@@ -4,7 +4,7 @@ The disks of the upper layer are yellow, rattlers hollow; floor, walls and disks
 centres of each contact; the width of the bar is proportional to the normal force :math:`f_n`, and its colour is one of
 
 - ``mobilised``, :math:`|f_t|/(\mu f_n)`: the mobilised fraction of Coulomb's bound, one for a sliding contact,
-- ``slip``, :math:`|s|/t^*`: the slip over the slip limit; a Snapshot has no slips,
+- ``slip``, :math:`|s|/t^*`: the slip over the slip limit; a Configuration has no slips,
 - ``force``, :math:`f_n` itself,
 - ``none``: ink.
 
@@ -25,8 +25,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from faultgouge.analysis import BadInputError, Packing, Snapshot
-from faultgouge.analysis.packing.arrays import Floats, Indices
+from faultgouge.analysis import BadInputError, Configuration, Packing
+from faultgouge.analysis.arrays import Floats, Indices
 
 from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER, figure_of, styled
 
@@ -37,8 +37,8 @@ WIDTH = 3.4
 """Width of a figure that holds one packing, inch."""
 
 
-def _slip_share(packing: Packing | Snapshot) -> Floats:
-    if isinstance(packing, Snapshot):
+def _slip_share(packing: Packing | Configuration) -> Floats:
+    if isinstance(packing, Configuration):
         raise BadInputError("A packing of LAMMPS has forces and no slips: let colours show mobilised, force or none.")
     limit = packing.law.slip_limit(packing.geometry.overlap)
     return np.divide(np.abs(packing.contacts.slip), limit, out=np.zeros(len(limit)), where=limit > 0)
@@ -53,7 +53,7 @@ def _force_scale(values: Floats) -> Normalize:
 
 
 COLOURS: dict[
-    str, tuple[str, Callable[[Packing | Snapshot], Floats], Callable[[Floats], Normalize], str | Colormap]
+    str, tuple[str, Callable[[Packing | Configuration], Floats], Callable[[Floats], Normalize], str | Colormap]
 ] = {
     "mobilised": (r"mobilised friction $|f_t|/(\mu f_n)$", attrgetter("mobilised"), _share_scale, MOBILIZATION),
     "slip": ("slip / slip limit", _slip_share, _share_scale, MOBILIZATION),
@@ -97,7 +97,7 @@ class View:
     edges: Floats
 
     @classmethod
-    def of(cls, packing: Packing | Snapshot, margin: float = 0.0) -> "View":
+    def of(cls, packing: Packing | Configuration, margin: float = 0.0) -> "View":
         """Every image of every disk and contact that reaches to within a margin of the box; length."""
         cell, origin, periodic = _cell(packing)
         position, radius, contacts = packing.position[:, :2], packing.radius, packing.contacts
@@ -142,7 +142,7 @@ class Wall:
         return np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
 
 
-def branch_vectors(packing: Packing | Snapshot) -> Floats:
+def branch_vectors(packing: Packing | Configuration) -> Floats:
     """From the second partner of each contact, or from the wall, to the first; length, shape (C, 2)."""
     if isinstance(packing, Packing):
         return np.asarray(packing.geometry.distance[:, None] * packing.geometry.normal)
@@ -151,16 +151,16 @@ def branch_vectors(packing: Packing | Snapshot) -> Floats:
     return np.asarray(reach[:, None] * c.normal[:, :2])
 
 
-def _cell(packing: Packing | Snapshot) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+def _cell(packing: Packing | Configuration) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Edges of the box in rows, its lower corner, and along which edges it is periodic."""
-    if isinstance(packing, Snapshot):
+    if isinstance(packing, Configuration):
         cell = packing.box[:2, :2].copy()
         cell[~cell.any(axis=1)] = np.eye(2)[~cell.any(axis=1)]  # an open side may have no length
         return cell, packing.origin[:2], packing.periodic[:2]
     return np.diag([packing.box_length or 1.0, 1.0]), np.zeros(2), np.array([packing.box_length is not None, False])
 
 
-def _walls(packing: Packing | Snapshot) -> tuple[Wall, ...]:
+def _walls(packing: Packing | Configuration) -> tuple[Wall, ...]:
     """The floor of a packing; the walls that disks of a snapshot touch."""
     if isinstance(packing, Packing):
         return (Wall(1, 1.0, 0.0),)
@@ -174,7 +174,12 @@ def _walls(packing: Packing | Snapshot) -> tuple[Wall, ...]:
 
 
 def _frame(
-    packing: Packing | Snapshot, position: Floats, cell: Floats, origin: Floats, periodic: Any, walls: tuple[Wall, ...]
+    packing: Packing | Configuration,
+    position: Floats,
+    cell: Floats,
+    origin: Floats,
+    periodic: Any,
+    walls: tuple[Wall, ...],
 ) -> tuple[Floats, Floats]:
     """Lower left and upper right corner of a picture: the box where it is periodic, else what lies in it."""
     reach, largest = packing.radius[:, None], packing.radius.max()
@@ -232,7 +237,7 @@ class PackingArtist:
     def __init__(
         self,
         axes: Axes,
-        packing: Packing | Snapshot,
+        packing: Packing | Configuration,
         color: str = "none",
         view: View | None = None,
         points: float | None = None,
@@ -263,11 +268,11 @@ class PackingArtist:
         self.chains.set_segments(list(np.stack([view.start + displacement[i], view.end + far], axis=1)))
 
     @staticmethod
-    def faces(packing: Packing | Snapshot) -> NDArray[np.str_]:
+    def faces(packing: Packing | Configuration) -> NDArray[np.str_]:
         """Colours of the disks, shape (N,)."""
         hollow = np.isin(np.arange(len(packing)), packing.rattlers)
         faces = np.where(hollow, "white", np.where(packing.top, UPPER, BULK))
-        return np.where(packing.free, faces, FLOOR) if isinstance(packing, Snapshot) else faces
+        return np.where(packing.free, faces, FLOOR) if isinstance(packing, Configuration) else faces
 
     def _disks(self, axes: Axes) -> EllipseCollection:
         packing, disk = self.packing, self.view.disk
@@ -313,13 +318,13 @@ class PackingArtist:
 
 @styled
 def draw_packing(
-    packing: Packing | Snapshot, axes: Axes | None = None, color: str = "mobilised", caption: bool = False
+    packing: Packing | Configuration, axes: Axes | None = None, color: str = "mobilised", caption: bool = False
 ) -> Figure:
     """Draw a packing with its force chains (the paper's figure 1).
 
     Parameters
     ----------
-    packing : Packing or Snapshot
+    packing : Packing or Configuration
         Any configuration of disks.
     axes : Axes, optional
         Where to draw; a figure of its own, with a legend, by default.
@@ -358,9 +363,9 @@ def draw_packing(
     return figure
 
 
-def in_words(packing: Packing | Snapshot) -> str:
+def in_words(packing: Packing | Configuration) -> str:
     """Load, contacts, rattlers, and how many contacts slide."""
-    if isinstance(packing, Snapshot):
+    if isinstance(packing, Configuration):
         c = packing.contacts
         slide = ", which slide" if c.sliding.any() else ", which stick" if c.at_bound.any() else ""
         return (
@@ -381,7 +386,7 @@ def _add_key(figure: Figure, artist: PackingArtist) -> None:
         handles.append(Patch(facecolor=UPPER, edgecolor=EDGE, linewidth=0.6, label="upper layer"))
     if len(packing.rattlers):
         handles.append(Patch(facecolor="white", edgecolor=EDGE, linewidth=0.6, label="rattler (no contact)"))
-    if isinstance(packing, Snapshot) and not packing.free.all():
+    if isinstance(packing, Configuration) and not packing.free.all():
         handles.append(Patch(facecolor=FLOOR, edgecolor=EDGE, linewidth=0.6, label="held"))
     if handles:
         below: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "ncols": 2}
@@ -398,7 +403,7 @@ def _add_key(figure: Figure, artist: PackingArtist) -> None:
 def _draw_load(axes: Axes, artist: PackingArtist) -> None:
     """Arrows down onto the upper layer, and one along x above it."""
     packing, view = artist.packing, artist.view
-    if isinstance(packing, Snapshot) or not packing.top.any():
+    if isinstance(packing, Configuration) or not packing.top.any():
         return
     x, y = packing.position[packing.top].T
     x = x if packing.box_length is None else x % packing.box_length

@@ -9,7 +9,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from faultgouge.analysis.packing.arrays import Floats
+from faultgouge.analysis.arrays import Floats
 
 from .style import INK, styled
 

@@ -8,7 +8,7 @@ from matplotlib.ticker import LogLocator
 from numpy.typing import ArrayLike
 
 from faultgouge.analysis import Growth
-from faultgouge.analysis.packing.arrays import Floats
+from faultgouge.analysis.arrays import Floats
 
 from .style import figure_of, styled
 

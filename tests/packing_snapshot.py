@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from faultgouge.analysis import Packing, Snapshot
-from faultgouge.analysis.packing.snapshot import linearise_contacts
+from faultgouge.analysis import Configuration, Packing
+from faultgouge.analysis.packing.linearise import linearise_contacts
 
 
-def snapshot_of(packing: Packing) -> Snapshot:
+def snapshot_of(packing: Packing) -> Configuration:
     """The linearised contacts of a packing, without its drag."""
     g, c, n = packing.geometry, packing.contacts, len(packing)
     flat = np.zeros(len(c))
@@ -17,7 +17,7 @@ def snapshot_of(packing: Packing) -> Snapshot:
     )  # fmt: skip
     load = np.zeros((n, 2, 3))
     load[packing.top, 0, :2] = packing.fx, -packing.fy
-    return Snapshot(
+    return Configuration(
         dimension=2, position=packing.position, radius=packing.radius, mass=packing.mass,
         inertia=packing.inertia_factor * packing.mass * packing.radius**2, contacts=contacts,
         box=np.diag([packing.box_length or 0.0, 0.0, 0.0]), origin=np.zeros(3),

@@ -31,6 +31,8 @@ FLOORS = {
     ),
     "faultgouge.analysis": (
         ("uncertain_digits", "errors", "progress", "table_display"),
+        ("arrays",),
+        ("configuration",),
         ("packing",),
         ("operators",),
         ("factors",),

@@ -1,11 +1,11 @@
-"""A run.h5 that contains a Snapshot, bitwise, in two or three dimensions.
+"""A run.h5 that contains a Configuration, bitwise, in two or three dimensions.
 
 The file is sealed like every run.h5 (:mod:`.checksummed_file`), and is H5MD 1.1::
 
     /h5md                             version, author, creator
     /particles/particles/position     (1, N, 3)  centres; z = 0 of disks
     /particles/particles/box          dimension 3; lengths of the edges, and which are periodic
-    /snapshot/<name>                  fields of :class:`~faultgouge.analysis.Snapshot`
+    /snapshot/<name>                  fields of :class:`~faultgouge.analysis.Configuration`
     /snapshot/contacts/<name>         fields of :class:`~faultgouge.analysis.LinearisedContacts`
 """
 
@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..configuration import PER_CONTACT, Configuration, LinearisedContacts
 from ..errors import PackingFileError
-from ..packing.snapshot import PER_CONTACT, LinearisedContacts, Snapshot
 from .atomic_write import has_checksum
 from .checksummed_file import new_file, open_checksummed, write
 from .plain_file import check_plain
@@ -26,14 +26,16 @@ SCALARS = ("dimension", "fx", "load_error")
 ARRAYS = ("position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind")
 
 
-def write_snapshot(path: Path, snapshot: Snapshot, attributes: Mapping[str, str | int | float] | None = None) -> None:
+def write_snapshot(
+    path: Path, snapshot: Configuration, attributes: Mapping[str, str | int | float] | None = None
+) -> None:
     """Write a snapshot; an existing file is replaced.
 
     Parameters
     ----------
     path : Path
         The file.
-    snapshot : Snapshot
+    snapshot : Configuration
         What it is to hold.
     attributes : mapping, optional
         Attributes of the root, such as the deck.
@@ -84,7 +86,7 @@ def holds_snapshot(path: Path) -> bool:
         return False
 
 
-def read_snapshot(path: Path) -> Snapshot:
+def read_snapshot(path: Path) -> Configuration:
     """The snapshot of a file.
 
     Raises
@@ -102,7 +104,7 @@ def read_snapshot(path: Path) -> Snapshot:
             contacts = LinearisedContacts(**{name: dataset(group["contacts"], name, size)[()] for name in PER_CONTACT})
             arrays = {name: dataset(group, name, size)[()] for name in ARRAYS}
             numbers = {name: group.attrs[name].item() for name in SCALARS}
-            return Snapshot(contacts=contacts, **arrays, **numbers)
+            return Configuration(contacts=contacts, **arrays, **numbers)
         except Exception as error:  # h5py raises nearly every exception there is, depending on what is damaged
             said = (str(error).strip() or type(error).__name__).rstrip(".")
             raise PackingFileError(f"{path} holds no snapshot that can be read: {said}.") from error

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..packing.arrays import Floats
+from ..arrays import Floats
 from ..packing.geometry import nearest_image
 from ..packing.packing import Packing
 

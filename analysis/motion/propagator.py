@@ -7,9 +7,9 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse.linalg import svds
 
+from ..configuration import Configuration
 from ..errors import FaultgougeError
 from ..packing.packing import Floats, Indices, Packing
-from ..packing.snapshot import Snapshot
 from ..spectrum.spectrum import Complexes
 from .matrix_functions import WELL_CONDITIONED, BlockDiagonal, Function, second_order
 from .oscillator import Oscillator
@@ -62,7 +62,7 @@ class NoGainError(FaultgougeError):
     """The packing has no transient gain: it is unstable, or has no energy."""
 
 
-def stable_motion(packing: Packing | Snapshot) -> LinearMotion:
+def stable_motion(packing: Packing | Configuration) -> LinearMotion:
     """The motion of a packing; NoGainError if the packing is unstable."""
     motion = LinearMotion.of(packing)
     values, dissipative = motion.modes.values, motion.dissipative

@@ -25,8 +25,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..configuration import Configuration
 from ..packing.packing import Floats, Packing
-from ..packing.snapshot import Snapshot
 from .matrix_functions import BlockDiagonal, first_order
 from .oscillator import Oscillator
 from .state_space import StateSpace, driven_motion, released_motion
@@ -45,7 +45,7 @@ class Response:
     velocity : ndarray, shape (T, 3N)
         Its time derivative, length / time.
     top : ndarray of bool, shape (N,)
-        The disks of the upper layer; none of a Snapshot.
+        The disks of the upper layer; none of a Configuration.
     dimension : int
         2 of disks, 3 of spheres.
     """
@@ -81,12 +81,12 @@ class LinearMotion:
         Of A without dissipation, of the first-order system with it.
     """
 
-    packing: Packing | Snapshot
+    packing: Packing | Configuration
     system: StateSpace
     modes: BlockDiagonal
 
     @classmethod
-    def of(cls, packing: Packing | Snapshot) -> "LinearMotion":
+    def of(cls, packing: Packing | Configuration) -> "LinearMotion":
         """Decompose a packing; errors as of `linear_response`."""
         system = StateSpace.of(packing)
         if packing.damped:
@@ -139,7 +139,7 @@ class LinearMotion:
 
 
 def linear_response(
-    packing: Packing | Snapshot,
+    packing: Packing | Configuration,
     times: ArrayLike,
     *,
     force: ArrayLike | None = None,
@@ -201,7 +201,7 @@ def layer_force(packing: Packing, amplitude: float) -> Floats:
     return force
 
 
-def coordinates(packing: Packing | Snapshot, name: str, values: ArrayLike) -> Floats:
+def coordinates(packing: Packing | Configuration, name: str, values: ArrayLike) -> Floats:
     """Numbers of all coordinates as an array of shape (3N,); a ValueError if they have another shape."""
     vector = np.asarray(values, dtype=np.float64)
     if vector.shape != (packing.coordinates,):

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Floats, set_frozen
 from ..errors import BadInputError
-from ..packing.arrays import Floats, set_frozen
 
 ONSET_OF_PULSE = 10.0
 """omega t_0 of a pulse: x = 5 at t = 0, where the pulse is 1e-9 of its peak."""

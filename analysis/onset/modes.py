@@ -8,29 +8,30 @@ do not swap names. (:math:`|y_a^H x_b|`, the obvious weight, vanishes at an exce
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TypeAlias, cast
+from typing import TypeAlias, TypeVar, cast
 
 import numpy as np
 from scipy.sparse import csr_array
 
+from ..configuration import Configuration
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
-from ..packing.snapshot import Configuration, Snapshot
 from ..spectrum.spectrum import Complexes, all_modes, exceeds_rounding, mass_weighted, unit_rounding
 from .eigenvalue_pair import Pair
 from .limits import LIMITS, Limits
 
 Members = tuple[int, int]  # the numbers of the two modes of a pair
 Operator: TypeAlias = Floats | csr_array
+AnyConfiguration = TypeVar("AnyConfiguration", bound=Packing | Configuration)
 
 
-def full_operator(packing: Packing | Snapshot, limits: Limits = LIMITS) -> csr_array:
+def full_operator(packing: Packing | Configuration, limits: Limits = LIMITS) -> csr_array:
     """A = M^(-1/2) K M^(-1/2) of the contacts that bear a force, of all coordinates, with its zero rows; 1 / time^2."""
     packing = force_bearing(packing, limits)
     return mass_weighted(stiffness_matrix(packing), packing)
 
 
-def force_bearing(packing: Configuration, limits: Limits = LIMITS) -> Configuration:
+def force_bearing(packing: AnyConfiguration, limits: Limits = LIMITS) -> AnyConfiguration:
     """The packing without the contacts whose force is no more than the packing's own imbalance.
 
     A disk that only such contacts hold comes to rest just about touching. Its overlap is rounding noise, and with the
@@ -39,11 +40,11 @@ def force_bearing(packing: Configuration, limits: Limits = LIMITS) -> Configurat
     """
     largest = packing.normal_force.max(initial=0.0)
     return cast(
-        Configuration, packing.loaded(min(limits.unknown_force * packing.residual, limits.small_force * largest))
+        AnyConfiguration, packing.loaded(min(limits.unknown_force * packing.residual, limits.small_force * largest))
     )
 
 
-def contact_states(packing: Packing | Snapshot, limits: Limits = LIMITS) -> bytes:
+def contact_states(packing: Packing | Configuration, limits: Limits = LIMITS) -> bytes:
     """Which contacts bear a force, and which of them slide to which side; equal for equal states."""
     return force_bearing(packing, limits).contact_states
 

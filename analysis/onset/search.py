@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
+from ..configuration import Configuration
 from ..errors import FaultgougeError, NoEquilibriumError, TurningPointError
 from ..packing.packing import Floats, Packing
-from ..packing.snapshot import Snapshot
 from ..progress import Watch, show_progress
 from ..spectrum.buckling import negative_eigenvalues
 from ..spectrum.spectrum import Spectrum, spectrum
@@ -71,7 +71,7 @@ class Instability:
     growth_rate: float
 
     @classmethod
-    def of(cls, packing: Packing | Snapshot) -> "Instability":
+    def of(cls, packing: Packing | Configuration) -> "Instability":
         """Count what all eigenvalues of a packing show, without contacts whose force is unknown."""
         return cls.from_spectrum(spectrum(force_bearing(packing)))
 
@@ -155,7 +155,9 @@ class Onset(TableDisplay):
         }
 
 
-def takes_all_modes(packing: Packing | Snapshot, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
+def takes_all_modes(
+    packing: Packing | Configuration, modes: tuple[int, int] | None = None, limits: Limits = LIMITS
+) -> bool:
     """Whether a packing is small enough for all of its modes to be searched, and for all windows to be found."""
     return modes is None and packing.coordinates <= 3 * limits.all_windows
 
@@ -199,7 +201,7 @@ def _narrowest(loads: Floats, limits: Limits) -> float:
 
 
 def find_onset(
-    equilibrium: Callable[[float], Packing | Snapshot],
+    equilibrium: Callable[[float], Packing | Configuration],
     forces: ArrayLike,
     *,
     narrowest: float | None = None,
@@ -219,9 +221,9 @@ def find_onset(
     Parameters
     ----------
     equilibrium : callable
-        fx -> Packing or Snapshot in equilibrium. It is called with the given loads in increasing order, and between
-        calls for the loads a and b with loads between these, in any order. There it may raise a NoEquilibriumError, and
-        the search goes around it. All other errors reach the caller.
+        fx -> Packing or Configuration in equilibrium. It is called with the given loads in increasing order, and
+        between calls for the loads a and b with loads between these, in any order. There it may raise a
+        NoEquilibriumError, and the search goes around it. All other errors reach the caller.
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
     narrowest : float, optional
@@ -282,7 +284,7 @@ def find_onset(
     doubtful: Increments = ()
     all_modes: Spectrum | None = None
     # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
-    if modes is None and (not takes_all or (first and isinstance(start, Snapshot))):
+    if modes is None and (not takes_all or (first and isinstance(start, Configuration))):
         all_modes = _complex_at_start(start, limits)
     if all_modes is not None:
         windows: tuple[Window, ...] = (_fastest(start, all_modes),)
@@ -311,7 +313,7 @@ def find_onset(
     return Onset(windows, complete, doubtful, modes, unstable, float(ends) if ends < np.inf else None)
 
 
-def _complex_at_start(start: Packing | Snapshot, limits: Limits) -> Spectrum | None:
+def _complex_at_start(start: Packing | Configuration, limits: Limits) -> Spectrum | None:
     """The spectrum of a packing at the smallest load, if it has a complex pair.
 
     None if it has none, or if the packing is too large for all eigenvalues to be asked for. Of a symmetric operator,
@@ -328,13 +330,13 @@ def _symmetric(matrix: csr_array) -> bool:
     return bool(abs(matrix - matrix.T).max() <= 1e-14 * abs(matrix).max())
 
 
-def _fastest(start: Packing | Snapshot, found: Spectrum) -> Window:
+def _fastest(start: Packing | Configuration, found: Spectrum) -> Window:
     """The window of the complex pair that grows fastest at the smallest load."""
     pair = max(found.pairs, key=lambda each: each.growth_rate)
     return _at_start(start, pair.eigenvalue.real, pair.overlap)
 
 
-def _at_start(start: Packing | Snapshot, eigenvalue: float, overlap: float) -> Window:
+def _at_start(start: Packing | Configuration, eigenvalue: float, overlap: float) -> Window:
     """A window that is open at the smallest load."""
     return Window.between(Edge(start.fx, 0.0, eigenvalue, overlap, "start"), None)
 

@@ -25,19 +25,19 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import eigsh
 
+from ..configuration import Configuration
 from ..packing.law import Derivatives
 from ..packing.packing import Floats, Packing
-from ..packing.snapshot import Snapshot
 from .linearised_contacts import assembled_damping
 from .stiffness import assemble_stiffness, contact_terms
 
 
-def damping_matrix(packing: Packing | Snapshot, sliding: ArrayLike = False) -> csr_array:
+def damping_matrix(packing: Packing | Configuration, sliding: ArrayLike = False) -> csr_array:
     """Assemble C = -dF/d(dq/dt).
 
     Parameters
     ----------
-    packing : Packing or Snapshot
+    packing : Packing or Configuration
         The configuration, with dashpots ``law.cn`` and ``law.ct`` and with ``drag_time``; any of them may be absent.
     sliding : array_like of bool, shape () or (C,)
         As in `stiffness_matrix`: contacts that continue to slide have no tangential dashpot.
@@ -45,10 +45,10 @@ def damping_matrix(packing: Packing | Snapshot, sliding: ArrayLike = False) -> c
     Returns
     -------
     scipy.sparse.csr_array, shape (3N, 3N), or (6N, 6N) of spheres
-        Force time / length, in the order (x.., y.., R theta..), or as in :mod:`~faultgouge.analysis.packing.snapshot`.
+        Force time / length, in the order (x.., y.., R theta..), or as in :mod:`~faultgouge.analysis.configuration`.
         For a Packing, C is symmetric and positive semidefinite. Without dashpots and drag, C is empty.
     """
-    if isinstance(packing, Snapshot):
+    if isinstance(packing, Configuration):
         return assembled_damping(packing)
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
@@ -80,6 +80,6 @@ def largest_damping_rate(packing: Packing) -> float:
     return float(found[0])
 
 
-def coordinate_mass(packing: Packing | Snapshot) -> Floats:
+def coordinate_mass(packing: Packing | Configuration) -> Floats:
     """Masses of all coordinates."""
     return packing.coordinate_mass

@@ -33,8 +33,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import coo_array, csr_array
 
-from ..packing.arrays import Floats, derive_frozen
-from ..packing.snapshot import LinearisedContacts, Snapshot
+from ..arrays import Floats, derive_frozen
+from ..configuration import Configuration, LinearisedContacts
 
 
 def contact_derivatives(contacts: LinearisedContacts, parting: ArrayLike = 0.5) -> tuple[Floats, Floats, Floats]:
@@ -62,17 +62,17 @@ def contact_derivatives(contacts: LinearisedContacts, parting: ArrayLike = 0.5) 
     return force, np.stack([torque_by_u, cross @ ft_by_w], axis=1), _outer(np.cross(n, ft), overlap)
 
 
-def assembled_stiffness(snapshot: Snapshot, parting: ArrayLike = 0.5) -> csr_array:
-    """K = -dF/dq of a snapshot; see :func:`~faultgouge.analysis.stiffness_matrix`.
+def assembled_stiffness(configuration: Configuration, parting: ArrayLike = 0.5) -> csr_array:
+    """K = -dF/dq of a configuration; see :func:`~faultgouge.analysis.stiffness_matrix`.
 
     Rows (F, T/R) and columns (translation, R theta) of both partners, from the blocks of each contact.
     """
-    count, c, pair = len(snapshot), snapshot.contacts, ~snapshot.contacts.wall
+    count, c, pair = len(configuration), configuration.contacts, ~configuration.contacts.wall
     force, torque, growth = contact_derivatives(c, parting)
     partners = np.stack([c.i, np.where(pair, c.j, 0)])
-    radius = snapshot.radius[partners]
+    radius = configuration.radius[partners]
     rolling, lever = c.slip_arm.T / radius, c.lever_arm.T / radius
-    takes_part = snapshot.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
+    takes_part = configuration.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
     # axes first: all that follows walks along contacts
     force, torque, growth = (np.ascontiguousarray(np.moveaxis(each, 0, -1)) for each in (force, torque, growth))
     blocks = np.empty((2, 2, 6, 6, len(c)))
@@ -84,7 +84,7 @@ def assembled_stiffness(snapshot: Snapshot, parting: ArrayLike = 0.5) -> csr_arr
             # -T/R = (l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
             blocks[p, q, 3:, :3] = (by * both * lever[p]) * torque[0] - (by * both * c.lever_slope / radius[p]) * growth
             blocks[p, q, 3:, 3:] = (both * lever[p] * rolling[q]) * torque[1]
-    if snapshot.dimension == 2:
+    if configuration.dimension == 2:
         in_plane = np.array([0, 1, 5])
         blocks = blocks[:, :, in_plane[:, None], in_plane]
     diagonal = np.zeros((*blocks.shape[2:4], count))
@@ -98,24 +98,24 @@ def assembled_stiffness(snapshot: Snapshot, parting: ArrayLike = 0.5) -> csr_arr
     columns = axis[:, None] + np.concatenate([every, second, first])
     where = tuple(np.broadcast_to(index, values.shape).ravel() for index in (rows, columns))
     # two particles that touch through two images have two contacts, which are added
-    matrix = coo_array((values.ravel(), where), shape=(snapshot.coordinates, snapshot.coordinates)).tocsr()
+    matrix = coo_array((values.ravel(), where), shape=(configuration.coordinates, configuration.coordinates)).tocsr()
     matrix.eliminate_zeros()
     return matrix
 
 
-def assembled_damping(snapshot: Snapshot) -> csr_array:
-    """C = -dF/d(dq/dt) of a snapshot; see :func:`~faultgouge.analysis.damping_matrix`."""
-    c = snapshot.contacts
+def assembled_damping(configuration: Configuration) -> csr_array:
+    """C = -dF/d(dq/dt) of a configuration; see :func:`~faultgouge.analysis.damping_matrix`."""
+    c = configuration.contacts
     none, still = np.zeros(len(c)), np.zeros((len(c), 3))
     # where no normal rotates the tangential force is but the direction in which a contact slides
     dashpots = derive_frozen(
         c, normal_force=none, closing=still, parting=still, distance=np.full(len(c), np.inf), lever_slope=none,
         normal_stiffness=c.normal_dashpot, tangential_stiffness=c.tangential_dashpot,
     )  # fmt: skip
-    return assembled_stiffness(derive_frozen(snapshot, contacts=dashpots))
+    return assembled_stiffness(derive_frozen(configuration, contacts=dashpots))
 
 
-def rescaling_operators(snapshot: Snapshot) -> tuple[csr_array, csr_array]:
+def rescaling_operators(configuration: Configuration) -> tuple[csr_array, csr_array]:
     r"""What K of the mean derivative lacks where a contact closes with another derivative than it parts with.
 
     With :math:`\dot\delta = N \dot q` the forces change by :math:`-K \dot q + B\, |N \dot q|`.
@@ -127,16 +127,16 @@ def rescaling_operators(snapshot: Snapshot) -> tuple[csr_array, csr_array]:
     b : scipy.sparse.csr_array, shape (coordinates, C)
         Forces by absolute rates of the overlaps, half of the difference of both derivatives; force / length.
     """
-    c, count = snapshot.contacts, len(snapshot)
+    c, count = configuration.contacts, len(configuration)
     difference = 0.5 * (c.overlap_derivative(0.0) - c.overlap_derivative(1.0))
     turn = np.cross(c.normal, difference)
-    in_plane = np.arange(6) if snapshot.dimension == 3 else np.array([0, 1, 5])
+    in_plane = np.arange(6) if configuration.dimension == 3 else np.array([0, 1, 5])
     contact = np.tile(np.arange(len(c)), len(in_plane))
-    n, b = (csr_array((len(c), snapshot.coordinates)) for _ in range(2))
+    n, b = (csr_array((len(c), configuration.coordinates)) for _ in range(2))
     for partner, arm, sign in ((c.i, c.lever_arm[:, 0], 1.0), (c.j, c.lever_arm[:, 1], -1.0)):
-        moves = (partner >= 0) & snapshot.free[partner]
+        moves = (partner >= 0) & configuration.free[partner]
         rate = np.hstack([-sign * c.normal, np.zeros_like(turn)]) * moves[:, None]
-        force = np.hstack([sign * difference, -(arm / snapshot.radius[partner])[:, None] * turn]) * moves[:, None]
+        force = np.hstack([sign * difference, -(arm / configuration.radius[partner])[:, None] * turn]) * moves[:, None]
         coordinate = (np.arange(len(in_plane))[:, None] * count + np.where(moves, partner, 0)).ravel()
         n = n + csr_array((rate.T[in_plane].ravel(), (contact, coordinate)), shape=n.shape)
         b = b + csr_array((force.T[in_plane].ravel(), (contact, coordinate)), shape=b.shape)

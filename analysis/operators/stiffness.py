@@ -46,9 +46,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array
 
+from ..configuration import Configuration
 from ..packing.law import Derivatives
 from ..packing.packing import Floats, Indices, Packing
-from ..packing.snapshot import Snapshot
 from .linearised_contacts import assembled_stiffness
 
 Form = Literal["consistent", "paper"]
@@ -59,7 +59,7 @@ SIGNS = np.einsum("pa,qb->pqab", SIDES, SIDES)
 
 
 def stiffness_matrix(
-    packing: Packing | Snapshot,
+    packing: Packing | Configuration,
     form: Form = "consistent",
     coupled: NDArray[np.bool_] | None = None,
     parting: ArrayLike = 0.5,
@@ -69,7 +69,7 @@ def stiffness_matrix(
 
     Parameters
     ----------
-    packing : Packing or Snapshot
+    packing : Packing or Configuration
         The configuration; it need not be in balance.
     form : {"consistent", "paper"}
         The exact derivative, or the derivative without the rotation of the tangent.
@@ -88,19 +88,19 @@ def stiffness_matrix(
     -------
     scipy.sparse.csr_array, shape (3N, 3N), or (6N, 6N) of spheres
         Force / length, in the order (x.., y.., R theta..), or as in
-        :mod:`~faultgouge.analysis.packing.snapshot`. Rows of rattlers are empty, and so are all rows and columns
+        :mod:`~faultgouge.analysis.configuration`. Rows of rattlers are empty, and so are all rows and columns
         of rotations without friction.
 
     Raises
     ------
     ValueError
-        If the form is neither of the two, or an option does not apply to a Snapshot.
+        If the form is neither of the two, or an option does not apply to a Configuration.
     """
     if form not in ("consistent", "paper"):
         raise ValueError(f'form = "{form}" must be "consistent" or "paper".')
-    if isinstance(packing, Snapshot):
+    if isinstance(packing, Configuration):
         if form == "paper" or coupled is not None:
-            raise ValueError("The operator of a Snapshot is the consistent one, of all of its contacts.")
+            raise ValueError("The operator of a Configuration is the consistent one, of all of its contacts.")
         return assembled_stiffness(packing, parting)
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)

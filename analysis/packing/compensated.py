@@ -14,7 +14,7 @@ with its error is a pair of arrays, (high, low), and represents their sum.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Floats
+from ..arrays import Floats
 
 Pair = tuple[Floats, Floats]
 

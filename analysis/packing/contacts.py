@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import Floats, Indices, derive_frozen, floats, integers, same_bits, set_frozen
+from ..arrays import Floats, Indices, derive_frozen, floats, integers, same_bits, set_frozen
 
 FLOOR = -1
 """The index that stands for the floor as the second partner of a contact."""

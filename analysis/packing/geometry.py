@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays import Floats, floats
 from ..errors import BadInputError
-from .arrays import Floats, floats
 from .compensated import Pair, exact_sum, overlap_and_distance, separation
 from .contacts import FLOOR, Contacts
 

@@ -114,7 +114,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import Floats, set_frozen
+from ..arrays import Floats, set_frozen
 
 AT_THE_BOUND = 1 - 1e-8
 """Share of its limit from which on a slip is at Coulomb's bound. A slip that LAMMPS has clamped differs from the limit

@@ -22,7 +22,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import (
+from ..arrays import (
     Floats,
     Indices,
     booleans,

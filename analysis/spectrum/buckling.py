@@ -15,9 +15,9 @@ eigenvalues lie within c/2 of -c/2, where Arnoldi's iteration with that shift fi
 import numpy as np
 from scipy.sparse import csc_array, eye_array
 
+from ..configuration import Configuration
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
 from ..packing.packing import Floats, Packing
-from ..packing.snapshot import Snapshot
 from .eigenpairs import eigenpairs
 from .spectrum import DENSE, SAFETY, dynamical_matrix, is_negative, spectrum, unit_rounding, zero_uncertainty
 
@@ -28,14 +28,14 @@ FIRST = 16
 """Eigenvalues that are asked for at first; twice as many until the interval is covered."""
 
 
-def negative_eigenvalues(packing: Packing | Snapshot) -> Floats:
+def negative_eigenvalues(packing: Packing | Configuration) -> Floats:
     """The real negative eigenvalues of a packing, beyond the uncertainty of rounding and of forces out of balance.
 
     If the symmetric part of the operator is positive definite, a sparse factorisation shows that there are none.
 
     Parameters
     ----------
-    packing : Packing or Snapshot
+    packing : Packing or Configuration
         In equilibrium.
 
     Returns

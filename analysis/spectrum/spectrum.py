@@ -43,10 +43,10 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
+from ..configuration import Configuration
 from ..operators.damping import coordinate_mass
 from ..operators.stiffness import Form, stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
-from ..packing.snapshot import Snapshot
 from ..table_display import TableDisplay
 
 Complexes = NDArray[np.complex128]
@@ -233,7 +233,7 @@ def rotation_share(right: Complexes | Floats, axes: int = 3) -> Floats:
     return energy[axes // 2 + axes % 2 :].sum(axis=0) / energy.sum(axis=0)
 
 
-def dynamical_matrix(packing: Packing | Snapshot, form: Form = "consistent") -> tuple[csr_array, Indices]:
+def dynamical_matrix(packing: Packing | Configuration, form: Form = "consistent") -> tuple[csr_array, Indices]:
     """A = M^(-1/2) K M^(-1/2) without its zero rows.
 
     Parameters
@@ -277,7 +277,7 @@ def all_modes(matrix: csr_array) -> tuple[Complexes, Complexes, Complexes]:
     return values[order], right, left
 
 
-def mass_weighted(stiffness: csr_array, packing: Packing | Snapshot) -> csr_array:
+def mass_weighted(stiffness: csr_array, packing: Packing | Configuration) -> csr_array:
     """M^(-1/2) K M^(-1/2), zero rows and all; 1 / time^2."""
     scale = 1.0 / np.sqrt(coordinate_mass(packing))
     rows = np.repeat(scale, np.diff(stiffness.indptr))
@@ -286,7 +286,7 @@ def mass_weighted(stiffness: csr_array, packing: Packing | Snapshot) -> csr_arra
     )
 
 
-def eigenvalues(packing: Packing | Snapshot, form: Form = "consistent") -> Complexes:
+def eigenvalues(packing: Packing | Configuration, form: Form = "consistent") -> Complexes:
     """Compute every eigenvalue without vectors, by LAPACK's dense solver, in a third of the time of :func:`spectrum`.
 
     Without vectors it is not known which complex pairs exceed their rounding uncertainty.
@@ -311,12 +311,12 @@ def _sort_eigenvalues(values: Complexes) -> Complexes:
     return np.asarray(values[np.lexsort((values.imag, values.real))], dtype=np.complex128)
 
 
-def spectrum(packing: Packing | Snapshot, form: Form = "consistent") -> Spectrum:
+def spectrum(packing: Packing | Configuration, form: Form = "consistent") -> Spectrum:
     """Compute every eigenvalue by LAPACK's dense solver, and left and right vectors only if there are complex pairs.
 
     Parameters
     ----------
-    packing : Packing or Snapshot
+    packing : Packing or Configuration
         The configuration. The result describes stability only if it is in equilibrium.
     form : {"consistent", "paper"}
         As in :func:`~faultgouge.analysis.stiffness_matrix`.
@@ -387,7 +387,7 @@ def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:
     return np.asarray(2.0 / dt * np.arcsin(0.5 * dt * root), dtype=np.complex128)
 
 
-def largest_frequency(packing: Packing | Snapshot) -> float:
+def largest_frequency(packing: Packing | Configuration) -> float:
     """omega_max = max sqrt|lambda|; to `LIMIT`, by Arnoldi's iteration (ARPACK), beyond `DENSE` coordinates.
 
     Returns
@@ -415,12 +415,12 @@ def unit_rounding(matrix: Floats | Complexes) -> float:
     return float(0.5 * np.finfo(np.float64).eps * np.linalg.norm(matrix))
 
 
-def in_balance(packing: Packing | Snapshot) -> bool:
+def in_balance(packing: Packing | Configuration) -> bool:
     """Whether what is left of the forces on a particle is rounding, of a dump's digits at most."""
     return packing.residual <= IN_BALANCE * float(packing.normal_force.max(initial=0.0))
 
 
-def zero_uncertainty(packing: Packing | Snapshot, rounding: float) -> float:
+def zero_uncertainty(packing: Packing | Configuration, rounding: float) -> float:
     """Uncertainty of an eigenvalue of zero that is perfectly conditioned, 1 / time^2.
 
     A motion that stretches no contact has the eigenvalue zero as the forces F of the contacts cancel, whose parts in A

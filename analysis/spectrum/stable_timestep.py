@@ -26,10 +26,10 @@ from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
+from ..configuration import Configuration
 from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Packing
-from ..packing.snapshot import Snapshot
 
 FEW, MANY = 40, 10_000
 """Coordinates up to which a time step is that of all eigenvalues, and from which on it has fewer digits."""
@@ -73,13 +73,13 @@ class StableTimestep(float):
 
 
 def stable_timestep(
-    of: float | Packing | Snapshot, stiffness: csr_array | None = None, damping: csr_array | None = None
+    of: float | Packing | Configuration, stiffness: csr_array | None = None, damping: csr_array | None = None
 ) -> StableTimestep:
     r"""The largest stable time step of velocity Verlet.
 
     Parameters
     ----------
-    of : float, Packing or Snapshot
+    of : float, Packing or Configuration
         omega_max, radian / time, or a configuration with its dashpots.
     stiffness, damping : scipy.sparse.csr_array, optional
         K and C of the configuration, where they are assembled already.
@@ -96,7 +96,7 @@ def stable_timestep(
     scipy.sparse.linalg.ArpackError
         If the iteration does not converge.
     """
-    if not isinstance(of, Packing | Snapshot):
+    if not isinstance(of, Packing | Configuration):
         return StableTimestep(2.0 / of)
     if stiffness is None:
         stiffness = stiffness_matrix(of)
@@ -179,7 +179,7 @@ def _next_mu(mu: float, value: float, moved: Floats, damping: csr_array | None) 
 
 
 def _sum_of(stiffness: csr_array, mu: float, damping: csr_array) -> csr_array:
-    """K + mu C; those of a Snapshot have their numbers in the same places, and a tenth of the time is enough."""
+    """K + mu C; those of a Configuration have their numbers in the same places, and a tenth of the time is enough."""
     if np.array_equal(stiffness.indptr, damping.indptr) and np.array_equal(stiffness.indices, damping.indices):
         data = stiffness.data + mu * damping.data
         return csr_array((data, stiffness.indices, stiffness.indptr), shape=stiffness.shape)

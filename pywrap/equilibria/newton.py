@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...analysis import Packing, nearest_image, touching
-from ...analysis.packing.arrays import Floats, Indices
+from ...analysis.arrays import Floats, Indices
 from ..lammps.trial_state import EPSILON, Trial
 from .newton_matrix import IDLE, StiffnessFactors, factor_stiffness
 from .rattlers import middle_of_cage

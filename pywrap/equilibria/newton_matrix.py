@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...analysis.arrays import Floats, Indices
 from ...analysis.factors.linear_solver import Band, BandSolver, Booleans, Solver, SparseSolver
 from ...analysis.operators.stiffness import assemble_stiffness, contact_terms
-from ...analysis.packing.arrays import Floats, Indices
 from ..lammps.contact_graph import ContactGraph
 from ..lammps.trial_state import Trial
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...analysis import NoEquilibriumError, Packing, nearest_image
-from ...analysis.packing.arrays import Indices
+from ...analysis.arrays import Indices
 from ..lammps.contact_graph import ContactGraph
 from ..lammps.engine import Engine
 from ..lammps.trial_state import rounding

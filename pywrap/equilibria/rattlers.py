@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...analysis import Packing, nearest_image, touching
-from ...analysis.packing.arrays import Floats, Indices
+from ...analysis.arrays import Floats, Indices
 from ...analysis.packing.geometry import neighbour_tree
 
 TRAVEL = 0.3

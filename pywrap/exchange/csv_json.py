@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from ...analysis import MindlinLaw, PackingFileError, read_packing
+from ...analysis.arrays import Floats
 from ...analysis.files.dumps import CONTACT, dump_frames
-from ...analysis.packing.arrays import Floats
 from .disks import Disks, Slips, of_columns
 from .text_columns import columns_of, lines_of
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import FLOOR, Contacts, MindlinLaw, Packing, PackingFileError, nearest_image, touching
-from ...analysis.packing.arrays import Floats, Indices
+from ...analysis.arrays import Floats, Indices
 from ...analysis.packing.geometry import neighbour_tree
 
 FLAT = 1e-6

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Packing
+from ...analysis.arrays import Floats
 from ...analysis.files.runfile_header import differing_parameters
-from ...analysis.packing.arrays import Floats
 from .disks import Slips
 
 KEYS = ("kn", "kt", "mu", "exponent", "rescaled", "coulomb", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
@@ -34,7 +34,7 @@ class ModeVectors:
     eigenvalue : complex
         lambda, 1 / time^2.
     displacement : ndarray of complex, shape (3, N)
-        x, y and R theta; of a Snapshot all its coordinates, shape (axes, N).
+        x, y and R theta; of a Configuration all its coordinates, shape (axes, N).
     """
 
     name: str

@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ...analysis import BadInputError, Snapshot
+from ...analysis import BadInputError, Configuration
+from ...analysis.arrays import Floats
 from ...analysis.files.atomic_write import replace_whole
-from ...analysis.packing.arrays import Floats
 from .export_quantities import ModeVectors
 from .vtp import write_frame_list, write_poly_data, write_xml
 
@@ -23,7 +23,7 @@ def check_snapshot_writer(path: Path) -> None:
         raise BadInputError(f"-o {path}: a snapshot goes into .vtp, .xyz; give it one of these suffixes.")
 
 
-def write_snapshot_for_others(path: Path, snapshot: Snapshot, modes: Sequence[ModeVectors] = ()) -> str:
+def write_snapshot_for_others(path: Path, snapshot: Configuration, modes: Sequence[ModeVectors] = ()) -> str:
     """Write a .vtp or an .xyz; what is in it, in words.
 
     Raises
@@ -45,7 +45,7 @@ FARTHEST = 0.5
 """Longest displacement in a film of a mode, in units of the smallest radius: particles stay beside their neighbours."""
 
 
-def write_mode_frames(path: Path, snapshot: Snapshot, mode: ModeVectors, count: int, periods: int = 1) -> None:
+def write_mode_frames(path: Path, snapshot: Configuration, mode: ModeVectors, count: int, periods: int = 1) -> None:
     """Write the motion of a mode, growth left out: frames with displaced particles, their displacement and rotation.
 
     Parameters
@@ -72,11 +72,11 @@ def write_mode_frames(path: Path, snapshot: Snapshot, mode: ModeVectors, count: 
         write_frame_list(path, ((float(k), _poly_data(snapshot, *frame)) for k, frame in enumerate(frames)))
 
 
-def _in_space(snapshot: Snapshot) -> Floats:
+def _in_space(snapshot: Configuration) -> Floats:
     return np.pad(snapshot.position, ((0, 0), (0, 3 - snapshot.dimension)))
 
 
-def _of_particles(snapshot: Snapshot, modes: Sequence[ModeVectors]) -> dict[str, Floats]:
+def _of_particles(snapshot: Configuration, modes: Sequence[ModeVectors]) -> dict[str, Floats]:
     c, pair = snapshot.contacts, ~snapshot.contacts.wall
     count, pressure = (
         np.bincount(c.i, weight, len(snapshot)) + np.bincount(c.j[pair], weight[pair], len(snapshot))
@@ -104,7 +104,7 @@ def _of_particles(snapshot: Snapshot, modes: Sequence[ModeVectors]) -> dict[str,
     return values
 
 
-def _poly_data(snapshot: Snapshot, position: Floats, modes: Sequence[ModeVectors]) -> ElementTree.Element:
+def _poly_data(snapshot: Configuration, position: Floats, modes: Sequence[ModeVectors]) -> ElementTree.Element:
     """Particles where they have been moved to, with the contacts that they have at rest."""
     c = snapshot.contacts
     first, rest = position[c.i], _in_space(snapshot)
@@ -126,7 +126,7 @@ def _poly_data(snapshot: Snapshot, position: Floats, modes: Sequence[ModeVectors
     return write_poly_data(position, ends, numbers, _of_particles(snapshot, modes), on_contacts)
 
 
-def _write_xyz(path: Path, snapshot: Snapshot, frames: Sequence[tuple[Floats, Sequence[ModeVectors]]]) -> None:
+def _write_xyz(path: Path, snapshot: Configuration, frames: Sequence[tuple[Floats, Sequence[ModeVectors]]]) -> None:
     """Frames, each of positions and modes."""
     lattice, origin = (" ".join(map(repr, each.ravel().tolist())) for each in (snapshot.box, snapshot.origin))
     sides = " ".join("T" if each else "F" for each in snapshot.periodic)

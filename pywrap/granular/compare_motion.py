@@ -1,4 +1,4 @@
-r"""LAMMPS's own motion from small velocities beside that of the linearised packing: the proof of a Snapshot.
+r"""LAMMPS's own motion from small velocities beside that of the linearised packing: the proof of a Configuration.
 
 From rest with the velocities :math:`\mathbf v_0` small motion is
 
@@ -30,9 +30,9 @@ import numpy as np
 from scipy.sparse import block_array, csr_array, diags_array
 from scipy.sparse.linalg import expm_multiply
 
-from ...analysis import Snapshot, damping_matrix, stiffness_matrix
+from ...analysis import Configuration, damping_matrix, stiffness_matrix
+from ...analysis.arrays import Floats, Indices
 from ...analysis.operators.linearised_contacts import rescaling_operators
-from ...analysis.packing.arrays import Floats, Indices
 from ...analysis.spectrum.spectrum import active_coordinates, mass_weighted
 from .granular_commands import SnapshotError
 from .lammps_arrays import owned_array, rows_of, set_velocity
@@ -68,7 +68,7 @@ class MotionComparison:
 
 
 def compare_motion(
-    lmp: Any, snapshot: Snapshot, time: float, amplitude: float, *, timestep: float | None = None, seed: int = 0
+    lmp: Any, snapshot: Configuration, time: float, amplitude: float, *, timestep: float | None = None, seed: int = 0
 ) -> MotionComparison:
     """LAMMPS's undamped motion from small velocities against exp(t G).
 
@@ -78,7 +78,7 @@ def compare_motion(
     ----------
     lmp : lammps.lammps
         The instance, as it was when the snapshot was taken; on one rank.
-    snapshot : Snapshot
+    snapshot : Configuration
         Of :func:`~faultgouge.pywrap.from_lammps`.
     time : float
         How long, positive.
@@ -116,7 +116,9 @@ def compare_motion(
     return MotionComparison(difference, step * steps, step, velocity, linear)
 
 
-def _linear_velocity(snapshot: Snapshot, stiffness: csr_array, active: Indices, start: Floats, time: float) -> Floats:
+def _linear_velocity(
+    snapshot: Configuration, stiffness: csr_array, active: Indices, start: Floats, time: float
+) -> Floats:
     """Velocities after some time; these and `start` are multiplied by the root of the masses."""
     a = stiffness[active][:, active]
     g = mass_weighted(damping_matrix(snapshot), snapshot)[active][:, active]
@@ -147,7 +149,7 @@ def _linear_velocity(snapshot: Snapshot, stiffness: csr_array, active: Indices, 
     return np.asarray(0.5 * (ends[0] - ends[1]))
 
 
-def _run(lmp: Any, snapshot: Snapshot, velocity: Floats, step: float, steps: int) -> Floats:
+def _run(lmp: Any, snapshot: Configuration, velocity: Floats, step: float, steps: int) -> Floats:
     """Velocities of the coordinates after some steps of LAMMPS."""
     lmp.command("log none")
     quieten(lmp, drag=True)

@@ -24,7 +24,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from ...analysis.packing.arrays import Floats
+from ...analysis.arrays import Floats
 from ..lammps.instance import start_lammps
 from .granular_commands import GIVE_LINES, Commands, SnapshotError
 from .instance_queries import explain_error

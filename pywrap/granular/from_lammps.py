@@ -1,4 +1,4 @@
-r"""A Snapshot of a live LAMMPS with its own granular styles, or ours: any packing, as it stands.
+r"""A Configuration of a live LAMMPS with its own granular styles, or ours: any packing, as it stands.
 
 What LAMMPS says of each contact (compute pair/local, fix wall/gran ... contacts) is its normal, its overlap and both
 forces, without dashpots, since the look is taken at rest (:mod:`~faultgouge.pywrap.granular.lammps_arrays`). The laws
@@ -34,9 +34,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis import LinearisedContacts, MindlinLaw, Snapshot
-from ...analysis.packing.arrays import Floats, Indices, derive_frozen
-from ...analysis.packing.snapshot import PER_CONTACT, WALL, linearise_contacts
+from ...analysis import Configuration, LinearisedContacts, MindlinLaw
+from ...analysis.arrays import Floats, Indices, derive_frozen
+from ...analysis.configuration import PER_CONTACT, WALL
+from ...analysis.packing.linearise import linearise_contacts
 from .contact_law_measurement import MeasuredLaw, State, measure_law
 from .granular_commands import (
     GIVE_LINES,
@@ -71,7 +72,7 @@ KnownLaws = dict[tuple[Any, ...], MeasuredLaw]
 
 def from_lammps(
     lmp: Any, commands: Iterable[str] | None = None, *, slides: bool = False, balance: float = BALANCE
-) -> Snapshot:
+) -> Configuration:
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
 
     The instance does not change: its next run is the same to the bit as without the look, on any number of ranks, and
@@ -92,7 +93,7 @@ def from_lammps(
 
     Returns
     -------
-    Snapshot
+    Configuration
 
     Raises
     ------
@@ -105,7 +106,7 @@ def from_lammps(
 
 def take_snapshot(
     lmp: Any, commands: Iterable[str] | None, laws: KnownLaws, *, slides: bool, balance: float
-) -> Snapshot:
+) -> Configuration:
     """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
     given = None if commands is None else read_commands(commands)
     look = partial(_look, lmp, given)
@@ -175,7 +176,7 @@ def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
     check_fixes(styles.fixes, commands)
 
 
-def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> Snapshot:
+def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> Configuration:
     count, dimension = len(found["id"]), lmp.extract_setting("dimension")
     if count == 0:
         raise SnapshotError("This LAMMPS has no particles.")
@@ -183,7 +184,7 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> S
     low, high, xy, yz, xz, periodic, _ = lmp.extract_box()
     size = np.subtract(high, low)
     box = np.array([[size[0], 0, 0], [xy, size[1], 0], [xz, yz, size[2]]])
-    made = Snapshot(
+    made = Configuration(
         dimension=dimension,
         position=found["x"][:, :dimension],
         radius=found["radius"],

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import Snapshot
-from ...analysis.packing.arrays import Floats, Indices
+from ...analysis import Configuration
+from ...analysis.arrays import Floats, Indices
 from ..lammps.instance import load_plugin
 from .granular_commands import SnapshotError
 from .instance_queries import communicator
@@ -30,7 +30,7 @@ def owned_array(lmp: Any, name: str) -> Floats:
     return np.zeros((0, 3)) if values is None else values[:count]
 
 
-def rows_of(lmp: Any, snapshot: Snapshot) -> Indices:
+def rows_of(lmp: Any, snapshot: Configuration) -> Indices:
     """Rows of LAMMPS's arrays on one rank, in the order of the particles of a snapshot."""
     ids = owned_array(lmp, "id")
     rows = np.argsort(ids)
@@ -39,7 +39,7 @@ def rows_of(lmp: Any, snapshot: Snapshot) -> Indices:
     return rows
 
 
-def set_velocity(lmp: Any, snapshot: Snapshot, velocity: Floats) -> None:
+def set_velocity(lmp: Any, snapshot: Configuration, velocity: Floats) -> None:
     """Give the particles the velocities of their coordinates, shape (axes N,)."""
     rows = rows_of(lmp, snapshot)
     translation, rotation = snapshot.vectors(velocity)

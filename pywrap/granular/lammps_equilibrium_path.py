@@ -32,10 +32,10 @@ from typing import Any, NoReturn
 import numpy as np
 from scipy.sparse import csc_array, eye_array
 
-from ...analysis import NoEquilibriumError, Snapshot, negative_eigenvalues, stiffness_matrix
+from ...analysis import Configuration, NoEquilibriumError, negative_eigenvalues, stiffness_matrix
+from ...analysis.arrays import derive_frozen
 from ...analysis.errors import FaultgougeError
 from ...analysis.factors.sparse_lu import general_lu
-from ...analysis.packing.arrays import derive_frozen
 from ...parent_death import end_with
 from .from_lammps import KnownLaws, take_snapshot
 from .granular_commands import INTEGRATORS, SnapshotError, read_commands, without_suffix
@@ -60,7 +60,7 @@ SLOWEST, FASTEST = 1e-4, 0.2
 """Rates of the drag, per time step; explicit drag alternates from 1 on."""
 
 
-Kept = tuple[float, Connection, Snapshot | None]
+Kept = tuple[float, Connection, Configuration | None]
 """A load, the copy of the process that is there, and its packing; the first has none."""
 
 
@@ -75,8 +75,8 @@ def lammps_path(
 ) -> "LammpsPath":
     """Equilibria of LAMMPS's own packing as a function of a load, for :func:`~faultgouge.analysis.find_onset`.
 
-    ``path(value)`` is the Snapshot in equilibrium at a value, with `fx` the value and `load_error` the shift of the
-    value that sets as much out of balance as the relaxation has left.
+    ``path(value)`` is the Configuration in equilibrium at a value, with `fx` the value and `load_error` the shift of
+    the value that sets as much out of balance as the relaxation has left.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class LammpsPath:
         self._kept: list[Kept] = [(-np.inf, here, None)]
         self._end = weakref.finalize(self, _end, self._kept, first, os.getpid(), folder)
 
-    def __call__(self, value: float) -> Snapshot:
+    def __call__(self, value: float) -> Configuration:
         """The packing in equilibrium at a value."""
         value = float(value)
         below, there, snapshot = next(each for each in reversed(self._kept) if each[0] <= value or each[0] == -np.inf)
@@ -220,10 +220,10 @@ class _Relaxation:
     balance: float
     steps: int
     laws: KnownLaws = field(default_factory=dict)
-    found: Snapshot | None = None  # the equilibrium where LAMMPS stands
+    found: Configuration | None = None  # the equilibrium where LAMMPS stands
     rate: float = 0.01  # of the drag, per time step: critical for a mode of 1000 steps
 
-    def result(self, value: float, relaxes: bool) -> Snapshot | FaultgougeError | None:
+    def result(self, value: float, relaxes: bool) -> Configuration | FaultgougeError | None:
         """The equilibrium at a value, or why there is none; None if Newton's method, when asked for, cannot serve."""
         try:
             self.set(value)
@@ -251,7 +251,7 @@ class _Relaxation:
         elif self.lmp.set_internal_variable(self.apply, value) != 0:
             self.lmp.command(f"variable {self.apply} equal {value:.17g}")
 
-    def look(self) -> Snapshot:
+    def look(self) -> Configuration:
         """The packing as it stands, moving or not."""
         return take_snapshot(self.lmp, self.commands, self.laws, slides=self.slides, balance=np.inf)
 
@@ -267,7 +267,7 @@ class _Relaxation:
         # forces have a rounding of 1e-16 of themselves, and of 1e-12 where overlaps are small beside coordinates
         return change / step if change > 1e-11 * np.abs(forces[0]).max() else 0.0
 
-    def displace_to_balance(self) -> Snapshot | None:
+    def displace_to_balance(self) -> Configuration | None:
         """Newton's method from the equilibrium where LAMMPS stands; None if it cannot serve."""
         start, lmp = self.found, self.lmp
         if start is None or start.contacts.at_bound.any():
@@ -310,7 +310,7 @@ class _Relaxation:
         good = good and not found.contacts.at_bound.any() and len(negative_eigenvalues(found)) == 0
         return found if good else None
 
-    def relax(self, value: float) -> Snapshot:
+    def relax(self, value: float) -> Configuration:
         """Run with drag until the packing rests."""
         lmp, dt = self.lmp, float(self.lmp.extract_global("dt"))
         found, way = self.look(), 0.0

@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 
 from mpi4py import MPI
 
-from ...analysis import BadInputError, Snapshot
+from ...analysis import BadInputError, Configuration
 from ..lammps.instance import lammps_instance
 from .deck_trial import try_without_runs
 from .from_lammps import from_lammps
@@ -14,7 +14,7 @@ from .granular_commands import SnapshotError, commands_in, logged_text
 from .instance_queries import explain_error
 
 
-def run_deck(path: Path, *, slides: bool = False) -> Snapshot:
+def run_deck(path: Path, *, slides: bool = False) -> Configuration:
     """Run a deck in its own folder, as `lmp -in` there, and take its last state as `from_lammps` does.
 
     Raises

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import FLOOR, Contacts
+from ...analysis.arrays import Floats, Indices
 from ...analysis.factors.linear_solver import Band, Booleans, band
-from ...analysis.packing.arrays import Floats, Indices
 
 
 class ContactGraph:

@@ -15,9 +15,9 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import Packing
+from ...analysis.arrays import Floats
 from ...analysis.files.signal_files import write_table
 from ...analysis.motion.signals import Signal
-from ...analysis.packing.arrays import Floats
 from .decks import Decks
 from .lammps_state import LammpsState
 from .plain_file_names import shared_folder

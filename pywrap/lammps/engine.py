@@ -19,8 +19,8 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike
 
 from ...analysis import Packing
+from ...analysis.arrays import Floats
 from ...analysis.motion.signals import Signal
-from ...analysis.packing.arrays import Floats
 from .data_file import box_heights, data_file, sort_contacts
 from .decks import Decks
 from .dynamics import Dynamics, Weakening

@@ -22,7 +22,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ...analysis import FLOOR, Contacts, Packing, touching
-from ...analysis.packing.arrays import Floats
+from ...analysis.arrays import Floats
 from ...analysis.packing.compensated import exact_sum
 from .contact_graph import ContactGraph
 from .decks import Decks

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Packing
-from ...analysis.packing.arrays import Floats
+from ...analysis.arrays import Floats
 from ...analysis.packing.law import Derivatives
 from .contact_graph import ContactGraph
 

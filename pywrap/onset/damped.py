@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, Window, find_onset
+from ...analysis.arrays import Floats
 from ...analysis.damped_onset.first_window import first_growing
 from ...analysis.damped_onset.modes import Pencil
 from ...analysis.damped_onset.windows import (
@@ -27,7 +28,6 @@ from ...analysis.onset import LIMITS, Family, Increments, full_operator, takes_a
 from ...analysis.onset.all_windows import windows_along
 from ...analysis.onset.modes import contact_states
 from ...analysis.onset.search import unit_of
-from ...analysis.packing.arrays import Floats
 from ...analysis.progress import Watch, report_progress, show_progress
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine

@@ -43,11 +43,11 @@ from scipy.linalg import LinAlgError, eigvals
 from scipy.sparse.linalg import ArpackError
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, dynamical_matrix, eigenpairs
+from ...analysis.arrays import Floats
 from ...analysis.damped_onset.modes import DampedMode, Pencil, nearest_mode
 from ...analysis.damped_onset.windows import DampedWindow
 from ...analysis.onset import force_bearing
 from ...analysis.onset.window_edges import GrowthWindow
-from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium
 from ..runs.equilibrium_path import EquilibriumPath
 from .nearby_root import nearby_root

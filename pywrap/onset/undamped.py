@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
+from ...analysis.arrays import Floats
 from ...analysis.errors import TurningPointError
 from ...analysis.onset import full_operator, takes_all_modes
 from ...analysis.onset.search import windows_rows
-from ...analysis.packing.arrays import Floats
 from ...analysis.progress import Watch, report_progress, show_progress
 from ...analysis.spectrum.spectrum import active_coordinates
 from ...analysis.table_display import TableDisplay

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import NoEquilibriumError, Packing
-from ...analysis.packing.arrays import Floats
+from ...analysis.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
 from ..lammps.engine import Engine
 from ..scenes.scene import Scene

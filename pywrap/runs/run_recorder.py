@@ -13,8 +13,8 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import RunFile, solid_fraction
+from ...analysis.arrays import Floats
 from ...analysis.files.atomic_write import check_output, lock_output
-from ...analysis.packing.arrays import Floats
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Motion, Weakening
 from ..scenes.command_sections import COMMANDS

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import Packing, largest_damping_rate, largest_frequency, mean_square_displacement, stable_timestep
-from ...analysis.packing.arrays import Floats, Indices
+from ...analysis.arrays import Floats, Indices
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Dynamics, Motion, Weakening
 from ..lammps.engine import Engine

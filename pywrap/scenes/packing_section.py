@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis import BadInputError, MindlinLaw, Packing, PackingFileError, RunFile
-from ...analysis.packing.arrays import Floats
+from ...analysis.arrays import Floats
 from ..exchange import Disks, format_of, is_hdf5, packing_of, read_disks, upper_layer
 from .random_start import layer_size, random_start
 from .validation import Positive, Section, refusal_sentence

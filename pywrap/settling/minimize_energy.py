@@ -31,8 +31,8 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 
 from ...analysis import NoEquilibriumError, Packing, stiffness_matrix
+from ...analysis.arrays import Floats
 from ...analysis.factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
-from ...analysis.packing.arrays import Floats
 from ...analysis.progress import report_progress
 from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
 from ..equilibria.rattlers import place_disks

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import MindlinLaw, NoEquilibriumError, Packing
-from ...analysis.packing.arrays import Floats
+from ...analysis.arrays import Floats
 from ...analysis.progress import Watch, report_progress, show_progress
 from ..equilibria.quasistatic import Equilibrium, equilibrate, idle_disks
 from ..equilibria.rattlers import clear_rattlers

@@ -34,8 +34,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from faultgouge.analysis import NoEquilibriumError, Packing, Window, damping_matrix
+from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.onset import Family, LostPairError, Pair, force_bearing, full_operator
-from faultgouge.analysis.packing.arrays import Floats
 from faultgouge.analysis.spectrum.spectrum import mass_weighted
 
 DIGITS = 1e-12

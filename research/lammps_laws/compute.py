@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import eig, eigvals
 
-from faultgouge.analysis import Snapshot, damping_matrix, spectrum, stiffness_matrix
-from faultgouge.analysis.packing.arrays import Floats
+from faultgouge.analysis import Configuration, damping_matrix, spectrum, stiffness_matrix
+from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.spectrum.spectrum import active_coordinates, mass_weighted
 from faultgouge.pywrap import compare_motion, from_lammps
 from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
@@ -128,7 +128,7 @@ def pour(law: str, d: int, count: int, mu: float, seed: int, log: Path, gamma: f
     return lmp
 
 
-def rest(lmp: Any, most: int = 25) -> Snapshot | None:
+def rest(lmp: Any, most: int = 25) -> Configuration | None:
     """The packing as soon as it balances; None if it does not come to rest in 250 units of time."""
     for _ in range(most):
         lmp.command("run 10000 post no")
@@ -168,7 +168,7 @@ def rows(
         lmp.close()
 
 
-def describe(found: Snapshot) -> dict[str, Any]:
+def describe(found: Configuration) -> dict[str, Any]:
     """What the spectrum says of a packing."""
     s, c = spectrum(found), found.contacts
     size = np.linalg.norm(c.tangential_force, axis=1) / c.friction
@@ -181,12 +181,12 @@ def describe(found: Snapshot) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def motion(lmp: Any, found: Snapshot) -> float:
+def motion(lmp: Any, found: Configuration) -> float:
     """LAMMPS's motion beside exp(t G), half a unit of time."""
     return float(compare_motion(lmp, found, 0.5, 3e-7, timestep=1e-4).difference)
 
 
-def damping_needed(found: Snapshot) -> dict[str, float] | None:
+def damping_needed(found: Configuration) -> dict[str, float] | None:
     """The least dashpots, as a share of those of the deck, with which nothing grows; None if nothing does without.
 
     And the restitution of a head-on collision of two particles with the mean stiffness and the mean dashpot.
@@ -295,7 +295,7 @@ def _follow(lmp: Any, push: Floats) -> tuple[Floats, Floats]:
     return LOOK * np.arange(1, len(squares) + 1, dtype=float), np.array(squares, dtype=float)
 
 
-def linear_motion(found: Snapshot, push: Floats, times: Floats) -> Floats:
+def linear_motion(found: Configuration, push: Floats, times: Floats) -> Floats:
     """D of the linearised packing at some times after a push from rest, without dashpots."""
     count = len(push)
     root = np.sqrt(found.coordinate_mass)

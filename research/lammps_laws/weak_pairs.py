@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig
 
-from faultgouge.analysis import Snapshot, spectrum, stiffness_matrix
-from faultgouge.analysis.packing.arrays import Floats
+from faultgouge.analysis import Configuration, spectrum, stiffness_matrix
+from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.spectrum.spectrum import active_coordinates, mass_weighted
 from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of, set_velocity
 from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
@@ -79,7 +79,7 @@ def rows(sample: Sample, seed: int) -> list[dict[str, Any]]:
     return found
 
 
-def follow(lmp: Any, snapshot: Snapshot, displacement: float) -> dict[str, float]:
+def follow(lmp: Any, snapshot: Configuration, displacement: float) -> dict[str, float]:
     """Rates of D of the fastest pair: "predicted", and "grows" and "decays" as its two parts do in LAMMPS."""
     a = mass_weighted(stiffness_matrix(snapshot), snapshot)
     active, root = active_coordinates(a), np.sqrt(snapshot.coordinate_mass)
@@ -97,7 +97,7 @@ def follow(lmp: Any, snapshot: Snapshot, displacement: float) -> dict[str, float
     return {"displacement": displacement, "predicted": 2 * float(s.real), "grows": grows, "decays": decays}
 
 
-def _run(lmp: Any, snapshot: Snapshot, start: Floats) -> Floats:
+def _run(lmp: Any, snapshot: Configuration, start: Floats) -> Floats:
     """Velocities of all coordinates at every look, without drag."""
     lmp.commands_list(["log none", "unfix drag", "unfix spin", f"timestep {STEP}"])
     set_velocity(lmp, snapshot, start)

@@ -36,8 +36,8 @@ import numpy as np
 from mpi4py import MPI
 from scipy.linalg import eigvals
 
-from faultgouge.analysis import Packing, Snapshot, damping_matrix, spectrum, stiffness_matrix
-from faultgouge.analysis.packing.arrays import Floats, Indices
+from faultgouge.analysis import Configuration, Packing, damping_matrix, spectrum, stiffness_matrix
+from faultgouge.analysis.arrays import Floats, Indices
 from faultgouge.analysis.spectrum.spectrum import active_coordinates, mass_weighted
 from faultgouge.pywrap import Scene, from_lammps, ramp, settle
 from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
@@ -210,7 +210,7 @@ def come_to_rest(lmp: Any, radii: Floats) -> float:
     return float(fastest)
 
 
-def fastest_damped(found: Snapshot) -> float:
+def fastest_damped(found: Configuration) -> float:
     """Largest Re s of s^2 M + s C + K, 1 / time."""
     a = mass_weighted(stiffness_matrix(found), found)
     active = active_coordinates(a)

@@ -6,8 +6,8 @@ from packing_snapshot import snapshot_of
 from scipy.linalg import expm
 
 from faultgouge.analysis import (
+    Configuration,
     LinearisedContacts,
-    Snapshot,
     damping_matrix,
     eigenvalues,
     find_onset,
@@ -18,9 +18,9 @@ from faultgouge.analysis import (
     stiffness_matrix,
     transient_gain,
 )
+from faultgouge.analysis.arrays import derive_frozen
+from faultgouge.analysis.configuration import PER_CONTACT
 from faultgouge.analysis.operators.linearised_contacts import rescaling_operators
-from faultgouge.analysis.packing.arrays import derive_frozen
-from faultgouge.analysis.packing.snapshot import PER_CONTACT
 
 STEP = np.longdouble(1e-8)
 """Of central differences. Their error is 1e-16 of the third derivative, the rounding of long doubles 1e-11."""
@@ -32,11 +32,11 @@ def cross(a, b):
 
 
 @pytest.fixture(params=[2, 3], ids=["disks", "spheres"])
-def bed(request) -> Snapshot:
+def bed(request) -> Configuration:
     return make(request.param)
 
 
-def make(d: int, *, arms_meet: bool = False, walls: bool = True, slides: bool = True) -> Snapshot:
+def make(d: int, *, arms_meet: bool = False, walls: bool = True, slides: bool = True) -> Configuration:
     """Six particles in no balance, every two of which touch, with a wall below the first two."""
     rng = np.random.default_rng(7 + d)
     n = 6
@@ -74,13 +74,13 @@ def make(d: int, *, arms_meet: bool = False, walls: bool = True, slides: bool = 
         tangential_dashpot=rng.uniform(1, 2, count),
     )  # fmt: skip
     mass = rng.uniform(1, 2, n)
-    return Snapshot(
+    return Configuration(
         dimension=d, position=position[:, :d], radius=radius, mass=mass, inertia=0.4 * mass * radius**2,
         contacts=contacts, box=np.eye(3), origin=np.zeros(3), periodic=np.zeros(3, bool), load=np.zeros((n, 2, 3)),
     )  # fmt: skip
 
 
-def forces(bed: Snapshot, q):
+def forces(bed: Configuration, q):
     """Forces on all coordinates after a small displacement: Hertz, and a history that turns with its contact."""
     d, n, c = bed.dimension, len(bed), bed.contacts
     move, turn = np.zeros((2, n, 3), np.longdouble)
@@ -185,7 +185,7 @@ def test_turned_and_mirrored(d, mirrored):
     for name, shape in PER_CONTACT.items():
         if shape == (3,):
             values[name] = values[name] @ turn.T
-    other = Snapshot(**{name: getattr(bed, name) for name in bed.__dataclass_fields__} | {
+    other = Configuration(**{name: getattr(bed, name) for name in bed.__dataclass_fields__} | {
         "contacts": LinearisedContacts(**values), "position": bed.position @ turn[:d, :d].T})  # fmt: skip
     spin = np.linalg.det(turn) * turn  # rotations are pseudovectors
     whole = np.zeros((bed.axes, bed.axes))
@@ -200,7 +200,7 @@ def test_spin_about_the_only_contact_costs_nothing():
     bed = make(3, walls=False, slides=False)
     pair = bed.contacts.chosen(np.arange(1))
     values = {name: getattr(bed, name) for name in bed.__dataclass_fields__} | {"contacts": pair}
-    two = Snapshot(**values)
+    two = Configuration(**values)
     assert list(two.rattlers) == [2, 3, 4, 5]
     found = spectrum(two)
     # three translations and three twists or common turns, and the soft ones of a force that is not in balance
@@ -210,7 +210,7 @@ def test_spin_about_the_only_contact_costs_nothing():
 
 def test_held_particles_take_part_in_contacts_alone(bed):
     free = np.arange(len(bed)) != 2
-    held = Snapshot(**{name: getattr(bed, name) for name in bed.__dataclass_fields__} | {"free": free})
+    held = Configuration(**{name: getattr(bed, name) for name in bed.__dataclass_fields__} | {"free": free})
     coordinates = np.tile(free, bed.axes)
     k, less = stiffness_matrix(bed).toarray(), stiffness_matrix(held).toarray()
     assert (
@@ -275,7 +275,7 @@ def test_onset_of_a_family_of_snapshots():
     # without large pushes along contacts, which buckle
     c = derive_frozen(still.contacts, normal_force=1e-3 * still.contacts.normal_force)
 
-    def at(load: float) -> Snapshot:
+    def at(load: float) -> Configuration:
         force = load * c.tangential_force
         b = 0.5 * force / c.overlap[:, None]
         return derive_frozen(

@@ -31,7 +31,7 @@ from .terminal import (
 )
 
 if TYPE_CHECKING:
-    from ..analysis import DampedWindow, Packing, Snapshot, Spectrum, Window
+    from ..analysis import Configuration, DampedWindow, Packing, Spectrum, Window
     from ..pywrap import Equilibrium, Scene
     from ..pywrap.onset.damped import DampedOnset
 
@@ -63,7 +63,7 @@ def spectrum(
     as_json: AsJson = False,
 ) -> None:
     """Compute the eigenvalues, complex pairs and rattlers of a stored packing."""
-    from faultgouge.analysis import Snapshot, solid_fraction
+    from faultgouge.analysis import Configuration, solid_fraction
     from faultgouge.analysis import spectrum as eigenvalues_of
     from faultgouge.analysis.spectrum.spectrum import in_balance
 
@@ -96,14 +96,14 @@ def spectrum(
             "rattlers": result.rattlers.tolist(),
             "fx": packing.fx,
             "residual": packing.residual,
-            "solid_fraction": None if isinstance(packing, Snapshot) else solid_fraction(packing),
+            "solid_fraction": None if isinstance(packing, Configuration) else solid_fraction(packing),
             "noise_pairs": result.noise_pairs,
             "transient_gain": gain,
         }
     )
 
 
-def _values(packing: Packing | Snapshot, as_json: bool) -> None:
+def _values(packing: Packing | Configuration, as_json: bool) -> None:
     """Eigenvalues without vectors: as JSON, or a line each."""
     from faultgouge.analysis import eigenvalues
 
@@ -115,8 +115,8 @@ def _values(packing: Packing | Snapshot, as_json: bool) -> None:
         print(f"{real:.17g} {imaginary:.17g}")
 
 
-def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[str, Any] | None) -> None:
-    from faultgouge.analysis import Snapshot
+def _print_spectrum(packing: Packing | Configuration, result: Spectrum, gain: dict[str, Any] | None) -> None:
+    from faultgouge.analysis import Configuration
     from faultgouge.analysis.spectrum.spectrum import in_balance
 
     _print_size(packing, result)
@@ -134,7 +134,7 @@ def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[st
             if len(result.eigenvalues)
             else "no disk touches another disk or the floor: stability is not defined"
         )
-    if not isinstance(packing, Snapshot) and packing.damped:
+    if not isinstance(packing, Configuration) and packing.damped:
         print("dashpots and drag are left out here: `faultgouge onset` of the scene includes them")
     if gain is not None:
         print(
@@ -147,12 +147,12 @@ def _print_spectrum(packing: Packing | Snapshot, result: Spectrum, gain: dict[st
         print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
 
 
-def _print_size(packing: Packing | Snapshot, result: Spectrum) -> None:
+def _print_size(packing: Packing | Configuration, result: Spectrum) -> None:
     """The packing, the range of its eigenvalues, and its contacts at Coulomb's bound."""
-    from faultgouge.analysis import Snapshot, solid_fraction
+    from faultgouge.analysis import Configuration, solid_fraction
 
     real = result.eigenvalues.real
-    if isinstance(packing, Snapshot):
+    if isinstance(packing, Configuration):
         what, fraction = f"{len(packing)} {'spheres' if packing.dimension == 3 else 'disks'} as LAMMPS left them", ""
         bound = int(packing.contacts.at_bound.sum())
         acts = "slide here" if packing.contacts.sliding.any() else "stick here"
@@ -186,7 +186,7 @@ def _print_growing_motions(result: Spectrum) -> None:
         )
 
 
-def _gain_of(packing: Packing | Snapshot) -> dict[str, Any] | None:
+def _gain_of(packing: Packing | Configuration) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None if unstable, too large, or where it fails."""
     from faultgouge.analysis.motion.transient import MOST_DISKS, NoGainError, transient_gains
 

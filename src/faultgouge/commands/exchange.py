@@ -135,7 +135,7 @@ def _import_deck(file: Path, output: Path, slides: bool) -> None:
         snapshot = run_deck(file, slides=slides)
     if is_root():
         write_snapshot(output, snapshot, {"deck": file.read_text(errors="replace")})
-    print_line(f"{repr(snapshot).removeprefix('<Snapshot: ').removesuffix('>')}; written to {output}")
+    print_line(f"{repr(snapshot).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
 
 
 @app.command(epilog="Example: faultgouge export run.h5 --mode pair -o packing.vtp")
@@ -167,7 +167,7 @@ def export(
     needs pip install 'faultgouge[export]'. With --frames the file is a film of
     displacements; a .pvd for ParaView comes with a folder of .vtp.
     """
-    from faultgouge.analysis import Snapshot
+    from faultgouge.analysis import Configuration
     from faultgouge.pywrap.exchange import ModeVectors
     from faultgouge.pywrap.exchange.formats import check_writer, write_packing
     from faultgouge.pywrap.exchange.snapshot_export import check_snapshot_writer, write_snapshot_for_others
@@ -188,7 +188,7 @@ def export(
         return
     modes = [] if mode is None else modes_of(packing, mode)[0]
     vectors = [ModeVectors(f"mode_{each.number}", each.eigenvalue, each.displacement) for each in modes]
-    if isinstance(packing, Snapshot):
+    if isinstance(packing, Configuration):
         words = write_snapshot_for_others(output, packing, vectors)
     else:
         words = f"F_x = {packing.fx:g}: {write_packing(output, packing, vectors)}"

@@ -24,7 +24,7 @@ from .terminal import (
 )
 
 if TYPE_CHECKING:
-    from faultgouge.analysis import Packing, Snapshot
+    from faultgouge.analysis import Configuration, Packing
     from faultgouge.figures.film import Film
     from faultgouge.figures.mode import Mode
 
@@ -202,7 +202,7 @@ def view(
     lock_output(context, output, file)
     if not is_root():
         return
-    packings: list[Packing] | list[Snapshot]
+    packings: list[Packing] | list[Configuration]
     if snapshot is not None:
         packings, series = [snapshot], None
         title = f"{file.name}: {len(snapshot)} disks as LAMMPS left them"
@@ -222,7 +222,7 @@ def view(
 
 
 def _frames_of_spheres(
-    context: typer.Context, snapshot: Snapshot, which: str, output: Path, count: int, periods: int
+    context: typer.Context, snapshot: Configuration, which: str, output: Path, count: int, periods: int
 ) -> None:
     """The motion of a mode of spheres, for programs that show spheres."""
     from faultgouge.analysis import BadInputError
@@ -274,7 +274,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
     return RampFilm(packings, count, color, dots=dots)
 
 
-def modes_of(packing: Packing | Snapshot, which: str) -> tuple[list[Mode], str]:
+def modes_of(packing: Packing | Configuration, which: str) -> tuple[list[Mode], str]:
     """The modes that --mode asks for, and what they are."""
     from faultgouge.analysis import normal_modes, spectrum
     from faultgouge.figures.mode import Mode, ModeError, unstable_pair

@@ -21,7 +21,7 @@ import typer
 from ..mpi_rank import is_root
 
 if TYPE_CHECKING:
-    from faultgouge.analysis import Packing, Snapshot
+    from faultgouge.analysis import Configuration, Packing
     from faultgouge.analysis.motion.growth import GrowthOfRun
     from faultgouge.pywrap import Equilibrium, Scene
     from faultgouge.pywrap.scenes.estimate import Task
@@ -58,14 +58,14 @@ def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
     return scene
 
 
-def stored_snapshot(file: Path) -> Snapshot | None:
+def stored_snapshot(file: Path) -> Configuration | None:
     """The snapshot of a run.h5 that holds one; None of all other files."""
     from faultgouge.analysis.files.snapshot_file import holds_snapshot, read_snapshot
 
     return read_snapshot(file) if holds_snapshot(file) else None
 
 
-def snapshot_of_disks(file: Path) -> Snapshot | None:
+def snapshot_of_disks(file: Path) -> Configuration | None:
     """The snapshot of a run.h5 that holds one of disks; None of all other files; spheres are refused."""
     from faultgouge.analysis import BadInputError
 

@@ -1,4 +1,4 @@
-"""A run.h5 that holds a Snapshot gives it back to the bit, or is refused."""
+"""A run.h5 that holds a Configuration gives it back to the bit, or is refused."""
 
 import h5py
 import numpy as np

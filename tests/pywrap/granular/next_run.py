@@ -8,7 +8,7 @@ import numpy as np
 from granular_packings import SMOOTH, command, instance, start, state, with_law
 from mpi4py import MPI
 
-from faultgouge.analysis import LinearisedContacts, Snapshot
+from faultgouge.analysis import Configuration, LinearisedContacts
 from faultgouge.pywrap import from_lammps
 
 WORLD = MPI.COMM_WORLD
@@ -20,7 +20,7 @@ def owned(lmp) -> set[int]:
     return set(lmp.numpy.extract_atom("id")[: lmp.extract_setting("nlocal")])
 
 
-def run(steps: int, looks: int, drag: float) -> tuple[np.ndarray, list[Snapshot], int, Snapshot]:
+def run(steps: int, looks: int, drag: float) -> tuple[np.ndarray, list[Configuration], int, Configuration]:
     """Six runs with looks before each.
 
     Returns their ends, what was seen, the number of particles that changed their rank in a look, and the last state.
@@ -41,7 +41,7 @@ thermo 10000
 neighbor 0.45 bin
 run {steps}
 """)  # fmt: skip
-    found: list[Snapshot] = []
+    found: list[Configuration] = []
     states, moved = [], 0
     for _ in range(6):
         before, there = state(lmp, WORLD), owned(lmp)

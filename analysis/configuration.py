@@ -1,8 +1,8 @@
 r"""A packing of another code, in two or three dimensions, with its contacts to first order.
 
 Any contact law enters the operators through a few numbers at each contact: the normal, the distance and the lever arms;
-the normal and the tangential force; and the derivatives of both. `LinearisedContacts` has them, `Snapshot` adds the
-particles, and :mod:`~faultgouge.analysis.operators.linearised_contacts` assembles the operators.
+the normal and the tangential force; and the derivatives of both. `LinearisedContacts` has them, `Configuration` adds
+the particles, and :mod:`~faultgouge.analysis.operators.linearised_contacts` assembles the operators.
 
 **Coordinates** are translations and rotations as lengths, :math:`R\theta`, axis by axis:
 (x.., y.., R theta..) of disks and (x.., y.., z.., R theta_x.., R theta_y.., R theta_z..) of spheres. Vectors always
@@ -16,7 +16,6 @@ motion continues: `sliding` chooses.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,8 +33,6 @@ from .arrays import (
     same_bits,
     set_frozen,
 )
-from .law import MindlinLaw
-from .packing import Packing
 
 WALL = -1
 """The index that stands for a wall as the second partner of a contact."""
@@ -166,35 +163,8 @@ class LinearisedContacts:
         return derive_frozen(self, **{name: np.array(getattr(self, name)[which]) for name in PER_CONTACT})
 
 
-def linearise_contacts(
-    law: MindlinLaw, overlap: Floats, slip: Floats, tangent: Floats, **where: ArrayLike
-) -> LinearisedContacts:
-    """Contacts of the smooth law of this package, along a tangent, shape (C, 3); `where` has all other fields.
-
-    They resist no slip at Coulomb's bound, on either side: that is the derivative of the smooth law.
-    """
-    grows, falls = (law.derivatives(overlap, slip, share) for share in (0.0, 1.0))
-    along, across = law.dashpots(overlap, slip)
-    count = len(overlap)
-    return LinearisedContacts(
-        overlap=overlap,
-        lever_slope=np.zeros(count),
-        normal_force=grows.normal_force,
-        tangential_force=grows.tangential_force[:, None] * tangent,
-        normal_stiffness=grows.normal_stiffness,
-        tangential_stiffness=-grows.slip_derivative,
-        closing=grows.overlap_derivative[:, None] * tangent,
-        parting=falls.overlap_derivative[:, None] * tangent,
-        friction=law.mu * grows.normal_force if law.frictional else np.full(count, np.inf),
-        sliding=np.zeros(count, dtype=np.bool_),
-        normal_dashpot=along,
-        tangential_dashpot=across,
-        **where,
-    )
-
-
 @dataclass(frozen=True, init=False, eq=False)
-class Snapshot:
+class Configuration:
     """Particles of a packing in two or three dimensions, with their linearised contacts.
 
     Parameters
@@ -222,7 +192,7 @@ class Snapshot:
     kind : array_like of int, shape (N,), optional
         Their types; 1 by default.
     fx : float
-        Value of the load parameter of the snapshot, if it belongs to a path.
+        Value of the load parameter of the configuration, if it belongs to a path.
     load_error : float
         Error of `fx` that corresponds to the residual, in units of `fx`.
 
@@ -269,7 +239,7 @@ class Snapshot:
     ) -> None:
         n = len(np.atleast_1d(np.asarray(radius)))
         if dimension not in (2, 3) or n == 0:
-            raise ValueError(f"A snapshot has particles in two or three dimensions, not {n} in {dimension}.")
+            raise ValueError(f"A configuration has particles in two or three dimensions, not {n} in {dimension}.")
         sizes = {"radius": radius, "mass": mass, "inertia": inertia}
         set_frozen(
             self,
@@ -295,7 +265,7 @@ class Snapshot:
 
     def __eq__(self, other: object) -> bool:
         """Whether every array and number is the same to the bit."""
-        return same_bits(self, other) if isinstance(other, Snapshot) else NotImplemented
+        return same_bits(self, other) if isinstance(other, Configuration) else NotImplemented
 
     def __hash__(self) -> int:
         return hash((len(self), self.fx, self.position.tobytes()))
@@ -306,7 +276,7 @@ class Snapshot:
         bound = int(self.contacts.at_bound.sum())
         slide = ", which slide" if self.contacts.sliding.any() else ", which stick" if bound else ""
         return (
-            f"<Snapshot: {len(self)} {what}, {count - walls} contacts between them and {walls} with walls, "
+            f"<Configuration: {len(self)} {what}, {count - walls} contacts between them and {walls} with walls, "
             f"{bound} at Coulomb's bound{slide}, {len(self.rattlers)} rattlers, residual {self.residual:.3g}>"
         )
 
@@ -333,7 +303,7 @@ class Snapshot:
 
     @property
     def top(self) -> NDArray[np.bool_]:
-        """The disks of a driven layer, shape (N,): none, as a snapshot has no such layer."""
+        """The disks of a driven layer, shape (N,): none, as a configuration has no such layer."""
         return np.zeros(len(self), dtype=np.bool_)
 
     @property
@@ -382,8 +352,8 @@ class Snapshot:
         order = np.lexsort((c.j, c.i))
         return np.array([c.i, c.j, c.sliding], dtype=np.int64)[:, order].tobytes()
 
-    def loaded(self, least: float) -> "Snapshot":
-        """The snapshot without the contacts that carry no more than a given normal force."""
+    def loaded(self, least: float) -> "Configuration":
+        """The configuration without the contacts that carry no more than a given normal force."""
         kept = self.contacts.normal_force > least
         return self if np.all(kept) else derive_frozen(self, contacts=self.contacts.chosen(kept))
 
@@ -398,6 +368,3 @@ class Snapshot:
         """The reverse of `vectors`."""
         d = self.dimension
         return np.concatenate([translation[:, :d].T.ravel(), rotation[:, d - self.axes :].T.ravel()])
-
-
-Configuration = TypeVar("Configuration", bound=Packing | Snapshot)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import BadInputError
+from .errors import BadInputError
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
