@@ -45,8 +45,12 @@ PER_CONTACT = {
     "i": (), "j": (), "normal": (3,), "distance": (), "overlap": (), "slip_arm": (2,), "lever_arm": (2,),
     "lever_slope": (), "normal_force": (), "tangential_force": (3,), "normal_stiffness": (), "tangential_stiffness": (),
     "closing": (3,), "parting": (3,), "friction": (), "sliding": (), "normal_dashpot": (), "tangential_dashpot": (),
+    "viscous_slider": (),
 }  # fmt: skip
 """Fields of `LinearisedContacts`, with the shape of each for one contact."""
+
+BOOLEAN = {"sliding": False, "viscous_slider": True}
+"""Fields that are true or false, with the values of contacts that do not say."""
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -85,6 +89,10 @@ class LinearisedContacts:
         Contacts that slide: they have no stiffness along f_t, and b is that of f_t = mu f_n.
     normal_dashpot, tangential_dashpot : array_like, shape (C,)
         Force time / length.
+    viscous_slider : array_like of bool, shape (C,)
+        Contacts whose slip at Coulomb's bound yields to the elastic and the viscous force together, with the bound mu
+        times the normal force of spring and dashpot: LAMMPS's slider, and the default. The slip of other contacts
+        yields to the elastic force alone, and the sum of both forces is cut at mu times the elastic normal force.
 
     Raises
     ------
@@ -110,13 +118,15 @@ class LinearisedContacts:
     sliding: NDArray[np.bool_]
     normal_dashpot: Floats
     tangential_dashpot: Floats
+    viscous_slider: NDArray[np.bool_]
 
     def __init__(self, **given: ArrayLike) -> None:
+        given = {name: np.full(np.shape(given.get("i", ())), value) for name, value in BOOLEAN.items()} | given
         if given.keys() != PER_CONTACT.keys():
             raise ValueError(f"Contacts need {', '.join(PER_CONTACT)}; these are {', '.join(given)}.")
         values: dict[str, NDArray] = {name: integers(name, given[name]) for name in ("i", "j")}
         count = len(values["i"])
-        values["sliding"] = booleans("sliding", given["sliding"], count)
+        values |= {name: booleans(name, given[name], count) for name in BOOLEAN}
         for name in ("distance", "friction"):  # may be infinite
             values[name] = np.array(given[name], dtype=np.float64)
             floats(name, np.where(values[name] == np.inf, 0.0, values[name]), (count,))
@@ -146,6 +156,14 @@ class LinearisedContacts:
         """Which contacts are at Coulomb's bound, shape (C,)."""
         tangential = np.linalg.norm(self.tangential_force, axis=1)
         return (tangential > 0) & (tangential >= AT_COULOMBS_BOUND * self.friction)
+
+    @property
+    def one_sided(self) -> NDArray[np.bool_]:
+        """Which contacts slide on ahead and stick on the way back, shape (C,).
+
+        These are the contacts at Coulomb's bound, but for those of a law whose tangential stiffness vanishes there.
+        """
+        return self.at_bound & (self.tangential_stiffness > 0)
 
     def overlap_derivative(self, parting: ArrayLike = 0.5) -> Floats:
         """b of each contact, shape (C, 3), with the weight of opening, shape () or (C,)."""

@@ -101,7 +101,9 @@ def read_snapshot(path: Path) -> Configuration:
         try:
             check_places(file)
             group, size = file["snapshot"], path.stat().st_size
-            contacts = LinearisedContacts(**{name: dataset(group["contacts"], name, size)[()] for name in PER_CONTACT})
+            contacts = LinearisedContacts(
+                **{name: dataset(group["contacts"], name, size)[()] for name in PER_CONTACT if name in group["contacts"]}
+            )
             arrays = {name: dataset(group, name, size)[()] for name in ARRAYS}
             numbers = {name: group.attrs[name].item() for name in SCALARS}
             return Configuration(contacts=contacts, **arrays, **numbers)

@@ -127,20 +127,42 @@ def rescaling_operators(configuration: Configuration) -> tuple[csr_array, csr_ar
     b : scipy.sparse.csr_array, shape (coordinates, C)
         Forces by absolute rates of the overlaps, half of the difference of both derivatives; force / length.
     """
-    c, count = configuration.contacts, len(configuration)
+    c = configuration.contacts
     difference = 0.5 * (c.overlap_derivative(0.0) - c.overlap_derivative(1.0))
-    turn = np.cross(c.normal, difference)
+    closing = np.repeat(np.hstack([-c.normal, np.zeros_like(difference)])[None], 2, axis=0)
+    closing[1] *= -1.0
+    return contact_rows(configuration, closing), csr_array(unit_forces(configuration, difference).T)
+
+
+def unit_forces(configuration: Configuration, force: Floats) -> csr_array:
+    """Forces on all coordinates, (F, T/R), of a tangential force of each contact, shape (C, 3) on i; one row each."""
+    c = configuration.contacts
+    turn = np.cross(c.normal, force)
+    rows = [
+        np.hstack([sign * force, -(c.lever_arm[:, p] / configuration.radius[partner])[:, None] * turn])
+        for p, (partner, sign) in enumerate(((c.i, 1.0), (c.j, -1.0)))
+    ]
+    return contact_rows(configuration, np.array(rows))
+
+
+def contact_rows(configuration: Configuration, rows: Floats) -> csr_array:
+    """A matrix with a row a contact, from its numbers on (translation, rotation as R theta) of i and of j.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (2, C, 6)
+        Numbers of the partner i, and of the partner j. Those of walls and of fixed particles are left out.
+    """
+    c, count = configuration.contacts, len(configuration)
     in_plane = np.arange(6) if configuration.dimension == 3 else np.array([0, 1, 5])
     contact = np.tile(np.arange(len(c)), len(in_plane))
-    n, b = (csr_array((len(c), configuration.coordinates)) for _ in range(2))
-    for partner, arm, sign in ((c.i, c.lever_arm[:, 0], 1.0), (c.j, c.lever_arm[:, 1], -1.0)):
+    matrix = csr_array((len(c), configuration.coordinates))
+    for numbers, partner in zip(rows, (c.i, c.j), strict=True):
         moves = (partner >= 0) & configuration.free[partner]
-        rate = np.hstack([-sign * c.normal, np.zeros_like(turn)]) * moves[:, None]
-        force = np.hstack([sign * difference, -(arm / configuration.radius[partner])[:, None] * turn]) * moves[:, None]
         coordinate = (np.arange(len(in_plane))[:, None] * count + np.where(moves, partner, 0)).ravel()
-        n = n + csr_array((rate.T[in_plane].ravel(), (contact, coordinate)), shape=n.shape)
-        b = b + csr_array((force.T[in_plane].ravel(), (contact, coordinate)), shape=b.shape)
-    return n, csr_array(b.T)
+        values = (numbers * moves[:, None]).T[in_plane].ravel()
+        matrix = matrix + csr_array((values, (contact, coordinate)), shape=matrix.shape)
+    return csr_array(matrix)
 
 
 def _outer(a: Floats, b: Floats) -> Floats:

@@ -31,5 +31,6 @@ def linearise_contacts(
         sliding=np.zeros(count, dtype=np.bool_),
         normal_dashpot=along,
         tangential_dashpot=across,
+        viscous_slider=np.zeros(count, dtype=np.bool_),
         **where,
     )
