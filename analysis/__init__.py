@@ -14,20 +14,11 @@ from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputEr
 from .files.dumps import read_dump
 from .files.json_packing import read_packing
 from .files.runfile import RunFile
+from .motion.buckling import negative_eigenvalues
+from .motion.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
 from .motion.growth import Growth, fit_growth, growth_of_run, mean_square_displacement
 from .motion.response import layer_force, linear_response
-from .motion.transient import NoGainError, TransientGain, transient_gain
-from .onset import Onset, OnsetError, Window, complex_windows, find_onset
-from .operators.damping import damping_matrix, largest_damping_rate
-from .operators.stiffness import stiffness_matrix
-from .packing.contacts import FLOOR, Contacts
-from .packing.geometry import ContactGeometry, nearest_image, touching
-from .packing.law import MindlinLaw
-from .packing.packing import Packing
-from .packing.solid_fraction import solid_fraction
-from .spectrum.buckling import negative_eigenvalues
-from .spectrum.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
-from .spectrum.spectrum import (
+from .motion.spectrum import (
     ComplexPair,
     Spectrum,
     discrete_frequency,
@@ -37,7 +28,16 @@ from .spectrum.spectrum import (
     largest_frequency,
     spectrum,
 )
-from .spectrum.stable_timestep import stable_timestep
+from .motion.stable_timestep import stable_timestep
+from .motion.transient import NoGainError, TransientGain, transient_gain
+from .onset import Onset, OnsetError, Window, complex_windows, find_onset
+from .operators.damping import damping_matrix, largest_damping_rate
+from .operators.stiffness import stiffness_matrix
+from .packing.contacts import FLOOR, Contacts
+from .packing.geometry import ContactGeometry, nearest_image, touching
+from .packing.law import MindlinLaw
+from .packing.packing import Packing
+from .packing.solid_fraction import solid_fraction
 
 Snapshot = Configuration
 """The name of `Configuration` until version 1."""

@@ -125,7 +125,7 @@ def unstable_pair(
         All its modes.
     believed : sequence of complex
         Eigenvalues of the complex pairs that are no rounding noise, fastest growing first, as of
-        :func:`~faultgouge.analysis.spectrum.spectrum`.
+        :func:`~faultgouge.analysis.motion.spectrum`.
 
     Returns
     -------

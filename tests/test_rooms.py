@@ -36,7 +36,6 @@ FLOORS = {
         ("packing",),
         ("operators",),
         ("factors",),
-        ("spectrum",),
         ("motion",),
         ("files",),
         ("onset",),

@@ -27,6 +27,7 @@ import numpy as np
 from scipy.sparse.linalg import ArpackError
 
 from ..errors import FaultgougeError, NoEquilibriumError
+from ..motion.spectrum import active_coordinates
 from ..onset.eigenbasis import Basis, Levels
 from ..onset.first_window import Increments, SliceSearch, search_along
 from ..onset.limits import LIMITS, Limits
@@ -35,7 +36,6 @@ from ..onset.slice_store import Border, Candidate, SliceResult
 from ..onset.window_edges import DoubtError, LostPairError, LostTrackError, track_pair
 from ..packing.packing import Floats
 from ..progress import report_progress
-from ..spectrum.spectrum import active_coordinates
 from .all_windows import nearly_growing, search_cluster
 from .imaginary_axis import growing_modes
 from .modes import DampedMode, Pencil, find_growing_near, in_own_time

@@ -31,6 +31,7 @@ from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from ..factors.sparse_lu import SingularMatrixError, SuperLUFactors, general_lu
+from ..motion.spectrum import SAFETY, Complexes, active_coordinates, mass_weighted, unit_rounding
 from ..motion.state_space import StateSpace
 from ..onset import force_bearing
 from ..onset.modes import assign_columns
@@ -38,7 +39,6 @@ from ..onset.search import unit_of
 from ..operators.damping import damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
-from ..spectrum.spectrum import SAFETY, Complexes, active_coordinates, mass_weighted, unit_rounding
 
 NEGLIGIBLE = 1e-3
 """Digits of an eigenvalue smaller than this share of |Z|_F are not asked for."""

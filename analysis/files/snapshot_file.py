@@ -102,7 +102,11 @@ def read_snapshot(path: Path) -> Configuration:
             check_places(file)
             group, size = file["snapshot"], path.stat().st_size
             contacts = LinearisedContacts(
-                **{name: dataset(group["contacts"], name, size)[()] for name in PER_CONTACT if name in group["contacts"]}
+                **{
+                    name: dataset(group["contacts"], name, size)[()]
+                    for name in PER_CONTACT
+                    if name in group["contacts"]
+                }
             )
             arrays = {name: dataset(group, name, size)[()] for name in ARRAYS}
             numbers = {name: group.attrs[name].item() for name in SCALARS}

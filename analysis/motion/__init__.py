@@ -1,7 +1,9 @@
-"""Small motion about an equilibrium, with and without dissipation: growth, responses to forces, transient gain.
+"""Small motion about an equilibrium: eigenvalues, what grows, responses to forces, growth in a run.
 
-`response` and `forcing` compute the motion, `transient` its largest amplitude, `growth` its growth in a LAMMPS run.
-`matrix_functions`, `oscillator`, `propagator` and `state_space` contain the mathematics.
+`spectrum`, `eigenpairs` and `buckling` have the eigenvalues of the stability operator, `normal_form` how two modes
+coalesce, `response` and `forcing` the motion under forces, `transient` its largest amplitude, `growth` its growth in a
+LAMMPS run, `stable_timestep` the time step. `matrix_functions`, `oscillator`, `propagator` and `state_space` contain
+the mathematics.
 
-May import: `packing`, `operators`, `spectrum`.
+May import: `configuration`, `packing`, `operators`, `factors`.
 """

@@ -35,9 +35,9 @@ from numpy.typing import ArrayLike
 
 from ..packing.compensated import separation
 from ..packing.packing import Floats, Packing
-from ..spectrum.spectrum import Complexes, spectrum
 from .power_law import fit_line
 from .propagator import SLOW
+from .spectrum import Complexes, spectrum
 from .state_space import StateSpace
 
 BLOCKS = 24

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..packing.packing import Floats
-from ..spectrum.spectrum import Complexes, discrete_frequency
+from .spectrum import Complexes, discrete_frequency
 
 
 class OscillatorMotion(NamedTuple):

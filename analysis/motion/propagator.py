@@ -10,10 +10,10 @@ from scipy.sparse.linalg import svds
 from ..configuration import Configuration
 from ..errors import FaultgougeError
 from ..packing.packing import Floats, Indices, Packing
-from ..spectrum.spectrum import Complexes
 from .matrix_functions import WELL_CONDITIONED, BlockDiagonal, Function, second_order
 from .oscillator import Oscillator
 from .response import LinearMotion
+from .spectrum import Complexes
 from .state_space import released_motion
 
 Norm = Literal["displacement", "energy"]

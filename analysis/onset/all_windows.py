@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ..errors import NoEquilibriumError, TurningPointError
+from ..motion.spectrum import Complexes
 from ..packing.packing import Floats, Indices
-from ..spectrum.spectrum import Complexes
 from .eigenvalue_pair import Pair, continue_pair, deepest_dip, dip_between
 from .march import look_between, march
 from .modes import LoadPoint, Members, Modes, assign_modes, neighbours

@@ -14,9 +14,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..configuration import Configuration
+from ..motion.spectrum import Complexes, all_modes, exceeds_rounding, mass_weighted, unit_rounding
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
-from ..spectrum.spectrum import Complexes, all_modes, exceeds_rounding, mass_weighted, unit_rounding
 from .eigenvalue_pair import Pair
 from .limits import LIMITS, Limits
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..motion.normal_form import ORTHOGONAL, NormalForm
+from ..motion.spectrum import Complexes
 from ..packing.packing import Floats, Packing
-from ..spectrum.normal_form import ORTHOGONAL, NormalForm
-from ..spectrum.spectrum import Complexes
 from .eigenvalue_pair import Pair, continue_pair
 from .modes import Modes, full_operator
 

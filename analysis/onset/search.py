@@ -11,10 +11,10 @@ from scipy.sparse import csr_array
 
 from ..configuration import Configuration
 from ..errors import FaultgougeError, NoEquilibriumError, TurningPointError
+from ..motion.buckling import negative_eigenvalues
+from ..motion.spectrum import Spectrum, spectrum
 from ..packing.packing import Floats, Packing
 from ..progress import Watch, show_progress
-from ..spectrum.buckling import negative_eigenvalues
-from ..spectrum.spectrum import Spectrum, spectrum
 from ..table_display import TableDisplay
 from ..uncertain_digits import with_uncertainty
 from .all_windows import all_windows

@@ -24,7 +24,7 @@ from mpi4py import MPI
 from pydantic import BaseModel
 
 from ...analysis import Packing, RunFile
-from ...analysis.spectrum.spectrum import dynamical_matrix
+from ...analysis.motion.spectrum import dynamical_matrix
 from ...pywrap import Engine, Equilibrium, Record, Scene
 from ...pywrap.lammps.dynamics import Dynamics, Weakening
 from ...pywrap.lammps.plain_file_names import temporary_folder

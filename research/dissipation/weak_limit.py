@@ -35,8 +35,8 @@ from numpy.typing import ArrayLike
 
 from faultgouge.analysis import NoEquilibriumError, Packing, Window, damping_matrix
 from faultgouge.analysis.arrays import Floats
+from faultgouge.analysis.motion.spectrum import mass_weighted
 from faultgouge.analysis.onset import Family, LostPairError, Pair, force_bearing, full_operator
-from faultgouge.analysis.spectrum.spectrum import mass_weighted
 
 DIGITS = 1e-12
 """Width to which the limit is bracketed, in units of the load."""

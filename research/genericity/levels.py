@@ -44,9 +44,9 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import spectrum
+from faultgouge.analysis.motion.spectrum import active_coordinates
 from faultgouge.analysis.onset import force_bearing, full_operator
 from faultgouge.analysis.packing.packing import Floats, Indices
-from faultgouge.analysis.spectrum.spectrum import active_coordinates
 from faultgouge.pywrap import Equilibrium, Scene
 from faultgouge.pywrap.runs.equilibrium_path import loads
 from faultgouge.pywrap.scenes.validation import require_section

@@ -23,9 +23,9 @@ from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
 from faultgouge.analysis import Packing, dynamical_matrix, eigenvalues
+from faultgouge.analysis.motion.spectrum import mass_weighted
 from faultgouge.analysis.onset import force_bearing
 from faultgouge.analysis.operators.damping import damping_matrix
-from faultgouge.analysis.spectrum.spectrum import mass_weighted
 from faultgouge.pywrap import Equilibrium, Scene
 from faultgouge.pywrap.scenes.units import dashpot, real_units, restitution
 from faultgouge.studies.modes.count_pairs import along_ramp, count_pairs

@@ -11,7 +11,7 @@ least Q over the pairs of a load is the Q that stops all of them. The *share* of
 pairs over the number of eigenvalues; rattlers have none.
 
 **Which pairs count.** For eigenvalues that nearly merge, rounding makes spurious pairs with imaginary parts of up to
-:math:`(u |A|_F\, c)^{1/2}` for couplings c (:mod:`~faultgouge.analysis.spectrum.spectrum`). No coupling is larger than
+:math:`(u |A|_F\, c)^{1/2}` for couplings c (:mod:`~faultgouge.analysis.motion.spectrum`). No coupling is larger than
 the largest eigenvalue, so that a pair beyond that bound is physical, and its vectors are not needed. For the other
 pairs the vectors are computed, and decide.
 
@@ -56,7 +56,7 @@ from ...analysis import (
     negative_eigenvalues,
     stiffness_matrix,
 )
-from ...analysis.spectrum.spectrum import (
+from ...analysis.motion.spectrum import (
     SAFETY,
     Complexes,
     active_coordinates,

@@ -25,10 +25,10 @@ import numpy as np
 from scipy.linalg import eigh, eigvals
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
+from ...analysis.motion.eigenpairs import eigenpairs
+from ...analysis.motion.spectrum import active_coordinates
 from ...analysis.onset import force_bearing, full_operator, takes_all_modes
 from ...analysis.packing.packing import Floats, Indices
-from ...analysis.spectrum.eigenpairs import eigenpairs
-from ...analysis.spectrum.spectrum import active_coordinates
 from ...pywrap import Scene, SceneError
 from ...pywrap.onset.path_error import with_path_error
 from ...pywrap.runs.equilibrium_path import EquilibriumPath, loads

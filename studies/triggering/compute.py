@@ -31,11 +31,11 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import Growth, Packing, RunFile, fit_growth, spectrum
+from ...analysis.motion.normal_form import LEAST_CROSSOVER
 from ...analysis.motion.power_law import PowerLaw, fit_power_law
 from ...analysis.motion.response import Response, layer_force, linear_response
 from ...analysis.onset.pair_form import PairForm, pair_forms
 from ...analysis.packing.packing import Floats
-from ...analysis.spectrum.normal_form import LEAST_CROSSOVER
 from ...pywrap import Engine, Equilibrium, Sample, Scene
 from ...pywrap.lammps.dynamics import Weakening
 from ...pywrap.onset.undamped import OnsetRun

@@ -21,7 +21,7 @@ from faultgouge.analysis import (
     touching,
 )
 from faultgouge.analysis.arrays import derive_frozen
-from faultgouge.analysis.spectrum.spectrum import participation_ratio, rotation_share
+from faultgouge.analysis.motion.spectrum import participation_ratio, rotation_share
 from faultgouge.figures import PairCurve, draw_packing, draw_pair, save
 from faultgouge.figures.mode import Mode, draw_modes
 from faultgouge.figures.packing import View

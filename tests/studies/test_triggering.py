@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from faultgouge.analysis.motion.normal_form import NormalForm
 from faultgouge.analysis.motion.power_law import PowerLaw
 from faultgouge.analysis.onset.pair_form import PairForm
-from faultgouge.analysis.spectrum.normal_form import NormalForm
 from faultgouge.figures.pages import render
 from faultgouge.pywrap.lammps.dynamics import Weakening
 from faultgouge.studies.triggering.compute import Sensitivity, Triggering, judge, summary

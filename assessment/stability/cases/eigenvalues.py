@@ -28,8 +28,8 @@ from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 
 from ....analysis import spectrum
+from ....analysis.motion.spectrum import SAFETY, unit_rounding
 from ....analysis.onset import Modes, full_operator
-from ....analysis.spectrum.spectrum import SAFETY, unit_rounding
 from ....pywrap import Scene
 from ....pywrap.onset.undamped import OnsetRun, onset_run
 from .case import Case, Outcome, failed_outcome, measured_outcome

@@ -65,7 +65,7 @@ def spectrum(
     """Compute the eigenvalues, complex pairs and rattlers of a stored packing."""
     from faultgouge.analysis import Configuration, solid_fraction
     from faultgouge.analysis import spectrum as eigenvalues_of
-    from faultgouge.analysis.spectrum.spectrum import in_balance
+    from faultgouge.analysis.motion.spectrum import in_balance
 
     packing = stored_snapshot(file) or stored_packing(file, frame)
     size = packing.coordinates
@@ -117,7 +117,7 @@ def _values(packing: Packing | Configuration, as_json: bool) -> None:
 
 def _print_spectrum(packing: Packing | Configuration, result: Spectrum, gain: dict[str, Any] | None) -> None:
     from faultgouge.analysis import Configuration
-    from faultgouge.analysis.spectrum.spectrum import in_balance
+    from faultgouge.analysis.motion.spectrum import in_balance
 
     _print_size(packing, result)
     if not in_balance(packing):

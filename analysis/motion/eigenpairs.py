@@ -1,6 +1,6 @@
 """Eigenvalues of the stability operator with their right and left vectors: all of them, or those nearest to a shift.
 
-Vectors are in the mass-weighted coordinates of :mod:`~faultgouge.analysis.spectrum.spectrum`.
+Vectors are in the mass-weighted coordinates of :mod:`~faultgouge.analysis.motion.spectrum`.
 """
 
 from dataclasses import dataclass

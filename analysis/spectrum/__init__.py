@@ -1,4 +1,0 @@
-"""Eigenvalues and modes of one packing: which pairs are complex, and how two modes coalesce (the normal form).
-
-May import: `packing`, `operators`.
-"""
