@@ -17,6 +17,8 @@ from .files.runfile import RunFile
 from .motion.buckling import negative_eigenvalues
 from .motion.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
 from .motion.growth import Growth, fit_growth, growth_of_run, mean_square_displacement
+from .motion.motion import Motion
+from .motion.one_sided import OneSidedMotion, one_sided_motion
 from .motion.response import layer_force, linear_response
 from .motion.spectrum import (
     ComplexPair,
@@ -56,8 +58,10 @@ __all__ = [
     "Growth",
     "LinearisedContacts",
     "MindlinLaw",
+    "Motion",
     "NoEquilibriumError",
     "NoGainError",
+    "OneSidedMotion",
     "Onset",
     "OnsetError",
     "OutputError",
@@ -88,6 +92,7 @@ __all__ = [
     "nearest_image",
     "negative_eigenvalues",
     "normal_modes",
+    "one_sided_motion",
     "read_dump",
     "read_packing",
     "solid_fraction",

@@ -16,6 +16,7 @@ motion continues: `sliding` chooses.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -213,6 +214,10 @@ class Configuration:
         Value of the load parameter of the configuration, if it belongs to a path.
     load_error : float
         Error of `fx` that corresponds to the residual, in units of `fx`.
+    top : array_like of bool, shape (N,), optional
+        The particles of a driven layer, on each of which fx acts; none by default.
+    drag_rate : float
+        1/tau of the drag -(m/tau) v and -(I/tau) omega on every particle, 1 / time; none by default.
 
     Raises
     ------
@@ -235,6 +240,8 @@ class Configuration:
     kind: Indices
     fx: float
     load_error: float
+    top: NDArray[np.bool_]
+    drag_rate: float
 
     def __init__(
         self,
@@ -254,6 +261,8 @@ class Configuration:
         kind: ArrayLike | None = None,
         fx: float = 0.0,
         load_error: float = 0.0,
+        top: ArrayLike | None = None,
+        drag_rate: float = 0.0,
     ) -> None:
         n = len(np.atleast_1d(np.asarray(radius)))
         if dimension not in (2, 3) or n == 0:
@@ -274,6 +283,8 @@ class Configuration:
             kind=integers("kind", np.ones(n, int) if kind is None else kind),
             fx=number("fx", fx),
             load_error=number("load_error", load_error),
+            top=booleans("top", np.zeros(n, bool) if top is None else top, n),
+            drag_rate=number("drag_rate", drag_rate),
         )
         if len(contacts) and max(contacts.i.max(), contacts.j.max()) >= n:
             raise ValueError(f"A contact names a particle beyond the last one, {n - 1}.")
@@ -315,14 +326,15 @@ class Configuration:
         return np.concatenate([self.mass] * self.dimension + [turning] * (self.axes - self.dimension))
 
     @property
-    def damped(self) -> bool:
-        """Whether contacts have dashpots."""
-        return bool(self.contacts.normal_dashpot.any() or self.contacts.tangential_dashpot.any())
+    def configuration(self) -> "Configuration":
+        """The configuration itself; a Packing has one, too."""
+        return self
 
     @property
-    def top(self) -> NDArray[np.bool_]:
-        """The disks of a driven layer, shape (N,): none, as a configuration has no such layer."""
-        return np.zeros(len(self), dtype=np.bool_)
+    def damped(self) -> bool:
+        """Whether there are dashpots or drag."""
+        dashpots = self.contacts.normal_dashpot.any() or self.contacts.tangential_dashpot.any()
+        return bool(dashpots or self.drag_rate > 0)
 
     @property
     def normal_force(self) -> Floats:
@@ -386,3 +398,10 @@ class Configuration:
         """The reverse of `vectors`."""
         d = self.dimension
         return np.concatenate([translation[:, :d].T.ravel(), rotation[:, d - self.axes :].T.ravel()])
+
+
+class HasConfiguration(Protocol):
+    """What an analysis takes: a Configuration, or a Packing, which has one."""
+
+    @property
+    def configuration(self) -> Configuration: ...

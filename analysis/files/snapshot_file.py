@@ -22,8 +22,10 @@ from .plain_file import check_plain
 from .runfile_header import CHECKSUM, CREATOR, program_version
 from .runfile_validation import check_places, dataset
 
-SCALARS = ("dimension", "fx", "load_error")
-ARRAYS = ("position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind")
+SCALARS = ("dimension", "fx", "load_error", "drag_rate")
+ARRAYS = ("position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind", "top")
+LATER = ("viscous_slider", "top", "drag_rate")
+"""Fields that files of version 1 do not have."""
 
 
 def write_snapshot(
@@ -101,15 +103,13 @@ def read_snapshot(path: Path) -> Configuration:
         try:
             check_places(file)
             group, size = file["snapshot"], path.stat().st_size
+            given = group["contacts"]
             contacts = LinearisedContacts(
-                **{
-                    name: dataset(group["contacts"], name, size)[()]
-                    for name in PER_CONTACT
-                    if name in group["contacts"]
-                }
+                **{name: dataset(given, name, size)[()] for name in PER_CONTACT if name in given or name not in LATER}
             )
-            arrays = {name: dataset(group, name, size)[()] for name in ARRAYS}
-            numbers = {name: group.attrs[name].item() for name in SCALARS}
+            arrays = {name: dataset(group, name, size)[()] for name in ARRAYS if name in group or name not in LATER}
+            stored = [name for name in SCALARS if name in group.attrs or name not in LATER]
+            numbers = {name: group.attrs[name].item() for name in stored}
             return Configuration(contacts=contacts, **arrays, **numbers)
         except Exception as error:  # h5py raises nearly every exception there is, depending on what is damaged
             said = (str(error).strip() or type(error).__name__).rstrip(".")

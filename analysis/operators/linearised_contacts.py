@@ -31,7 +31,7 @@ law in three dimensions.)
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import coo_array, csr_array, diags_array
 
 from ..arrays import Floats, derive_frozen
 from ..configuration import Configuration, LinearisedContacts
@@ -112,7 +112,10 @@ def assembled_damping(configuration: Configuration) -> csr_array:
         c, normal_force=none, closing=still, parting=still, distance=np.full(len(c), np.inf), lever_slope=none,
         normal_stiffness=c.normal_dashpot, tangential_stiffness=c.tangential_dashpot,
     )  # fmt: skip
-    return assembled_stiffness(derive_frozen(configuration, contacts=dashpots))
+    matrix = assembled_stiffness(derive_frozen(configuration, contacts=dashpots))
+    if not configuration.drag_rate:
+        return matrix
+    return csr_array(matrix + diags_array(configuration.drag_rate * configuration.coordinate_mass))
 
 
 def rescaling_operators(configuration: Configuration) -> tuple[csr_array, csr_array]:

@@ -34,10 +34,12 @@ from ..arrays import (
     same_bits,
     set_frozen,
 )
+from ..configuration import Configuration
 from .compensated import Pair
 from .contacts import Contacts
 from .geometry import ContactGeometry, check_box, contact_geometry
 from .law import MindlinLaw
+from .linearise import linearise_contacts
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -205,6 +207,26 @@ class Packing:
             return float(np.finfo(float).eps * np.abs(self.position).max())
         exponent = int(np.frexp(2 * self.radius.max())[1])
         return float(np.ldexp(1.0, exponent - 26 - 52))
+
+    @cached_property
+    def configuration(self) -> Configuration:
+        """The disks with their contacts to first order."""
+        g, c, n = self.geometry, self.contacts, len(self)
+        flat = np.zeros(len(c))
+        arms = np.column_stack([self.radius[c.i], np.where(c.floor, 0.0, self.radius[c.j])])
+        contacts = linearise_contacts(
+            self.law, g.overlap, c.slip, np.column_stack([g.tangent, flat]), i=c.i, j=c.j, slip_arm=arms,
+            lever_arm=arms, normal=np.column_stack([g.normal, flat]), distance=np.where(c.floor, np.inf, g.distance),
+        )  # fmt: skip
+        load = np.zeros((n, 2, 3))
+        load[self.top, 0, :2] = self.fx, -self.fy
+        return Configuration(
+            dimension=2, position=self.position, radius=self.radius, mass=self.mass,
+            inertia=self.inertia_factor * self.mass * self.radius**2, contacts=contacts,
+            box=np.diag([self.box_length or 0.0, 0.0, 0.0]), origin=np.zeros(3),
+            periodic=np.array([self.box_length is not None, False, False]), load=load, fx=self.fx,
+            load_error=self.load_error, top=self.top, drag_rate=1 / self.drag_time if self.drag_time else 0.0,
+        )  # fmt: skip
 
     @cached_property
     def geometry(self) -> ContactGeometry:

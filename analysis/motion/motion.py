@@ -1,0 +1,199 @@
+r"""Small motion of a configuration about its equilibrium: the operators, and what grows.
+
+With the stiffness K, the damping C and the masses M, small motion obeys :math:`M \ddot q + C \dot q + K q = 0`. A
+`Motion` has :math:`A = M^{-1/2} K M^{-1/2}` and :math:`G = M^{-1/2} C M^{-1/2}` on the coordinates that feel a force.
+A motion :math:`e^{st}` has :math:`s^2 + s G + A` singular; the mean square displacement D grows as
+:math:`e^{2 \mathrm{Re}\, s\, t}`. Without dissipation :math:`s = \pm i\sqrt\lambda` for the eigenvalues of A.
+
+**Contacts at Coulomb's bound** slide on ahead and stick on the way back
+(:mod:`~faultgouge.analysis.operators.sliders`). Two linear systems are their neighbours: all stick, with K and C; or
+all slide on for ever, with :math:`K + G Y` and :math:`C + G Z`, since then the play :math:`p = Y q + Z \dot q`.
+Neither bounds what contacts do that stick and slide in turn.
+
+**What grows.** `growing` is the one place that says which eigenvalues grow beyond their rounding. Without dissipation
+an eigenvalue of A grows if its imaginary part exceeds :math:`\kappa u |A|`, or if it is real and below zero by more
+than the uncertainty of zero (:mod:`~faultgouge.analysis.motion.spectrum`). With dissipation s grows if
+:math:`\mathrm{Re}\, s` exceeds :math:`\kappa u |Z|` with :math:`\kappa = 1/|l^H r|` and the first-order matrix Z in
+coordinates of the energy (:mod:`~faultgouge.analysis.motion.state_space`). A motion that no force opposes has s = 0
+twice, in one block of Jordan's: rounding turns that into a pair of either sign, whose :math:`\kappa` is as large.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eig
+from scipy.sparse import csr_array
+
+from ..arrays import Floats, Indices
+from ..configuration import Configuration, HasConfiguration
+from ..operators.damping import damping_matrix
+from ..operators.sliders import sliders_of
+from ..operators.stiffness import stiffness_matrix
+from .spectrum import (
+    SAFETY,
+    Complexes,
+    active_coordinates,
+    all_modes,
+    exceeds_rounding,
+    is_negative,
+    mass_weighted,
+    unit_rounding,
+    zero_uncertainty,
+)
+from .state_space import StateSpace
+
+FREE = 1e-6
+"""Eigenvalues s below this share of the largest are those of motions that no force opposes, if they are as uncertain:
+rounding leaves sqrt(u) of a double zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """The eigenvalues s of small motion, those with Im s >= 0; each is uncertain by `uncertainty`.
+
+    Attributes
+    ----------
+    values : ndarray of complex, shape (m,)
+        s, the fastest growing first, 1 / time. Motions that no force opposes are left out.
+    grows : ndarray of bool, shape (m,)
+        Those with Re s > 0 beyond rounding.
+    free : int
+        Number of motions that no force opposes, and that drift.
+    """
+
+    values: Complexes
+    grows: NDArray[np.bool_]
+    free: int
+
+    @property
+    def growth_rate(self) -> float:
+        """Of D, 1 / time: the largest 2 Re s, zero where nothing grows or decays beyond rounding."""
+        return 2 * float(self.values.real.max(initial=-np.inf)) if len(self.values) else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The linear motion of a configuration, in mass-weighted coordinates M^(1/2) q that feel a force.
+
+    Attributes
+    ----------
+    configuration : Configuration
+        Whose motion it is.
+    active : ndarray of int, shape (E,)
+        Which coordinates take part.
+    root_mass : ndarray, shape (E,)
+        M^(1/2).
+    stiffness : scipy.sparse.csr_array, shape (E, E)
+        A, 1 / time^2.
+    damping : scipy.sparse.csr_array, shape (E, E)
+        G, 1 / time; without entries if there is no dissipation.
+    """
+
+    configuration: Configuration
+    active: Indices
+    root_mass: Floats
+    stiffness: csr_array
+    damping: csr_array
+
+    @classmethod
+    def of(cls, packing: HasConfiguration, *, sliding: bool = False, dissipation: bool = True) -> "Motion":
+        """Assemble the operators.
+
+        Parameters
+        ----------
+        packing : Configuration or Packing
+            The equilibrium.
+        sliding : bool
+            Whether all contacts at Coulomb's bound slide on, in place of sticking.
+        dissipation : bool
+            Whether dashpots and drag count.
+        """
+        configuration = packing.configuration
+        k = stiffness_matrix(configuration)
+        c = damping_matrix(configuration) if dissipation and configuration.damped else csr_array(k.shape)
+        if sliding:
+            sliders = sliders_of(configuration)
+            k = csr_array(k + sliders.force @ sliders.excess)
+            if c.nnz:
+                c = csr_array(c + sliders.force @ sliders.viscous_excess)
+        a, g = (mass_weighted(matrix, configuration) for matrix in (k, c))
+        active = active_coordinates(a)
+        root = np.sqrt(configuration.coordinate_mass[active])
+        return cls(configuration, active, root, a[active][:, active], g[active][:, active])
+
+    @property
+    def dissipative(self) -> bool:
+        """Whether there is dissipation."""
+        return self.damping.nnz > 0
+
+    @cached_property
+    def first_order(self) -> StateSpace:
+        """The dense first-order system in coordinates of the energy."""
+        return StateSpace.of_matrices(self.stiffness, self.damping, self.root_mass)
+
+    @cached_property
+    def rates(self) -> Rates:
+        """All eigenvalues s, by LAPACK."""
+        if not len(self.active):
+            return Rates(np.zeros(0, complex), np.zeros(0, bool), 0)
+        return self._damped_rates() if self.dissipative else self._undamped_rates()
+
+    def _undamped_rates(self) -> Rates:
+        values, left, right = all_modes(self.stiffness)
+        overlap = np.abs(np.sum(left.conj() * right, axis=0))
+        rounding = unit_rounding(self.stiffness.data)
+        zero = zero_uncertainty(self.configuration, rounding)
+        oscillates, buckles = growing_undamped(values, overlap, rounding, zero)
+        grows, kept = oscillates | buckles, values.imag >= 0
+        free = ~grows & (np.abs(values) <= zero)
+        s = 1j * np.sqrt(np.where(grows, values, np.abs(values.real)).astype(complex))
+        s = np.where(s.real < 0, -s, s)  # of a pair of roots the one that grows
+        order = np.flatnonzero(kept & ~free)
+        order = order[np.argsort(-s[order].real, kind="stable")]
+        return Rates(s[order], grows[order], int(free.sum()))
+
+    def _damped_rates(self) -> Rates:
+        z = self.first_order.matrix
+        values, left, right = eig(z, left=True, check_finite=False)
+        overlap = np.abs(np.sum(left.conj() * right, axis=0))
+        rounding = unit_rounding(z)
+        free = (np.abs(values) < FREE * np.abs(values).max()) & (np.abs(values) * overlap <= SAFETY * rounding)
+        order = np.flatnonzero((values.imag >= 0) & ~free)
+        order = order[np.argsort(-values[order].real, kind="stable")]
+        grows = growing(values, overlap, rounding)
+        return Rates(values[order], grows[order], int(free.sum()) // 2)
+
+
+def growing(rate: Complexes, overlap: Floats, rounding: float) -> NDArray[np.bool_]:
+    """Which s grow in spite of dissipation, beyond rounding.
+
+    Parameters
+    ----------
+    rate : ndarray of complex
+        Eigenvalues s of the first-order system, 1 / time.
+    overlap : ndarray
+        |l^H r| of their unit vectors.
+    rounding : float
+        u |Z|_F, 1 / time.
+    """
+    return np.asarray(np.real(rate) * overlap > SAFETY * rounding)
+
+
+def growing_undamped(
+    values: Complexes, overlap: Floats, rounding: float, zero: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which eigenvalues of A grow with oscillation, as complex pairs, and which without, as negative ones.
+
+    Parameters
+    ----------
+    values : ndarray of complex
+        Eigenvalues, 1 / time^2.
+    overlap : ndarray
+        |y^H x| of their unit vectors.
+    rounding, zero : float
+        u |A|_F, and the uncertainty of an eigenvalue of zero, 1 / time^2.
+    """
+    oscillates = np.array([exceeds_rounding(v, o, rounding) for v, o in zip(values, overlap, strict=True)], dtype=bool)
+    return oscillates, is_negative(values, overlap, zero)

@@ -1,0 +1,260 @@
+r"""Small motion of a packing whose contacts at Coulomb's bound slide on ahead and stick on the way back.
+
+To first order in the displacement q from the equilibrium,
+
+.. math::
+
+    M \ddot q = -K q - C \dot q - G (p + x) + B r + t\, \mathbf g, \qquad
+    p_c(t) = \max_{t' \le t} \left(Y_c q + Z_c \dot q + h_c r_c\right)_+, \qquad
+    r_c(t) = \int_0^t \left|\dot\delta_c\right| \mathrm dt'
+
+with K and C of sticking contacts, the sliders' G, Y, Z and h of :mod:`~faultgouge.analysis.operators.sliders`, x the
+part of the excess that the slider of this package cuts without memory, and the load :math:`t\, \mathbf g` that rises. B
+and r are those of laws with two derivatives, one while a contact closes and one while it parts, whose mean is in K
+(:func:`~faultgouge.analysis.operators.linearised_contacts.rescaling_operators`). Each contact at the bound is a play
+operator; nothing else remembers.
+
+The motion is positively homogeneous of degree one: the motion of a times the push (or of a times the rate of loading)
+is a times the motion, for a > 0. No amplitude enters, and no matrix describes the motion: it may grow where the packing
+with sticking contacts is stable, and rest where the packing with sliding contacts is not. The equations of a slider
+with a load that rises slowly are those of rate-independent plasticity; self-sustained vibration of sliding contacts is
+known as flutter (Bigoni and Noselli, J. Mech. Phys. Solids 59, 2208, 2011).
+
+The steps are those of velocity Verlet, with dashpots at the velocity of the half step, as LAMMPS takes them.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array, hstack
+
+from ..arrays import Floats, floats
+from ..configuration import Configuration, HasConfiguration
+from ..operators.linearised_contacts import rescaling_operators
+from ..operators.sliders import sliders_of
+from .motion import Motion
+from .stable_timestep import stable_timestep
+
+STEP = 0.05
+"""Time step, as a share of the largest stable one. Beside LAMMPS D is right to some per cent after growth by twelve
+decades; with twice the step, to some 8 per cent."""
+
+
+@dataclass(frozen=True, eq=False)
+class OneSidedMotion:
+    """Displacements of the particles from the equilibrium, for the push or the rate of loading as it was given.
+
+    Attributes
+    ----------
+    times : ndarray, shape (T,)
+        Times.
+    displacement, velocity : ndarray, shape (T, N, d)
+        Length, and length / time.
+    slid : ndarray, shape (T, B)
+        p of each contact at the bound: the tangential force that its slider has taken away, force.
+    """
+
+    times: Floats
+    displacement: Floats
+    velocity: Floats
+    slid: Floats
+
+    @property
+    def mean_square_displacement(self) -> Floats:
+        """D: mean over the particles of |displacement|^2, length^2, shape (T,)."""
+        return np.asarray(np.sum(self.displacement**2, axis=2).mean(axis=1))
+
+
+@dataclass
+class State:
+    """Several motions at one time, in columns: mass-weighted displacement z and velocity v, shape (E, P), and what
+    contacts remember: p of sliders, shape (B, P), and r, shape (R, P), of contacts with two derivatives."""
+
+    time: float
+    z: Floats
+    v: Floats
+    p: Floats
+    r: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class OneSidedSystem:
+    """The equations of one configuration, assembled once.
+
+    Attributes
+    ----------
+    motion : Motion
+        K and C of sticking contacts.
+    """
+
+    motion: Motion
+
+    @classmethod
+    def of(cls, packing: HasConfiguration) -> "OneSidedSystem":
+        """Assemble the equations, with the packing's own dashpots and drag."""
+        return cls(Motion.of(packing))
+
+    @cached_property
+    def step(self) -> float:
+        """Time step of `advance`, time."""
+        configuration = self.motion.configuration
+        return STEP * float(stable_timestep(configuration)) if len(self.motion.active) else 1.0
+
+    @cached_property
+    def _weight(self) -> csr_array:
+        """M^(-1/2) on the active coordinates, shape (coordinates, E)."""
+        m = self.motion
+        shape = (m.configuration.coordinates, len(m.active))
+        return csr_array((1 / m.root_mass, (m.active, np.arange(len(m.active)))), shape=shape)
+
+    @cached_property
+    def sliders(self) -> tuple[csr_array, csr_array, Floats, NDArray[np.bool_]]:
+        """G, shape (E, B), Y beside Z, shape (B, 2E), h, and which p remembers dashpots, shape (B, 1)."""
+        s = sliders_of(self.motion.configuration)
+        if not self.motion.dissipative:
+            s.viscous_excess.data[:] = 0.0
+        both = csr_array(hstack([s.excess @ self._weight, s.viscous_excess @ self._weight]))
+        return csr_array(self._weight.T @ s.force), both, s.rectified[:, None], s.viscous[:, None]
+
+    @cached_property
+    def rescaled(self) -> tuple[csr_array, csr_array, csr_array]:
+        """N, shape (R, E), and B, shape (E, R), of the R contacts with two derivatives; h selects, shape (B, R)."""
+        rates, forces = rescaling_operators(self.motion.configuration)
+        contacts = self.motion.configuration.contacts
+        two = np.flatnonzero(np.any(contacts.closing != contacts.parting, axis=1))
+        bound = np.flatnonzero(contacts.one_sided)
+        here, place = np.isin(bound, two), np.searchsorted(two, bound)
+        select = csr_array((np.ones(here.sum()), (np.flatnonzero(here), place[here])), shape=(len(bound), len(two)))
+        return csr_array(rates[two] @ self._weight), csr_array(self._weight.T @ forces[:, two]), select
+
+    @cached_property
+    def _linear(self) -> csr_array:
+        """-A beside -G, shape (E, 2E)."""
+        return csr_array(hstack([-self.motion.stiffness, -self.motion.damping]))
+
+    def start(self, velocity: Floats) -> State:
+        """At rest in the equilibrium, but for velocities of all coordinates, shape (coordinates, P)."""
+        v = self.motion.root_mass[:, None] * velocity[self.motion.active]
+        count = v.shape[1]
+        remembered = [np.zeros((matrix.shape[0], count)) for matrix in (self.sliders[1], self.rescaled[0])]
+        return State(0.0, np.zeros_like(v), v.copy(), *remembered)
+
+    def advance(self, state: State, time: float, rise: Floats | None = None) -> None:
+        """Go on to a time, in equal steps no longer than `step`.
+
+        Parameters
+        ----------
+        state : State
+            Changes in place.
+        time : float
+            Not before the time of the state.
+        rise : ndarray, shape (coordinates, P), optional
+            Forces that rise, per time: the load is t times these.
+        """
+        count = int(np.ceil((time - state.time) / self.step - 1e-9))
+        if count < 1:
+            return
+        load = None if rise is None else self._weight.T @ rise
+        dt = (time - state.time) / count
+        force = self._force(state, state.v, load)
+        for _ in range(count):
+            state.v += 0.5 * dt * force
+            change = dt * state.v
+            state.z += change
+            state.time += dt
+            if len(state.r):
+                state.r += np.abs(self.rescaled[0] @ change)
+            force = self._force(state, state.v, load)
+            state.v += 0.5 * dt * force
+        state.time = time
+
+    def _force(self, state: State, velocity: Floats, load: Floats | None) -> Floats:
+        """Mass-weighted forces; sliders give way."""
+        both = np.concatenate([state.z, velocity])
+        force = self._linear @ both
+        if load is not None:
+            force += state.time * load
+        if len(state.r):
+            force += self.rescaled[1] @ state.r
+        if len(state.p):
+            grip, excess, rectified, viscous = self.sliders
+            elastic, whole = self._excess(excess, both)
+            if len(state.r):
+                turned = rectified * (self.rescaled[2] @ state.r)
+                elastic, whole = elastic + turned, whole + turned
+            np.maximum(state.p, np.where(viscous, whole, elastic), out=state.p)
+            force -= grip @ np.maximum(state.p, whole)
+        return np.asarray(force)
+
+    def _excess(self, excess: csr_array, both: Floats) -> tuple[Floats, Floats]:
+        """Excess of springs, and of springs and dashpots."""
+        whole = excess @ both
+        if not self._remembers_springs_alone:
+            return whole, whole
+        springs = both.copy()
+        springs[len(both) // 2 :] = 0.0
+        return excess @ springs, whole
+
+    @cached_property
+    def _remembers_springs_alone(self) -> bool:
+        """Whether some slider forgets the excess of its dashpot."""
+        return self.motion.dissipative and not bool(np.all(self.sliders[3]))
+
+    def displacement(self, z: Floats) -> Floats:
+        """Displacements of the particles, shape (N, d, P), of mass-weighted coordinates."""
+        c = self.motion.configuration
+        q = (self._weight @ z).reshape(c.axes, len(c), -1)[: c.dimension]
+        return np.asarray(np.moveaxis(q, 0, 1))
+
+
+def one_sided_motion(
+    packing: HasConfiguration,
+    velocity: ArrayLike | None = None,
+    rise: ArrayLike | None = None,
+    times: ArrayLike = (0.0,),
+) -> OneSidedMotion:
+    """Small motion of a configuration after a push, or under a load that rises, contacts at the bound as they are.
+
+    Parameters
+    ----------
+    packing : Configuration or Packing
+        The equilibrium, with its dashpots and drag.
+    velocity : array_like, shape (N, d), optional
+        Velocities at t = 0, length / time; none by default. The motion is homogeneous, so that numbers of order one do.
+    rise : array_like, shape (N, d), optional
+        Forces per unit of time that are added to the load; none by default.
+    times : array_like, shape (T,)
+        When to look, increasing, not negative.
+
+    Returns
+    -------
+    OneSidedMotion
+
+    Raises
+    ------
+    ValueError
+        If a shape does not fit, or times are not finite and increasing.
+    """
+    configuration = packing.configuration
+    time = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    if time.ndim != 1 or not np.all(np.isfinite(time)) or np.any(np.diff(time, prepend=0.0) < 0):
+        raise ValueError("The times of a motion are finite, not negative, and in increasing order.")
+    system = OneSidedSystem.of(configuration)
+    state = system.start(_of_all_coordinates(configuration, "velocity", velocity))
+    load = None if rise is None else _of_all_coordinates(configuration, "rise", rise)
+    seen = []
+    for each in time:
+        system.advance(state, float(each), load)
+        seen.append((system.displacement(state.z)[..., 0], system.displacement(state.v)[..., 0], state.p[:, 0].copy()))
+    displacement, speed, slid = (np.array(each) for each in zip(*seen, strict=True))
+    return OneSidedMotion(time, displacement, speed, slid)
+
+
+def _of_all_coordinates(configuration: Configuration, name: str, values: ArrayLike | None) -> Floats:
+    """Vectors of the particles as numbers of all coordinates, shape (coordinates, 1); without rotations."""
+    whole = np.zeros((configuration.axes, len(configuration)))
+    if values is not None:
+        whole[: configuration.dimension] = floats(name, values, (len(configuration), configuration.dimension)).T
+    return whole.reshape(-1, 1)
