@@ -30,6 +30,7 @@ from .motion.spectrum import (
     largest_frequency,
     spectrum,
 )
+from .motion.stability import Stability, stability
 from .motion.stable_timestep import stable_timestep
 from .motion.transient import NoGainError, TransientGain, transient_gain
 from .onset import Onset, OnsetError, Window, complex_windows, find_onset
@@ -70,6 +71,7 @@ __all__ = [
     "RunFile",
     "Snapshot",
     "Spectrum",
+    "Stability",
     "TransientGain",
     "Window",
     "closest_to_meeting",
@@ -97,6 +99,7 @@ __all__ = [
     "read_packing",
     "solid_fraction",
     "spectrum",
+    "stability",
     "stable_timestep",
     "stiffness_matrix",
     "touching",

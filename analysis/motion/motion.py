@@ -23,7 +23,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eig
+from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 
 from ..arrays import Floats, Indices
@@ -45,8 +45,8 @@ from .spectrum import (
 from .state_space import StateSpace
 
 FREE = 1e-6
-"""Eigenvalues s below this share of the largest are those of motions that no force opposes, if they are as uncertain:
-rounding leaves sqrt(u) of a double zero."""
+"""Eigenvalues s below this share of the largest are those of motions that no force opposes: rounding leaves sqrt(u) of
+a double zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,13 +156,16 @@ class Motion:
 
     def _damped_rates(self) -> Rates:
         z = self.first_order.matrix
-        values, left, right = eig(z, left=True, check_finite=False)
-        overlap = np.abs(np.sum(left.conj() * right, axis=0))
-        rounding = unit_rounding(z)
-        free = (np.abs(values) < FREE * np.abs(values).max()) & (np.abs(values) * overlap <= SAFETY * rounding)
+        values, rounding = eigvals(z, check_finite=False), unit_rounding(z)
+        largest = np.abs(values).max()
+        grows = values.real > np.sqrt(SAFETY * rounding * largest)  # no double eigenvalue is as uncertain
+        if np.any(~grows & (values.real > 0) & (np.abs(values) > FREE * largest)):
+            # vectors take three times as long as eigenvalues
+            values, left, right = eig(z, left=True, check_finite=False)
+            grows = growing(values, np.abs(np.sum(left.conj() * right, axis=0)), rounding)
+        free = ~grows & (np.abs(values) <= FREE * largest)
         order = np.flatnonzero((values.imag >= 0) & ~free)
         order = order[np.argsort(-values[order].real, kind="stable")]
-        grows = growing(values, overlap, rounding)
         return Rates(values[order], grows[order], int(free.sum()) // 2)
 
 

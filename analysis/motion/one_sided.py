@@ -90,17 +90,19 @@ class OneSidedSystem:
     """
 
     motion: Motion
+    share: float = STEP
+    """Time step, as a share of the largest stable one."""
 
     @classmethod
-    def of(cls, packing: HasConfiguration) -> "OneSidedSystem":
+    def of(cls, packing: HasConfiguration, share: float = STEP) -> "OneSidedSystem":
         """Assemble the equations, with the packing's own dashpots and drag."""
-        return cls(Motion.of(packing))
+        return cls(Motion.of(packing), share)
 
     @cached_property
     def step(self) -> float:
         """Time step of `advance`, time."""
         configuration = self.motion.configuration
-        return STEP * float(stable_timestep(configuration)) if len(self.motion.active) else 1.0
+        return self.share * float(stable_timestep(configuration)) if len(self.motion.active) else 1.0
 
     @cached_property
     def _weight(self) -> csr_array:

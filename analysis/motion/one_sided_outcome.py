@@ -1,0 +1,202 @@
+r"""What becomes of one-sided motion: it grows, rests or has not settled; or drifts and vibrates under a rising load.
+
+Motions begin with random pushes of all particles alike, and with their opposites, since one-sided motion is not odd. A
+motion *grows* if D has gained `DECADES` and still gains at a steady rate; it *rests* if the sliders have come to rest
+and the packing with sticking contacts does not grow, since then the motion is linear and decays for ever. Otherwise the
+motion has not settled. The time is `CHUNK` stable time steps as often as needed, up to `WORK` multiplications.
+
+Under a load that rises at a constant rate the motion is proportional to the rate. Its *drift* is the mean velocity of
+each particle over a window, its *vibration* what is left: root mean squares over particles and axes.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats
+from ..progress import report_progress
+from .one_sided import OneSidedSystem, State
+
+PUSHES = 2
+"""Random pushes; the opposite of each is followed, too, since one-sided motion is not odd."""
+
+STEP = 0.1
+"""Time step of one-sided motion as a share of the largest stable one: rates of growth are right to some per cent."""
+
+CHUNK = 300
+"""Stable time steps between two looks at whether a motion has settled: some ten periods of a slow mode."""
+
+LOOKS = 10
+"""D is looked at so often in a chunk."""
+
+WORK = 2e10
+"""Multiplications with entries of the operators that one motion may take: some minutes."""
+
+DECADES = 8.0
+"""Growth of D that no packing at rest was seen to reach without growing for ever: transient amplification of packings
+at Coulomb's bound went up to 6e5."""
+
+MOST_DECADES = 25.0
+"""Growth of D at which a motion has grown enough."""
+
+STEADY = 0.3
+"""A motion still grows if D gains this share of its mean rate, in each quarter of the second half of the time."""
+
+SETTLED = 1e-3
+"""Change of p in a quarter of the time, as a share of the largest p, below which sliders may be at rest."""
+
+SAMPLES = 400
+"""Velocities that a window of a load that rises has."""
+
+WINDOWS = 0.2
+"""Relative difference of the vibrations of two windows below which a motion under a rising load is steady."""
+
+
+def _chunks(system: OneSidedSystem, columns: int, time: float | None) -> tuple[float, int]:
+    """Time of a chunk, and how many there are at most."""
+    chunk = CHUNK * system.step / system.share
+    if time is not None:
+        return time / 8, 8
+    entries = (system.motion.stiffness.nnz + system.motion.damping.nnz) * columns
+    return chunk, int(np.clip(WORK / (entries * chunk / system.step), 4, 40))
+
+
+def follow_pushes(
+    system: OneSidedSystem, sticking: float, sticking_grows: bool, time: float | None = None
+) -> dict[str, Any]:
+    """Whether one-sided motion grows from some pushes: `Stability.one_sided`.
+
+    Parameters
+    ----------
+    system : OneSidedSystem
+        Of the configuration.
+    sticking, sticking_grows : float, bool
+        Growth rate with sticking contacts, 1 / time, and whether they grow.
+    time : float, optional
+        How long; until the motion has settled by default.
+    """
+    configuration = system.motion.configuration
+    rng = np.random.Generator(np.random.PCG64(0))
+    push = np.zeros((configuration.coordinates, PUSHES))
+    push[: configuration.dimension * len(configuration)] = rng.standard_normal(
+        (configuration.dimension * len(configuration), PUSHES)
+    )
+    state = system.start(np.hstack([push, -push]))
+    chunk, most = _chunks(system, 2 * PUSHES, time)
+    times, sizes, slid = [0.0], [np.zeros(2 * PUSHES)], [state.p.copy()]
+    grows: bool | None = None
+    for number in range(most):
+        for look in range(LOOKS):
+            system.advance(state, chunk * (number + (look + 1) / LOOKS))
+            times.append(state.time)
+            sizes.append(_mean_square(system, state))
+            slid.append(state.p.copy())
+        seen = np.array(times[1:]), np.array(sizes[1:])
+        report_progress(f"one-sided motion: t = {state.time:.4g}, D = {seen[1][-1].max():.3g} push^2")
+        grows = _outcome(*seen, slid, sticking_grows)
+        if time is None and grows is not None:
+            break
+        if not np.all(np.isfinite(seen[1][-1])):
+            break
+    t, d = seen
+    rate, error = _rate(t, d)
+    return {
+        "grows": grows,
+        "growth_rate": rate if grows else sticking if grows is False else None,
+        "error": error if grows else None,
+        "amplification": float(d.max()),
+        "time": float(t[-1]),
+    }
+
+
+def _mean_square(system: OneSidedSystem, state: State) -> Floats:
+    """D of each push, shape (P,)."""
+    return np.asarray(np.sum(system.displacement(state.z) ** 2, axis=1).mean(axis=0))
+
+
+def _outcome(time: Floats, size: Floats, slid: list[Floats], sticking_grows: bool) -> bool | None:
+    """Whether the motion grows, rests (False), or has not settled.
+
+    Sliders rest if they moved little in the third quarter of the time, and less by half, or not at all, in the fourth.
+    """
+    largest = size.max(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gained = np.log10(largest / largest[0])
+    if gained[-1] > MOST_DECADES or (gained[-1] > DECADES and _still_grows(time, gained)):
+        return True
+    if sticking_grows or len(slid) <= 2 * LOOKS:
+        return None
+    largest_slip = np.abs(slid[-1]).max(axis=0)
+    before, after = (
+        np.abs(slid[end] - slid[begin]).max(axis=0)
+        for begin, end in ((len(slid) // 2, 3 * len(slid) // 4), (3 * len(slid) // 4, -1))
+    )
+    dies = (after <= 0.5 * before) | (after <= np.finfo(float).eps * largest_slip)
+    return False if np.all(dies & (before <= SETTLED * largest_slip)) else None
+
+
+def _still_grows(time: Floats, gained: Floats) -> bool:
+    """Whether D gains at a steady rate in the second half of the time, so that it did not saturate."""
+    parts = np.array_split(np.arange(len(time) // 2, len(time)), 4)
+    mean = gained[-1] / time[-1]
+    steps = [(gained[part[-1]] - gained[part[0] - 1]) / (time[part[-1]] - time[part[0] - 1]) for part in parts]
+    return bool(min(steps) > STEADY * mean)
+
+
+def _rate(time: Floats, size: Floats) -> tuple[float, float]:
+    """Growth rate of D over the second half of the time, and its error: what its two quarters differ by."""
+    fastest = int(np.argmax(size[-1]))
+    with np.errstate(divide="ignore"):
+        logs = np.log(size[:, fastest])
+    quarters = [slice(len(time) // 2, 3 * len(time) // 4), slice(3 * len(time) // 4, len(time))]
+    slopes = [np.polyfit(time[part], logs[part], 1)[0] for part in quarters if len(time[part]) > 1]
+    if len(slopes) < 2 or not np.all(np.isfinite(slopes)):
+        return float("nan"), float("nan")
+    return float(np.mean(slopes)), float(abs(slopes[1] - slopes[0]) / 2)
+
+
+def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = None) -> dict[str, Any]:
+    """Drift and vibration under a load that rises at the rate 1: `Stability.rising`.
+
+    Parameters
+    ----------
+    system : OneSidedSystem
+        Of the configuration.
+    direction : ndarray, shape (coordinates, 1)
+        Forces per unit of time.
+    time : float, optional
+        How long; the vibration of the two last quarters is compared.
+    """
+    state = system.start(np.zeros_like(direction))
+    chunk, most = _chunks(system, 1, time)
+    windows: list[tuple[float, float]] = []
+    for number in range(most):
+        start = system.displacement(state.z)[..., 0]
+        squares: NDArray[np.float64] = np.zeros_like(start)
+        for sample in range(SAMPLES):
+            system.advance(state, chunk * (number + (sample + 1) / SAMPLES), direction)
+            squares += system.displacement(state.v)[..., 0] ** 2 / SAMPLES
+        mean = (system.displacement(state.z)[..., 0] - start) / chunk
+        windows.append((_root_mean(mean**2), _root_mean(np.maximum(squares - mean**2, 0.0))))
+        report_progress(f"under the rising load: t = {state.time:.4g}, vibration {windows[-1][1]:.3g}")
+        if time is None and number >= 7 and _steady(windows):
+            break
+    last = np.array(windows[-(len(windows) // 4 or 1) :])
+    drift, vibration = np.sqrt(np.mean(last**2, axis=0)).tolist()
+    return {"drift": drift, "vibration": vibration, "time": state.time, "steady": _steady(windows)}
+
+
+def _steady(windows: list[tuple[float, float]]) -> bool:
+    """Whether the vibrations of the third and of the last quarter agree, or vanish beside the drift."""
+    quarter = len(windows) // 4
+    if not quarter:
+        return False
+    before, after = (
+        np.mean(np.array(windows)[part], axis=0) for part in (slice(-2 * quarter, -quarter), slice(-quarter, None))
+    )
+    return bool(abs(after[1] - before[1]) <= WINDOWS * after[1] or max(after[1], before[1]) < 1e-3 * after[0])
+
+
+def _root_mean(squares: Floats) -> float:
+    return float(np.sqrt(np.mean(squares)))

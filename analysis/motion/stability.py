@@ -1,0 +1,278 @@
+r"""Does a packing at rest move? The verdict, with its own dissipation and its contacts at Coulomb's bound as they are.
+
+**No contact at Coulomb's bound.** Small motion is linear. The packing is stable if no eigenvalue s of
+:math:`s^2 M + s C + K` has Re s > 0 beyond rounding (:mod:`~faultgouge.analysis.motion.motion`), with C of its own
+dashpots and drag. Complex pairs of K alone are the answer without loss, and no verdict on a packing with dashpots.
+
+**Contacts at the bound** slide on ahead and stick on the way back, and no eigenvalue decides
+(:mod:`~faultgouge.analysis.motion.one_sided`). The one-sided motion is followed from random pushes until it grows, or
+rests, and so is the motion under a load that rises (:mod:`~faultgouge.analysis.motion.one_sided_outcome`). If it has
+not settled in the time that was followed, the verdict is unknown. """
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arrays import Floats, floats
+from ..configuration import Configuration, HasConfiguration
+from ..operators.asymmetry import asymmetry
+from .motion import Motion
+from .one_sided import OneSidedSystem
+from .one_sided_outcome import PUSHES, STEP, follow_load, follow_pushes
+from .spectrum import Spectrum, in_balance, spectrum
+
+
+@dataclass(frozen=True)
+class LinearNeighbour:
+    """The linear motion with all contacts at the bound alike.
+
+    Attributes
+    ----------
+    growth_rate : float
+        Largest 2 Re s, 1 / time.
+    """
+
+    growth_rate: float
+
+
+@dataclass(frozen=True)
+class Undamped:
+    """The motion without dissipation, of sticking contacts: the eigenvalues of K.
+
+    Attributes
+    ----------
+    growth_rate : float
+        Of D, 1 / time.
+    pairs, negative : int
+        Complex pairs, and negative eigenvalues.
+    """
+
+    growth_rate: float
+    pairs: int
+    negative: int
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Whether a packing moves.
+
+    Attributes
+    ----------
+    stable : bool or None
+        None: unknown, for the `reasons`.
+    growth_rate : float
+        Of D, 1 / time, with dissipation: largest 2 Re s, negative if every motion decays. Where contacts at the bound
+        make the packing grow, the rate of the one-sided motion.
+    undamped : Undamped
+        Without dissipation.
+    at_bound : int
+        Contacts at Coulomb's bound.
+    one_sided : dict or None
+        grows (True, False, None), growth_rate and its error, amplification (largest D over the mean square velocity of
+        the push along an axis, time^2), time (how long); None without contacts that slide on one side.
+    rising : dict or None
+        drift and vibration over the rate of loading, time, steady; None unless asked.
+    sticking, sliding : LinearNeighbour
+        If all contacts at the bound stuck, and if all slid on; no bounds of what they do.
+    asymmetry : dict
+        Shares of what makes K asymmetric: tangential_force, lever_arm, overlap.
+    dissipative : bool
+        Whether there are dashpots or drag.
+    free : int
+        Motions that no force opposes.
+    contacts : int
+        Number of contacts.
+    reasons : tuple of str
+        Why the verdict is unknown.
+    """
+
+    stable: bool | None
+    growth_rate: float
+    undamped: Undamped
+    at_bound: int
+    one_sided: dict[str, Any] | None
+    rising: dict[str, Any] | None
+    sticking: LinearNeighbour
+    sliding: LinearNeighbour
+    asymmetry: dict[str, float]
+    dissipative: bool
+    free: int
+    contacts: int
+    reasons: tuple[str, ...] = field(default=())
+
+    def __str__(self) -> str:
+        """The verdict in sentences, the verdict first."""
+        return "\n".join(self.sentences)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The verdict, what holds without dissipation, and what contacts at the bound do."""
+        return tuple([self._verdict, *self._without_loss, *self._at_the_bound, *self._under_the_load])
+
+    @property
+    def _verdict(self) -> str:
+        free = f", except for {_number(self.free, 'motion')} that no force opposes" if self.free else ""
+        if not self.contacts:
+            return "no particle touches another or a wall: stability is not defined"
+        if self.stable is None:
+            return f"not known whether the packing is stable: {'; '.join(self.reasons)}"
+        if not self.stable:
+            how = " in spite of the dissipation" if self.dissipative else ""
+            return f"unstable: small motion grows{how}, D as exp({self.growth_rate:.6g} t)"
+        if self.one_sided is not None:
+            return (
+                f"stable: each of {2 * PUSHES} pushes comes to rest{free}; D reaches "
+                f"{self.one_sided['amplification']:.3g} times the mean square velocity of the push (followed for t = "
+                f"{self.one_sided['time']:.4g})"
+            )
+        if self.dissipative and self.growth_rate < 0:
+            return f"stable: every motion decays, D at least as fast as exp({self.growth_rate:.6g} t){free}"
+        return f"stable: no motion grows{free}"
+
+    @property
+    def _without_loss(self) -> Iterator[str]:
+        u = self.undamped
+        if self.dissipative and (u.pairs or u.negative):
+            counts = {"complex pair": u.pairs, "negative eigenvalue": u.negative}
+            what = " and ".join(_number(count, name) for name, count in counts.items() if count)
+            yield f"without dissipation: {what}, D as exp({u.growth_rate:.6g} t)"
+
+    @property
+    def _at_the_bound(self) -> Iterator[str]:
+        if self.at_bound == 0:
+            return
+        yield f"{self.at_bound} of {_number(self.contacts, 'contact')} {_is(self.at_bound)} at Coulomb's bound" + (
+            ": each slides on ahead and sticks on the way back"
+            if self.one_sided is not None
+            else ", where this law has one derivative: they slide"
+        )
+        if self.one_sided is not None:
+            yield (
+                f"neither of two linear motions decides: if all of them stuck, D as exp({self.sticking.growth_rate:.4g}"
+                f" t); if all slid on, as exp({self.sliding.growth_rate:.4g} t)"
+            )
+
+    @property
+    def _under_the_load(self) -> Iterator[str]:
+        if self.rising is not None:
+            yield (
+                f"under a load that rises at the rate 1: drift {self.rising['drift']:.3g}, vibration "
+                f"{self.rising['vibration']:.3g}{'' if self.rising['steady'] else ', not steady yet'}"
+            )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON."""
+        return {
+            "stable": self.stable,
+            "growth_rate": self.growth_rate,
+            "undamped": vars(self.undamped),
+            "at_bound": self.at_bound,
+            "one_sided": self.one_sided,
+            "rising": self.rising,
+            "sticking": vars(self.sticking),
+            "sliding": vars(self.sliding),
+            "asymmetry": self.asymmetry,
+            "free": self.free,
+            "reasons": list(self.reasons),
+        }
+
+
+def stability(
+    packing: HasConfiguration,
+    rise: str | ArrayLike | None = None,
+    time: float | None = None,
+    *,
+    spectrum_of_stiffness: Spectrum | None = None,
+) -> Stability:
+    """Whether a packing moves, with its own dissipation and its contacts at Coulomb's bound as they are.
+
+    Parameters
+    ----------
+    packing : Configuration or Packing
+        The equilibrium.
+    rise : "fx" or array_like, shape (N, d), optional
+        The direction in which the load rises: the force on the upper layer, or forces per unit of time.
+    time : float, optional
+        How long one-sided motion is followed; until it has settled by default, or some minutes.
+    spectrum_of_stiffness : Spectrum, optional
+        That of the packing, where it is known.
+
+    Returns
+    -------
+    Stability
+
+    Raises
+    ------
+    ValueError
+        If the direction has another shape, or is "fx" of a packing without an upper layer.
+    """
+    configuration = packing.configuration
+    direction = None if rise is None else _direction(configuration, rise)
+    found = spectrum(configuration) if spectrum_of_stiffness is None else spectrum_of_stiffness
+    undamped = Undamped(found.growth_rate(), len(found.pairs), len(found.negative))
+    contacts, damped = configuration.contacts, configuration.damped
+    reasons = list(_what_is_wrong(configuration, found))
+    sticking, free, grows = _linear(configuration, found, damped)
+    sliding, one_sided, rising = sticking, None, None
+    if contacts.one_sided.any():
+        sliding = LinearNeighbour(Motion.of(configuration, sliding=True).rates.growth_rate)
+        if not reasons:
+            one_sided = follow_pushes(OneSidedSystem.of(configuration, STEP), sticking.growth_rate, grows, time)
+            if one_sided["grows"] is None:
+                reasons.append(
+                    f"the motion of contacts at Coulomb's bound has not settled within t = {one_sided['time']:.4g}, "
+                    f"where D is {one_sided['amplification']:.3g} times the mean square velocity of the push"
+                )
+            grows = one_sided["grows"]
+    if direction is not None and not reasons:
+        rising = follow_load(OneSidedSystem.of(configuration, STEP), direction, time)
+    rate = one_sided["growth_rate"] if one_sided is not None and one_sided["grows"] else sticking.growth_rate
+    return Stability(
+        stable=None if reasons or not len(contacts) else not grows, growth_rate=rate, undamped=undamped,
+        at_bound=int(contacts.at_bound.sum()), one_sided=one_sided, rising=rising, sticking=sticking, sliding=sliding,
+        asymmetry=asymmetry(configuration), dissipative=damped, free=free, contacts=len(contacts),
+        reasons=tuple(reasons),
+    )  # fmt: skip
+
+
+def _what_is_wrong(configuration: Configuration, found: Spectrum) -> Iterator[str]:
+    """Why no verdict is possible."""
+    if not np.all(np.isfinite(found.eigenvalues)):
+        yield "numbers of the operator overflow"
+    if not in_balance(configuration):
+        yield (
+            f"the packing moves: the residual force on a particle is {configuration.residual:.3g}, "
+            f"the largest contact force {configuration.normal_force.max(initial=0.0):.3g}"
+        )
+
+
+def _linear(configuration: Configuration, found: Spectrum, damped: bool) -> tuple[LinearNeighbour, int, bool]:
+    """Growth rate, free motions and whether something grows, of sticking contacts."""
+    if not damped:
+        return LinearNeighbour(found.growth_rate()), found.free, bool(len(found.unstable))
+    rates = Motion.of(configuration).rates
+    return LinearNeighbour(rates.growth_rate), rates.free, bool(rates.grows.any())
+
+
+def _direction(configuration: Configuration, rise: str | ArrayLike) -> Floats:
+    """Forces per unit of time on all coordinates, shape (coordinates, 1)."""
+    n, d = len(configuration), configuration.dimension
+    if isinstance(rise, str):
+        if rise != "fx" or not configuration.top.any():
+            raise ValueError('rise is "fx" of a packing with an upper layer, or an array of forces, shape (N, d).')
+        forces = np.zeros((n, d))
+        forces[:, 0] = configuration.top
+    else:
+        forces = floats("rise", rise, (n, d))
+    return np.concatenate([forces.T.ravel(), np.zeros((configuration.axes - d) * n)])[:, None]
+
+
+def _number(count: int, name: str) -> str:
+    return f"{count} {name}{'' if count == 1 else 's'}"
+
+
+def _is(count: int) -> str:
+    return "is" if count == 1 else "are"
