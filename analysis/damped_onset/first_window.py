@@ -27,7 +27,7 @@ import numpy as np
 from scipy.sparse.linalg import ArpackError
 
 from ..errors import FaultgougeError, NoEquilibriumError
-from ..motion.spectrum import active_coordinates
+from ..motion.eigenvalues import active_coordinates
 from ..onset.eigenbasis import Basis, Levels
 from ..onset.first_window import Increments, SliceSearch, search_along
 from ..onset.limits import LIMITS, Limits

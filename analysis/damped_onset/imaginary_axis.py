@@ -28,7 +28,7 @@ from scipy.sparse.linalg import ArpackError, eigsh
 
 from ..errors import FaultgougeError
 from ..factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
-from ..motion.spectrum import Complexes, active_coordinates
+from ..motion.eigenvalues import Complexes, active_coordinates
 from ..packing.packing import Floats, Indices
 from .all_windows import drop_duplicates
 from .modes import DampedMode, Pencil, find_growing_near, refine_mode

@@ -31,7 +31,7 @@ from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from ..factors.sparse_lu import SingularMatrixError, SuperLUFactors, general_lu
-from ..motion.spectrum import SAFETY, Complexes, active_coordinates, mass_weighted, unit_rounding
+from ..motion.eigenvalues import SAFETY, Complexes, active_coordinates, growing, mass_weighted, unit_rounding
 from ..motion.state_space import StateSpace
 from ..onset import force_bearing
 from ..onset.modes import assign_columns
@@ -158,7 +158,7 @@ class DampedMode:
     @property
     def grows(self) -> bool:
         """Whether Re s > 0 beyond its uncertainty."""
-        return bool(self.rate.real * self.overlap > SAFETY * self.pencil.rounding)
+        return bool(growing(self.rate, self.overlap, self.pencil.rounding))
 
     def change(self, other: Pencil) -> complex:
         """First-order change of s on the way to another pencil."""

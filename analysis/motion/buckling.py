@@ -19,7 +19,8 @@ from ..configuration import Configuration
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
 from ..packing.packing import Floats, Packing
 from .eigenpairs import eigenpairs
-from .spectrum import DENSE, SAFETY, dynamical_matrix, is_negative, spectrum, unit_rounding, zero_uncertainty
+from .eigenvalues import SAFETY, is_negative, unit_rounding, zero_uncertainty
+from .spectrum import DENSE, dynamical_matrix, spectrum
 
 SPREAD = 4.0
 """Factor from one bound that is tried to the next: each costs factors, and a loose one more eigenvalues."""

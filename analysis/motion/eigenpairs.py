@@ -13,16 +13,8 @@ from ..configuration import Configuration
 from ..factors.sparse_lu import general_lu
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Packing
-from .spectrum import (
-    SAFETY,
-    Complexes,
-    all_modes,
-    dynamical_matrix,
-    mass_weighted,
-    participation_ratio,
-    rotation_share,
-    unit_rounding,
-)
+from .eigenvalues import SAFETY, Complexes, all_modes, mass_weighted, unit_rounding
+from .spectrum import dynamical_matrix, participation_ratio, rotation_share
 
 
 @dataclass(frozen=True, eq=False)

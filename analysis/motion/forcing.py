@@ -33,9 +33,9 @@ from numpy.typing import ArrayLike
 from scipy.linalg import eig, expm
 
 from ..packing.packing import Floats, Packing
+from .eigenvalues import Complexes
 from .response import Response, coordinates
 from .signals import Signal
-from .spectrum import Complexes
 from .state_space import StateSpace
 
 KNOTS = 4

@@ -35,10 +35,10 @@ from numpy.typing import ArrayLike
 
 from ..packing.compensated import separation
 from ..packing.packing import Floats, Packing
+from .eigenvalues import Complexes
+from .motion import Motion
 from .power_law import fit_line
-from .propagator import SLOW
-from .spectrum import Complexes, spectrum
-from .state_space import StateSpace
+from .spectrum import spectrum
 
 BLOCKS = 24
 """Stretches over which D is averaged: enough for an error, few enough to hold many periods each."""
@@ -382,9 +382,9 @@ def _undamped_growth(packing: Packing, dt: float | None) -> tuple[float, int, in
 
 
 def unstable_rates(packing: Packing) -> Complexes:
-    """The eigenvalues s with Re s > 0 of a packing with dissipation, from all eigenvalues; 1 / time."""
-    rates = np.linalg.eigvals(StateSpace.of(packing).matrix)
-    return np.asarray(rates[rates.real > SLOW * np.abs(rates).max(initial=0.0)], dtype=np.complex128)
+    """The eigenvalues s with Re s > 0 beyond rounding of a packing with dissipation; 1 / time."""
+    rates = Motion.of(packing).rates
+    return rates.values[rates.grows]
 
 
 def _damped_growth(packing: Packing) -> tuple[float, int, int]:

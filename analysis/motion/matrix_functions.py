@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig, schur, solve_sylvester
 
 from ..packing.packing import Floats, Indices
-from .spectrum import Complexes
+from .eigenvalues import Complexes
 
 WELL_CONDITIONED = 0.1
 """Eigenvalues with a smaller |y^H x| are kept together with their partner; the others lose a digit at most."""

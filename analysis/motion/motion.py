@@ -10,12 +10,9 @@ A motion :math:`e^{st}` has :math:`s^2 + s G + A` singular; the mean square disp
 all slide on for ever, with :math:`K + G Y` and :math:`C + G Z`, since then the play :math:`p = Y q + Z \dot q`.
 Neither bounds what contacts do that stick and slide in turn.
 
-**What grows.** `growing` is the one place that says which eigenvalues grow beyond their rounding. Without dissipation
-an eigenvalue of A grows if its imaginary part exceeds :math:`\kappa u |A|`, or if it is real and below zero by more
-than the uncertainty of zero (:mod:`~faultgouge.analysis.motion.spectrum`). With dissipation s grows if
-:math:`\mathrm{Re}\, s` exceeds :math:`\kappa u |Z|` with :math:`\kappa = 1/|l^H r|` and the first-order matrix Z in
-coordinates of the energy (:mod:`~faultgouge.analysis.motion.state_space`). A motion that no force opposes has s = 0
-twice, in one block of Jordan's: rounding turns that into a pair of either sign, whose :math:`\kappa` is as large.
+**What grows** beyond rounding is said by :mod:`~faultgouge.analysis.motion.eigenvalues`, of A without dissipation, and
+of the first-order matrix Z in coordinates of the energy (:mod:`~faultgouge.analysis.motion.state_space`) with it. A
+motion that no force opposes has s = 0 twice, in one block of Jordan's: rounding turns that into a pair of either sign.
 """
 
 from dataclasses import dataclass
@@ -31,13 +28,13 @@ from ..configuration import Configuration, HasConfiguration
 from ..operators.damping import damping_matrix
 from ..operators.sliders import sliders_of
 from ..operators.stiffness import stiffness_matrix
-from .spectrum import (
+from .eigenvalues import (
     SAFETY,
     Complexes,
     active_coordinates,
     all_modes,
-    exceeds_rounding,
-    is_negative,
+    growing,
+    growing_undamped,
     mass_weighted,
     unit_rounding,
     zero_uncertainty,
@@ -167,36 +164,3 @@ class Motion:
         order = np.flatnonzero((values.imag >= 0) & ~free)
         order = order[np.argsort(-values[order].real, kind="stable")]
         return Rates(values[order], grows[order], int(free.sum()) // 2)
-
-
-def growing(rate: Complexes, overlap: Floats, rounding: float) -> NDArray[np.bool_]:
-    """Which s grow in spite of dissipation, beyond rounding.
-
-    Parameters
-    ----------
-    rate : ndarray of complex
-        Eigenvalues s of the first-order system, 1 / time.
-    overlap : ndarray
-        |l^H r| of their unit vectors.
-    rounding : float
-        u |Z|_F, 1 / time.
-    """
-    return np.asarray(np.real(rate) * overlap > SAFETY * rounding)
-
-
-def growing_undamped(
-    values: Complexes, overlap: Floats, rounding: float, zero: float
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which eigenvalues of A grow with oscillation, as complex pairs, and which without, as negative ones.
-
-    Parameters
-    ----------
-    values : ndarray of complex
-        Eigenvalues, 1 / time^2.
-    overlap : ndarray
-        |y^H x| of their unit vectors.
-    rounding, zero : float
-        u |A|_F, and the uncertainty of an eigenvalue of zero, 1 / time^2.
-    """
-    oscillates = np.array([exceeds_rounding(v, o, rounding) for v, o in zip(values, overlap, strict=True)], dtype=bool)
-    return oscillates, is_negative(values, overlap, zero)

@@ -26,7 +26,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..packing.packing import Floats
-from .spectrum import Complexes, discrete_frequency
+from .eigenvalues import Complexes
+from .spectrum import discrete_frequency
 
 
 class OscillatorMotion(NamedTuple):

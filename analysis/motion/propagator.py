@@ -10,10 +10,11 @@ from scipy.sparse.linalg import svds
 from ..configuration import Configuration
 from ..errors import FaultgougeError
 from ..packing.packing import Floats, Indices, Packing
+from .eigenvalues import Complexes
 from .matrix_functions import WELL_CONDITIONED, BlockDiagonal, Function, second_order
+from .motion import Motion
 from .oscillator import Oscillator
 from .response import LinearMotion
-from .spectrum import Complexes
 from .state_space import released_motion
 
 Norm = Literal["displacement", "energy"]
@@ -44,9 +45,6 @@ NOISE = 1e-7
 """Growth rates and differences of frequencies below this share of the largest frequency are rounding where two modes
 are about to coalesce: the root of that of a well-conditioned eigenvalue."""
 
-SLOW = 1e-10
-"""The same with dissipation, which keeps modes from coalescing."""
-
 ACCURACY = 1e-9
 """Relative error of the largest singular value."""
 
@@ -64,13 +62,9 @@ class NoGainError(FaultgougeError):
 
 def stable_motion(packing: Packing | Configuration) -> LinearMotion:
     """The motion of a packing; NoGainError if the packing is unstable."""
-    motion = LinearMotion.of(packing)
-    values, dissipative = motion.modes.values, motion.dissipative
-    growth = values.real if dissipative else np.abs(np.sqrt(values).imag)
-    size = np.abs(values).max(initial=0.0)
-    if np.any(growth > (SLOW * size if dissipative else NOISE * np.sqrt(size))):
+    if Motion.of(packing).rates.grows.any():
         raise NoGainError("the packing is unstable: some motion grows for ever, and no gain is the largest")
-    return motion
+    return LinearMotion.of(packing)
 
 
 @dataclass(frozen=True, eq=False)

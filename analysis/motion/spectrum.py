@@ -36,32 +36,28 @@ exactly and for complex :math:`\lambda` too: real eigenvalues below :math:`4/dt^
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
-from ..configuration import Configuration
-from ..operators.damping import coordinate_mass
+from ..configuration import Configuration, HasConfiguration
 from ..operators.stiffness import Form, stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
 from ..table_display import TableDisplay
-
-Complexes = NDArray[np.complex128]
-
-SAFETY = 50.0
-"""Imaginary parts count from this many times their rounding uncertainty.
-
-LAPACK's eigenvalues of one operator with its coordinates in different orders differ by up to 20 kappa u |A|_F
-over the 285 eigenvalues of a packing of 100 disks (measured, at five loads), and kappa of a pair that is
-itself noise is uncertain by a factor of two or so.
-"""
-
-IN_BALANCE = 1e-4
-"""Residual force over the largest normal force up to which a packing is in equilibrium. Dumps with few digits leave
-1e-6; a packing before it is brought to rest, 1e-2 and more."""
+from .eigenvalues import (
+    Complexes,
+    active_coordinates,
+    exceeds_rounding,
+    is_negative,
+    mass_weighted,
+    unit_rounding,
+    zero_uncertainty,
+)
+from .motion import Motion, Rates
 
 DENSE = 900
 """Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
@@ -134,6 +130,8 @@ class Spectrum(TableDisplay):
         u |A|_F, 1 / time^2: uncertainty of a perfectly conditioned eigenvalue.
     uncertainty : float
         That of an eigenvalue of zero, 1 / time^2, by rounding and by forces that are out of balance.
+    packing : Configuration or Packing
+        Whose eigenvalues they are.
     """
 
     eigenvalues: Complexes
@@ -143,14 +141,31 @@ class Spectrum(TableDisplay):
     rattlers: Indices
     rounding: float
     uncertainty: float
+    packing: HasConfiguration
 
     def __repr__(self) -> str:
         real = self.eigenvalues.real
         span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
-        return (
-            f"<Spectrum: {len(real)} eigenvalues{span}, {len(self.pairs)} complex pairs, {len(self.negative)} negative "
-            f"eigenvalues, {len(self.rattlers)} rattlers>"
-        )
+        return f"<Spectrum: {self._verdict}; {len(real)} eigenvalues of K{span}, {len(self.rattlers)} rattlers>"
+
+    @property
+    def _verdict(self) -> str:
+        """Growth with dissipation first, without it second; with contacts at the bound the rates of both neighbours."""
+        contacts = self.packing.configuration.contacts
+        pairs, negative = f"{len(self.pairs)} complex pairs", f"{len(self.negative)} negative eigenvalues"
+        counts = f"{pairs} and {negative}" if len(self.negative) else pairs
+        alone = f"K alone has {counts}, D as exp({self.growth_rate():.6g} t)"
+        if contacts.one_sided.any():
+            stick, slide = (Motion.of(self.packing, sliding=slides).rates.growth_rate for slides in (False, True))
+            return (
+                f"{int(contacts.one_sided.sum())} contacts at Coulomb's bound slide on ahead and stick on the way back; "
+                f"neither linear motion decides: D as exp({stick:.4g} t) if all stuck, exp({slide:.4g} t) if all "
+                f"slid (`stability` follows them); {alone}"
+            )
+        if self.damped_growth_rate is None:
+            return "no motion grows" if self.is_stable else f"unstable, D as exp({self.growth_rate():.6g} t): {counts}"
+        grows = "every motion decays" if self.is_stable else "unstable"
+        return f"{grows} with the packing's dissipation, D as exp({self.damped_growth_rate:.6g} t); {alone}"
 
     def _rows(self) -> dict[str, str]:
         rows = {
@@ -161,12 +176,29 @@ class Spectrum(TableDisplay):
             for pair in self.pairs
         }
         rows |= {f"{value:.10g}": f"2 |Im \u03c9| = {growth_rate(value):.6g}, negative" for value in self.negative}
-        return rows or {"no complex pair and no negative eigenvalue": "linearly stable"}
+        return rows or {"complex pairs and negative eigenvalues of K": "none"}
 
     @property
-    def is_stable(self) -> bool:
-        """Whether no motion grows: no complex pair and no negative eigenvalue beyond rounding noise."""
+    def is_stable(self) -> bool | None:
+        """Whether no motion grows beyond rounding, with the packing's dissipation.
+
+        None where contacts at Coulomb's bound slide on ahead and stick on the way back: no eigenvalue decides, and
+        :func:`~faultgouge.analysis.stability` follows their motion.
+        """
+        if not np.all(np.isfinite(self.eigenvalues)) or self.packing.configuration.contacts.one_sided.any():
+            return None
+        if self._damped is not None:
+            return not self._damped.grows.any()
         return not self.pairs and not len(self.negative)
+
+    @property
+    def damped_growth_rate(self) -> float | None:
+        """Largest 2 Re s with dashpots and drag, 1 / time; None without dissipation."""
+        return None if self._damped is None else self._damped.growth_rate
+
+    @cached_property
+    def _damped(self) -> Rates | None:
+        return Motion.of(self.packing).rates if self.packing.configuration.damped else None
 
     @property
     def free(self) -> int:
@@ -256,36 +288,6 @@ def dynamical_matrix(packing: Packing | Configuration, form: Form = "consistent"
     return matrix[active][:, active], active
 
 
-def active_coordinates(matrix: csr_array) -> Indices:
-    """Coordinates that feel a force: the rows that are not zero."""
-    return np.flatnonzero(np.diff(matrix.indptr))
-
-
-def all_modes(matrix: csr_array) -> tuple[Complexes, Complexes, Complexes]:
-    """All eigenvalues, shape (E,), with unit right and left vectors in columns, shape (n, E), by LAPACK.
-
-    They are sorted by real part, then imaginary part. Coordinates that feel no force are left out.
-    """
-    active = active_coordinates(matrix)
-    right, left = np.zeros((2, matrix.shape[0], len(active)), dtype=np.complex128)
-    if len(active) == 0:
-        return np.zeros(0, dtype=np.complex128), right, left
-    inner = matrix[active][:, active].toarray()
-    values, y, x = eig(inner, left=True, right=True, overwrite_a=True, check_finite=False)
-    order = np.lexsort((values.imag, values.real))
-    right[active], left[active] = x[:, order], y[:, order]
-    return values[order], right, left
-
-
-def mass_weighted(stiffness: csr_array, packing: Packing | Configuration) -> csr_array:
-    """M^(-1/2) K M^(-1/2), zero rows and all; 1 / time^2."""
-    scale = 1.0 / np.sqrt(coordinate_mass(packing))
-    rows = np.repeat(scale, np.diff(stiffness.indptr))
-    return csr_array(
-        (rows * stiffness.data * scale[stiffness.indices], stiffness.indices, stiffness.indptr), shape=stiffness.shape
-    )
-
-
 def eigenvalues(packing: Packing | Configuration, form: Form = "consistent") -> Complexes:
     """Compute every eigenvalue without vectors, by LAPACK's dense solver, in a third of the time of :func:`spectrum`.
 
@@ -359,6 +361,7 @@ def spectrum(packing: Packing | Configuration, form: Form = "consistent") -> Spe
         rattlers=packing.rattlers,
         rounding=rounding,
         uncertainty=uncertainty,
+        packing=packing,
     )
 
 
@@ -408,45 +411,3 @@ def largest_frequency(packing: Packing | Configuration) -> float:
     start = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
     largest = eigs(matrix, 1, which="LM", v0=start, tol=LIMIT, return_eigenvectors=False)
     return float(np.sqrt(np.abs(largest).max()))
-
-
-def unit_rounding(matrix: Floats | Complexes) -> float:
-    """u |A|_F with the unit roundoff u = 2^-53: the backward error scale of an eigenvalue solver."""
-    return float(0.5 * np.finfo(np.float64).eps * np.linalg.norm(matrix))
-
-
-def in_balance(packing: Packing | Configuration) -> bool:
-    """Whether what is left of the forces on a particle is rounding, of a dump's digits at most."""
-    return packing.residual <= IN_BALANCE * float(packing.normal_force.max(initial=0.0))
-
-
-def zero_uncertainty(packing: Packing | Configuration, rounding: float) -> float:
-    """Uncertainty of an eigenvalue of zero that is perfectly conditioned, 1 / time^2.
-
-    A motion that stretches no contact has the eigenvalue zero as the forces F of the contacts cancel, whose parts in A
-    are F / (R m). Forces that are out of balance by r leave r / (R m). Of a packing that moves, A counts as it is.
-    """
-    imbalance = (
-        packing.residual / float(np.min(packing.radius * packing.mass, initial=np.inf)) if in_balance(packing) else 0.0
-    )
-    return SAFETY * rounding + imbalance
-
-
-def is_negative(values: Complexes, overlap: Floats, uncertainty: float) -> NDArray[np.bool_]:
-    """Which eigenvalues are real and below zero by more than kappa times the uncertainty of one of zero."""
-    return (values.imag == 0) & (-values.real * overlap > uncertainty)
-
-
-def exceeds_rounding(eigenvalue: complex, overlap: float | np.floating, rounding: float) -> bool:
-    """Whether an imaginary part exceeds SAFETY kappa u |A|, its own rounding uncertainty.
-
-    Parameters
-    ----------
-    eigenvalue : complex
-        A computed eigenvalue.
-    overlap : float
-        |y^H x| of its unit vectors.
-    rounding : float
-        u |A|_F of the operator.
-    """
-    return bool(abs(eigenvalue.imag) * overlap > SAFETY * rounding)

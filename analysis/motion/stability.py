@@ -7,9 +7,9 @@ dashpots and drag. Complex pairs of K alone are the answer without loss, and no 
 **Contacts at the bound** slide on ahead and stick on the way back, and no eigenvalue decides
 (:mod:`~faultgouge.analysis.motion.one_sided`). The one-sided motion is followed from random pushes until it grows, or
 rests, and so is the motion under a load that rises (:mod:`~faultgouge.analysis.motion.one_sided_outcome`). If it has
-not settled in the time that was followed, the verdict is unknown. """
+not settled in the time that was followed, the verdict is unknown."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,10 +19,11 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, floats
 from ..configuration import Configuration, HasConfiguration
 from ..operators.asymmetry import asymmetry
+from .eigenvalues import in_balance
 from .motion import Motion
 from .one_sided import OneSidedSystem
 from .one_sided_outcome import PUSHES, STEP, follow_load, follow_pushes
-from .spectrum import Spectrum, in_balance, spectrum
+from .spectrum import Spectrum, spectrum
 
 
 @dataclass(frozen=True)
@@ -186,6 +187,7 @@ def stability(
     time: float | None = None,
     *,
     spectrum_of_stiffness: Spectrum | None = None,
+    reasons: Sequence[str] = (),
 ) -> Stability:
     """Whether a packing moves, with its own dissipation and its contacts at Coulomb's bound as they are.
 
@@ -199,6 +201,8 @@ def stability(
         How long one-sided motion is followed; until it has settled by default, or some minutes.
     spectrum_of_stiffness : Spectrum, optional
         That of the packing, where it is known.
+    reasons : sequence of str
+        What the caller knows that makes a verdict impossible.
 
     Returns
     -------
@@ -214,27 +218,27 @@ def stability(
     found = spectrum(configuration) if spectrum_of_stiffness is None else spectrum_of_stiffness
     undamped = Undamped(found.growth_rate(), len(found.pairs), len(found.negative))
     contacts, damped = configuration.contacts, configuration.damped
-    reasons = list(_what_is_wrong(configuration, found))
+    why = [*reasons, *_what_is_wrong(configuration, found)]
     sticking, free, grows = _linear(configuration, found, damped)
     sliding, one_sided, rising = sticking, None, None
     if contacts.one_sided.any():
         sliding = LinearNeighbour(Motion.of(configuration, sliding=True).rates.growth_rate)
-        if not reasons:
+        if not why:
             one_sided = follow_pushes(OneSidedSystem.of(configuration, STEP), sticking.growth_rate, grows, time)
             if one_sided["grows"] is None:
-                reasons.append(
+                why.append(
                     f"the motion of contacts at Coulomb's bound has not settled within t = {one_sided['time']:.4g}, "
                     f"where D is {one_sided['amplification']:.3g} times the mean square velocity of the push"
                 )
             grows = one_sided["grows"]
-    if direction is not None and not reasons:
+    if direction is not None and not why:
         rising = follow_load(OneSidedSystem.of(configuration, STEP), direction, time)
     rate = one_sided["growth_rate"] if one_sided is not None and one_sided["grows"] else sticking.growth_rate
     return Stability(
-        stable=None if reasons or not len(contacts) else not grows, growth_rate=rate, undamped=undamped,
+        stable=None if why or not len(contacts) else not grows, growth_rate=rate, undamped=undamped,
         at_bound=int(contacts.at_bound.sum()), one_sided=one_sided, rising=rising, sticking=sticking, sliding=sliding,
         asymmetry=asymmetry(configuration), dissipative=damped, free=free, contacts=len(contacts),
-        reasons=tuple(reasons),
+        reasons=tuple(why),
     )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ from ..configuration import Configuration
 from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
-from .spectrum import Complexes, active_coordinates, mass_weighted
+from .eigenvalues import Complexes, active_coordinates, mass_weighted
 
 SOFTEST = 1e-6
 """Eigenvalues of the symmetric part below this share of the largest weigh as much: a mode without a restoring force has

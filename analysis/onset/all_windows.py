@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ..errors import NoEquilibriumError, TurningPointError
-from ..motion.spectrum import Complexes
+from ..motion.eigenvalues import Complexes
 from ..packing.packing import Floats, Indices
 from .eigenvalue_pair import Pair, continue_pair, deepest_dip, dip_between
 from .march import look_between, march

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array
 
-from ..motion.spectrum import active_coordinates
+from ..motion.eigenvalues import active_coordinates
 from ..packing.packing import Floats, Indices
 from .limits import LIMITS, Limits
 from .ranks import Ranks

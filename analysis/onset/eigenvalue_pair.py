@@ -41,7 +41,7 @@ from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse import csc_array, csr_array, eye_array
 
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
-from ..motion.spectrum import Complexes, exceeds_rounding, unit_rounding
+from ..motion.eigenvalues import Complexes, exceeds_rounding, unit_rounding
 from ..packing.packing import Floats
 from .limits import LIMITS, Limits
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ..configuration import Configuration
-from ..motion.spectrum import Complexes, all_modes, exceeds_rounding, mass_weighted, unit_rounding
+from ..motion.eigenvalues import Complexes, all_modes, exceeds_rounding, mass_weighted, unit_rounding
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats, Indices, Packing
 from .eigenvalue_pair import Pair

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..motion.eigenvalues import Complexes
 from ..motion.normal_form import ORTHOGONAL, NormalForm
-from ..motion.spectrum import Complexes
 from ..packing.packing import Floats, Packing
 from .eigenvalue_pair import Pair, continue_pair
 from .modes import Modes, full_operator

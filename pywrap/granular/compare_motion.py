@@ -32,7 +32,7 @@ from scipy.sparse.linalg import expm_multiply
 
 from ...analysis import Configuration, damping_matrix, stiffness_matrix
 from ...analysis.arrays import Floats, Indices
-from ...analysis.motion.spectrum import active_coordinates, mass_weighted
+from ...analysis.motion.eigenvalues import active_coordinates, mass_weighted
 from ...analysis.operators.linearised_contacts import rescaling_operators
 from .granular_commands import SnapshotError
 from .lammps_arrays import owned_array, rows_of, set_velocity

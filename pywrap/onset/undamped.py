@@ -11,7 +11,7 @@ import numpy as np
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from ...analysis.arrays import Floats
 from ...analysis.errors import TurningPointError
-from ...analysis.motion.spectrum import active_coordinates
+from ...analysis.motion.eigenvalues import active_coordinates
 from ...analysis.onset import full_operator, takes_all_modes
 from ...analysis.onset.search import windows_rows
 from ...analysis.progress import Watch, report_progress, show_progress

@@ -35,7 +35,7 @@ from numpy.typing import ArrayLike
 
 from faultgouge.analysis import NoEquilibriumError, Packing, Window, damping_matrix
 from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.spectrum import mass_weighted
+from faultgouge.analysis.motion.eigenvalues import mass_weighted
 from faultgouge.analysis.onset import Family, LostPairError, Pair, force_bearing, full_operator
 
 DIGITS = 1e-12

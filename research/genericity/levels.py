@@ -44,7 +44,7 @@ from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import spectrum
-from faultgouge.analysis.motion.spectrum import active_coordinates
+from faultgouge.analysis.motion.eigenvalues import active_coordinates
 from faultgouge.analysis.onset import force_bearing, full_operator
 from faultgouge.analysis.packing.packing import Floats, Indices
 from faultgouge.pywrap import Equilibrium, Scene

@@ -28,7 +28,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from faultgouge.analysis import NoEquilibriumError, Packing
-from faultgouge.analysis.motion.spectrum import mass_weighted
+from faultgouge.analysis.motion.eigenvalues import mass_weighted
 from faultgouge.analysis.onset import complex_windows, force_bearing
 from faultgouge.analysis.operators.stiffness import stiffness_matrix
 from faultgouge.analysis.packing.packing import Floats

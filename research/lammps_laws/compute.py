@@ -14,7 +14,7 @@ from scipy.linalg import eig, eigvals
 
 from faultgouge.analysis import Configuration, damping_matrix, spectrum, stiffness_matrix
 from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.spectrum import active_coordinates, mass_weighted
+from faultgouge.analysis.motion.eigenvalues import active_coordinates, mass_weighted
 from faultgouge.pywrap import compare_motion, from_lammps
 from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
 

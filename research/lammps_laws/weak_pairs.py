@@ -25,7 +25,7 @@ from scipy.linalg import eig
 
 from faultgouge.analysis import Configuration, spectrum, stiffness_matrix
 from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.spectrum import active_coordinates, mass_weighted
+from faultgouge.analysis.motion.eigenvalues import active_coordinates, mass_weighted
 from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of, set_velocity
 from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
 from research.lammps_laws.compute import MU, NONE, STEEP, STEP, TILTS, describe, pour, read, rest

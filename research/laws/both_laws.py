@@ -28,7 +28,7 @@ from mpi4py import MPI
 from scipy.linalg import eigvals
 
 from faultgouge.analysis import NoEquilibriumError, Packing, negative_eigenvalues, stiffness_matrix
-from faultgouge.analysis.motion.spectrum import active_coordinates, mass_weighted
+from faultgouge.analysis.motion.eigenvalues import active_coordinates, mass_weighted
 from faultgouge.pywrap import Equilibrium, Scene, ramp
 from faultgouge.pywrap.scenes.units import dashpot
 from faultgouge.studies.modes.count_pairs import count_pairs

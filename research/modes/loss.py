@@ -23,7 +23,7 @@ from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
 from faultgouge.analysis import Packing, dynamical_matrix, eigenvalues
-from faultgouge.analysis.motion.spectrum import mass_weighted
+from faultgouge.analysis.motion.eigenvalues import mass_weighted
 from faultgouge.analysis.onset import force_bearing
 from faultgouge.analysis.operators.damping import damping_matrix
 from faultgouge.pywrap import Equilibrium, Scene

@@ -28,7 +28,7 @@ from scipy.sparse import csc_array, csr_array, eye_array
 
 from ...analysis import Packing, dynamical_matrix
 from ...analysis.factors.sparse_lu import symmetric_lu
-from ...analysis.motion.spectrum import SAFETY, Complexes, unit_rounding
+from ...analysis.motion.eigenvalues import SAFETY, Complexes, unit_rounding
 from ...analysis.onset import LIMITS, Limits
 from ...analysis.onset.block_lanczos import slices
 from ...analysis.packing.packing import Floats

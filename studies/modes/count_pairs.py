@@ -56,7 +56,7 @@ from ...analysis import (
     negative_eigenvalues,
     stiffness_matrix,
 )
-from ...analysis.motion.spectrum import (
+from ...analysis.motion.eigenvalues import (
     SAFETY,
     Complexes,
     active_coordinates,

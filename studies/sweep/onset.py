@@ -26,7 +26,7 @@ from scipy.linalg import eigh, eigvals
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from ...analysis.motion.eigenpairs import eigenpairs
-from ...analysis.motion.spectrum import active_coordinates
+from ...analysis.motion.eigenvalues import active_coordinates
 from ...analysis.onset import force_bearing, full_operator, takes_all_modes
 from ...analysis.packing.packing import Floats, Indices
 from ...pywrap import Scene, SceneError

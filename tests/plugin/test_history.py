@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, fit_growth, stiffness_matrix
-from faultgouge.analysis.motion.spectrum import mass_weighted
+from faultgouge.analysis.motion.eigenvalues import mass_weighted
 from faultgouge.pywrap import Scene, perturb, ramp
 from faultgouge.pywrap.lammps.engine import Engine
 

@@ -28,7 +28,7 @@ from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 
 from ....analysis import spectrum
-from ....analysis.motion.spectrum import SAFETY, unit_rounding
+from ....analysis.motion.eigenvalues import SAFETY, unit_rounding
 from ....analysis.onset import Modes, full_operator
 from ....pywrap import Scene
 from ....pywrap.onset.undamped import OnsetRun, onset_run

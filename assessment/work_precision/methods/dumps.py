@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ....analysis import Packing, RunFile, read_dump, stiffness_matrix, touching
-from ....analysis.motion.spectrum import Complexes
+from ....analysis.motion.eigenvalues import Complexes
 from ....analysis.operators.damping import coordinate_mass
 from ....pywrap import Engine
 from .work_precision_study import Run, Settings, Study, Theory, study_of, timed_points

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.linalg import eig, eigvals
 
 from ....analysis import Packing, dynamical_matrix, eigenpairs
-from ....analysis.motion.spectrum import Complexes
+from ....analysis.motion.eigenvalues import Complexes
 from ....pywrap import Engine, equilibrate
 from .extended import refined_near
 from .onset import OnsetMethods

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.linalg import eig
 
 from ....analysis import Packing, dynamical_matrix
-from ....analysis.motion.spectrum import Complexes, unit_rounding
+from ....analysis.motion.eigenvalues import Complexes, unit_rounding
 from ....analysis.packing.packing import Floats
 
 ITERATIONS = 30

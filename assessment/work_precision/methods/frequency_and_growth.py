@@ -23,7 +23,7 @@ import numpy as np
 from scipy.linalg import eig
 
 from ....analysis import Packing, discrete_frequency, dynamical_matrix, spectrum, stable_timestep
-from ....analysis.motion.spectrum import Complexes, unit_rounding
+from ....analysis.motion.eigenvalues import Complexes, unit_rounding
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine, Equilibrium
 from .extended import refine_eigenvalue

@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 
 from ....analysis import Onset, Packing, find_onset, spectrum
-from ....analysis.motion.spectrum import SAFETY
+from ....analysis.motion.eigenvalues import SAFETY
 from ....pywrap import Engine, Equilibrium, Scene
 from ....pywrap.onset.path_error import with_path_error
 from ....pywrap.runs.equilibrium_path import EquilibriumPath

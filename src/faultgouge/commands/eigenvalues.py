@@ -24,14 +24,13 @@ from .terminal import (
     report_fallback,
     say,
     status,
+    stored_configuration,
     stored_files,
-    stored_packing,
-    stored_snapshot,
     table_of,
 )
 
 if TYPE_CHECKING:
-    from ..analysis import Configuration, DampedWindow, Packing, Spectrum, Window
+    from ..analysis import Configuration, DampedWindow, Packing, Spectrum, Stability, Window
     from ..pywrap import Equilibrium, Scene
     from ..pywrap.onset.damped import DampedOnset
 
@@ -60,28 +59,47 @@ def spectrum(
     values: Annotated[
         bool, typer.Option("--values", help="Only the eigenvalues: for a thousand disks in a third of the time.")
     ] = False,
+    gain: Annotated[
+        bool,
+        typer.Option("--gain", help="Also how much a stable packing amplifies its worst push; up to 150 disks."),
+    ] = False,
+    rise: Annotated[
+        bool, typer.Option("--rise", help="Also the motion while F_x rises slowly: drift and vibration over its rate.")
+    ] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="Also conditions of pairs, quality factors, what makes K asymmetric.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Compute the eigenvalues, complex pairs and rattlers of a stored packing."""
-    from faultgouge.analysis import Configuration, solid_fraction
-    from faultgouge.analysis import spectrum as eigenvalues_of
-    from faultgouge.analysis.motion.spectrum import in_balance
+    """Say whether a stored packing is stable; compute its eigenvalues, complex pairs and rattlers.
 
-    packing = stored_snapshot(file) or stored_packing(file, frame)
-    size = packing.coordinates
+    The verdict comes first: with the packing's own dashpots and drag, and with
+    contacts at Coulomb's bound as they are, which slide on ahead and stick on the
+    way back. The eigenvalues are those of K alone, without dissipation.
+    """
+    from faultgouge.analysis import Packing, solid_fraction, stability
+    from faultgouge.analysis import spectrum as eigenvalues_of
+    from faultgouge.analysis.progress import show_progress
+
+    packing, assumed = stored_configuration(file, frame)
+    size = packing.configuration.coordinates
     if size > LARGE:
         # four matrices of doubles; 18000 coordinates took 10.2 GB
         say(f"{size} coordinates: their spectrum needs {32e-9 * size**2:.2g} GB, and a time that grows as their cube")
     if values:
         _values(packing, as_json)
         return
-    result, gain = eigenvalues_of(packing), _gain_of(packing)
+    result = eigenvalues_of(packing)
+    with status("stability") as show, show_progress(show):
+        verdict = stability(packing, "fx" if rise else None, spectrum_of_stiffness=result, reasons=assumed)
+    gains = _gain_of(packing) if gain else None
     if not as_json:
-        _print_spectrum(packing, result, gain)
+        _print_spectrum(packing, result, verdict, gains, verbose)
         return
     names = ("condition", "overlap", "growth_rate", "frequency", "quality", "participation", "rotation")
     print_json(
         {
+            "stability": verdict.as_dict(),
             "eigenvalues": [[value.real, value.imag] for value in result.eigenvalues.tolist()],
             "pairs": [
                 {"eigenvalue": [pair.eigenvalue.real, pair.eigenvalue.imag]}
@@ -91,14 +109,14 @@ def spectrum(
             "pair_count": len(result.pairs),
             "least_q": result.least_q if result.pairs else None,
             "negative": result.negative.tolist(),
-            "stable": result.is_stable if in_balance(packing) else None,
+            "stable": verdict.stable,
             "largest_growth_rate": result.growth_rate(),
             "rattlers": result.rattlers.tolist(),
-            "fx": packing.fx,
+            "fx": packing.configuration.fx,
             "residual": packing.residual,
-            "solid_fraction": None if isinstance(packing, Configuration) else solid_fraction(packing),
+            "solid_fraction": solid_fraction(packing) if isinstance(packing, Packing) else None,
             "noise_pairs": result.noise_pairs,
-            "transient_gain": gain,
+            "transient_gain": gains,
         }
     )
 
@@ -115,75 +133,60 @@ def _values(packing: Packing | Configuration, as_json: bool) -> None:
         print(f"{real:.17g} {imaginary:.17g}")
 
 
-def _print_spectrum(packing: Packing | Configuration, result: Spectrum, gain: dict[str, Any] | None) -> None:
-    from faultgouge.analysis import Configuration
-    from faultgouge.analysis.motion.spectrum import in_balance
-
+def _print_spectrum(
+    packing: Packing | Configuration,
+    result: Spectrum,
+    verdict: Stability,
+    gain: dict[str, Any] | None,
+    verbose: bool,
+) -> None:
+    print(verdict)
     _print_size(packing, result)
-    if not in_balance(packing):
-        print(
-            f"not in equilibrium: the residual force on a disk is {packing.residual:.3g}, and the spectrum of a "
-            "moving packing does not show whether it is stable"
-        )
-    _print_growing_motions(result)
-    if result.is_stable and in_balance(packing):
-        free = result.free
-        but = f", except for {free} eigenvalues of zero: no force opposes such a motion" if free else ""
-        print(
-            f"no complex pair and no negative eigenvalue: linearly stable{but}"
-            if len(result.eigenvalues)
-            else "no disk touches another disk or the floor: stability is not defined"
-        )
-    if not isinstance(packing, Configuration) and packing.damped:
-        print("dashpots and drag are left out here: `faultgouge onset` of the scene includes them")
+    _print_growing_motions(result, verdict.dissipative, verbose)
     if gain is not None:
         print(
-            f"a displacement from rest grows by up to {gain['displacement']:.6g} times in |q|^2, within t = "
+            f"a displacement from rest grows by up to {gain['displacement']:.6g} times in its square, within t = "
             f"{gain['time']:.6g} (by up to {gain['energy']:.6g} in energy); disk {gain['disk']} is the worst to push"
             if gain["displacement"] > 1
             else "no displacement from rest grows"
         )
-    if result.noise_pairs:
-        print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
+    if verbose:
+        shares = ", ".join(f"{name.replace('_', ' ')} {share:.3g}" for name, share in verdict.asymmetry.items())
+        print(f"what makes K asymmetric, as shares: {shares}")
+        if result.noise_pairs:
+            print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
 
 
 def _print_size(packing: Packing | Configuration, result: Spectrum) -> None:
-    """The packing, the range of its eigenvalues, and its contacts at Coulomb's bound."""
-    from faultgouge.analysis import Configuration, solid_fraction
+    """The packing, and the range of its eigenvalues."""
+    from faultgouge.analysis import Packing, solid_fraction
 
     real = result.eigenvalues.real
-    if isinstance(packing, Configuration):
-        what, fraction = f"{len(packing)} {'spheres' if packing.dimension == 3 else 'disks'} as LAMMPS left them", ""
-        bound = int(packing.contacts.at_bound.sum())
-        acts = "slide here" if packing.contacts.sliding.any() else "stick here"
-    else:
+    if isinstance(packing, Packing):
         what, fraction = f"F_x = {packing.fx:g}", f"; volume fraction {solid_fraction(packing):.4f}"
-        bound = int(packing.sliding.sum()) if packing.law.coulomb else 0
-        acts = "stick here, and a motion that grows because they slide on is not in the spectrum"
-    if bound:
-        say(f"{bound} of {len(packing.contacts)} contacts are at Coulomb's bound; they {acts}")
+    else:
+        what, fraction = f"{len(packing)} {'spheres' if packing.dimension == 3 else 'disks'} as LAMMPS left them", ""
     span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ", as no particle touches another"
-    print(f"{what}: {len(real)} eigenvalues{span}, {len(result.rattlers)} rattlers left out{fraction}")
+    rattlers = f"{len(result.rattlers)} rattler{'' if len(result.rattlers) == 1 else 's'}"
+    print(f"{what}: {len(real)} eigenvalues of K{span}, {rattlers} left out{fraction}")
 
 
-def _print_growing_motions(result: Spectrum) -> None:
+def _print_growing_motions(result: Spectrum, dissipative: bool, verbose: bool) -> None:
     from faultgouge.analysis import growth_rate
 
+    alone = " without dissipation" if dissipative else ""
     for value in result.negative:
-        print(f"negative eigenvalue {value:.10g}: D grows as exp({growth_rate(value):.6g} t), without oscillation")
+        print(f"negative eigenvalue {value:.10g}: D grows as exp({growth_rate(value):.6g} t){alone}, no oscillation")
     for pair in result.pairs[:MOST_PAIRS]:
+        condition = f", |y^H x| = {pair.overlap:.2g}" if verbose else ""
         print(
             f"complex pair {pair.eigenvalue.real:.10g} +- {pair.eigenvalue.imag:.10g} i: "
-            f"D grows as exp({pair.growth_rate:.6g} t), |y^H x| = {pair.overlap:.2g}"
+            f"D grows as exp({pair.growth_rate:.6g} t){alone}{condition}"
         )
     if len(result.pairs) > MOST_PAIRS:
         print(f"and {len(result.pairs) - MOST_PAIRS} more: --json has all {len(result.pairs)}")
-    if len(result.negative):
-        print(f"unstable, like a column that buckles: {len(result.negative)} negative eigenvalues")
-    if result.pairs:
-        print(
-            f"{len(result.pairs)} complex pairs; least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}"
-        )
+    if result.pairs and verbose:
+        print(f"least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}")
 
 
 def _gain_of(packing: Packing | Configuration) -> dict[str, Any] | None:

@@ -11,6 +11,7 @@ from ..mpi_rank import is_root
 from ..signal_guard import keeps
 from .pictures import modes_of
 from .terminal import (
+    NONE_GIVEN,
     Frame,
     PackingFile,
     lock_output,
@@ -116,8 +117,11 @@ def import_(
         say(f"{file}: {disks.remark}")
     keeps(f"nothing has been written to {output} yet")
     packing = _in_balance(file, packing, relax)
+    assumed = disks.slips is None and packing.law.frictional
     if is_root():
-        _store(output, packing)
+        _store(output, packing, assumed)
+    if assumed:
+        say(f"{file} gives no tangential forces: they are taken as zero, and nothing can be said of the stability")
     contacts_of = f"{len(packing.contacts)} contacts, {len(packing.rattlers)} rattlers"
     print_line(
         f"{len(packing)} disks, {int(packing.top.sum())} of them the upper layer, {contacts_of}; residual "
@@ -313,11 +317,12 @@ def _in_balance(file: Path, packing: Packing, relax: bool) -> Packing:
     return found.packing
 
 
-def _store(output: Path, packing: Packing) -> None:
+def _store(output: Path, packing: Packing, assumed: bool) -> None:
     from faultgouge.analysis import RunFile
     from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 
-    with RunFile.create(output, packing, {"task": "import"}) as file:
+    attributes = {"task": "import"} | ({"tangential_forces": NONE_GIVEN} if assumed else {})
+    with RunFile.create(output, packing, attributes) as file:
         file.append(packing, floor=rounding_floor(packing), evaluations=0)
         with file.change():
             file.complete = True
