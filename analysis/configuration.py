@@ -46,11 +46,11 @@ PER_CONTACT = {
     "i": (), "j": (), "normal": (3,), "distance": (), "overlap": (), "slip_arm": (2,), "lever_arm": (2,),
     "lever_slope": (), "normal_force": (), "tangential_force": (3,), "normal_stiffness": (), "tangential_stiffness": (),
     "closing": (3,), "parting": (3,), "friction": (), "sliding": (), "normal_dashpot": (), "tangential_dashpot": (),
-    "viscous_slider": (),
+    "slider": (), "viscous_slider": (),
 }  # fmt: skip
 """Fields of `LinearisedContacts`, with the shape of each for one contact."""
 
-BOOLEAN = {"sliding": False, "viscous_slider": True}
+BOOLEAN = {"sliding": False, "slider": True, "viscous_slider": True}
 """Fields that are true or false, with the values of contacts that do not say."""
 
 
@@ -90,6 +90,9 @@ class LinearisedContacts:
         Contacts that slide: they have no stiffness along f_t, and b is that of f_t = mu f_n.
     normal_dashpot, tangential_dashpot : array_like, shape (C,)
         Force time / length.
+    slider : array_like of bool, shape (C,)
+        Contacts whose tangential force is that of a spring in series with Coulomb's slider, so that its derivative
+        jumps at the bound; the default. The force of a smoothed law has one derivative there.
     viscous_slider : array_like of bool, shape (C,)
         Contacts whose slip at Coulomb's bound yields to the elastic and the viscous force together, with the bound mu
         times the normal force of spring and dashpot: LAMMPS's slider, and the default. The slip of other contacts
@@ -119,6 +122,7 @@ class LinearisedContacts:
     sliding: NDArray[np.bool_]
     normal_dashpot: Floats
     tangential_dashpot: Floats
+    slider: NDArray[np.bool_]
     viscous_slider: NDArray[np.bool_]
 
     def __init__(self, **given: ArrayLike) -> None:
@@ -160,11 +164,8 @@ class LinearisedContacts:
 
     @property
     def one_sided(self) -> NDArray[np.bool_]:
-        """Which contacts slide on ahead and stick on the way back, shape (C,).
-
-        These are the contacts at Coulomb's bound, but for those of a law whose tangential stiffness vanishes there.
-        """
-        return self.at_bound & (self.tangential_stiffness > 0)
+        """Which contacts slide on ahead and stick on the way back, shape (C,): sliders at Coulomb's bound."""
+        return self.at_bound & self.slider
 
     def overlap_derivative(self, parting: ArrayLike = 0.5) -> Floats:
         """b of each contact, shape (C, 3), with the weight of opening, shape () or (C,)."""

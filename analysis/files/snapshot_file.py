@@ -24,7 +24,7 @@ from .runfile_validation import check_places, dataset
 
 SCALARS = ("dimension", "fx", "load_error", "drag_rate")
 ARRAYS = ("position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind", "top")
-LATER = ("viscous_slider", "top", "drag_rate")
+LATER = ("slider", "viscous_slider", "top", "drag_rate")
 """Fields that files of version 1 do not have."""
 
 

@@ -68,7 +68,7 @@ class OneSidedMotion:
 
 
 @dataclass
-class State:
+class OneSidedState:
     """Several motions at one time, in columns: mass-weighted displacement z and velocity v, shape (E, P), and what
     contacts remember: p of sliders, shape (B, P), and r, shape (R, P), of contacts with two derivatives."""
 
@@ -136,19 +136,19 @@ class OneSidedSystem:
         """-A beside -G, shape (E, 2E)."""
         return csr_array(hstack([-self.motion.stiffness, -self.motion.damping]))
 
-    def start(self, velocity: Floats) -> State:
+    def start(self, velocity: Floats) -> OneSidedState:
         """At rest in the equilibrium, but for velocities of all coordinates, shape (coordinates, P)."""
         v = self.motion.root_mass[:, None] * velocity[self.motion.active]
         count = v.shape[1]
         remembered = [np.zeros((matrix.shape[0], count)) for matrix in (self.sliders[1], self.rescaled[0])]
-        return State(0.0, np.zeros_like(v), v.copy(), *remembered)
+        return OneSidedState(0.0, np.zeros_like(v), v.copy(), *remembered)
 
-    def advance(self, state: State, time: float, rise: Floats | None = None) -> None:
+    def advance(self, state: OneSidedState, time: float, rise: Floats | None = None) -> None:
         """Go on to a time, in equal steps no longer than `step`.
 
         Parameters
         ----------
-        state : State
+        state : OneSidedState
             Changes in place.
         time : float
             Not before the time of the state.
@@ -172,7 +172,7 @@ class OneSidedSystem:
             state.v += 0.5 * dt * force
         state.time = time
 
-    def _force(self, state: State, velocity: Floats, load: Floats | None) -> Floats:
+    def _force(self, state: OneSidedState, velocity: Floats, load: Floats | None) -> Floats:
         """Mass-weighted forces; sliders give way."""
         both = np.concatenate([state.z, velocity])
         force = self._linear @ both

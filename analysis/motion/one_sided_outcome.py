@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..progress import report_progress
-from .one_sided import OneSidedSystem, State
+from .one_sided import OneSidedState, OneSidedSystem
 
 PUSHES = 2
 """Random pushes; the opposite of each is followed, too, since one-sided motion is not odd."""
@@ -110,7 +110,7 @@ def follow_pushes(
     }
 
 
-def _mean_square(system: OneSidedSystem, state: State) -> Floats:
+def _mean_square(system: OneSidedSystem, state: OneSidedState) -> Floats:
     """D of each push, shape (P,)."""
     return np.asarray(np.sum(system.displacement(state.z) ** 2, axis=1).mean(axis=0))
 

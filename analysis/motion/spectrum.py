@@ -157,8 +157,9 @@ class Spectrum(TableDisplay):
         alone = f"K alone has {counts}, D as exp({self.growth_rate():.6g} t)"
         if contacts.one_sided.any():
             stick, slide = (Motion.of(self.packing, sliding=slides).rates.growth_rate for slides in (False, True))
+            count = int(contacts.one_sided.sum())
             return (
-                f"{int(contacts.one_sided.sum())} contacts at Coulomb's bound slide on ahead and stick on the way back; "
+                f"{count} contacts at Coulomb's bound slide on ahead and stick on the way back: "
                 f"neither linear motion decides: D as exp({stick:.4g} t) if all stuck, exp({slide:.4g} t) if all "
                 f"slid (`stability` follows them); {alone}"
             )

@@ -40,7 +40,7 @@ class LinearNeighbour:
 
 
 @dataclass(frozen=True)
-class Undamped:
+class WithoutDissipation:
     """The motion without dissipation, of sticking contacts: the eigenvalues of K.
 
     Attributes
@@ -67,7 +67,7 @@ class Stability:
     growth_rate : float
         Of D, 1 / time, with dissipation: largest 2 Re s, negative if every motion decays. Where contacts at the bound
         make the packing grow, the rate of the one-sided motion.
-    undamped : Undamped
+    undamped : WithoutDissipation
         Without dissipation.
     at_bound : int
         Contacts at Coulomb's bound.
@@ -92,7 +92,7 @@ class Stability:
 
     stable: bool | None
     growth_rate: float
-    undamped: Undamped
+    undamped: WithoutDissipation
     at_bound: int
     one_sided: dict[str, Any] | None
     rising: dict[str, Any] | None
@@ -130,7 +130,7 @@ class Stability:
                 f"{self.one_sided['time']:.4g})"
             )
         if self.dissipative and self.growth_rate < 0:
-            return f"stable: every motion decays, D at least as fast as exp({self.growth_rate:.6g} t){free}"
+            return f"stable: every motion decays, the slowest with D as exp({self.growth_rate:.6g} t){free}"
         return f"stable: no motion grows{free}"
 
     @property
@@ -142,15 +142,20 @@ class Stability:
             yield f"without dissipation: {what}, D as exp({u.growth_rate:.6g} t)"
 
     @property
+    def _has_two_neighbours(self) -> bool:
+        """Whether contacts at the bound slide on ahead and stick on the way back."""
+        return self.sliding != self.sticking
+
+    @property
     def _at_the_bound(self) -> Iterator[str]:
         if self.at_bound == 0:
             return
         yield f"{self.at_bound} of {_number(self.contacts, 'contact')} {_is(self.at_bound)} at Coulomb's bound" + (
             ": each slides on ahead and sticks on the way back"
-            if self.one_sided is not None
+            if self._has_two_neighbours
             else ", where this law has one derivative: they slide"
         )
-        if self.one_sided is not None:
+        if self._has_two_neighbours:
             yield (
                 f"neither of two linear motions decides: if all of them stuck, D as exp({self.sticking.growth_rate:.4g}"
                 f" t); if all slid on, as exp({self.sliding.growth_rate:.4g} t)"
@@ -216,7 +221,7 @@ def stability(
     configuration = packing.configuration
     direction = None if rise is None else _direction(configuration, rise)
     found = spectrum(configuration) if spectrum_of_stiffness is None else spectrum_of_stiffness
-    undamped = Undamped(found.growth_rate(), len(found.pairs), len(found.negative))
+    undamped = WithoutDissipation(found.growth_rate(), len(found.pairs), len(found.negative))
     contacts, damped = configuration.contacts, configuration.damped
     why = [*reasons, *_what_is_wrong(configuration, found)]
     sticking, free, grows = _linear(configuration, found, damped)

@@ -31,6 +31,7 @@ def linearise_contacts(
         sliding=np.zeros(count, dtype=np.bool_),
         normal_dashpot=along,
         tangential_dashpot=across,
+        slider=np.full(count, law.coulomb),
         viscous_slider=np.zeros(count, dtype=np.bool_),
         **where,
     )

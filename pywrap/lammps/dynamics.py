@@ -23,7 +23,7 @@ from .lammps_state import LammpsState
 from .plain_file_names import shared_folder
 
 
-class Motion(NamedTuple):
+class MotionState(NamedTuple):
     """Positions and velocities in the course of an undamped run.
 
     Attributes
@@ -135,16 +135,16 @@ class Dynamics:
         """Time steps so far."""
         return self._decks.steps
 
-    def advance(self, steps: int) -> Motion:
+    def advance(self, steps: int) -> MotionState:
         """Go on by so many steps."""
         self._decks.command(f"run {steps} pre no post no")
         law = self._packing.law
         friction = law.mu if self._weakening is None else self._decks.lammps.extract_fix("weaken", 0, 0)
         position, low, velocity = self._state.motion()
         spin = velocity[:, 2] if law.frictional else np.zeros(len(velocity))
-        return Motion(position, low, velocity[:, :2], spin, float(friction))
+        return MotionState(position, low, velocity[:, :2], spin, float(friction))
 
-    def work(self, steps: int) -> tuple[Motion, float]:
+    def work(self, steps: int) -> tuple[MotionState, float]:
         """Go on by so many steps, and the work of all forces meanwhile by the trapezoidal rule (deck part work.in)."""
         # windows of fix ave/time end at multiples of their length
         self._decks.command(f"reset_timestep {(self.steps + steps - 1) // steps * steps}")

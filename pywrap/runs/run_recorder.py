@@ -16,7 +16,7 @@ from ...analysis import RunFile, solid_fraction
 from ...analysis.arrays import Floats
 from ...analysis.files.atomic_write import check_output, lock_output
 from ..equilibria.quasistatic import Equilibrium
-from ..lammps.dynamics import Motion, Weakening
+from ..lammps.dynamics import MotionState, Weakening
 from ..scenes.command_sections import COMMANDS
 from ..scenes.scene import SECTIONS, Scene
 from ..scenes.validation import SceneError
@@ -163,7 +163,7 @@ class Record:
             return
         trajectory = scene.output is not None and scene.output.trajectory and name == "undamped"
         samples: list[Sample] = []
-        motions: list[tuple[float, Motion]] = []
+        motions: list[tuple[float, MotionState]] = []
 
         run = perturb(
             scene,
@@ -179,7 +179,7 @@ class Record:
             yield sample
         self._keep(name, samples, motions, None)
 
-    def append_motion(self, time: float, motion: Motion) -> None:
+    def append_motion(self, time: float, motion: MotionState) -> None:
         """Write positions of an undamped run, series trajectory."""
         self._append_motions([(time, motion)])
 
@@ -194,7 +194,7 @@ class Record:
         return samples, Checkpoint(int(state.pop("step")), state) if state else None
 
     def _keep(
-        self, name: str, samples: list[Sample], motions: list[tuple[float, Motion]], reached: Checkpoint | None
+        self, name: str, samples: list[Sample], motions: list[tuple[float, MotionState]], reached: Checkpoint | None
     ) -> None:
         """Write what has come since the last checkpoint, together with this one."""
         if self._file is not None and (samples or reached):
@@ -210,7 +210,7 @@ class Record:
         samples.clear()
         motions.clear()
 
-    def _append_motions(self, motions: list[tuple[float, Motion]]) -> None:
+    def _append_motions(self, motions: list[tuple[float, MotionState]]) -> None:
         if self._file is None or not motions:
             return
         low = [motion.position_low for _, motion in motions if motion.position_low is not None]

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from ...analysis import Packing, largest_damping_rate, largest_frequency, mean_square_displacement, stable_timestep
 from ...analysis.arrays import Floats, Indices
 from ..equilibria.quasistatic import Equilibrium
-from ..lammps.dynamics import Dynamics, Motion, Weakening
+from ..lammps.dynamics import Dynamics, MotionState, Weakening
 from ..lammps.engine import Engine
 from ..scenes.scene import Scene
 from ..scenes.sections import Friction, Perturb
@@ -108,7 +108,7 @@ def perturb(
     early: int = 200,
     communicator: MPI.Comm | None = None,
     weakening: Weakening | None = None,
-    watch: Callable[[float, Motion], None] | None = None,
+    watch: Callable[[float, MotionState], None] | None = None,
     keep: Callable[[Checkpoint], None] | None = None,
     resume: Checkpoint | None = None,
 ) -> Iterator[Sample]:
@@ -199,7 +199,7 @@ def weakening_of(friction: Friction, v0: float) -> Weakening:
     return Weakening(B=friction.B, w=friction.w, mu_ss=friction.mu_ss, v0=v0, v_ss=friction.velocity_scale(v0))
 
 
-def _sample_run(time: float, motion: Motion, packing: Packing) -> Sample:
+def _sample_run(time: float, motion: MotionState, packing: Packing) -> Sample:
     displaced = mean_square_displacement(
         motion.position, packing.position, packing.box_length, motion.position_low, packing.position_low
     )

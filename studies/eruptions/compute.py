@@ -35,7 +35,7 @@ from ...analysis import Packing, mean_square_displacement, nearest_image, spectr
 from ...analysis.motion.growth import unstable_rates
 from ...analysis.packing.packing import Floats
 from ...pywrap import Engine
-from ...pywrap.lammps.dynamics import Dynamics, Motion
+from ...pywrap.lammps.dynamics import Dynamics, MotionState
 from ...pywrap.runs.undamped import time_step
 from ..packing_tools import contact_pairs, unit_of_time
 
@@ -143,7 +143,7 @@ def growth_rate(packing: Packing) -> float:
     return 2 * float(unstable_rates(packing).real.max(initial=0.0))
 
 
-def _course(dynamics: Dynamics, dt: float, longest: float) -> Iterator[tuple[float, Motion]]:
+def _course(dynamics: Dynamics, dt: float, longest: float) -> Iterator[tuple[float, MotionState]]:
     """Looks that are close together at first and further apart later, each at a step of its own."""
     last = int(longest / dt)
     early = np.geomspace(min(100, last), last, SAMPLES).astype(np.int64)
@@ -180,7 +180,7 @@ class _Watch:
         self._contacts = contact_pairs(carrying)
         self._slid = _sliding_pairs(carrying)
 
-    def look(self, time: float, motion: Motion, now: Packing) -> Look:
+    def look(self, time: float, motion: MotionState, now: Packing) -> Look:
         """The packing at one time.
 
         Time, D, mean displacement of the upper layer along x, kinetic energy of translation and rotation; contacts of
