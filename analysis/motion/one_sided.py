@@ -20,7 +20,8 @@ with sticking contacts is stable, and rest where the packing with sliding contac
 with a load that rises slowly are those of rate-independent plasticity; self-sustained vibration of sliding contacts is
 known as flutter (Bigoni and Noselli, J. Mech. Phys. Solids 59, 2208, 2011).
 
-The steps are those of velocity Verlet, with dashpots at the velocity of the half step, as LAMMPS takes them.
+The steps are those of velocity Verlet, with dashpots at the velocity of the half step, as LAMMPS takes them. Without a
+contact that remembers, the motion is linear, and is that of the exponential function of the first-order matrix.
 """
 
 from dataclasses import dataclass
@@ -28,7 +29,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array, hstack
+from scipy.sparse import block_array, csr_array, eye_array, hstack
+from scipy.sparse.linalg import expm_multiply
 
 from ..arrays import Floats, floats
 from ..configuration import Configuration, HasConfiguration
@@ -172,6 +174,26 @@ class OneSidedSystem:
             state.v += 0.5 * dt * force
         state.time = time
 
+    @property
+    def remembers_nothing(self) -> bool:
+        """Whether motion is linear: no contact at the bound, and none with two derivatives."""
+        return not self.sliders[1].shape[0] and not self.rescaled[0].shape[0]
+
+    def advance_exactly(self, state: OneSidedState, time: float, rise: Floats | None = None) -> None:
+        """As `advance`, of a linear motion: by the exponential of (z, v, t, 1), to rounding."""
+        a, g = self.motion.stiffness, self.motion.damping
+        size, columns = state.z.shape
+        omega = float(np.sqrt(abs(a).sum(axis=1).max(initial=0.0))) or 1.0  # so that both halves weigh as much
+        load = np.zeros((size, columns)) if rise is None else self._weight.T @ rise
+        clock = csr_array([[0.0, 1.0], [0.0, 0.0]])  # of t and 1
+        for k in range(columns):
+            pull = csr_array(np.column_stack([load[:, k], np.zeros(size)]))
+            system = block_array([[None, omega * eye_array(size), None], [-a / omega, -g, pull], [None, None, clock]])
+            before = np.concatenate([omega * state.z[:, k], state.v[:, k], [state.time, 1.0]])
+            after = expm_multiply((time - state.time) * csr_array(system), before)
+            state.z[:, k], state.v[:, k] = after[:size] / omega, after[size : 2 * size]
+        state.time = time
+
     def _force(self, state: OneSidedState, velocity: Floats, load: Floats | None) -> Floats:
         """Mass-weighted forces; sliders give way."""
         both = np.concatenate([state.z, velocity])
@@ -247,8 +269,9 @@ def one_sided_motion(
     state = system.start(_of_all_coordinates(configuration, "velocity", velocity))
     load = None if rise is None else _of_all_coordinates(configuration, "rise", rise)
     seen = []
+    advance = system.advance_exactly if system.remembers_nothing else system.advance
     for each in time:
-        system.advance(state, float(each), load)
+        advance(state, float(each), load)
         seen.append((system.displacement(state.z)[..., 0], system.displacement(state.v)[..., 0], state.p[:, 0].copy()))
     displacement, speed, slid = (np.array(each) for each in zip(*seen, strict=True))
     return OneSidedMotion(time, displacement, speed, slid)

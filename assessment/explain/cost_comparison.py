@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...analysis.packing.packing import Floats
-from ...pywrap.lammps.dynamics import Motion
+from ...pywrap.lammps.dynamics import MotionState
 from ..timing import in_turns
 
 TURNS, FEW = 11, 5
@@ -120,6 +120,6 @@ class Part:
         return vars(self) | {"cost": self.cost.as_dict() if self.cost else None}
 
 
-def same_motion(one: Motion, other: Motion) -> bool:
+def same_motion(one: MotionState, other: MotionState) -> bool:
     """Whether positions and velocities are the same to the bit."""
     return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in one._fields)

@@ -1,0 +1,183 @@
+"""One-sided motion beside a force law that is integrated as it stands, and its properties."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from linearised import motion_matrix
+from scipy.linalg import expm
+
+from faultgouge.analysis import Contacts, MindlinLaw, Motion, Packing, one_sided_motion, stability, stiffness_matrix
+from faultgouge.analysis.arrays import derive_frozen
+from faultgouge.analysis.motion.eigenvalues import mass_weighted
+from faultgouge.analysis.motion.one_sided import OneSidedSystem
+from faultgouge.analysis.operators.sliders import sliders_of
+
+PUSH = 1e-6
+"""Times a velocity of one: displacements of 1e-7 are far below overlaps of 1e-2, and far above rounding."""
+
+
+@pytest.fixture
+def bound(cluster):
+    """Six disks with Coulomb's slider and dashpots; contacts slide at the bound in either direction, or stick."""
+    law = MindlinLaw(2e3, 6e2, 0.7, exponent=cluster.law.exponent, cn=9.0, ct=4.0, coulomb=True)
+    bare, c = replace(cluster, law=law), cluster.contacts
+    share = np.resize([1.0, 0.3, -1.0, -0.4], len(c))
+    return replace(bare, contacts=Contacts(c.i, c.j, share * law.slip_limit(bare.geometry.overlap)))
+
+
+def integrate(packing, velocity, step, count, rise=None):
+    """Displacements of the disks: velocity Verlet of the law itself, under loads that balance the packing at first."""
+    law, c, n, top = packing.law, packing.contacts, len(packing), np.zeros((3, len(packing)))
+    pair = np.flatnonzero(~c.floor)
+    mass = np.array([packing.mass, packing.mass, packing.inertia_factor * packing.mass])
+    place = np.array([*packing.position.T, np.zeros(n)])  # with u = R theta
+    slip, speed, start = c.slip.copy(), np.array([*velocity.T, np.zeros(n)]), place.copy()
+
+    def branch(where):
+        x = where[:2, c.i] - np.where(c.floor, 0, where[:2, c.j])
+        x[0, c.floor] = 0.0
+        x[0] -= packing.box_length * np.round(x[0] / packing.box_length)
+        return x
+
+    def forces(where, moves, slip):
+        x = branch(where)
+        r = np.hypot(*x)
+        normal, overlap = x / r, packing.radius[c.i] + np.where(c.floor, 0, packing.radius[c.j]) - r
+        tangent = np.array([-normal[1], normal[0]])
+        v = moves[:, c.i] * [[1.0], [1.0], [1.0]] - np.where(c.floor, 0, moves[:, c.j] * [[1.0], [1.0], [-1.0]])
+        rate = np.sum(tangent * v[:2], axis=0) - v[2]
+        power, bound = law.growth(overlap), law.mu * law.kn * overlap * law.growth(overlap)
+        fn = law.kn * overlap * power - law.cn * power * np.sum(normal * v[:2], axis=0)
+        ft = np.clip(-law.kt * power * slip - law.ct * power * rate, -bound, bound)
+        on = np.zeros((3, n))
+        for axis, f in enumerate(fn * normal + ft * tangent):
+            np.add.at(on[axis], c.i, f)
+            np.subtract.at(on[axis], c.j[pair], f[pair])
+        np.subtract.at(on[2], c.i, ft)
+        np.subtract.at(on[2], c.j[pair], ft[pair])
+        return on
+
+    rest = forces(place, 0 * speed, slip)
+    force = forces(place, speed, slip) - rest
+    for k in range(count):
+        speed = speed + 0.5 * step * force / mass
+        before, place = place, place + step * speed
+        a, b = branch(before), branch(place)
+        r0, r1 = np.hypot(*a), np.hypot(*b)
+        middle = 0.5 * (a / r0 + b / r1)
+        d = step * speed
+        rolled = d[2, c.i] + np.where(c.floor, 0, d[2, c.j])
+        between = d[:2, c.i] - np.where(c.floor, 0, d[:2, c.j])
+        gain = -middle[1] * between[0] + middle[0] * between[1] - rolled
+        overlap = packing.radius[c.i] + np.where(c.floor, 0, packing.radius[c.j]) - r1
+        if law.rescales:
+            gain = gain - slip / (2 * overlap) * np.maximum(r0 - r1, 0.0)
+        slip = law.clamped(overlap, slip + gain)
+        load = top if rise is None else (k + 1) * step * np.array([*rise.T, np.zeros(n)])
+        force = forces(place, speed, slip) - rest + load
+        speed = speed + 0.5 * step * force / mass
+    return (place - start)[:2].T
+
+
+def test_is_the_motion_of_the_law(bound):
+    system = OneSidedSystem.of(bound)
+    count = 400
+    time = count * system.step
+    velocity = np.random.default_rng(3).standard_normal((len(bound), 2))
+    found = one_sided_motion(bound, velocity, times=[time])
+    assert np.count_nonzero(found.slid[-1] > 0) > 3  # contacts slide, in both directions
+    assert len(sliders_of(bound.configuration)) == np.count_nonzero(bound.sliding)
+    followed = integrate(bound, PUSH * velocity, system.step, count) / PUSH
+    size = np.abs(found.displacement[0]).max()
+    np.testing.assert_allclose(followed, found.displacement[0], rtol=0, atol=1e-4 * size)  # second order in PUSH
+    # sticking contacts alone move otherwise
+    linear = expm(time * motion_matrix(bound)) @ np.concatenate([np.zeros(18), *velocity.T, np.zeros(6)])
+    assert np.abs(linear[:12].reshape(2, 6).T - found.displacement[0]).max() > 0.1 * size
+
+
+def test_is_the_motion_of_the_law_under_a_load_that_rises(bound):
+    system, count = OneSidedSystem.of(bound), 400
+    rise = np.random.default_rng(4).standard_normal((len(bound), 2))
+    found = one_sided_motion(bound, rise=rise, times=[count * system.step])
+    followed = integrate(bound, 0 * rise, system.step, count, PUSH * rise) / PUSH
+    size = np.abs(found.displacement[0]).max()
+    np.testing.assert_allclose(followed, found.displacement[0], rtol=0, atol=1e-4 * size)
+    assert np.count_nonzero(found.slid[-1] > 0) > 2
+
+
+@settings(max_examples=10, deadline=None)
+@given(scale=st.floats(1e-6, 1e6), seed=st.integers(0, 99))
+def test_is_homogeneous(scale, seed):
+    packing = _three()
+    velocity = np.random.default_rng(seed).standard_normal((3, 2))
+    one, other = (one_sided_motion(packing, v, times=[0.1, 0.3]) for v in (velocity, scale * velocity))
+    size = np.abs(one.displacement).max()
+    np.testing.assert_allclose(other.displacement / scale, one.displacement, rtol=0, atol=1e-12 * size)
+    assert one.mean_square_displacement.shape == (2,)
+
+
+def _three():
+    law = MindlinLaw(2e3, 6e2, 0.5, cn=2.0, ct=1.0, coulomb=True)
+    c = Contacts([0, 1, 2, 2], [-1, -1, 0, 1], [0.0, 0.0, 0.0, 0.0])
+    bare = Packing(position=[[0.0, 0.49], [1.0, 0.49], [0.5, 1.34]], radius=[0.5] * 3, contacts=c, law=law)
+    return replace(bare, contacts=c.slipped(law.slip_limit(bare.geometry.overlap) * [0.3, -0.3, 0.2, 1.0], None))
+
+
+def test_without_contacts_at_the_bound_it_is_linear(bound):
+    """To rounding; and by steps, to their second order."""
+    packing = replace(bound, law=replace(bound.law, mu=7.0, exponent=1.0))
+    velocity = np.random.default_rng(5).standard_normal((6, 2))
+    times = [0.05, 0.2]
+    start = np.concatenate([np.zeros(18), *velocity.T, np.zeros(6)])
+    found = one_sided_motion(packing, velocity, times=times)
+    for k, time in enumerate(times):
+        linear = (expm(time * motion_matrix(packing)) @ start)[:12].reshape(2, 6).T
+        size = np.abs(linear).max()
+        np.testing.assert_allclose(found.displacement[k], linear, rtol=0, atol=1e-12 * size)
+    errors = []
+    for share in (0.1, 0.05):
+        system = OneSidedSystem(Motion.of(replace(packing, law=replace(packing.law, cn=0.0, ct=0.0))), share)
+        state = system.start(start[18:, None])
+        exact = system.start(start[18:, None])
+        system.advance(state, 0.2)
+        system.advance_exactly(exact, 0.2)
+        errors.append(np.abs(state.z - exact.z).max())
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
+
+
+def test_times_are_refused_that_are_none():
+    for times in ([1.0, 0.5], [-1.0], [np.nan]):
+        with pytest.raises(ValueError, match="increasing order"):
+            one_sided_motion(_three(), times=times)
+
+
+def test_sliding_on_for_ever_is_the_derivative_of_the_bound(bound):
+    """K + G Y of sliders is K with f_t = mu f_n, as the law itself has it."""
+    slides = stiffness_matrix(bound, sliding=True)
+    found = Motion.of(bound, sliding=True)
+    expected = mass_weighted(slides, bound)[found.active][:, found.active]
+    assert abs(found.stiffness - expected).max() < 1e-12 * abs(expected).max()
+
+
+def test_stability_of_three_disks():
+    found = stability(_three())
+    assert found.at_bound == 1
+    assert found.stable is None  # in no balance
+    assert "the packing moves" in found.reasons[0]
+    at_rest = _three().configuration
+    at_rest = derive_frozen(at_rest, load=-at_rest.contact_force)
+    told = stability(at_rest)
+    assert told.stable is True
+    assert told.one_sided["grows"] is False
+    assert told.one_sided["amplification"] > 0
+    assert str(told).startswith("stable: each of 4 pushes comes to rest")
+    assert "neither of two linear motions decides" in str(told)
+    assert set(told.as_dict()) >= {"stable", "growth_rate", "undamped", "at_bound", "one_sided", "rising", "asymmetry"}
+    rising = stability(at_rest, rise=np.tile([1.0, 0.0], (3, 1))).rising
+    twice = stability(at_rest, rise=np.tile([2.0, 0.0], (3, 1))).rising
+    assert twice["drift"] == pytest.approx(2 * rising["drift"], rel=1e-9)
+    with pytest.raises(ValueError, match="upper layer"):
+        stability(at_rest, rise="fx")
