@@ -29,7 +29,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import block_array, csr_array, eye_array, hstack
+from scipy.sparse import block_array, csr_array, eye_array, hstack, vstack
 from scipy.sparse.linalg import expm_multiply
 
 from ..arrays import Floats, floats
@@ -134,9 +134,15 @@ class OneSidedSystem:
         return csr_array(rates[two] @ self._weight), csr_array(self._weight.T @ forces[:, two]), select
 
     @cached_property
-    def _linear(self) -> csr_array:
-        """-A beside -G, shape (E, 2E)."""
-        return csr_array(hstack([-self.motion.stiffness, -self.motion.damping]))
+    def _products(self) -> csr_array:
+        """What multiplies (z, v) in each step, in one matrix: -A beside -G; the excess; that of springs alone, if some
+        slider remembers no more."""
+        m, (_, excess, _, viscous) = self.motion, self.sliders
+        rows = [hstack([-m.stiffness, -m.damping]), excess]
+        if m.dissipative and not np.all(viscous):
+            size = len(m.active)
+            rows.append(hstack([excess[:, :size], csr_array((excess.shape[0], size))]))
+        return csr_array(vstack(rows))
 
     def start(self, velocity: Floats) -> OneSidedState:
         """At rest in the equilibrium, but for velocities of all coordinates, shape (coordinates, P)."""
@@ -196,35 +202,22 @@ class OneSidedSystem:
 
     def _force(self, state: OneSidedState, velocity: Floats, load: Floats | None) -> Floats:
         """Mass-weighted forces; sliders give way."""
-        both = np.concatenate([state.z, velocity])
-        force = self._linear @ both
+        size, count = len(state.z), len(state.p)
+        products = self._products @ np.concatenate([state.z, velocity])
+        force = products[:size]
         if load is not None:
             force += state.time * load
         if len(state.r):
             force += self.rescaled[1] @ state.r
-        if len(state.p):
-            grip, excess, rectified, viscous = self.sliders
-            elastic, whole = self._excess(excess, both)
+        if count:
+            grip, _, rectified, viscous = self.sliders
+            whole, springs = products[size : size + count], products[-count:]
             if len(state.r):
                 turned = rectified * (self.rescaled[2] @ state.r)
-                elastic, whole = elastic + turned, whole + turned
-            np.maximum(state.p, np.where(viscous, whole, elastic), out=state.p)
+                whole, springs = whole + turned, springs + turned
+            np.maximum(state.p, np.where(viscous, whole, springs), out=state.p)
             force -= grip @ np.maximum(state.p, whole)
         return np.asarray(force)
-
-    def _excess(self, excess: csr_array, both: Floats) -> tuple[Floats, Floats]:
-        """Excess of springs, and of springs and dashpots."""
-        whole = excess @ both
-        if not self._remembers_springs_alone:
-            return whole, whole
-        springs = both.copy()
-        springs[len(both) // 2 :] = 0.0
-        return excess @ springs, whole
-
-    @cached_property
-    def _remembers_springs_alone(self) -> bool:
-        """Whether some slider forgets the excess of its dashpot."""
-        return self.motion.dissipative and not bool(np.all(self.sliders[3]))
 
     def displacement(self, z: Floats) -> Floats:
         """Displacements of the particles, shape (N, d, P), of mass-weighted coordinates."""

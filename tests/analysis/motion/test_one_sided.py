@@ -121,9 +121,9 @@ def test_is_homogeneous(scale, seed):
 
 def _three():
     law = MindlinLaw(2e3, 6e2, 0.5, cn=2.0, ct=1.0, coulomb=True)
-    c = Contacts([0, 1, 2, 2], [-1, -1, 0, 1], [0.0, 0.0, 0.0, 0.0])
-    bare = Packing(position=[[0.0, 0.49], [1.0, 0.49], [0.5, 1.34]], radius=[0.5] * 3, contacts=c, law=law)
-    return replace(bare, contacts=c.slipped(law.slip_limit(bare.geometry.overlap) * [0.3, -0.3, 0.2, 1.0], None))
+    c = Contacts([0, 1, 2, 2, 0], [-1, -1, 0, 1, 1], np.zeros(5))
+    bare = Packing(position=[[0.0, 0.49], [0.99, 0.49], [0.495, 1.34]], radius=[0.5] * 3, contacts=c, law=law)
+    return replace(bare, contacts=c.slipped(law.slip_limit(bare.geometry.overlap) * [0.3, -0.3, 0.2, 1.0, 0.1], None))
 
 
 def test_without_contacts_at_the_bound_it_is_linear(bound):
