@@ -176,8 +176,8 @@ def test_stability_of_three_disks():
     assert str(told).startswith("stable: each of 4 pushes comes to rest")
     assert "neither of two linear motions decides" in str(told)
     assert set(told.as_dict()) >= {"stable", "growth_rate", "undamped", "at_bound", "one_sided", "rising", "asymmetry"}
-    rising = stability(at_rest, rise=np.tile([1.0, 0.0], (3, 1))).rising
-    twice = stability(at_rest, rise=np.tile([2.0, 0.0], (3, 1))).rising
+    rising = stability(at_rest, rise=np.tile([1.0, 0.0], (3, 1)), time=4.0).rising
+    twice = stability(at_rest, rise=np.tile([2.0, 0.0], (3, 1)), time=4.0).rising
     assert twice["drift"] == pytest.approx(2 * rising["drift"], rel=1e-9)
     with pytest.raises(ValueError, match="upper layer"):
         stability(at_rest, rise="fx")
