@@ -66,7 +66,7 @@ def dense(factors):
 @pytest.mark.parametrize("shape", [(432,), (432, 1), (432, 5), (432, 6), (432, 13)])
 def test_compiled_factors_solve(shape):
     """An indefinite matrix, and numbers of right sides below, at and above the six that are solved for at a time."""
-    order = np.argsort(minimum_degree(csc_array(lattice(12) + 37 * eye_array(432))))
+    order = np.argsort(minimum_degree(lattice(12)))
     matrix = csc_array(lattice(12) - 3 * eye_array(432))[order][:, order]
     right = np.random.default_rng(2).standard_normal(shape)
     factors = symmetric_lu(matrix, ordered=True, symmetric=True)
