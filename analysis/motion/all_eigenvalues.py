@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array
 
+from ..arrays import Complexes, Floats
 from ..factors.inertia import count_places, factor_shifted, places_of_numbers
 from ..factors.sparse_lu import minimum_degree
-from ..packing.packing import Floats
 from ..progress import report_progress
-from .block_arnoldi import Complexes, ShiftedDisc, Marked, Reach, SpectrumError
+from .block_arnoldi import Marked, Reach, ShiftedDisc, SpectrumError
 
 
 @dataclass(frozen=True)
@@ -230,7 +230,8 @@ class _SlicedSpectrum:
 
 
 def _widest_gap(distance: Floats, near: float, far: float) -> float:
-    """The middle of the widest gap between distances from a shift, between two of them."""
+    """The middle of the widest gap between distances from a shift, in the outer half of two of them."""
+    near += 0.5 * (far - near)  # what is nearer may be the slice's own
     inside = np.sort(np.concatenate([distance[(distance > near) & (distance < far)], [near, far]]))
     k = int(np.argmax(np.diff(inside)))
     return float(0.5 * (inside[k] + inside[k + 1]))

@@ -18,14 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig, qr, schur
-from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csc_array, eye_array
 
+from ..arrays import Complexes, Floats
 from ..errors import FaultgougeError
 from ..factors.sparse_lu import DIAGONAL_PIVOT, Factors, SingularMatrixError, symmetric_lu
-from ..packing.packing import Floats
-
-Complexes = NDArray[np.complex128]
 
 INACCURATE = 1e-9
 """Relative residual of solutions without pivoting from which on pivots are chosen; usually it is some 1e-13."""
@@ -90,6 +87,8 @@ class Krylov:
 
     def subspace(self, wanted: Complexes) -> Floats:
         """An orthonormal basis of the invariant subspace of some eigenvalues of H, closed under conjugation."""
+        from scipy.optimize import linear_sum_assignment
+
         every = np.linalg.eigvals(self.square)
         distance = np.abs(wanted[:, None] - every)
         chosen = every[linear_sum_assignment(distance)[1]]
@@ -242,6 +241,8 @@ class ShiftedDisc:
 
     def _left_space(self, right: Floats, wanted: Complexes, accuracy: float) -> Krylov:
         """The space of the transposed inverse, until it has the eigenvalues that are wanted."""
+        from scipy.optimize import linear_sum_assignment
+
         block = self.krylov.block
         # few left vectors are next to what the right space has
         start = right.T if right.shape[1] <= block else np.random.default_rng(1).standard_normal((block, len(right)))
