@@ -17,6 +17,7 @@ found again from other shifts, with larger blocks, one after the other. If this 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +87,12 @@ class SpectrumSlice:
     values: Complexes
     vectors: Marked
 
+    @classmethod
+    def empty(cls, shift: float, size: int) -> "SpectrumSlice":
+        """A slice of which nothing was found."""
+        nothing = np.zeros((size, 0), complex)
+        return cls(shift, 0.0, np.zeros(0, complex), Marked(np.zeros(0, complex), nothing, nothing))
+
     def between(self, low: float, high: float) -> Complexes:
         """Those with a real part in [low, high)."""
         return self.values[(self.values.real >= low) & (self.values.real < high)]
@@ -115,16 +122,14 @@ def all_eigenvalues(matrix: csr_array, sizes: SliceSizes = SIZES) -> AllEigenval
     first = 3 * sizes.own
     for k in range(len(spectrum.borders) - 1):
         report_progress(f"slice {k + 1} of {len(spectrum.borders) - 1} of the spectrum")
-        found, first = spectrum.slice(k, first)
+        try:
+            found, first = spectrum.slice(k, first)
+        except SpectrumError:
+            found = SpectrumSlice.empty(float(spectrum.borders[k : k + 2].mean()), matrix.shape[0])
         slices.append(found)
     for block in (2, 4, 8):
-        wrong = spectrum.what_is_wrong(slices)
-        if not wrong:
-            break
-        for k in spectrum.suspects(slices):
-            slices[k], _ = spectrum.slice(k, first, block * sizes.block)
-            if not (wrong := spectrum.what_is_wrong(slices)):
-                break
+        if spectrum.what_is_wrong(slices):
+            spectrum.mend(slices, block * sizes.block, first)
     if wrong := spectrum.what_is_wrong(slices):
         raise SpectrumError(f"All eigenvalues of {matrix.shape[0]} coordinates: {wrong}.")
     return spectrum.joined(slices)
@@ -176,13 +181,25 @@ class _SlicedSpectrum:
             nothing = np.zeros((len(self.order), 0), complex)
             return SpectrumSlice(shift, disc.radius, values, Marked(values[:0], nothing, nothing)), disc.enough(reach)
         marked = disc.marked(chosen, accuracy)
-        return SpectrumSlice(shift, disc.radius, np.concatenate([values[~chosen], marked.values]), marked), disc.enough(reach)
+        return SpectrumSlice(shift, disc.radius, np.concatenate([values[~chosen], marked.values]), marked), disc.enough(
+            reach
+        )
+
+    def mend(self, slices: list[SpectrumSlice], block: int, first: int) -> None:
+        """Find suspects again, with larger blocks from other shifts, until nothing is wrong."""
+        for k in self.suspects(slices):
+            try:
+                slices[k], _ = self.slice(k, first, block)
+            except SpectrumError:
+                continue
+            if not self.what_is_wrong(slices):
+                return
 
     def ends(self, slices: list[SpectrumSlice]) -> Floats:
         """Real parts up to which each slice has its own, as far as possible from all eigenvalues."""
         inner = []
         for one, other, border in zip(slices[:-1], slices[1:], self.borders[1:-1], strict=True):
-            room = 0.5 * min(one.shift + one.radius - border, border - other.shift + other.radius)
+            room = max(0.0, 0.5 * min(one.shift + one.radius - border, border - other.shift + other.radius))
             real = np.concatenate([one.values.real, other.values.real])
             near = np.sort(np.concatenate([real[np.abs(real - border) < room], [border - room, border + room]]))
             k = int(np.argmax(np.diff(near)))
@@ -205,7 +222,7 @@ class _SlicedSpectrum:
             return f"their sum is off the trace by {abs(values.sum() - trace):.3g}"
         if abs((values**2).sum() - square) > 2 * allowed * largest:
             return f"the sum of their squares is off the trace of the square by {abs((values**2).sum() - square):.3g}"
-        for one, other in zip(slices[:-1], slices[1:], strict=True):
+        for one, other in pairwise(slices):
             if not _agree(one, other, np.sqrt(self.sizes.accuracy) * self.spacing):
                 return f"the slices about {one.shift:.6g} and {other.shift:.6g} disagree"
         return ""

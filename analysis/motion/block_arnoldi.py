@@ -2,8 +2,8 @@ r"""Eigenvalues next to a shift, with right and left vectors, by a block Arnoldi
 
 In the block Krylov space of :math:`(A - \sigma)^{-1}` the eigenvalues :math:`\lambda` closest to :math:`\sigma` come
 first: they are the largest :math:`\theta = 1/(\lambda - \sigma)` of the projection H. A residual r of the inverse
-changes :math:`\lambda` by :math:`\kappa\, r / |\theta|^2` at the most to first order. `ShiftedDisc` has all eigenvalues up to
-the first one that has not converged.
+changes :math:`\lambda` by :math:`\kappa\, r / |\theta|^2` at the most to first order. `ShiftedDisc` has all
+eigenvalues up to the first one that has not converged.
 
 **Vectors.** The left vectors are the right ones of :math:`A^T`, from a second space with the same factors. Of two
 eigenvalues that nearly coalesce the vectors are nearly parallel, and uncertain; the planes of both are not. So vectors
@@ -26,6 +26,10 @@ from ..factors.sparse_lu import DIAGONAL_PIVOT, Factors, SingularMatrixError, sy
 
 INACCURATE = 1e-9
 """Relative residual of solutions without pivoting from which on pivots are chosen; usually it is some 1e-13."""
+
+
+DEPENDENT = 1e-10
+"""Length of a new vector, beside the longest of its block, below which its direction is rounding."""
 
 
 class SpectrumError(FaultgougeError):
@@ -71,6 +75,10 @@ class Krylov:
                 image -= part @ self.basis[:known]
                 self.projection[:known, last] += part.T
             vectors, rest = qr(image.T, mode="economic", overwrite_a=True, check_finite=False)
+            if np.abs(np.diag(rest)).min() < DEPENDENT * np.abs(np.diag(rest)).max(initial=1e-300):
+                # a direction that rounding has chosen: any serves that is orthogonal to all before
+                image = vectors.T - (vectors.T @ self.basis[:known].T) @ self.basis[:known]
+                vectors = qr(image.T, mode="economic", overwrite_a=True, check_finite=False)[0]
             self.basis[known : known + self.block] = vectors.T
             self.projection[known : known + self.block, last] = rest
             self.used = known
@@ -179,7 +187,9 @@ class ShiftedDisc:
     krylov: Krylov
 
     @classmethod
-    def about(cls, matrix: csc_array, shift: float, reach: Reach, block: int, first: int, seed: int = 0) -> "ShiftedDisc":
+    def about(
+        cls, matrix: csc_array, shift: float, reach: Reach, block: int, first: int, seed: int = 0
+    ) -> "ShiftedDisc":
         """The eigenvalues about a shift.
 
         Parameters

@@ -36,7 +36,7 @@ from scipy.sparse.linalg import eigs
 from ..arrays import Complexes, Floats
 from ..errors import BadInputError
 from ..progress import report_progress
-from .block_arnoldi import Krylov
+from .block_arnoldi import DEPENDENT, Krylov
 
 BLOCK = 4
 """Vectors that are multiplied at a time: each takes half of the time of one by itself."""
@@ -125,10 +125,14 @@ def fastest_growing(
         If the count or the times are out of range.
     """
     if count < 1 or not 0 < periods[0] <= periods[1]:
-        raise BadInputError(f"{count} motions in {periods[0]:g} to {periods[1]:g} periods: take one or more, ascending.")
+        raise BadInputError(
+            f"{count} motions in {periods[0]:g} to {periods[1]:g} periods: take one or more, ascending."
+        )
     size = matrix.shape[0]
     if size <= 2 * BLOCK:
-        raise BadInputError(f"An operator of {size} coordinates is for `spectrum`: products serve more than {2 * BLOCK}.")
+        raise BadInputError(
+            f"An operator of {size} coordinates is for `spectrum`: products serve more than {2 * BLOCK}."
+        )
     motion = _Undamped.of(matrix) if damping is None else _Damped.of(matrix, damping)
     start = np.random.default_rng(0).standard_normal((max(BLOCK, min(2 * count, 8)), motion.size))
     length, products = periods[0], 0
@@ -186,8 +190,12 @@ class _Undamped:
         """Rate of eigenvalues of A."""
         return np.asarray(2 * np.abs(np.sqrt(values.astype(complex)).imag))
 
+    def outstanding(self, chance: float) -> float:
+        """Modulus of f beyond which an eigenvalue stands out, where the logarithm of its share grows so in a block."""
+        return float(np.cosh(chance))
+
     def visible(self, chance: float) -> float:
-        """Rate times t of a motion that appears where the logarithm of its share grows by so much in a block."""
+        """Rate times t of a motion that stands out."""
         return float(2 * np.arcsinh(np.cosh(chance)))
 
     def displacement(self, vectors: Complexes) -> Complexes:
@@ -252,6 +260,10 @@ class _Damped:
         """Rate of eigenvalues of Z."""
         return np.asarray(2 * values.real)
 
+    def outstanding(self, chance: float) -> float:
+        """As without dissipation."""
+        return float(np.exp(chance))
+
     def visible(self, chance: float) -> float:
         """As without dissipation."""
         return 2 * chance
@@ -279,11 +291,11 @@ def _chebyshev(product: Callable[[Floats], Floats], weight: Floats, sign: int, c
 
 @dataclass(frozen=True, eq=False)
 class _Space:
-    """What a space has of the motions that grow, the fastest first."""
+    """What a space has of the motions that grow, the fastest first; `fastest` is a basis of what grows most."""
 
     motion: Motion
     step: Step
-    basis: Floats
+    fastest: Floats
     values: Complexes
     vectors: Complexes
     residuals: Floats
@@ -297,9 +309,9 @@ class _Space:
 
     def next_start(self, start: Floats) -> Floats:
         """A block for a longer time, from the fastest motions."""
-        known = min(len(start) // 2, self.basis.shape[1])
+        known = min(len(start) // 2, self.fastest.shape[1])
         fresh = np.random.default_rng(1).standard_normal(start.shape)
-        fresh[:known] = np.sqrt(start.shape[1]) * self.basis[:, :known].T
+        fresh[:known] = np.sqrt(start.shape[1]) * self.fastest[:, :known].T
         return fresh
 
     def result(self, count: int, products: int) -> FastestGrowth:
@@ -327,30 +339,37 @@ def _search(motion: Motion, step: Step, start: Floats, count: int) -> tuple[_Spa
     while True:
         krylov.extend(blocks * block)
         chance = np.log(2 * np.sqrt(motion.size) / (CHANCE * APPEARS)) / (krylov.used // block)
-        space = _growing(motion, step, krylov, motion.visible(float(chance)) / step.time, count)
+        space = _growing(motion, step, krylov, float(chance), count)
         if space.found >= count or krylov.full or (len(space.values) == 0 and blocks >= FIRST_BLOCKS):
             return space, krylov
         blocks += 3
 
 
-def _growing(motion: Motion, step: Step, krylov: Krylov, limit: float, count: int) -> _Space:
-    """The motions of a space whose rates are above a limit, solved for anew in the space of the fastest ones."""
+def _growing(motion: Motion, step: Step, krylov: Krylov, chance: float, count: int) -> _Space:
+    """The motions of a space that stand out, solved for anew in the space of these."""
     theta, small = eig(krylov.square)
-    order = np.argsort(-np.abs(theta), kind="stable")
-    # twice as many as are wanted, as both of a pair count, and some that are slower
-    order = order[: 2 * count + 6]
-    chosen = np.concatenate([small[:, order].real, small[:, order].imag], axis=1)
-    vectors, triangle, _ = qr(chosen, mode="economic", pivoting=True)
-    rank = int(np.count_nonzero(np.abs(np.diag(triangle)) > 1e-10 * abs(triangle[0, 0])))
-    basis = krylov.basis[: krylov.used].T @ vectors[:, :rank]
+    order = np.argsort(-np.abs(theta), kind="stable")[: 2 * count + 6]  # both of a pair count
+    fastest = krylov.basis[: krylov.used].T @ _real_basis(small[:, order[: krylov.block]])
+    order = order[np.abs(theta[order]) > motion.outstanding(chance)]
+    basis = krylov.basis[: krylov.used].T @ _real_basis(small[:, order])
     image = motion.product(basis)
-    values, x = eig(basis.T @ image)
+    values, x = eig(basis.T @ image) if len(order) else (np.zeros(0, complex), np.zeros((0, 0), complex))
+    limit = motion.visible(chance) / step.time
     rates = motion.growth(values)
     grows = np.flatnonzero((rates > limit) & (values.imag >= 0))
     grows = grows[np.argsort(-rates[grows], kind="stable")]
     values, x = values[grows], x[:, grows]
     residuals = np.linalg.norm(image @ x - (basis @ x) * values, axis=0) / np.abs(values)
-    return _Space(motion, step, basis, values, basis @ x, residuals, limit)
+    return _Space(motion, step, fastest, values, basis @ x, residuals, limit)
+
+
+def _real_basis(vectors: Complexes) -> Floats:
+    """An orthonormal basis of the real and the imaginary parts of vectors."""
+    if vectors.shape[1] == 0:
+        return np.zeros(vectors.shape)
+    parts = np.concatenate([vectors.real, vectors.imag], axis=1)
+    basis, triangle, _ = qr(parts, mode="economic", pivoting=True)
+    return np.asarray(basis[:, np.abs(np.diag(triangle)) > DEPENDENT * abs(triangle[0, 0])])
 
 
 def _largest(matrix: csr_array) -> float:

@@ -145,9 +145,7 @@ class _Spectrum:
 
     def shifts(self, pool: ThreadPoolExecutor, first: int, stop: int) -> list[Shift]:
         """The shifts of all slices from the eigenvalue of number `first` on, and before that of number `stop`."""
-        places, numbers = count_places(
-            self.matrix, partial(self.count_below, pool), (first, stop), self.limits.coarse
-        )
+        places, numbers = count_places(self.matrix, partial(self.count_below, pool), (first, stop), self.limits.coarse)
         pieces = max(1, round((stop - first) / self.limits.own))
         ends = first + np.arange(pieces + 1) * (stop - first) // pieces
         borders = places_of_numbers(places, numbers, ends)
