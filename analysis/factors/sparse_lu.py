@@ -4,9 +4,9 @@
 pivoting.
 
 **SuperLU**, which SciPy has, factors all others, and finds orders of elimination of minimum degree on the pattern of
-A + A^T. Pivots are taken from the diagonal. By default SuperLU joins small columns of the elimination tree to supernodes and
-fills these with zeros. Without this, the factors of 300,000 coordinates have three quarters of the entries, and take
-half of the time.
+A + A^T. Pivots are taken from the diagonal. By default SuperLU joins small columns of the elimination tree to
+supernodes and fills these with zeros. Without this, the factors of 300,000 coordinates have three quarters of the
+entries, and take half of the time.
 
 **MUMPS**, if python-mumps is installed (``pip install faultgouge[mumps]``), from `MUMPS_FROM` coordinates on. Nested
 dissection gives its factors fewer entries, and pivots of two rows keep them accurate. MUMPS cannot run in several
