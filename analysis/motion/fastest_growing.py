@@ -273,7 +273,7 @@ class _Damped:
         return vectors[: self.matrix.shape[0]]
 
 
-Motion = _Undamped | _Damped
+Equation = _Undamped | _Damped
 
 
 def _chebyshev(product: Callable[[Floats], Floats], weight: Floats, sign: int, columns: Floats) -> Floats:
@@ -293,7 +293,7 @@ def _chebyshev(product: Callable[[Floats], Floats], weight: Floats, sign: int, c
 class _Space:
     """What a space has of the motions that grow, the fastest first; `fastest` is a basis of what grows most."""
 
-    motion: Motion
+    motion: Equation
     step: Step
     fastest: Floats
     values: Complexes
@@ -331,7 +331,7 @@ class _Space:
         )
 
 
-def _search(motion: Motion, step: Step, start: Floats, count: int) -> tuple[_Space, Krylov]:
+def _search(motion: Equation, step: Step, start: Floats, count: int) -> tuple[_Space, Krylov]:
     """What grows over a time."""
     block = len(start)
     krylov = Krylov(step.apply, start, BLOCKS * block)
@@ -345,7 +345,7 @@ def _search(motion: Motion, step: Step, start: Floats, count: int) -> tuple[_Spa
         blocks += 3
 
 
-def _growing(motion: Motion, step: Step, krylov: Krylov, chance: float, count: int) -> _Space:
+def _growing(motion: Equation, step: Step, krylov: Krylov, chance: float, count: int) -> _Space:
     """The motions of a space that stand out, solved for anew in the space of these."""
     theta, small = eig(krylov.square)
     order = np.argsort(-np.abs(theta), kind="stable")[: 2 * count + 6]  # both of a pair count

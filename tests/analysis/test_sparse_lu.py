@@ -56,7 +56,7 @@ def test_solutions_of_a_matrix_and_its_transpose(unit, pivoting, ordered, backen
 
 
 def test_order_of_particles_is_that_of_their_coordinates():
-    """Rows of one pattern follow each other, and the factors are as sparse as those of all coordinates by themselves."""
+    """Rows of one pattern follow each other, and the factors are as sparse as in an order of all coordinates."""
     matrix = csc_array(lattice(20) + 40 * eye_array(1200))
     mixed = np.random.default_rng(0).permutation(1200)
     shuffled = csc_array(matrix[mixed][:, mixed])
