@@ -2,8 +2,8 @@
 
 `spectrum`, `eigenpairs` and `buckling` have the eigenvalues of the stability operator; of large packings
 `all_eigenvalues` finds all, with `block_arnoldi`, and `fastest_growing` the ones that matter most. `normal_form` has
-how two modes coalesce, `response` and `forcing` the motion under forces, `transient` its largest amplitude, `growth` its
-growth in a LAMMPS run, `stable_timestep` the time step. `matrix_functions`, `oscillator`, `propagator` and
+how two modes coalesce, `response` and `forcing` the motion under forces, `transient` its largest amplitude, `growth`
+its growth in a LAMMPS run, `stable_timestep` the time step. `matrix_functions`, `oscillator`, `propagator` and
 `state_space` contain the mathematics.
 
 May import: `configuration`, `packing`, `operators`, `factors`.
