@@ -65,8 +65,8 @@ DENSE = 900
 """Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
 
 SLICED = 2000
-"""Coordinates from which on the spectrum is taken in slices. Of 870 coordinates of disks LAPACK takes 0.4 of the time of
-slices, of 900 of spheres 0.3, and with the growth of both the times are the same at 2,000 and at 2,900."""
+"""Coordinates from which on the spectrum is taken in slices. Of 870 coordinates of disks LAPACK takes 0.4 of the time
+of slices, of 900 of spheres 0.3, and with the growth of both the times are the same at 2,000 and at 2,900."""
 
 LIMIT = 1e-4
 """Relative error of the largest eigenvalue of more coordinates. It bounds time steps, that are far below the bound; to
