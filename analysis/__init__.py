@@ -16,6 +16,7 @@ from .files.json_packing import read_packing
 from .files.runfile import RunFile
 from .motion.buckling import negative_eigenvalues
 from .motion.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
+from .motion.fastest_growing import FastestGrowth, fastest_growing
 from .motion.growth import Growth, fit_growth, growth_of_run, mean_square_displacement
 from .motion.motion import Motion
 from .motion.one_sided import OneSidedMotion, one_sided_motion
@@ -55,6 +56,7 @@ __all__ = [
     "DampedOnsetError",
     "DampedWindow",
     "Eigenpairs",
+    "FastestGrowth",
     "FaultgougeError",
     "Growth",
     "LinearisedContacts",
@@ -82,6 +84,7 @@ __all__ = [
     "dynamical_matrix",
     "eigenpairs",
     "eigenvalues",
+    "fastest_growing",
     "find_onset",
     "fit_growth",
     "growth_of_run",

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import BadInputError
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 Indices = NDArray[np.int64]
 
 if TYPE_CHECKING:

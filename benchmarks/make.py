@@ -42,6 +42,7 @@ BENCHMARKS = {
     "answer": Benchmark("python benchmarks/first_answer.py", "python benchmarks/first_answer.py --turns 3"),
     "increment": Benchmark("python benchmarks/increment.py", "python benchmarks/increment.py"),
     "size": Benchmark("python benchmarks/scale.py", None),
+    "spectra": Benchmark("python benchmarks/spectra.py", None),
 }
 """Commands by their names in the template."""
 

@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 from scipy.linalg import eig
 from scipy.sparse import csr_array
 
-from ..arrays import Floats, Indices
+from ..arrays import Complexes, Floats, Indices
 from ..configuration import Configuration
 from ..packing.packing import Packing
-
-Complexes = NDArray[np.complex128]
 
 SAFETY = 50.0
 """Imaginary parts count from this many times their rounding uncertainty.

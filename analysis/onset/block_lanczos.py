@@ -23,12 +23,12 @@ from itertools import chain, pairwise
 
 import numpy as np
 from scipy.linalg import eigh, qr
-from scipy.sparse import csc_array, csr_array, eye_array
-from scipy.sparse.linalg import eigsh
+from scipy.sparse import csc_array, csr_array
 from threadpoolctl import threadpool_limits
 
 from ..errors import FaultgougeError
-from ..factors.sparse_lu import minimum_degree, symmetric_lu
+from ..factors.inertia import Factorization, Solve, count_places, factor_shifted, places_of_numbers
+from ..factors.sparse_lu import minimum_degree
 from ..packing.packing import Floats, Indices
 from .limits import LIMITS, Limits
 from .ranks import ALONE, Ranks
@@ -37,22 +37,6 @@ from .slice_store import NEW_PASS, Border, Shift, Slice, SlicePass, Take
 
 class SliceError(FaultgougeError):
     """A part of a spectrum was not found: one sentence."""
-
-
-Solve = Callable[[Floats], Floats]
-Factorization = tuple[Solve, int]
-
-
-def factor_shifted(matrix: csc_array, shift: float, mumps: bool = False) -> Factorization:
-    """The inverse of S - shift, and how many eigenvalues of S are below the shift: Sylvester's law of inertia.
-
-    The factors are made without pivoting, so that the signs of the pivots tell the inertia. What stability that costs
-    is looked at afterwards, by Rayleigh quotients. The coordinates of S are in the order of elimination. `mumps` says
-    whether MUMPS may be used.
-    """
-    shifted = csc_array(matrix - shift * eye_array(matrix.shape[0]))
-    factors = symmetric_lu(shifted, ordered=True, symmetric=True, mumps=mumps)
-    return factors.solve, factors.negative
 
 
 def slices(
@@ -146,9 +130,7 @@ class _Spectrum:
         self, matrix: csc_array, limits: Limits, factorise: Callable[[csc_array, float], Factorization], ranks: Ranks
     ) -> None:
         self.limits, self.factorise, self.ranks = limits, factorise, ranks
-        size = matrix.shape[0]
-        self.bound = float(abs(matrix).sum(axis=0).max())  # no eigenvalue is beyond
-        self.order: Indices = np.argsort(minimum_degree(csc_array(matrix + 2 * self.bound * eye_array(size))))
+        self.order: Indices = np.argsort(minimum_degree(matrix))
         self.given, self.matrix = csr_array(matrix), csc_array(matrix[self.order][:, self.order])
         self.spare: list[Floats] = []  # memory for bases: fresh memory takes longer than a pass over it
 
@@ -163,28 +145,10 @@ class _Spectrum:
 
     def shifts(self, pool: ThreadPoolExecutor, first: int, stop: int) -> list[Shift]:
         """The shifts of all slices from the eigenvalue of number `first` on, and before that of number `stop`."""
-        from scipy.interpolate import PchipInterpolator
-
-        size = self.matrix.shape[0]
-        start = np.random.default_rng(0).standard_normal(size)
-        top = float(eigsh(self.matrix, k=1, which="LA", tol=1e-3, v0=start, return_eigenvectors=False)[0])
-        places, numbers = np.array([-1e-9 * self.bound, 1.01 * top]), np.array([0, size])
-        numbers[0] = self.count_below(pool, places[:1])[0]
-        while numbers[0] > 0 and places[0] > -self.bound:  # a few negative ones lie next to zero, far from the bound
-            places = np.insert(places, 0, 10 * places[0])
-            numbers = np.insert(numbers, 0, self.count_below(pool, places[:1])[0] if places[0] > -self.bound else 0)
-        while True:
-            wanted = (numbers[1:] > first) & (numbers[:-1] < stop)
-            wide = np.flatnonzero(wanted & (np.diff(numbers) > self.limits.coarse) & (np.diff(places) > 1e-6 * top))
-            if len(wide) == 0:
-                break
-            between = places[wide] + 0.5 * (places[wide + 1] - places[wide])
-            numbers = np.insert(numbers, wide + 1, self.count_below(pool, between))
-            places = np.insert(places, wide + 1, between)
-        numbers, last = np.unique(numbers[::-1], return_index=True)
+        places, numbers = count_places(self.matrix, partial(self.count_below, pool), (first, stop), self.limits.coarse)
         pieces = max(1, round((stop - first) / self.limits.own))
         ends = first + np.arange(pieces + 1) * (stop - first) // pieces
-        borders = PchipInterpolator(numbers, places[::-1][last])(ends)
+        borders = places_of_numbers(places, numbers, ends)
         middles = 0.5 * (borders[:-1] + borders[1:])
         return [(float(middle), (int(a), int(b))) for middle, (a, b) in zip(middles, pairwise(ends), strict=True)]
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array, diags_array
 
+from faultgouge.analysis.factors.inertia import factor_shifted
 from faultgouge.analysis.onset import LIMITS, Limits, Ranks
-from faultgouge.analysis.onset.block_lanczos import SliceError, factor_shifted, slices
+from faultgouge.analysis.onset.block_lanczos import SliceError, slices
 
 FEW = Limits(own=24, coarse=60, first_look=20, one_basis=50)
 

@@ -1,0 +1,279 @@
+r"""All eigenvalues of a large sparse non-symmetric operator, a slice of the spectrum after the other.
+
+LAPACK needs time with the cube of the number n of coordinates, and :math:`n^2` numbers. Here the spectrum is cut into
+slices by shifts on the real axis, and `block_arnoldi` finds the eigenvalues in a disc about each shift, with a few
+hundred vectors. The time is a little more than the square of n.
+
+**Shifts.** Every eigenvalue :math:`\lambda` of A has a real part between the lowest and the largest eigenvalue of the
+symmetric part :math:`S = (A + A^T)/2` (Bendixson, Acta Math. 25, 359 (1902)). A is nearly symmetric, so that its
+eigenvalues are as dense as those of S, which inertia counts. Discs overlap, and are as large as imaginary parts
+demand.
+
+**That all are found.** There is no law of inertia for A. But n eigenvalues are to be found, their sum is the trace of
+A, and the sum of their squares the trace of :math:`A^2`. Two neighbouring discs must also find the same eigenvalues
+where they overlap. Where one of these is violated, the slices that have the fewest eigenvalues beside what S has are
+found again from other shifts, with larger blocks, one after the other. If this does not help there is an error.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csc_array, csr_array
+
+from ..arrays import Complexes, Floats
+from ..factors.inertia import count_places, factor_shifted, places_of_numbers
+from ..factors.sparse_lu import minimum_degree
+from ..progress import report_progress
+from .block_arnoldi import Marked, Reach, ShiftedDisc, SpectrumError
+
+
+@dataclass(frozen=True)
+class SliceSizes:
+    """Sizes and tolerances of slices, with their reasons."""
+
+    own: int = 60
+    """Eigenvalues of a slice. More cost more orthogonalisation, fewer cost more factors."""
+    block: int = 6
+    """Vectors that are solved for at a time: each takes half of the time of one by itself."""
+    beyond: float = 1.1
+    """Radius of a disc in units of half its slice: what two neighbours both have."""
+    accuracy: float = 1e-6
+    """Error of an eigenvalue, in mean distances of eigenvalues, to first order; it enters as its square where vectors
+    are nearly orthogonal."""
+    oblique: float = 0.1
+    """|y^H x| below which a real eigenvalue may belong to a pair that is about to coalesce: its error is large, and it
+    is found again from the plane of both."""
+    complete: float = 1e-3
+    """Error of the trace, in mean distances of eigenvalues, as of all errors together."""
+    largest: int = 12
+    """Vectors of a space at the most, in units of `own`."""
+
+
+SIZES = SliceSizes()
+
+
+@dataclass(frozen=True, eq=False)
+class AllEigenvalues:
+    """All eigenvalues of a matrix, and vectors of those that matter.
+
+    Attributes
+    ----------
+    values : ndarray of complex, shape (n,)
+        Sorted by real part, then imaginary part.
+    marked : Marked
+        Those with a positive imaginary part, those that are real and negative, and real ones that are oblique.
+    """
+
+    values: Complexes
+    marked: Marked
+
+
+@dataclass(frozen=True, eq=False)
+class SpectrumSlice:
+    """Eigenvalues of a disc, those with vectors among them.
+
+    Attributes
+    ----------
+    shift, radius : float
+    values : ndarray of complex, shape (k,)
+    vectors : Marked
+    """
+
+    shift: float
+    radius: float
+    values: Complexes
+    vectors: Marked
+
+    @classmethod
+    def empty(cls, shift: float, size: int) -> "SpectrumSlice":
+        """A slice of which nothing was found."""
+        nothing = np.zeros((size, 0), complex)
+        return cls(shift, 0.0, np.zeros(0, complex), Marked(np.zeros(0, complex), nothing, nothing))
+
+    def between(self, low: float, high: float) -> Complexes:
+        """Those with a real part in [low, high)."""
+        return self.values[(self.values.real >= low) & (self.values.real < high)]
+
+
+def all_eigenvalues(matrix: csr_array, sizes: SliceSizes = SIZES) -> AllEigenvalues:
+    """All eigenvalues of a sparse matrix that is nearly symmetric.
+
+    Parameters
+    ----------
+    matrix : scipy.sparse.csr_array, shape (n, n)
+        A, such as M^(-1/2) K M^(-1/2) of the coordinates that feel a force; its pattern is symmetric.
+    sizes : SliceSizes
+        Sizes and tolerances.
+
+    Returns
+    -------
+    AllEigenvalues
+
+    Raises
+    ------
+    SpectrumError
+        If not all are found.
+    """
+    spectrum = _SlicedSpectrum.of(matrix, sizes)
+    slices = []
+    first = 3 * sizes.own
+    for k in range(len(spectrum.borders) - 1):
+        report_progress(f"slice {k + 1} of {len(spectrum.borders) - 1} of the spectrum")
+        try:
+            found, first = spectrum.slice(k, first)
+        except SpectrumError:
+            found = SpectrumSlice.empty(float(spectrum.borders[k : k + 2].mean()), matrix.shape[0])
+        slices.append(found)
+    for block in (2, 4, 8):
+        if spectrum.what_is_wrong(slices):
+            spectrum.mend(slices, block * sizes.block, first)
+    if wrong := spectrum.what_is_wrong(slices):
+        raise SpectrumError(f"All eigenvalues of {matrix.shape[0]} coordinates: {wrong}.")
+    return spectrum.joined(slices)
+
+
+@dataclass(frozen=True, eq=False)
+class _SlicedSpectrum:
+    """A matrix in an order that keeps its factors sparse, and the borders of its slices."""
+
+    matrix: csc_array
+    order: NDArray[np.int64]
+    borders: Floats
+    numbers: NDArray[np.int64]
+    spacing: float
+    sizes: SliceSizes
+
+    @classmethod
+    def of(cls, matrix: csr_array, sizes: SliceSizes) -> "_SlicedSpectrum":
+        size = matrix.shape[0]
+        symmetric = csc_array(0.5 * (matrix + matrix.T))
+        order = np.argsort(minimum_degree(symmetric))
+        symmetric, ordered = csc_array(symmetric[order][:, order]), csc_array(matrix[order][:, order])
+
+        def count(shifts: Floats) -> list[int]:
+            return [factor_shifted(symmetric, shift)[1] for shift in shifts]
+
+        places, below = _tighten(*count_places(symmetric, count, (0, size), 2 * sizes.own), count)
+        pieces = max(1, round(size / sizes.own))
+        numbers = np.arange(pieces + 1) * size // pieces
+        borders = places_of_numbers(places, below, numbers)
+        return cls(ordered, order, borders, numbers, float(places[-1] - places[0]) / size, sizes)
+
+    def slice(self, number: int, first: int, block: int | None = None) -> tuple[SpectrumSlice, int]:
+        """The eigenvalues of a slice, found with `first` vectors at first, and how many of these it took."""
+        low, high = self.borders[number : number + 2]
+        sizes, again = self.sizes, block is not None
+        most = sizes.largest * sizes.own if block is None else sizes.largest * max(sizes.own, block)
+        accuracy = max(sizes.accuracy * self.spacing, 4 * np.finfo(float).eps * np.abs(self.borders).max())
+        reach = Reach(low, high, sizes.beyond, accuracy, most)
+        shift = float(low + (0.44 if again else 0.5) * (high - low))
+        disc = ShiftedDisc.about(self.matrix, shift, reach, block or sizes.block, first, seed=block or 0)
+        values, overlap = disc.values, disc.overlap
+        chosen = (values.imag != 0) | (values.real < 0) | (overlap < sizes.oblique)
+        # two that nearly coalesce are on the same side of the widest gap
+        ends = [_widest_gap(sign * (values.real - shift), sign * (end - shift), disc.radius)
+                for sign, end in ((-1, low), (1, high))]  # fmt: skip
+        chosen &= (values.real > shift - ends[0]) & (values.real < shift + ends[1])
+        if not chosen.any():
+            nothing = np.zeros((len(self.order), 0), complex)
+            return SpectrumSlice(shift, disc.radius, values, Marked(values[:0], nothing, nothing)), disc.enough(reach)
+        marked = disc.marked(chosen, accuracy)
+        return SpectrumSlice(shift, disc.radius, np.concatenate([values[~chosen], marked.values]), marked), disc.enough(
+            reach
+        )
+
+    def mend(self, slices: list[SpectrumSlice], block: int, first: int) -> None:
+        """Find suspects again, with larger blocks from other shifts, until nothing is wrong."""
+        for k in self.suspects(slices):
+            try:
+                slices[k], _ = self.slice(k, first, block)
+            except SpectrumError:
+                continue
+            if not self.what_is_wrong(slices):
+                return
+
+    def ends(self, slices: list[SpectrumSlice]) -> Floats:
+        """Real parts up to which each slice has its own, as far as possible from all eigenvalues."""
+        inner = []
+        for one, other, border in zip(slices[:-1], slices[1:], self.borders[1:-1], strict=True):
+            room = max(0.0, 0.5 * min(one.shift + one.radius - border, border - other.shift + other.radius))
+            real = np.concatenate([one.values.real, other.values.real])
+            near = np.sort(np.concatenate([real[np.abs(real - border) < room], [border - room, border + room]]))
+            k = int(np.argmax(np.diff(near)))
+            inner.append(0.5 * (near[k] + near[k + 1]))
+        return np.array([-np.inf, *inner, np.inf])
+
+    def values(self, slices: list[SpectrumSlice]) -> list[Complexes]:
+        """Of each slice its own."""
+        ends = self.ends(slices)
+        return [part.between(*pair) for part, *pair in zip(slices, ends[:-1], ends[1:], strict=True)]
+
+    def what_is_wrong(self, slices: list[SpectrumSlice]) -> str:
+        """Why these are not all eigenvalues; an empty string if they are."""
+        values, size = np.concatenate(self.values(slices)), self.matrix.shape[0]
+        if len(values) != size:
+            return f"{len(values)} were found"
+        trace, square = self.matrix.diagonal().sum(), (self.matrix @ self.matrix).diagonal().sum()
+        allowed, largest = self.sizes.complete * self.spacing, np.abs(values).max(initial=0.0)
+        if abs(values.sum() - trace) > allowed:
+            return f"their sum is off the trace by {abs(values.sum() - trace):.3g}"
+        if abs((values**2).sum() - square) > 2 * allowed * largest:
+            return f"the sum of their squares is off the trace of the square by {abs((values**2).sum() - square):.3g}"
+        for one, other in pairwise(slices):
+            if not _agree(one, other, np.sqrt(self.sizes.accuracy) * self.spacing):
+                return f"the slices about {one.shift:.6g} and {other.shift:.6g} disagree"
+        return ""
+
+    def suspects(self, slices: list[SpectrumSlice]) -> NDArray[np.int64]:
+        """The slices, those first that have the fewest eigenvalues beside the symmetric part."""
+        return np.argsort([len(own) for own in self.values(slices)] - np.diff(self.numbers), kind="stable")
+
+    def joined(self, slices: list[SpectrumSlice]) -> AllEigenvalues:
+        """All eigenvalues, and vectors in the given order of coordinates."""
+        ends = self.ends(slices)
+        values = np.concatenate(self.values(slices))
+        parts: list[Marked] = []
+        for part, low, high in zip(slices, ends[:-1], ends[1:], strict=True):
+            known = part.vectors
+            own = (known.values.real >= low) & (known.values.real < high) & (known.values.imag >= 0)
+            parts.append(Marked(known.values[own], known.right[:, own], known.left[:, own]))
+        right, left = (np.concatenate([getattr(part, side) for part in parts], axis=1) for side in ("right", "left"))
+        place = np.argsort(self.order)
+        marked = Marked(np.concatenate([part.values for part in parts]), right[place], left[place])
+        return AllEigenvalues(values[np.lexsort((values.imag, values.real))], marked)
+
+
+def _widest_gap(distance: Floats, near: float, far: float) -> float:
+    """The middle of the widest gap between distances from a shift, in the outer half of two of them."""
+    near += 0.5 * (far - near)  # what is nearer may be the slice's own
+    inside = np.sort(np.concatenate([distance[(distance > near) & (distance < far)], [near, far]]))
+    k = int(np.argmax(np.diff(inside)))
+    return float(0.5 * (inside[k] + inside[k + 1]))
+
+
+def _agree(one: SpectrumSlice, other: SpectrumSlice, close: float) -> bool:
+    """Whether two slices have the same eigenvalues where both should have all."""
+    for a, b in ((one, other), (other, one)):
+        distance = np.abs(a.values - b.shift)
+        both = a.values[(distance < 0.99 * b.radius) & (np.abs(a.values - a.shift) < 0.99 * a.radius)]
+        if len(both) and (len(b.values) == 0 or np.abs(both[:, None] - b.values).min(axis=1).max() > close):
+            return False
+    return True
+
+
+def _tighten(
+    places: Floats, numbers: NDArray[np.int64], count: Callable[[Floats], list[int]]
+) -> tuple[Floats, NDArray[np.int64]]:
+    """The lowest and the highest place moved next to the first and to the last eigenvalue."""
+    places = places.copy()
+    for _ in range(8):
+        middle = 0.5 * (places[[0, -2]] + places[[1, -1]])
+        low, high = count(middle)
+        if low == 0 and len(places) > 2:
+            places[0] = middle[0]
+        if high == numbers[-1] and len(places) > 2:
+            places[-1] = middle[1]
+    return places, numbers

@@ -1,0 +1,158 @@
+"""All eigenvalues in slices, with vectors, against spectra that are known and against LAPACK; what is missing is told.
+
+Matrices have small slices here, so that some ten of them are enough for a test.
+"""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from known_spectra import complex_block, turned
+from scipy.linalg import eig
+from scipy.optimize import linear_sum_assignment
+
+from faultgouge.analysis import spectrum
+from faultgouge.analysis.motion import spectrum as spectrum_module
+from faultgouge.analysis.motion.all_eigenvalues import SliceSizes, all_eigenvalues
+from faultgouge.analysis.motion.block_arnoldi import ShiftedDisc, SpectrumError
+
+SMALL = SliceSizes(own=24, block=4)
+
+
+def nearest(one, other):
+    """How far eigenvalues are from those of another list, each from one of its own."""
+    distance = np.abs(one[:, None] - other)
+    rows, columns = linear_sum_assignment(distance)
+    return distance[rows, columns]
+
+
+@pytest.mark.slow
+@settings(max_examples=3, deadline=None)
+@given(st.integers(0, 10_000))
+def test_known_spectra(seed):
+    """Real ones, clusters, negative ones, pairs next to the axis and away from it, and pairs about to coalesce."""
+    rng = np.random.default_rng(seed)
+    real = [np.array([[value]]) for value in rng.uniform(0, 100, 120)]
+    cluster = [np.array([[value]]) for value in 40 + 1e-7 * np.arange(3)]
+    negative = [np.array([[value]]) for value in (-3.0, -0.01)]
+    pairs = [complex_block(rng.uniform(5, 95), 10.0 ** rng.uniform(-6, 0.5)) for _ in range(15)]
+    # eigenvalues a +- 1e-3 and a +- 1e-3 i, of condition 500
+    oblique = [np.array([[a, 1.0], [e, a]]) for a in rng.uniform(5, 95, 3) for e in (1e-6, -1e-6)]
+    blocks = [*real, *cluster, *negative, *pairs, *oblique]
+    expected = np.concatenate([np.linalg.eigvals(each) for each in blocks])
+    found = all_eigenvalues(turned(blocks, rng), SMALL)
+    assert len(found.values) == len(expected)
+    # 1e-6 of a mean distance, 0.6, at the edge of a disc; what is next to the shift has all digits
+    assert nearest(found.values, expected).max() < 1e-6
+    marked = found.marked
+    assert np.count_nonzero(marked.values.imag > 0) == 15 + 3
+    # rounding of a norm of 800, times 500
+    assert nearest(marked.values, expected).max() < 1e-10
+    assert np.sort(marked.values[(marked.values.imag == 0) & (marked.values.real < 0)].real) == pytest.approx(
+        np.array([-3.0, -0.01]), abs=1e-11
+    )
+
+
+@pytest.mark.slow
+def test_vectors_are_those_of_lapack():
+    rng = np.random.default_rng(1)
+    blocks = [complex_block(a, 0.1 + b) for a, b in rng.uniform(1, 60, (60, 2)) / [1, 30]]
+    blocks += [np.array([[a, 1.0], [-1e-4, a + 1e-3]]) for a in rng.uniform(1, 60, 4)]
+    matrix = turned(blocks, rng)
+    values, left, right = eig(matrix.toarray(), left=True)
+    marked = all_eigenvalues(matrix, SMALL).marked
+    assert len(marked.values) == 64
+    for k, value in enumerate(marked.values):
+        same = np.argmin(np.abs(values - value))
+        # of condition 50; the planes have converged to 1e-6 on the left, and vectors within them exactly
+        assert abs(right[:, same].conj() @ marked.right[:, k]) == pytest.approx(1, abs=1e-6)
+        assert abs(left[:, same].conj() @ marked.left[:, k]) == pytest.approx(1, abs=1e-6)
+        assert marked.overlap[k] == pytest.approx(abs(left[:, same].conj() @ right[:, same]), rel=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("copies", [5, 20])
+def test_more_equal_eigenvalues_than_a_block_has_vectors(copies):
+    """As of spheres that spin without a force. A slice that lacks some is found again with larger blocks."""
+    rng = np.random.default_rng(copies)
+    real = np.concatenate([np.zeros(copies), np.full(copies, 7.0), rng.uniform(1, 50, 300)])
+    found = all_eigenvalues(turned([np.array([[value]]) for value in real], rng), SMALL)
+    np.testing.assert_allclose(found.values.real, np.sort(real), rtol=0, atol=1e-6)
+
+
+@pytest.fixture
+def losing(monkeypatch):
+    """Discs that lose an eigenvalue, so many of them."""
+
+    def lose(times):
+        about, left = ShiftedDisc.about.__func__, [times]
+
+        def about_without(cls, *arguments, **named):
+            disc = about(cls, *arguments, **named)
+            if left[0] == 0 or np.count_nonzero(disc.values.imag == 0) == 0:
+                return disc
+            left[0] -= 1
+            kept = np.arange(len(disc.values)) != np.flatnonzero(disc.values.imag == 0)[0]
+            changed = {name: getattr(disc, name) for name in disc.__dataclass_fields__}
+            return cls(**changed | {"values": disc.values[kept], "overlap": disc.overlap[kept]})
+
+        monkeypatch.setattr(ShiftedDisc, "about", classmethod(about_without))
+
+    return lose
+
+
+def test_a_missing_eigenvalue_is_found_again(losing):
+    rng = np.random.default_rng(3)
+    real = rng.uniform(1, 50, 150)
+    losing(1)
+    found = all_eigenvalues(turned([np.array([[value]]) for value in real], rng), SMALL)
+    np.testing.assert_allclose(found.values.real, np.sort(real), rtol=0, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_missing_eigenvalues_are_told(losing):
+    rng = np.random.default_rng(3)
+    losing(-1)
+    with pytest.raises(SpectrumError, match=r"All eigenvalues of 150 coordinates: 14\d were found"):
+        all_eigenvalues(turned([np.array([[value]]) for value in rng.uniform(1, 50, 150)], rng), SMALL)
+
+
+@pytest.fixture
+def from_zero(monkeypatch):
+    """`spectrum` in slices of any packing."""
+    monkeypatch.setattr(spectrum_module, "SLICED", 0)
+    monkeypatch.setattr(spectrum_module, "all_eigenvalues", lambda matrix: all_eigenvalues(matrix, SMALL))
+
+
+def same_spectrum(found, expected):
+    """Eigenvalues, pairs and what is known of them."""
+    spacing = np.ptp(expected.eigenvalues.real) / len(expected.eigenvalues)
+    assert nearest(found.eigenvalues, expected.eigenvalues).max() < 1e-6 * spacing
+    assert found.noise_pairs == expected.noise_pairs
+    assert len(found.pairs) == len(expected.pairs) > 0
+    for one, other in zip(found.pairs, expected.pairs, strict=True):
+        # the safety factor allows for the rounding of both
+        assert abs(one.eigenvalue - other.eigenvalue) * other.overlap < 50 * expected.rounding
+        assert abs(one.eigenvalue - other.eigenvalue) < 1e-12 * abs(other.eigenvalue) / other.overlap
+        assert one.overlap == pytest.approx(other.overlap, rel=1e-4)
+        assert one.participation == pytest.approx(other.participation, rel=1e-6)
+        assert one.rotation == pytest.approx(other.rotation, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_spectrum_of_a_packing(request):
+    """Beyond its onset the reference packing has complex pairs."""
+    packing = request.getfixturevalue("path")(0.022)
+    expected = spectrum(packing)
+    request.getfixturevalue("from_zero")
+    same_spectrum(spectrum(packing), expected)
+
+
+@pytest.mark.slow
+def test_spectrum_where_slices_fail(request, losing):
+    """LAPACK then serves."""
+    packing = request.getfixturevalue("path")(0.022)
+    expected = spectrum(packing)
+    request.getfixturevalue("from_zero")
+    losing(-1)
+    assert np.array_equal(spectrum(packing).eigenvalues, expected.eigenvalues)
