@@ -32,7 +32,7 @@ from .motion.spectrum import (
     spectrum,
 )
 from .motion.stability import Stability, stability
-from .motion.stable_timestep import stable_timestep
+from .motion.stable_timestep import rayleigh_timestep, stable_timestep
 from .motion.transient import NoGainError, TransientGain, transient_gain
 from .onset import Onset, OnsetError, Window, complex_windows, find_onset
 from .operators.damping import damping_matrix, largest_damping_rate
@@ -98,6 +98,7 @@ __all__ = [
     "negative_eigenvalues",
     "normal_modes",
     "one_sided_motion",
+    "rayleigh_timestep",
     "read_dump",
     "read_packing",
     "solid_fraction",

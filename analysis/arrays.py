@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array, issparse
 
 from .errors import BadInputError
 
@@ -30,6 +31,10 @@ def same_bits(one: Any, other: Any) -> bool:
         a, b = getattr(one, name), getattr(other, name)
         if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
             same = a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes()
+        elif issparse(a) and issparse(b):
+            same = a.shape == b.shape and all(
+                np.array_equal(getattr(a, each), getattr(b, each)) for each in ("indptr", "indices", "data")
+            )
         else:
             same = bool((a is None) == (b is None) and a == b)
         if not same:
@@ -102,6 +107,19 @@ def floats(name: str, value: ArrayLike, shape: Iterable[int]) -> Floats:
     if not np.isfinite(array).all():
         raise ValueError(f"{name} holds a value that is not finite.")
     return array
+
+
+def square(name: str, value: csr_array, size: int) -> csr_array:
+    """A copy as a sparse matrix, read-only; a ValueError if it has another shape, or an entry that is not finite."""
+    matrix = csr_array(value, dtype=np.float64, copy=True)
+    matrix.sum_duplicates()
+    if matrix.shape != (size, size):
+        raise ValueError(f"{name} has shape {matrix.shape}; {(size, size)} is needed.")
+    if not np.isfinite(matrix.data).all():
+        raise ValueError(f"{name} holds a value that is not finite.")
+    for each in (matrix.data, matrix.indices, matrix.indptr):
+        frozen(each)
+    return matrix
 
 
 def integers(name: str, value: ArrayLike) -> Indices:

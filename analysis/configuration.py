@@ -12,14 +12,23 @@ have three components; those of disks lie in the plane, and disks turn about z.
 \delta` differs between a growing and a falling overlap; every operator takes the weight of opening contacts
 (:mod:`~faultgouge.analysis.packing.law`). A contact at Coulomb's bound sticks if the motion reverses, and slides if the
 motion continues: `sliding` chooses.
+
+**Operators that are given.** A Configuration whose `stiffness` is given has K and C as they were measured, by
+differences of forces, and its contacts have places and forces alone, as far as these are known: their derivatives are
+zero, and Coulomb's bound is infinite, since nothing is known of either.
+
+**Bodies.** Coordinates that move as one, such as the particles of a rigid lid, are q = P Q with the `constraint` P.
+The operators are those of Q: P_1^T K P, and C likewise, where P_1 is 1 where P is not 0. Column k of P has what Q_k
+moves, and the coordinate k itself by 1. The mass of Q_k is the sum of masses times P.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array
 
 from .arrays import (
     Floats,
@@ -33,6 +42,7 @@ from .arrays import (
     positive_each,
     same_bits,
     set_frozen,
+    square,
 )
 
 WALL = -1
@@ -219,6 +229,15 @@ class Configuration:
         The particles of a driven layer, on each of which fx acts; none by default.
     drag_rate : float
         1/tau of the drag -(m/tau) v and -(I/tau) omega on every particle, 1 / time; none by default.
+    stiffness, damping : scipy.sparse.csr_array, shape (coordinates, coordinates), optional
+        K, force / length, and C, force time / length, in place of the derivatives of contacts; both or none.
+    operator_error : float
+        Error of K and C, as a share of the largest entry.
+    jump : array_like, shape (N,), optional
+        Difference of the one-sided derivatives of the force on each particle, of which K and C have the mean, as a
+        share of the largest entry; zero by default.
+    constraint : scipy.sparse.csr_array, shape (coordinates, coordinates), optional
+        P of q = P Q; the identity by default, and only where `stiffness` is given.
 
     Raises
     ------
@@ -243,6 +262,11 @@ class Configuration:
     load_error: float
     top: NDArray[np.bool_]
     drag_rate: float
+    stiffness: csr_array | None
+    damping: csr_array | None
+    operator_error: float
+    jump: Floats
+    constraint: csr_array | None
 
     def __init__(
         self,
@@ -264,11 +288,20 @@ class Configuration:
         load_error: float = 0.0,
         top: ArrayLike | None = None,
         drag_rate: float = 0.0,
+        stiffness: csr_array | None = None,
+        damping: csr_array | None = None,
+        operator_error: float = 0.0,
+        jump: ArrayLike | None = None,
+        constraint: csr_array | None = None,
     ) -> None:
         n = len(np.atleast_1d(np.asarray(radius)))
         if dimension not in (2, 3) or n == 0:
             raise ValueError(f"A configuration has particles in two or three dimensions, not {n} in {dimension}.")
+        if (stiffness is None) != (damping is None) or (stiffness is None and constraint is not None):
+            raise ValueError("stiffness and damping are given together, and a constraint with them.")
         sizes = {"radius": radius, "mass": mass, "inertia": inertia}
+        size = n * (3 if dimension == 2 else 6)
+        matrices = {"stiffness": stiffness, "damping": damping, "constraint": constraint}
         set_frozen(
             self,
             dimension=int(dimension),
@@ -286,6 +319,9 @@ class Configuration:
             load_error=number("load_error", load_error),
             top=booleans("top", np.zeros(n, bool) if top is None else top, n),
             drag_rate=number("drag_rate", drag_rate),
+            operator_error=number("operator_error", operator_error),
+            jump=floats("jump", np.zeros(n) if jump is None else jump, (n,)),
+            **{name: None if each is None else square(name, each, size) for name, each in matrices.items()},
         )
         if len(contacts) and max(contacts.i.max(), contacts.j.max()) >= n:
             raise ValueError(f"A contact names a particle beyond the last one, {n - 1}.")
@@ -305,10 +341,25 @@ class Configuration:
         count, walls = len(self.contacts), int(self.contacts.wall.sum())
         bound = int(self.contacts.at_bound.sum())
         slide = ", which slide" if self.contacts.sliding.any() else ", which stick" if bound else ""
+        state = f"{walls} with walls, {bound} at Coulomb's bound{slide}"
+        if self.stiffness is not None:
+            count_one_sided = len(self.one_sided_particles)
+            sided = f", forces on {count_one_sided} particles one-sided" if count_one_sided else ""
+            state = f"{walls} known with walls, K and C by differences of forces to {self.operator_error:.1g}{sided}"
         return (
-            f"<Configuration: {len(self)} {what}, {count - walls} contacts between them and {walls} with walls, "
-            f"{bound} at Coulomb's bound{slide}, {len(self.rattlers)} rattlers, residual {self.residual:.3g}>"
+            f"<Configuration: {len(self)} {what}, {count - walls} contacts between them and {state}, "
+            f"{len(self.rattlers)} rattlers, residual {self.residual:.3g}>"
         )
+
+    @property
+    def operators(self) -> Literal["laws", "differences"]:
+        """Whether K and C come from the laws of contacts, or are given, as differences of forces."""
+        return "laws" if self.stiffness is None else "differences"
+
+    @property
+    def one_sided_particles(self) -> Indices:
+        """Indices of the particles whose forces have other derivatives forwards than backwards, where K is given."""
+        return np.flatnonzero(self.jump)
 
     @property
     def axes(self) -> int:
@@ -324,7 +375,11 @@ class Configuration:
     def coordinate_mass(self) -> Floats:
         """Masses of the coordinates, m of translations and I/R^2 of rotations, shape (axes N,)."""
         turning = self.inertia / self.radius**2
-        return np.concatenate([self.mass] * self.dimension + [turning] * (self.axes - self.dimension))
+        mass = np.concatenate([self.mass] * self.dimension + [turning] * (self.axes - self.dimension))
+        if self.constraint is None:
+            return mass
+        moved = self.constraint.T @ mass
+        return np.where(moved > 0, moved, mass)  # what leads nothing has no rows
 
     @property
     def configuration(self) -> "Configuration":
@@ -334,6 +389,8 @@ class Configuration:
     @property
     def damped(self) -> bool:
         """Whether there are dashpots or drag."""
+        if self.damping is not None:
+            return bool(self.damping.nnz)
         dashpots = self.contacts.normal_dashpot.any() or self.contacts.tangential_dashpot.any()
         return bool(dashpots or self.drag_rate > 0)
 
@@ -350,8 +407,12 @@ class Configuration:
 
     @cached_property
     def rattlers(self) -> Indices:
-        """Indices of the particles that touch nothing."""
-        return frozen(np.setdiff1d(np.arange(len(self)), [self.contacts.i, self.contacts.j]))
+        """Indices of the particles that touch nothing; where K is given, of those that move and feel nothing."""
+        if self.stiffness is None:
+            return frozen(np.setdiff1d(np.arange(len(self)), [self.contacts.i, self.contacts.j]))
+        feels = (np.diff(self.stiffness.indptr) > 0).astype(np.float64)
+        feels = feels if self.constraint is None else self.constraint @ feels
+        return frozen(np.flatnonzero(self.free & ~feels.reshape(self.axes, -1).any(axis=0)))
 
     @cached_property
     def net_force(self) -> Floats:
@@ -371,10 +432,19 @@ class Configuration:
     @property
     def residual(self) -> float:
         """Largest |(F, T/R)| on a particle that moves and has a contact, force; zero if none has."""
+        return float(self.particle_residual.max(initial=0.0))
+
+    @property
+    def particle_residual(self) -> Floats:
+        """|(F, T/R)| on each particle, force, shape (N,); zero if it does not move, or has no contact."""
         force = self.net_force.copy()
         force[:, 1] /= self.radius[:, None]
+        if self.constraint is not None:
+            forces = (self.constraint != 0).T @ self.join_vectors(force[:, 0], force[:, 1])
+            force = np.stack(self._apart(forces), axis=1)
         size = np.where(self.free, np.sqrt(np.sum(force * force, axis=(1, 2))), 0.0)
-        return float(np.delete(size, self.rattlers).max(initial=0.0))
+        size[self.rattlers] = 0.0
+        return size
 
     @property
     def contact_states(self) -> bytes:
@@ -384,19 +454,27 @@ class Configuration:
         return np.array([c.i, c.j, c.sliding], dtype=np.int64)[:, order].tobytes()
 
     def loaded(self, least: float) -> "Configuration":
-        """The configuration without the contacts that carry no more than a given normal force."""
+        """The configuration without the contacts that carry no more than a given normal force; as it is where K is
+        given, in which all contacts have a share."""
         kept = self.contacts.normal_force > least
-        return self if np.all(kept) else derive_frozen(self, contacts=self.contacts.chosen(kept))
+        return (
+            self
+            if np.all(kept) or self.stiffness is not None
+            else derive_frozen(self, contacts=self.contacts.chosen(kept))
+        )
 
     def vectors(self, coordinates: NDArray) -> tuple[NDArray, NDArray]:
         """Translations and rotations R theta, shape (N, 3) each, of values of the coordinates, shape (axes N,)."""
+        return self._apart(coordinates if self.constraint is None else self.constraint @ coordinates)
+
+    def _apart(self, coordinates: NDArray) -> tuple[NDArray, NDArray]:
         d, parts = self.dimension, coordinates.reshape(self.axes, -1)
         translation, rotation = np.zeros((2, len(self), 3), dtype=parts.dtype)
         translation[:, :d], rotation[:, d - self.axes :] = parts[:d].T, parts[d:].T
         return translation, rotation
 
     def join_vectors(self, translation: NDArray, rotation: NDArray) -> NDArray:
-        """The reverse of `vectors`."""
+        """The reverse of `vectors`; of coordinates that move as one the leading one counts."""
         d = self.dimension
         return np.concatenate([translation[:, :d].T.ravel(), rotation[:, d - self.axes :].T.ravel()])
 

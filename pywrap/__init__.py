@@ -17,6 +17,7 @@ from .granular.compare_motion import MotionComparison, compare_motion
 from .granular.from_lammps import from_lammps
 from .granular.granular_commands import SnapshotError
 from .granular.lammps_equilibrium_path import LammpsPath, lammps_path
+from .granular.relax import relax
 from .lammps.engine import Engine
 from .lammps.instance import EngineError
 from .runs.equilibrium_path import ramp, reach
@@ -45,5 +46,6 @@ __all__ = [
     "perturb",
     "ramp",
     "reach",
+    "relax",
     "settle",
 ]

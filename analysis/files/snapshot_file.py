@@ -7,12 +7,15 @@ The file is sealed like every run.h5 (:mod:`.checksummed_file`), and is H5MD 1.1
     /particles/particles/box          dimension 3; lengths of the edges, and which are periodic
     /snapshot/<name>                  fields of :class:`~faultgouge.analysis.Configuration`
     /snapshot/contacts/<name>         fields of :class:`~faultgouge.analysis.LinearisedContacts`
+    /snapshot/<matrix>/<part>         stiffness, damping and constraint, where these are given: data, indices, indptr
 """
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from ..configuration import PER_CONTACT, Configuration, LinearisedContacts
 from ..errors import PackingFileError
@@ -22,10 +25,18 @@ from .plain_file import check_plain
 from .runfile_header import CHECKSUM, CREATOR, program_version
 from .runfile_validation import check_places, dataset
 
-SCALARS = ("dimension", "fx", "load_error", "drag_rate")
-ARRAYS = ("position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind", "top")
-LATER = ("slider", "viscous_slider", "top", "drag_rate")
+if TYPE_CHECKING:
+    import h5py
+
+SCALARS = ("dimension", "fx", "load_error", "drag_rate", "operator_error")
+ARRAYS = (
+    "position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind", "top", "jump",
+)  # fmt: skip
+LATER = ("slider", "viscous_slider", "top", "drag_rate", "operator_error", "jump")
 """Fields that files of version 1 do not have."""
+
+MATRICES = ("stiffness", "damping", "constraint")
+PARTS = ("data", "indices", "indptr")
 
 
 def write_snapshot(
@@ -66,11 +77,11 @@ def write_snapshot(
             group.attrs[name] = getattr(snapshot, name)
         for name in ARRAYS:
             group.create_dataset(name, data=getattr(snapshot, name))
-        for name in PER_CONTACT:
-            values = getattr(snapshot.contacts, name)
-            group.create_dataset(
-                f"contacts/{name}", data=values, **(CHECKSUM if len(values) else {}), chunks=len(values) > 0 or None
-            )
+        contacts = {f"contacts/{name}": getattr(snapshot.contacts, name) for name in PER_CONTACT}
+        given = {name: matrix for name in MATRICES if (matrix := getattr(snapshot, name)) is not None}
+        parts = {f"{name}/{each}": getattr(matrix, each) for name, matrix in given.items() for each in PARTS}
+        for name, values in (contacts | parts).items():
+            group.create_dataset(name, data=values, **(CHECKSUM if len(values) else {}), chunks=len(values) > 0 or None)
         for name, said in (attributes or {}).items():
             file.attrs[name] = said
         write(path, file)
@@ -110,7 +121,16 @@ def read_snapshot(path: Path) -> Configuration:
             arrays = {name: dataset(group, name, size)[()] for name in ARRAYS if name in group or name not in LATER}
             stored = [name for name in SCALARS if name in group.attrs or name not in LATER]
             numbers = {name: group.attrs[name].item() for name in stored}
-            return Configuration(contacts=contacts, **arrays, **numbers)
+            matrices = {name: _matrix(group[name], size) for name in MATRICES if name in group}
+            return Configuration(contacts=contacts, **arrays, **numbers, **matrices)
         except Exception as error:  # h5py raises nearly every exception there is, depending on what is damaged
             said = (str(error).strip() or type(error).__name__).rstrip(".")
             raise PackingFileError(f"{path} holds no snapshot that can be read: {said}.") from error
+
+
+def _matrix(group: "h5py.Group", size: int) -> csr_array:
+    """A square sparse matrix; an error if it is none."""
+    data, indices, indptr = (dataset(group, name, size)[()] for name in PARTS)
+    matrix = csr_array((data, indices, indptr), shape=(len(indptr) - 1,) * 2)
+    matrix.check_format()
+    return matrix

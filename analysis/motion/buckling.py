@@ -19,7 +19,7 @@ from ..configuration import Configuration
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
 from ..packing.packing import Floats, Packing
 from .eigenpairs import eigenpairs
-from .eigenvalues import SAFETY, is_negative, unit_rounding, zero_uncertainty
+from .eigenvalues import SAFETY, is_negative, operator_rounding, zero_uncertainty
 from .spectrum import DENSE, dynamical_matrix, spectrum
 
 SPREAD = 4.0
@@ -45,7 +45,7 @@ def negative_eigenvalues(packing: Packing | Configuration) -> Floats:
         The most negative first, 1 / time^2. Empty if the packing does not buckle. Complex pairs are not included.
     """
     matrix, _ = dynamical_matrix(packing)
-    size, rounding = matrix.shape[0], unit_rounding(matrix.data)
+    size, rounding = matrix.shape[0], operator_rounding(packing, matrix.data)
     symmetric = csc_array(0.5 * (matrix + matrix.T))
     bound = uncertainty = zero_uncertainty(packing, rounding)
     if _is_positive(symmetric, bound):

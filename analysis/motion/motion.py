@@ -36,7 +36,7 @@ from .eigenvalues import (
     growing,
     growing_undamped,
     mass_weighted,
-    unit_rounding,
+    operator_rounding,
     zero_uncertainty,
 )
 from .state_space import StateSpace
@@ -140,7 +140,7 @@ class Motion:
     def _undamped_rates(self) -> Rates:
         values, left, right = all_modes(self.stiffness)
         overlap = np.abs(np.sum(left.conj() * right, axis=0))
-        rounding = unit_rounding(self.stiffness.data)
+        rounding = operator_rounding(self.configuration, self.stiffness.data)
         zero = zero_uncertainty(self.configuration, rounding)
         oscillates, buckles = growing_undamped(values, overlap, rounding, zero)
         grows, kept = oscillates | buckles, values.imag >= 0
@@ -153,7 +153,7 @@ class Motion:
 
     def _damped_rates(self) -> Rates:
         z = self.first_order.matrix
-        values, rounding = eigvals(z, check_finite=False), unit_rounding(z)
+        values, rounding = eigvals(z, check_finite=False), operator_rounding(self.configuration, z)
         largest = np.abs(values).max()
         grows = values.real > np.sqrt(SAFETY * rounding * largest)  # no double eigenvalue is as uncertain
         if np.any(~grows & (values.real > 0) & (np.abs(values) > FREE * largest)):

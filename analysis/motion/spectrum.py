@@ -56,7 +56,7 @@ from .eigenvalues import (
     exceeds_rounding,
     is_negative,
     mass_weighted,
-    unit_rounding,
+    operator_rounding,
     zero_uncertainty,
 )
 from .motion import Motion, Rates
@@ -338,7 +338,7 @@ def spectrum(packing: Packing | Configuration, form: Form = "consistent") -> Spe
     Spectrum
     """
     matrix, active = dynamical_matrix(packing, form)
-    rounding = unit_rounding(matrix.data)
+    rounding = operator_rounding(packing, matrix.data)
     uncertainty = zero_uncertainty(packing, rounding)
     values, marked = _values_and_vectors(matrix, uncertainty)
     overlap = marked.overlap

@@ -79,13 +79,13 @@ class Stability:
     sticking, sliding : LinearNeighbour
         If all contacts at the bound stuck, and if all slid on; no bounds of what they do.
     asymmetry : dict
-        Shares of what makes K asymmetric: tangential_force, lever_arm, overlap.
+        Shares of what makes K asymmetric: tangential_force, lever_arm, overlap; empty where K is given.
     dissipative : bool
         Whether there are dashpots or drag.
     free : int
         Motions that no force opposes.
     contacts : int
-        Number of contacts.
+        Number of contacts; where K is given, and walls hand out no contacts, of particles that feel something.
     reasons : tuple of str
         Why the verdict is unknown.
     """
@@ -238,11 +238,14 @@ def stability(
             grows = one_sided["grows"]
     if direction is not None and not why:
         rising = follow_load(OneSidedSystem.of(configuration, STEP), direction, time)
+    given = configuration.stiffness is not None  # and contacts, as far as they are known, have no derivatives
+    shares = {} if given else asymmetry(configuration)
+    touching = max(len(contacts), len(configuration) - len(configuration.rattlers)) if given else len(contacts)
     rate = one_sided["growth_rate"] if one_sided is not None and one_sided["grows"] else sticking.growth_rate
     return Stability(
-        stable=None if why or not len(contacts) else not grows, growth_rate=rate, undamped=undamped,
+        stable=None if why or not touching else not grows, growth_rate=rate, undamped=undamped,
         at_bound=int(contacts.at_bound.sum()), one_sided=one_sided, rising=rising, sticking=sticking, sliding=sliding,
-        asymmetry=asymmetry(configuration), dissipative=damped, free=free, contacts=len(contacts),
+        asymmetry=shares, dissipative=damped, free=free, contacts=touching,
         reasons=tuple(why),
     )  # fmt: skip
 
@@ -251,6 +254,13 @@ def _what_is_wrong(configuration: Configuration, found: Spectrum) -> Iterator[st
     """Why no verdict is possible."""
     if not np.all(np.isfinite(found.eigenvalues)):
         yield "numbers of the operator overflow"
+    sided = configuration.one_sided_particles
+    if len(sided):
+        named = ", ".join(map(str, configuration.ids[sided[:5]])) + (", ..." if len(sided) > 5 else "")
+        yield (
+            f"the forces on {_number(len(sided), 'particle')} ({named}) have other derivatives forwards than "
+            "backwards, and K by differences of forces is the mean of both"
+        )
     if not in_balance(configuration):
         yield (
             f"the packing moves: the residual force on a particle is {configuration.residual:.3g}, "

@@ -47,6 +47,9 @@ products miss 0.3 % of mu^2, and 150 products miss 0.006 %. Nobody runs so near 
 CHANCE = 1e-3
 """Probability that the fastest motion of many coordinates is beyond the error."""
 
+HERTZ = 1e-3
+"""Deviation of d ln f_n / d ln delta from 3/2 up to which a force is Hertz's."""
+
 LOOKS = 6
 """Steps of the iteration for mu: each squares its error."""
 
@@ -108,6 +111,41 @@ def stable_timestep(
     found = (_of_all_eigenvalues if len(scale) <= FEW else _of_arnoldi)(scale, stiffness, damping)
     # rounding may take the limit below the bound where the two are the same
     return StableTimestep(found, found.error, min(float(found), 2.0 / _largest_mu(scale, stiffness, damping)))
+
+
+def rayleigh_timestep(configuration: Configuration) -> float | None:
+    r"""The time step of Rayleigh's formula, of which a tenth to a third is usual in simulations of grains.
+
+    .. math:: \frac{\pi R \sqrt{\rho/G}}{0.1631\,\nu + 0.8766}
+
+    is the time in which a Rayleigh wave runs half around the smallest sphere (Y. Li, Y. Xu and C. Thornton, Powder
+    Technol. 160, 219, 2005). The formula knows neither overlaps nor the number of contacts.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Spheres with Hertz's force. The shear modulus G is that of :math:`k_n' = 2 E^* \sqrt{R\delta}` of the stiffest
+        contact, with equal materials, :math:`E^* = G/(1 - \nu)`, and Poisson's ratio that of
+        :math:`k_t'/k_n' = 2 (1 - \nu)/(2 - \nu)`, or 0.3 where no ratio from 0 to 0.5 has this.
+
+    Returns
+    -------
+    float or None
+        Time; None of disks, and of contacts that are not Hertz's.
+    """
+    c = configuration.contacts
+    if configuration.dimension == 2 or not len(c) or np.any(c.normal_force <= 0):
+        return None
+    if np.any(np.abs(c.normal_stiffness * c.overlap / c.normal_force - 1.5) > HERTZ):
+        return None
+    first, second = configuration.radius[c.i], np.where(c.wall, np.inf, configuration.radius[c.j])
+    modulus = c.normal_stiffness / (2 * np.sqrt(c.overlap / (1 / first + 1 / second)))
+    stiffest = int(np.argmax(modulus))
+    ratio = c.tangential_stiffness[stiffest] / c.normal_stiffness[stiffest]
+    nu = (2 - 2 * ratio) / (2 - ratio) if 2 / 3 <= ratio <= 1 else 0.3
+    density = configuration.mass / (4 / 3 * np.pi * configuration.radius**3)
+    travel = configuration.radius * np.sqrt(density / (modulus[stiffest] * (1 - nu)))
+    return float(np.pi * travel[configuration.free].min() / (0.1631 * nu + 0.8766))
 
 
 def _largest_mu(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> float:

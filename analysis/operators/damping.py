@@ -49,7 +49,7 @@ def damping_matrix(packing: Packing | Configuration, sliding: ArrayLike = False)
         For a Packing, C is symmetric and positive semidefinite. Without dashpots and drag, C is empty.
     """
     if isinstance(packing, Configuration):
-        return assembled_damping(packing)
+        return assembled_damping(packing) if packing.damping is None else packing.damping.copy()
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry

@@ -101,6 +101,13 @@ def stiffness_matrix(
     if isinstance(packing, Configuration):
         if form == "paper" or coupled is not None:
             raise ValueError("The operator of a Configuration is the consistent one, of all of its contacts.")
+        if packing.stiffness is not None:
+            if np.any(np.asarray(parting) != 0.5) or np.any(sliding):
+                raise ValueError(
+                    "K of this configuration is a difference of forces, the mean of closing and parting, and of both "
+                    "sides of Coulomb's bound: leave parting and sliding out."
+                )
+            return packing.stiffness.copy()
         return assembled_stiffness(packing, parting)
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)

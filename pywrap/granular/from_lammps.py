@@ -24,36 +24,44 @@ mindlin_rescale/force                  3/2    1/2    0              1/2
 and hooke with a mindlin model, or hertz with linear_history, are as their parts; the wall of fix wall/gran
 hooke/history is as linear_history_classic in the release of 22 Jul 2025. A small vibration shakes a contact at
 Coulomb's bound down to elastic, so that it sticks by default.
+
+Whatever has none of these laws (cohesion, rolling and twisting friction, regions, bonds, springs, a lid that moves as
+one) has K and C by differences of LAMMPS's own forces (:mod:`~faultgouge.pywrap.granular.force_differences`).
 """
 
 from collections.abc import Iterable
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array
 
 from ...analysis import Configuration, LinearisedContacts, MindlinLaw
 from ...analysis.arrays import Floats, Indices, derive_frozen
 from ...analysis.configuration import PER_CONTACT, WALL
 from ...analysis.packing.linearise import linearise_contacts
 from .contact_law_measurement import MeasuredLaw, State, measure_law
+from .force_differences import HOLDS, MOVES, Particles, measure_operators
 from .granular_commands import (
     GIVE_LINES,
     INTEGRATORS,
     OWN,
     WALLS,
     Commands,
+    NotLinearisedError,
     SnapshotError,
     check_fixes,
     check_pair,
+    check_rest,
     read_commands,
     without_suffix,
 )
 from .instance_queries import Styles, communicator, log_of, only_log, styles_of
-from .lammps_arrays import Arrays, arrays_at_rest, given_back
+from .lammps_arrays import Arrays, arrays_at_rest, contacts_of_plane, given_back
 from .look_in_a_copy import can_copy, in_a_copy, quieten
+from .mobility import MOBILE, mobility
 
 BALANCE = 1e-4
 """Share of the mean contact force that may be out of balance: then the motion is that of a packing which comes to rest
@@ -71,7 +79,12 @@ KnownLaws = dict[tuple[Any, ...], MeasuredLaw]
 
 
 def from_lammps(
-    lmp: Any, commands: Iterable[str] | None = None, *, slides: bool = False, balance: float = BALANCE
+    lmp: Any,
+    commands: Iterable[str] | None = None,
+    *,
+    slides: bool = False,
+    balance: float = BALANCE,
+    differences: bool = False,
 ) -> Configuration:
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
 
@@ -81,8 +94,8 @@ def from_lammps(
     Parameters
     ----------
     lmp : lammps.lammps
-        The instance: disks or spheres with gran/hooke/history, gran/hertz/history, granular or mindlin/smooth, between
-        planes of fix wall/gran ... contacts or in a periodic box, at rest. On several ranks all of them make this call.
+        The instance: disks or spheres at rest. Laws are measured with gran/hooke/history, gran/hertz/history, granular
+        or mindlin/smooth, between planes of fix wall/gran or in a periodic box. On several ranks all make this call.
     commands : iterable of str, optional
         The lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the deck; by default those in the
         instance's log.
@@ -90,43 +103,204 @@ def from_lammps(
         Whether contacts at Coulomb's bound slide; they stick by default.
     balance : float
         Residual that is allowed, as a share of the mean contact force.
+    differences : bool
+        Whether K and C are found by differences of LAMMPS's forces even where all laws of contacts are measured.
 
     Returns
     -------
     Configuration
+        With its contacts' laws, as they are measured; or, where these do not apply (`operators` says which), with K and
+        C by differences of forces, on one rank.
 
     Raises
     ------
     SnapshotError
-        If the packing cannot be taken: it moves, or has rolling or twisting friction, cohesion, no history, walls
-        without contacts, moving or curved walls, or bodies; or the commands are not those of the instance.
+        If the packing cannot be taken: it moves, or has moving walls or bodies that rotate; or the commands are not
+        those of the instance.
     """
-    return take_snapshot(lmp, commands, {}, slides=slides, balance=balance)
+    return take_snapshot(lmp, commands, {}, slides=slides, balance=balance, differences=differences)
 
 
 def take_snapshot(
-    lmp: Any, commands: Iterable[str] | None, laws: KnownLaws, *, slides: bool, balance: float
+    lmp: Any,
+    commands: Iterable[str] | None,
+    laws: KnownLaws,
+    *,
+    slides: bool,
+    balance: float,
+    differences: bool = False,
 ) -> Configuration:
     """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
     given = None if commands is None else read_commands(commands)
     look = partial(_look, lmp, given)
-    snapshot = _snapshot(lmp, *(in_a_copy(look) if can_copy(lmp) else look()), laws)
+    try:
+        if differences:
+            raise NotLinearisedError("K and C by differences of forces are asked for.")
+        snapshot = _snapshot(lmp, *(in_a_copy(look) if can_copy(lmp) else look()), laws)
+    except NotLinearisedError as reason:
+        if not can_copy(lmp):
+            raise
+        if slides:
+            raise SnapshotError(
+                f"{str(reason).rstrip('.')}; so K is found by differences of forces, which have no choice between "
+                "sticking and sliding contacts: leave slides out."
+            ) from reason
+        snapshot = configuration_by_differences(lmp, given)
     contacts = snapshot.contacts
-    force = contacts.normal_force.mean() if len(contacts) else 0.0
-    if snapshot.residual > balance * force:
-        advice = (
-            "run on with drag (fix viscous, and fix viscous/sphere for rotation) until it rests, or allow more by "
-            "from_lammps(lmp, balance=...)"
-        )
-        if _touch_twice(contacts):
-            advice = TWICE
-        raise SnapshotError(
-            f"The packing moves: its residual is {snapshot.residual / force:.3g} of the mean contact force, and "
-            f"{balance:g} is allowed; {advice}."
-        )
+    _check_balance(snapshot, balance)
     if slides:
         return derive_frozen(snapshot, contacts=derive_frozen(contacts, sliding=contacts.at_bound))
     return snapshot
+
+
+def force_scale(snapshot: Configuration) -> float:
+    """The mean normal force of contacts; where no contact is known, that of an overlap of 1e-4 of a radius."""
+    if len(snapshot.contacts):
+        return float(np.abs(snapshot.contacts.normal_force).mean())
+    return (
+        0.0
+        if snapshot.stiffness is None
+        else 1e-4 * float(np.abs(snapshot.stiffness.data).max(initial=0.0) * snapshot.radius.mean())
+    )
+
+
+def _check_balance(snapshot: Configuration, balance: float) -> None:
+    """Refuse a packing that moves, with the particle that is farthest from rest."""
+    force = force_scale(snapshot)
+    if snapshot.residual <= balance * force:
+        return
+    size = snapshot.particle_residual
+    worst = int(np.argmax(size))
+    place = ", ".join(f"{x:.6g}" for x in snapshot.position[worst])
+    others = int(np.sum(size > balance * force)) - 1
+    also = f", and {others} more {'are' if others > 1 else 'is'} out of balance" if others else ""
+    advice = (
+        "bring it to rest by faultgouge.relax(lmp) or a longer run with drag (fix viscous, and fix viscous/sphere for "
+        "rotation), or allow more by from_lammps(lmp, balance=...), in a command --balance"
+    )
+    raise SnapshotError(
+        f"The packing moves: the residual of particle {snapshot.ids[worst]} at ({place}) is {size[worst] / force:.3g} "
+        f"of the mean contact force, and {balance:g} is allowed{also}; "
+        f"{TWICE if _touch_twice(snapshot.contacts) else advice}."
+    )
+
+
+def configuration_by_differences(lmp: Any, given: Commands | None) -> Configuration:
+    """A Configuration whose K and C are differences of LAMMPS's forces, on one rank.
+
+    Its contacts are those of pairs that touch, with their forces as far as LAMMPS hands them out.
+    """
+    made, constraint = _particles_and_constraint(lmp, given)
+    scale = force_scale(made) or None
+    place = np.zeros((len(made), 3))
+    place[:, : made.dimension] = made.position
+    particles = Particles(made.dimension, made.ids, place, made.radius, constraint)
+    measured = measure_operators(lmp, particles, scale)
+    return derive_frozen(
+        made,
+        stiffness=measured.stiffness,
+        damping=measured.damping,
+        operator_error=measured.error,
+        jump=measured.jump,
+    )
+
+
+def particles_at_rest(lmp: Any, given: Commands | None) -> Configuration:
+    """The particles of an instance as they stand, and the forces of pairs, without K and C: both are empty."""
+    return _particles_and_constraint(lmp, given)[0]
+
+
+def _particles_and_constraint(lmp: Any, given: Commands | None) -> tuple[Configuration, csr_array]:
+    """A Configuration without K and C, and P of q = P Q, which it has only where P says more than which are free."""
+    columns = ["dx dy dz force p1 p2 p3", "dx dy dz force", "dx dy dz"]
+    while True:  # not every pair style hands all of these out
+        try:
+            commands, found, members = in_a_copy(partial(_look_at_forces, lmp, given, columns[0]))
+            break
+        except SnapshotError:
+            columns.pop(0)
+            if not columns:
+                raise
+    count, dimension = len(found["id"]), lmp.extract_setting("dimension")
+    if count == 0:
+        raise SnapshotError("This LAMMPS has no particles.")
+    lines = {name: line for name, line in commands.fixes.items() if name in members}
+    constraint, factor = mobility(lines, members, found["rmass"], dimension)
+    axes = 6 if dimension == 3 else 3
+    free = np.diff(constraint.indptr).reshape(axes, count).any(axis=0)
+    alone = diags_array(np.tile(free, axes).astype(np.float64))
+    box, origin, periodic = _box(lmp)
+    empty = csr_array(constraint.shape)
+    made = Configuration(
+        dimension=dimension,
+        position=found["x"][:, :dimension],
+        radius=found["radius"],
+        mass=found["rmass"],
+        inertia=factor * found["rmass"] * found["radius"] ** 2,
+        contacts=_forces_of_pairs(found, box),
+        box=box,
+        origin=origin,
+        periodic=periodic,
+        load=np.zeros((count, 2, 3)),
+        free=free,
+        ids=found["id"].astype(np.int64),
+        kind=found["type"].astype(np.int64),
+        stiffness=empty,
+        damping=empty,
+        constraint=constraint if abs(constraint - alone).nnz else None,
+    )
+    total = np.stack([found["f"], found["torque"]], axis=1)
+    return derive_frozen(made, load=np.where(free[:, None, None], total, 0.0) - made.contact_force), constraint
+
+
+def _look_at_forces(
+    lmp: Any, given: Commands | None, columns: str
+) -> tuple[Commands, Arrays, dict[str, NDArray[np.bool_]]]:
+    """The commands, the particles, and who is in the groups of the fixes that move or hold them; in a copy."""
+    if given is None:
+        lines = log_of(lmp)
+        if lines is None:
+            raise SnapshotError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
+        given = read_commands(lines, log=True)
+    lmp.command("log none")
+    styles = styles_of(lmp)
+    with suppress(NotLinearisedError):
+        check_instance(lmp, styles, given)
+    check_rest(styles.fixes, given)
+    moving = {name for name, style in styles.fixes.items() if style.startswith((*MOVES, *HOLDS))}
+    for name in moving:
+        style = styles.fixes[name]
+        if without_suffix(style) not in MOBILE:
+            raise SnapshotError(
+                f"fix {name} {style} moves or holds particles in a way that is not known here: unfix it."
+            )
+        if name not in given.fixes or without_suffix(given.fixes[name].split()[3]) != without_suffix(style):
+            raise SnapshotError(
+                f"The commands have no line of fix {name} {style}: give the line that the deck has among commands."
+            )
+    groups = {name: line.split()[2] for name, line in given.fixes.items() if name in moving}
+    quieten(lmp)
+    found = arrays_at_rest(lmp, groups, [], columns)
+    order = np.argsort(found["id"], kind="stable")
+    members = {name: found.pop(f"group {name}")[order] for name in groups}
+    return given, {n: rows if n in ("contacts", "partners") else rows[order] for n, rows in found.items()}, members
+
+
+def _forces_of_pairs(found: Arrays, box: Floats) -> LinearisedContacts:
+    """Pairs that touch, with their forces alone: derivatives are zero, and no bound is known."""
+    pairs = _pairs(found, box)
+    count, columns = pairs.forces.shape
+    if columns == 0:
+        pairs = _OneLaw(pairs.who, {name: values[:0] for name, values in pairs.geometry.items()}, np.zeros((0, 4)))
+        count = 0
+    none, still = np.zeros(count), np.zeros((count, 3))
+    tangential = pairs.forces[:, 1:4] if columns >= 4 else still
+    made = LinearisedContacts(
+        **pairs.geometry, lever_arm=pairs.geometry["slip_arm"], lever_slope=none, normal_force=pairs.forces[:, 0],
+        tangential_force=tangential, normal_stiffness=none, tangential_stiffness=none, closing=still, parting=still,
+        friction=np.full(count, np.inf), sliding=np.zeros(count, bool), normal_dashpot=none, tangential_dashpot=none,
+    )  # fmt: skip
+    return made.chosen(made.normal_force != 0)
 
 
 def _look(lmp: Any, given: Commands | None) -> tuple[Commands, Arrays]:
@@ -147,8 +321,16 @@ def _look(lmp: Any, given: Commands | None) -> tuple[Commands, Arrays]:
     columns = "dx dy dz force p3" if given.style == OWN else "dx dy dz force p1 p2 p3"
     if copied:
         quieten(lmp)
+    silent = [name for name in walls if given.style != OWN and "contacts" not in given.fixes[name].split()]
+    if silent and not copied:
+        raise SnapshotError(
+            f"fix {silent[0]} wall/gran does not hand out its contacts, and on several ranks or with threads they are "
+            "not found without it: write contacts at its end."
+        )
     with nullcontext() if copied else given_back(lmp):
-        mine = arrays_at_rest(lmp, groups, walls, columns)
+        mine = arrays_at_rest(lmp, groups, [name for name in walls if name not in silent], columns)
+    for name in silent:
+        mine[f"wall {name}"] = contacts_of_plane(lmp, name, given.fixes[name], mine)
     every = world.allgather(mine)
     found = {name: _join_ranks([each[name] for each in every]) for name in mine}
     order = np.argsort(found["id"], kind="stable")
@@ -172,6 +354,9 @@ def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
     if lmp.extract_global("ftm2v") != 1.0:
         units = lmp.extract_global("units")
         raise SnapshotError(f"In units {units} force is not mass times acceleration: use lj, si, cgs, micro or nano.")
+    check_rest(styles.fixes, commands)
+    if lmp.extract_setting("molecule_flag") and lmp.extract_global("nbonds"):
+        raise NotLinearisedError("Bonds hold particles together: take them out.")
     check_pair(commands, lmp.available_styles("pair"))
     check_fixes(styles.fixes, commands)
 
@@ -181,9 +366,7 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> C
     if count == 0:
         raise SnapshotError("This LAMMPS has no particles.")
     free, frozen, factor = _mobility(commands, found)
-    low, high, xy, yz, xz, periodic, _ = lmp.extract_box()
-    size = np.subtract(high, low)
-    box = np.array([[size[0], 0, 0], [xy, size[1], 0], [xz, yz, size[2]]])
+    box, origin, periodic = _box(lmp)
     made = Configuration(
         dimension=dimension,
         position=found["x"][:, :dimension],
@@ -192,8 +375,8 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> C
         inertia=factor * found["rmass"] * found["radius"] ** 2,
         contacts=_contacts(lmp, commands, found, frozen, laws, box),
         box=box,
-        origin=np.array(low),
-        periodic=np.array(periodic, dtype=bool),
+        origin=origin,
+        periodic=periodic,
         load=np.zeros((count, 2, 3)),
         free=free,
         ids=found["id"].astype(np.int64),
@@ -203,6 +386,14 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> C
     load = np.where(free[:, None, None], total - made.contact_force, -made.contact_force)
     _check_torques(load[free, 1] / made.radius[free, None], made.contacts)
     return derive_frozen(made, load=load)
+
+
+def _box(lmp: Any) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Edges of the box in rows, its lower corner, and along which edges it is periodic."""
+    low, high, xy, yz, xz, periodic, _ = lmp.extract_box()
+    size = np.subtract(high, low)
+    edges = np.array([[size[0], 0, 0], [xy, size[1], 0], [xz, yz, size[2]]])
+    return edges, np.array(low), np.array(periodic, dtype=np.bool_)
 
 
 TWICE = "particles touch each other twice, of which LAMMPS mixes the histories: take a box that is wider"
@@ -226,7 +417,7 @@ def _check_torques(others: Floats, contacts: LinearisedContacts) -> None:
             "contacts in a way that is not known here; releases of 29 Aug 2024 to 22 Jul 2025 are"
         )
         reason = TWICE if _touch_twice(contacts) else reason
-        raise SnapshotError(f"The torques on particles are not those of their contacts: {reason}.")
+        raise NotLinearisedError(f"The torques on particles are not those of their contacts: {reason}.")
 
 
 def _mobility(commands: Commands, found: Arrays) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:

@@ -38,6 +38,10 @@ class SnapshotError(FaultgougeError):
     """A packing of LAMMPS cannot be taken as it stands: one sentence with what would do."""
 
 
+class NotLinearisedError(SnapshotError):
+    """What has no linearised contacts here: K and C by differences of forces may serve."""
+
+
 @dataclass(frozen=True)
 class Commands:
     """What a deck says of contacts and of motion: pair_style with the pair_coeff that hold, and fixes by their IDs."""
@@ -125,12 +129,12 @@ def check_pair(commands: Commands, styles: Iterable[str]) -> None:
     if used[0].startswith("hybrid"):
         used = [without_suffix(word) for word in words[2:] if word in known]
         if "overlay" in words[1] and len(used) > 1:
-            raise SnapshotError(f"pair_style {words[1]} adds several forces at a contact: use one granular style.")
+            raise NotLinearisedError(f"pair_style {words[1]} adds several forces at a contact: use one granular style.")
     for style in used:
         if style == "gran/hooke":
-            raise SnapshotError("pair_style gran/hooke has no tangential history: use gran/hooke/history.")
+            raise NotLinearisedError("pair_style gran/hooke has no tangential history: use gran/hooke/history.")
         if style not in HISTORY and (style != OWN or len(used) > 1):
-            raise SnapshotError(
+            raise NotLinearisedError(
                 f"pair_style {style} is none of {', '.join(HISTORY)} and {OWN}: only these have contacts to linearise."
             )
     if "granular" in used:
@@ -144,43 +148,69 @@ def _check_model(words: list[str], line: str) -> None:
         return
     for word in words:
         if word in COHESIVE:
-            raise SnapshotError(f"{line!r}: {word} is cohesive; use hooke, hertz or hertz/material.")
+            raise NotLinearisedError(f"{line!r}: {word} is cohesive; use hooke, hertz or hertz/material.")
     for keyword, name in UNSUPPORTED_SUBMODELS.items():
         if keyword in words and words[words.index(keyword) + 1 :][:1] != ["none"]:
-            raise SnapshotError(f"{line!r} has {name}, which is not linearised here: leave {keyword} out.")
+            raise NotLinearisedError(f"{line!r} has {name}, which is not linearised here: leave {keyword} out.")
     model = (words[words.index("tangential") + 1 :] if "tangential" in words else ["none"])[:1]
     if model[0] not in TANGENTIAL:
-        raise SnapshotError(f"{line!r}: tangential {model[0]} keeps no history; use {', '.join(TANGENTIAL)}.")
+        raise NotLinearisedError(f"{line!r}: tangential {model[0]} keeps no history; use {', '.join(TANGENTIAL)}.")
+
+
+MOVING = {
+    "rigid": "holds particles together in a body: for a lid that does not rotate use fix nve and fix aveforce 0 0 0",
+    "poems": "holds particles together in bodies: leave it out",
+    "move": "moves particles: unfix it, and let the packing come to rest",
+    "deform": "moves the box: unfix it, and let the packing come to rest",
+    "press/berendsen": "moves the box: unfix it, and let the packing come to rest",
+    "nph": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
+    "npt": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
+    "nvt": "has a thermostat: use fix nve/sphere in its place, and let the packing come to rest",
+}
+"""Fixes, by the beginnings of their styles, with which no packing of particles rests."""
+
+NO_CONTACTS = {
+    "setforce": "holds some coordinates: use fix freeze, or leave the particles out of fix nve/sphere",
+    "lineforce": "holds some coordinates: leave it out",
+    "planeforce": "holds some coordinates: leave it out",
+    "aveforce": "shares forces among particles: leave it out",
+    "spring": "pulls at particles as contacts do not tell: leave it out",
+    "indent": "pushes particles as contacts do not tell: leave it out",
+    "drag": "pulls at particles as contacts do not tell: leave it out",
+    "smd": "pulls at particles as contacts do not tell: leave it out",
+    "restrain": "pulls at particles as contacts do not tell: leave it out",
+    "wall/gran/region": "has curved walls: use planes of fix wall/gran",
+}
+"""Fixes, by the beginnings of their styles, whose forces are not those of contacts that are linearised here."""
+
+
+def check_rest(styles: dict[str, str], commands: Commands) -> None:
+    """Refuse fixes, by ID and style, with which no packing rests, however K is found."""
+    for name, style in styles.items():
+        plain = without_suffix(style)
+        for begin, says in MOVING.items():
+            if plain.startswith(begin):
+                raise SnapshotError(f"fix {name} {style} {says}.")
+        for word in ("wiggle", "shear"):
+            if plain == "wall/gran" and word in commands.fixes.get(name, "").split()[4:]:
+                raise SnapshotError(f"The wall of fix {name} moves: let it rest without {word}.")
 
 
 def check_fixes(styles: dict[str, str], commands: Commands) -> None:
-    """Refuse fixes, by ID and style, that move or hold particles, walls or the box as contacts do not tell."""
-    refused = {
-        "rigid": "holds particles together in bodies, whose modes are not those of particles: leave it out",
-        "poems": "holds particles together in bodies, whose modes are not those of particles: leave it out",
-        "move": "moves particles: unfix it, and let the packing come to rest",
-        "deform": "moves the box: unfix it, and let the packing come to rest",
-        "press/berendsen": "moves the box: unfix it, and let the packing come to rest",
-        "nph": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
-        "npt": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
-        "nvt": "has a thermostat: use fix nve/sphere in its place, and let the packing come to rest",
-        "setforce": "holds some coordinates: use fix freeze, or leave the particles out of fix nve/sphere",
-        "lineforce": "holds some coordinates: leave it out",
-        "planeforce": "holds some coordinates: leave it out",
-        "aveforce": "shares forces among particles: leave it out",
-        "spring": "pulls at particles as contacts do not tell: leave it out",
-        "indent": "pushes particles as contacts do not tell: leave it out",
-        "wall/gran/region": "has curved walls: use planes of fix wall/gran",
-    }
+    """Refuse fixes, by ID and style, that move or hold particles as contacts do not tell."""
     for name, style in styles.items():
         plain = without_suffix(style)
-        for begin, says in refused.items():
+        for begin, says in NO_CONTACTS.items():
             if plain.startswith(begin):
-                raise SnapshotError(f"fix {name} {style} {says}.")
+                raise NotLinearisedError(f"fix {name} {style} {says}.")
         if plain.startswith("wall/") and plain not in WALLS:
-            raise SnapshotError(f"fix {name} {style} is no wall of contacts: use planes of fix wall/gran.")
+            raise NotLinearisedError(f"fix {name} {style} is no wall of contacts: use planes of fix wall/gran.")
         if plain.startswith("nve") and plain not in INTEGRATORS:
-            raise SnapshotError(f"fix {name} {style} does not turn particles by their contacts: use fix nve/sphere.")
+            raise NotLinearisedError(
+                f"fix {name} {style} does not turn particles by their contacts: use fix nve/sphere."
+            )
+        if plain == "addforce" and "v_" in commands.fixes.get(name, ""):
+            raise NotLinearisedError(f"fix {name} {style} has a variable, which may depend on places.")
         if plain not in (*WALLS, *INTEGRATORS, "freeze"):
             continue
         line = commands.fixes.get(name)
@@ -197,15 +227,11 @@ def _check_wall(name: str, line: str) -> None:
     for word, says in {
         "region": "is a region: use a plane, xplane, yplane or zplane",
         "zcylinder": "is a cylinder: use a plane, xplane, yplane or zplane",
-        "wiggle": "moves: let it rest without wiggle",
-        "shear": "moves: let it rest without shear",
         "temperature": "conducts heat, which is not linearised here: leave temperature out",
     }.items():
         if word in words[4:]:
-            raise SnapshotError(f"The wall of fix {name} {says}.")
-    if "contacts" not in words:
-        raise SnapshotError(f"fix {name} wall/gran does not hand out its contacts: write contacts at its end.")
+            raise NotLinearisedError(f"The wall of fix {name} {says}.")
     if words[4] == "hooke":
-        raise SnapshotError(f"fix {name} wall/gran hooke has no tangential history: use hooke/history.")
+        raise NotLinearisedError(f"fix {name} wall/gran hooke has no tangential history: use hooke/history.")
     if words[4] == "granular":
         _check_model(words[5:], line)

@@ -14,13 +14,16 @@ import numpy as np
 from ...analysis import Configuration
 from ...analysis.arrays import Floats, Indices
 from ..lammps.instance import load_plugin
-from .granular_commands import SnapshotError
+from .granular_commands import NotLinearisedError, SnapshotError
 from .instance_queries import communicator
 
 Arrays = dict[str, Any]
 
 ATOM_ARRAYS = ("x", "image", "v", "omega", "f", "torque")
 """What `given_back` restores."""
+
+
+PLANES = ("xplane", "yplane", "zplane")
 
 
 def owned_array(lmp: Any, name: str) -> Floats:
@@ -73,6 +76,41 @@ def arrays_at_rest(lmp: Any, groups: dict[str, str], walls: list[str], columns: 
     finally:
         for name in ("faultgouge_c", "faultgouge_i"):
             lmp.command(f"uncompute {name}")
+
+
+def contacts_of_plane(lmp: Any, fix: str, line: str, found: Arrays) -> Floats:
+    """What `fix wall/gran ... contacts` hands out of each particle, of planes without that word; in a copy.
+
+    The wall's force on a particle is the force that is missing without the wall.
+
+    Parameters
+    ----------
+    lmp : lammps.lammps
+        The copy, which loses the wall.
+    fix, line : str
+        The ID, and the command.
+    found : dict of arrays
+        Of :func:`arrays_at_rest`.
+
+    Returns
+    -------
+    ndarray, shape (N, 8)
+        Whether it touches, the wall's force, the point of contact and the radius.
+    """
+    words = line.split()
+    at = next(k for k, word in enumerate(words) if word in PLANES)
+    axis, planes = PLANES.index(words[at]), [float(word) for word in words[at + 1 : at + 3] if word != "NULL"]
+    lmp.command(f"unfix {fix}")
+    lmp.command("run 0 post no")
+    order = np.argsort(owned_array(lmp, "id"))[np.argsort(np.argsort(found["id"]))]
+    force, x, radius = found["f"] - owned_array(lmp, "f")[order], found["x"], found["radius"]
+    rows = np.hstack([np.zeros((len(x), 1)), force, x, radius[:, None]])
+    for plane in planes:
+        touch = (np.abs(x[:, axis] - plane) < radius) & np.any(force != 0, axis=1)
+        if np.any(rows[touch, 0]):
+            raise NotLinearisedError(f"A particle touches both planes of fix {fix}, which hands out no contacts.")
+        rows[touch, 0], rows[touch, 4 + axis] = 1.0, plane
+    return rows
 
 
 @contextmanager

@@ -32,7 +32,7 @@ from typing import Any, NoReturn
 import numpy as np
 from scipy.sparse import csc_array, eye_array
 
-from ...analysis import Configuration, NoEquilibriumError, negative_eigenvalues, stiffness_matrix
+from ...analysis import Configuration, negative_eigenvalues, stiffness_matrix
 from ...analysis.arrays import derive_frozen
 from ...analysis.errors import FaultgougeError
 from ...analysis.factors.sparse_lu import general_lu
@@ -42,23 +42,13 @@ from .granular_commands import INTEGRATORS, SnapshotError, read_commands, withou
 from .instance_queries import explain_error, log_of, log_path
 from .lammps_arrays import owned_array, rows_of, set_velocity
 from .look_in_a_copy import can_copy, in_a_copy, quieten, silent_copy
-
-REST = 1e-8
-"""Residual over the mean contact force at rest: far below the couplings of 1e-3 that make complex pairs, and far above
-rounding, 1e-12 of a force whose overlap is 1e-4 of a radius."""
-
-CHUNK = 2000
-"""Steps between two looks: many beside the set-up of a run, few beside a relaxation."""
+from .relax import RATE, REST, bring_to_rest
 
 ITERATIONS = 10
 """Iterations of Newton's method, each of which must halve the residual until rounding stops it: six are the rule."""
 
 LONG = 1e6
 """Length of a step in which particles are displaced, in time steps: so slow that dashpots have no share in forces."""
-
-SLOWEST, FASTEST = 1e-4, 0.2
-"""Rates of the drag, per time step; explicit drag alternates from 1 on."""
-
 
 Kept = tuple[float, Connection, Configuration | None]
 """A load, the copy of the process that is there, and its packing; the first has none."""
@@ -221,7 +211,7 @@ class _Relaxation:
     steps: int
     laws: KnownLaws = field(default_factory=dict)
     found: Configuration | None = None  # the equilibrium where LAMMPS stands
-    rate: float = 0.01  # of the drag, per time step: critical for a mode of 1000 steps
+    rate: float = RATE
 
     def result(self, value: float, relaxes: bool) -> Configuration | FaultgougeError | None:
         """The equilibrium at a value, or why there is none; None if Newton's method, when asked for, cannot serve."""
@@ -270,7 +260,7 @@ class _Relaxation:
     def displace_to_balance(self) -> Configuration | None:
         """Newton's method from the equilibrium where LAMMPS stands; None if it cannot serve."""
         start, lmp = self.found, self.lmp
-        if start is None or start.contacts.at_bound.any():
+        if start is None or start.contacts.at_bound.any() or start.operators == "differences":
             return None
         if not np.array_equal(start.contacts.closing, start.contacts.parting):
             return None
@@ -312,38 +302,7 @@ class _Relaxation:
 
     def relax(self, value: float) -> Configuration:
         """Run with drag until the packing rests."""
-        lmp, dt = self.lmp, float(self.lmp.extract_global("dt"))
-        found, way = self.look(), 0.0
-        moving, mass = found.ids[found.free], float(found.mass[found.free].mean())
-        turning = lmp.has_style("fix", "viscous/sphere")  # else the dashpots of contacts damp rotation
-        for _ in range(0, self.steps, CHUNK):
-            drag = mass * self.rate / dt
-            spin = drag * float(np.mean(found.radius**2)) if turning else 0.0
-            lmp.command(f"fix faultgouge_drag all viscous {drag:.17g}")
-            if turning:
-                lmp.command(f"fix faultgouge_spin all viscous/sphere {spin:.17g}")
-            lmp.command(f"run {CHUNK} post no")
-            free = np.isin(owned_array(lmp, "id"), moving)
-            radius = owned_array(lmp, "radius")[free, None]
-            f, torque, v, omega = (owned_array(lmp, name)[free] for name in ("f", "torque", "v", "omega"))
-            forces, drags = np.hstack([f, torque / radius]), np.hstack([drag * v, spin * omega / radius])
-            # both: the forces of a vibration vanish together at times, and those on a sphere that rolls away always
-            residual = float(np.linalg.norm(np.hstack([forces, drags]), axis=1).max())
-            way += CHUNK * dt * float(np.linalg.norm(v, axis=1).mean())
-            if len(found.contacts) == 0 or residual <= self.balance * found.contacts.normal_force.mean():
-                found = self.look()
-                if found.residual <= self.balance * found.contacts.normal_force.mean():
-                    set_velocity(lmp, found, np.zeros(found.coordinates))
-                    lmp.command("unfix faultgouge_drag")
-                    if turning:
-                        lmp.command("unfix faultgouge_spin")
-                    return found
-            if way > 2 * found.radius.mean():
-                raise NoEquilibriumError(f"The packing flows at {value:.10g}: its particles have moved by a diameter.")
-            ratio = np.linalg.norm(forces) / max(np.linalg.norm(drags), np.finfo(float).tiny)
-            self.rate *= 2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0
-            self.rate = float(np.clip(self.rate, SLOWEST, FASTEST))
-        raise NoEquilibriumError(
-            f"The packing does not come to rest at {value:.10g} in {self.steps} steps: {residual:.3g} is out of "
-            "balance; give more steps, or the packing creeps."
+        found, self.rate = bring_to_rest(
+            self.lmp, self.look, self.look(), self.balance, self.steps, self.rate, f" at {value:.10g}"
         )
+        return found

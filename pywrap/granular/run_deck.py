@@ -9,13 +9,16 @@ from mpi4py import MPI
 from ...analysis import BadInputError, Configuration
 from ..lammps.instance import lammps_instance
 from .deck_trial import try_without_runs
-from .from_lammps import from_lammps
+from .from_lammps import BALANCE
 from .granular_commands import SnapshotError, commands_in, logged_text
 from .instance_queries import explain_error
+from .kept_state import take_or_keep
 
 
-def run_deck(path: Path, *, slides: bool = False) -> Configuration:
+def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE, keep: Path | None = None) -> Configuration:
     """Run a deck in its own folder, as `lmp -in` there, and take its last state as `from_lammps` does.
+
+    A state that cannot be taken is kept in a restart file beside `keep`.
 
     Raises
     ------
@@ -42,7 +45,7 @@ def run_deck(path: Path, *, slides: bool = False) -> Configuration:
         lmp.command("log none")  # which writes it
         lmp.command("timer timeout unlimited")  # else `run 0` is skipped where fix halt has ended the deck
         text = world.bcast(logged_text(log, path.parent) if world.rank == 0 else None, root=0)
-        found = from_lammps(lmp, commands_in(text), slides=slides)
+        found = take_or_keep(lmp, commands_in(text), keep, slides=slides, balance=balance)
         lmp.close()
         world.barrier()
     return found

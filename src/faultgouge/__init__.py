@@ -6,6 +6,7 @@ results; ``faultgouge.assessment`` measures errors, run time and limits.
 """
 
 import sys
+from typing import Any
 
 if "IPython" in sys.modules:
     from .notebook import show_pictures
@@ -13,7 +14,11 @@ if "IPython" in sys.modules:
     show_pictures()
 
 
-def __getattr__(name: str) -> str:
+def __getattr__(name: str) -> Any:
+    if name == "relax":
+        from .pywrap import relax
+
+        return relax
     # the version when it is asked for: importlib.metadata takes as long to import as all that --help needs
     if name == "__version__":
         from importlib.metadata import version

@@ -96,25 +96,95 @@ def _check_film_of_spheres(faultgouge_here, tmp_path, snapshot):
     assert ElementTree.parse(tmp_path / files[-1]).find(".//Piece").get("NumberOfVerts") == "3"
 
 
-DRUM = "region r cylinder z 0 0 9 INF INF side in"
-
-
 def test_refused_before_the_run(faultgouge_here, tmp_path):
-    (tmp_path / "pile.in").write_text(DECK.format(**ROUND, word="") + "run 1000000000\n")
-    assert "write contacts at its end" in faultgouge_here("import", "pile.in", code=2).stderr
-    drum = DECK.format(**ROUND, word="contacts").replace(
-        "run 6000", f"{DRUM}\nfix d all wall/gran/region hooke/history 1 1 1 1 1 1 region r\nrun 1000000000"
-    )
-    (tmp_path / "drum.in").write_text(drum)
-    assert "drum.in: fix d wall/gran/region has curved walls" in faultgouge_here("import", "drum.in", code=2).stderr
-    glue = DECK.format(**ROUND, word="contacts").replace("gran/hertz/history ${kn} NULL 10 NULL 0.9 1", "granular", 1)
-    glue = glue.replace("pair_coeff * *", "pair_coeff * * jkr 1e3 50 0.3 10 tangential mindlin 800 1 0.5")
-    (tmp_path / "glue.in").write_text(glue.replace("run 6000", "run 1000000000"))
-    assert "jkr is cohesive" in faultgouge_here("import", "glue.in", code=2).stderr
+    (tmp_path / "pile.in").write_text(DECK.format(**ROUND, word="shear x 1.0 contacts") + "run 1000000000\n")
+    assert "let it rest without shear" in faultgouge_here("import", "pile.in", code=2).stderr
     assert "leave all options" in faultgouge_here("import", "pile.in", "--kn", "3", code=2).stderr
+    assert "greater than or equal to 0" in faultgouge_here("import", "pile.in", "--balance", "nan", code=2).stderr
+    assert "--balance are for a LAMMPS deck" in faultgouge_here("import", "a.csv", "--balance", "1", code=2).stderr
     (tmp_path / "in.wrong").write_text("units nothing\npair_style granular\n")
     assert "LAMMPS stopped: " in faultgouge_here("import", "in.wrong", code=1).stderr
     assert not (tmp_path / "packing.h5").exists()
+
+
+def test_walls_that_hand_out_no_contacts(faultgouge_here, tmp_path):
+    """The word `contacts` changes no motion, and the contacts are found without it."""
+    from faultgouge.analysis.files.snapshot_file import read_snapshot
+
+    found = {}
+    for word in ("contacts", ""):
+        (tmp_path / f"pile{word}.in").write_text(DECK.format(**ROUND, word=word))
+        faultgouge_here("import", f"pile{word}.in", "-o", f"pile{word}.h5")
+        found[word] = read_snapshot(tmp_path / f"pile{word}.h5")
+    one, other = (found[word].contacts for word in ("contacts", ""))
+    assert found[""].operators == "laws"
+    assert np.array_equal(one.i, other.i)
+    assert one.wall.sum() == 3
+    for name in ("normal", "overlap", "normal_force", "tangential_force", "tangential_stiffness"):
+        assert getattr(other, name) == pytest.approx(getattr(one, name), abs=1e-12 * one.normal_stiffness.max())
+
+
+COHESIVE = "jkr 1e3 0.05 0.3 10 tangential mindlin 800 1 0.5 rolling sds 100 1 0.2"
+
+
+def test_any_model_in_a_region(faultgouge_here, tmp_path):
+    """K and C by differences of forces, and the command says so, with the time step."""
+    from faultgouge.analysis.files.snapshot_file import read_snapshot
+
+    deck = DECK.format(**ROUND, word="").replace("gran/hertz/history ${kn} NULL 10 NULL 0.9 1", "granular", 1)
+    deck = deck.replace("pair_coeff * *", f"pair_coeff * * {COHESIVE}")
+    lines = [line for line in deck.splitlines() if not line.startswith("fix floor")]
+    bowl = f"region bowl sphere 0 0 3 3 side in\nfix bowl all wall/gran/region granular {COHESIVE} region bowl"
+    deck = "\n".join(lines).replace("fix drag", f"{bowl}\nfix drag").replace("run 6000", "run 60000")
+    (tmp_path / "glue.in").write_text(deck)
+    said = faultgouge_here("import", "glue.in", "-o", "glue.h5").stdout
+    assert "3 spheres, " in said
+    assert "K and C by differences of forces to " in said
+    assert "largest stable time step " in said
+    found = read_snapshot(tmp_path / "glue.h5")
+    assert found.operators == "differences"
+    assert found.operator_error < 1e-5
+    assert "eigenvalues" in json.loads(faultgouge_here("spectrum", "glue.h5", "--json").stdout)
+    faultgouge_here("export", "glue.h5", "--mode", "1", "-o", "glue.vtp")
+    assert "no choice between" in faultgouge_here("import", "glue.in", "--slides", "-o", "slid.h5", code=1).stderr
+
+
+def test_time_step_beside_rayleighs(faultgouge_here, tmp_path):
+    """Young's modulus 1e3, Poisson's ratio 0.25: G = 400, and Rayleigh's step is pi R sqrt(rho/G) / 0.9174."""
+    deck = DECK.format(**ROUND, word="contacts").replace("gran/hertz/history ${kn} NULL 10 NULL 0.9 1", "granular", 1)
+    law = "hertz/material 1e3 10 0.25 tangential mindlin NULL 1 0.9"
+    deck = deck.replace("pair_coeff * *", f"pair_coeff * * {law}")
+    deck = deck.replace("wall/gran hertz/history ${kn} NULL 10 NULL 0.9 1", f"wall/gran granular {law}")
+    (tmp_path / "pile.in").write_text(deck)
+    said = faultgouge_here("import", "pile.in", "-o", "pile.h5").stdout
+    step, share, usual = map(float, re.search(r"step (\S+), (\S+) of Rayleigh's formula \((\S+)\)", said).groups())
+    assert usual == pytest.approx(np.pi * 0.5 / np.sqrt(400) / (0.1631 * 0.25 + 0.8766), rel=1e-3)
+    assert share == pytest.approx(step / usual, rel=1e-2)
+
+
+def test_a_state_that_moves_is_kept(faultgouge_here, tmp_path):
+    """Where the run was too short, the restart goes on as the deck itself does, tangential histories and all."""
+    from faultgouge.analysis.files.snapshot_file import read_snapshot
+
+    deck = DECK.format(**ROUND, word="contacts")
+    short = deck.replace("run 6000", "run 1500")
+    (tmp_path / "short.in").write_text(short)
+    said = faultgouge_here("import", "short.in", "-o", "short.h5", code=1).stderr
+    assert re.search(r"The packing moves: the residual of particle [123] at \(", said)
+    assert "The state is kept in short.restart: go on by a deck of read_restart short.restart" in said
+    assert not (tmp_path / "short.h5").exists()
+    lines = deck[deck.index("variable kn") :]
+    (tmp_path / "on.in").write_text(f"comm_modify vel yes\nread_restart short.restart\n{lines}".replace("6000", "4499"))
+    faultgouge_here("import", "on.in", "-o", "on.h5")
+    (tmp_path / "whole.in").write_text(deck)
+    faultgouge_here("import", "whole.in", "-o", "whole.h5")
+    on, whole = (read_snapshot(tmp_path / f"{name}.h5") for name in ("on", "whole"))
+    # the first step after a restart has the dashpots of another half step, a force of 1e-4 here
+    assert on.position == pytest.approx(whole.position, abs=1e-6)
+    tangential = whole.contacts.tangential_force
+    assert np.abs(on.contacts.tangential_force - tangential).max() < 1e-3 * np.abs(tangential).max()
+    more = faultgouge_here("import", "short.in", "--balance", "1e9", "-o", "moves.h5").stdout
+    assert "residual" in more
 
 
 def test_what_variables_hide_is_not_refused(faultgouge_here, tmp_path):
@@ -131,10 +201,6 @@ def test_fixes_with_variables_are_refused_before_the_run(faultgouge_here, tmp_pa
     deck = DECK.format(**ROUND, word="contacts").replace("run 6000", "run 1000000000")
     deck = deck.replace("boundary f f", "boundary p p")
     for lines, says in (
-        (
-            f"{DRUM}\nfix drum all wall/gran/region hertz/history ${{kn}} NULL 10 NULL 0.9 1 region r",
-            "fix drum .* has curved walls",
-        ),
         (
             "fix top all wall/gran hertz/history ${kn} 1 1 1 1 1 zplane NULL 4 shear x ${kn} contacts",
             "The wall .* moves",

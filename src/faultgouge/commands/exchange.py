@@ -24,7 +24,7 @@ from .terminal import (
 )
 
 if TYPE_CHECKING:
-    from faultgouge.analysis import Packing
+    from faultgouge.analysis import Configuration, Packing
     from faultgouge.pywrap import Scene
     from faultgouge.pywrap.exchange import Disks
 
@@ -86,6 +86,15 @@ def import_(
     slides: Annotated[
         bool, typer.Option("--slides", help="For a deck: contacts at Coulomb's bound slide; by default they stick.")
     ] = False,
+    balance: Annotated[
+        float | None,
+        typer.Option(
+            help="For a deck: force on a particle that may be out of balance, as a share of the mean contact force; "
+            "1e-4 by default.",
+            min=0.0,
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Convert a packing of another code to a run.h5 for draw, spectrum, and the key packing.file of a scene.
 
@@ -104,12 +113,12 @@ def import_(
         given = [top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame, relax or None]
         if floor or any(each is not None for each in given):
             raise typer.BadParameter(
-                f"{file} is a deck, which says all by itself: leave all options but -o and --slides"
+                f"{file} is a deck, which says all by itself: leave all options but -o, --slides and --balance"
             )
-        _import_deck(file, output, slides)
+        _import_deck(file, output, slides, balance)
         return
-    if slides:
-        raise typer.BadParameter("--slides is for a LAMMPS deck (.in): leave it out")
+    if slides or balance is not None:
+        raise typer.BadParameter("--slides and --balance are for a LAMMPS deck (.in): leave them out")
     disks = _place_disks(file, frame, floor, width, contacts)
     laws = {"kn": kn, "kt": _number_or_text(kt), "mu": mu, "exponent": exponent}
     packing = _packing(disks, top, scene, laws | {"fy": fy, "fx": fx, "inertia_factor": inertia})
@@ -129,17 +138,29 @@ def import_(
     )
 
 
-def _import_deck(file: Path, output: Path, slides: bool) -> None:
+def _import_deck(file: Path, output: Path, slides: bool, balance: float | None) -> None:
     """Run a deck and keep its last state."""
     from faultgouge.analysis.files.snapshot_file import write_snapshot
+    from faultgouge.pywrap.granular.from_lammps import BALANCE
     from faultgouge.pywrap.granular.run_deck import run_deck
 
     keeps(f"nothing has been written to {output} yet")
     with status(f"{file}: LAMMPS runs"):
-        snapshot = run_deck(file, slides=slides)
+        snapshot = run_deck(file, slides=slides, balance=BALANCE if balance is None else balance, keep=output)
     if is_root():
         write_snapshot(output, snapshot, {"deck": file.read_text(errors="replace")})
     print_line(f"{repr(snapshot).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
+    print_line(_time_steps(snapshot))
+
+
+def _time_steps(configuration: Configuration) -> str:
+    """The largest stable time step beside the one that the speed of Rayleigh's wave would give."""
+    from faultgouge.analysis import rayleigh_timestep, stable_timestep
+
+    found, usual = stable_timestep(configuration), rayleigh_timestep(configuration)
+    if usual is None:
+        return f"largest stable time step {found:.4g}"
+    return f"largest stable time step {found:.4g}, {found / usual:.3g} of Rayleigh's formula ({usual:.4g})"
 
 
 @app.command(epilog="Example: faultgouge export run.h5 --mode pair -o packing.vtp")

@@ -1,0 +1,52 @@
+"""The last state of a deck is taken, or kept: hours of a run are not lost where a packing cannot be taken.
+
+The restart is written by a run of one step. LAMMPS forgets tangential histories in a file that `write_restart` writes
+after a run, and has all of them in one that the run itself writes.
+"""
+
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ...analysis import Configuration
+from .from_lammps import from_lammps
+from .granular_commands import SnapshotError
+
+
+def take_or_keep(
+    lmp: Any, commands: Iterable[str], keep: Path | None, *, slides: bool, balance: float
+) -> Configuration:
+    """What `from_lammps` takes; an error of it says where the state is kept, in a file beside `keep`, if that is given.
+
+    Raises
+    ------
+    SnapshotError
+        If the packing cannot be taken.
+    """
+    try:
+        return from_lammps(lmp, commands, slides=slides, balance=balance)
+    except SnapshotError as error:
+        kept = None if keep is None else _keep(lmp, keep.with_suffix(".restart"))
+        if kept is None:
+            raise
+        raise SnapshotError(
+            f"{str(error).rstrip('.')}. The state is kept in {kept}: go on by a deck of read_restart {kept} and the "
+            "lines of this deck from pair_style on, without those that make particles, and with a longer run."
+        ) from error
+
+
+def _keep(lmp: Any, file: Path) -> Path | None:
+    """Write a restart; None if LAMMPS cannot, or there is such a file."""
+    if file.exists():
+        return None
+    with suppress(Exception):  # LAMMPS raises what its bindings choose, and the first error is the one to be said
+        lmp.command("timer timeout unlimited")
+        lmp.command(f'restart 1 "{file.resolve()}.*"')
+        lmp.command("run 1 post no")
+        lmp.command("restart 0")
+        written = sorted(file.parent.glob(f"{file.name}.*"))
+        if written:
+            written[-1].rename(file)
+            return file
+    return None

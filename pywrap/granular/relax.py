@@ -1,0 +1,150 @@
+"""Bring a live LAMMPS to rest by its own dynamics with drag.
+
+`fix viscous`, and `fix viscous/sphere` where this LAMMPS has one, take energy away. The drag follows the motion: where
+the forces are much larger than the drag, particles accelerate, and the drag grows; where the drag balances the forces,
+particles creep, and the drag falls. A packing rests when forces and drags are far below the mean contact force, both,
+since the forces of a vibration vanish together at times, and those on a sphere that rolls away always.
+"""
+
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...analysis import Configuration, NoEquilibriumError
+from ...analysis.arrays import Floats
+from .from_lammps import force_scale, particles_at_rest, take_snapshot
+from .granular_commands import SnapshotError, read_commands
+from .lammps_arrays import owned_array, rows_of, set_velocity
+from .look_in_a_copy import can_copy
+
+REST = 1e-8
+"""Residual over the mean contact force at rest: far below the couplings of 1e-3 that make complex pairs, and far above
+rounding, 1e-12 of a force whose overlap is 1e-4 of a radius."""
+
+CHUNK = 2000
+"""Steps between two looks: many beside the set-up of a run, few beside a relaxation."""
+
+RATE = 0.01
+"""Rate of the drag at the beginning, per time step: critical for a mode of 1000 steps."""
+
+SLOWEST, FASTEST = 1e-4, 0.2
+"""Rates of the drag, per time step; explicit drag alternates from 1 on."""
+
+
+def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = REST, steps: int = 1_000_000) -> float:
+    """Bring a LAMMPS instance to rest by its own dynamics with drag; the instance runs, and ends without velocities.
+
+    Parameters
+    ----------
+    lmp : lammps.lammps
+        The instance, on one rank and one thread.
+    commands : iterable of str, optional
+        As of :func:`~faultgouge.pywrap.from_lammps`.
+    balance : float
+        Largest residual at rest, as a share of the mean contact force.
+    steps : int
+        Time steps after which a packing that is not at rest flows.
+
+    Returns
+    -------
+    float
+        The residual that is left, as a share of the mean contact force.
+
+    Raises
+    ------
+    SnapshotError
+        If the instance cannot be taken, as by `from_lammps`.
+    NoEquilibriumError
+        If the packing flows: its particles have moved by their diameter in the mean, or do not come to rest.
+    """
+    if not can_copy(lmp):
+        raise SnapshotError("relax looks at copies of the process: use one rank and one thread.")
+    given = None if commands is None else list(commands)
+    start = particles_at_rest(lmp, None if given is None else read_commands(given))
+    look = partial(take_snapshot, lmp, given, {}, slides=False, balance=np.inf)
+    found, _ = bring_to_rest(lmp, look, start, balance, steps, RATE, "")
+    return found.residual / (force_scale(found) or 1.0)
+
+
+def bring_to_rest(
+    lmp: Any,
+    look: Callable[[], Configuration],
+    start: Configuration,
+    balance: float,
+    steps: int,
+    rate: float,
+    where: str,
+) -> tuple[Configuration, float]:
+    """Run with drag until the packing rests.
+
+    Parameters
+    ----------
+    lmp : lammps.lammps
+        The instance.
+    look : callable
+        Takes the packing as it stands.
+    start : Configuration
+        Its particles, which of them move, and the forces of its contacts, as far as these are known.
+    balance, steps
+        As of :func:`relax`.
+    rate : float
+        Of the drag at the beginning, per time step.
+    where : str
+        What errors say of the load.
+
+    Returns
+    -------
+    found : Configuration
+        The packing at rest.
+    rate : float
+        Of the drag at the end.
+    """
+    dt, turning = float(lmp.extract_global("dt")), lmp.has_style("fix", "viscous/sphere")  # else dashpots alone
+    drags = {"faultgouge_drag": "viscous"} | ({"faultgouge_spin": "viscous/sphere"} if turning else {})
+    way, residual, force = 0.0, np.inf, force_scale(start)
+    mass, squared_radius = float(start.mass[start.free].mean()), float(np.mean(start.radius**2))
+    try:
+        for _ in range(0, steps, CHUNK):
+            drag = mass * rate / dt
+            spin = drag * squared_radius if turning else 0.0
+            for (name, style), strength in zip(drags.items(), (drag, spin), strict=False):
+                lmp.command(f"fix {name} all {style} {strength:.17g}")
+            lmp.command(f"run {CHUNK} post no")
+            forces = _on_bodies(lmp, start, ("f", "torque"), (1.0, 1.0))
+            drag_forces = _on_bodies(lmp, start, ("v", "omega"), (drag, spin))
+            residual = float(np.linalg.norm(np.vstack([forces, drag_forces]), axis=0).max())
+            speed = np.linalg.norm(owned_array(lmp, "v")[rows_of(lmp, start)][start.free], axis=1)
+            way += CHUNK * dt * float(speed.mean())
+            if force == 0.0 or residual <= balance * force:
+                found = look()
+                force = force_scale(found)
+                if found.residual <= balance * force:
+                    set_velocity(lmp, found, np.zeros(found.coordinates))
+                    return found, rate
+            if way > 2 * start.radius.mean():
+                raise NoEquilibriumError(f"The packing flows{where}: its particles have moved by a diameter.")
+            ratio = np.linalg.norm(forces) / max(np.linalg.norm(drag_forces), np.finfo(float).tiny)
+            rate *= 2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0
+            rate = float(np.clip(rate, SLOWEST, FASTEST))
+    finally:
+        for name in drags:
+            if name in lmp.available_ids("fix"):
+                lmp.command(f"unfix {name}")
+    raise NoEquilibriumError(
+        f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of "
+        "balance; give more steps, or the packing creeps."
+    )
+
+
+def _on_bodies(lmp: Any, start: Configuration, names: tuple[str, str], weight: tuple[float, float]) -> Floats:
+    """Two arrays of LAMMPS over (1, radius), on what moves: sums where particles move as one; shape (axes, N)."""
+    rows = rows_of(lmp, start)
+    along, around = (factor * owned_array(lmp, name)[rows] for name, factor in zip(names, weight, strict=True))
+    values = start.join_vectors(along, around / start.radius[:, None])
+    if start.constraint is None:
+        values = np.where(np.tile(start.free, start.axes), values, 0.0)
+    else:
+        values = (start.constraint != 0).T @ values
+    return values.reshape(start.axes, -1)

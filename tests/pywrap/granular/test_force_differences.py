@@ -1,0 +1,155 @@
+"""K and C by differences of LAMMPS's forces: beside the measured laws, beside LAMMPS's motion, and through a file."""
+
+import numpy as np
+import pytest
+from granular_packings import LAWS, command, instance, start, with_law
+
+from faultgouge.analysis import damping_matrix, spectrum, stiffness_matrix
+from faultgouge.analysis.files.snapshot_file import read_snapshot, write_snapshot
+
+
+def bed(tmp_path, law: str, d: int):
+    """Particles at rest on a slope."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = instance(tmp_path / "log.lammps")
+    start(lmp, d, 20 if d == 3 else 18)
+    with_law(lmp, law, d, "40", "40", ("0.2", "0.2"), "10.0" if "rescale" in law and d == 2 else "3.0")
+    command(lmp, f"""
+fix load all gravity 1.0 vector {"0.1 0 -1" if d == 3 else "0.05 -1 0"}
+fix move all nve/sphere
+fix drag all viscous 1.5
+timestep 0.002
+thermo 100000
+""")  # fmt: skip
+    for _ in range(12):
+        lmp.command("run 20000")
+        found = from_lammps(lmp, balance=np.inf)
+        if found.residual < 1e-9 * found.contacts.normal_force.mean():
+            break
+    return lmp, found
+
+
+def apart(one, other) -> float:
+    return float(abs(one - other).max() / abs(other).max())
+
+
+STYLES = ("gran/hooke/history", "gran/hertz/history", "mindlin", "mindlin_rescale/force", "tsuji")
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize(
+    "law", [pytest.param(each, marks=() if each in STYLES[1:4:2] else pytest.mark.slow) for each in LAWS]
+)
+def test_measured_laws_and_differences_agree(tmp_path, law, d):
+    """K within 1e-5, which `granular` and its bound of 1e-10 of Coulomb's needs, and C within 1e-6, of the largest."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp, laws = bed(tmp_path, law, d)
+    found = from_lammps(lmp, differences=True)
+    assert (laws.operators, found.operators) == ("laws", "differences")
+    assert not laws.contacts.at_bound.any()
+    assert apart(stiffness_matrix(found), stiffness_matrix(laws)) < 1e-5
+    assert apart(damping_matrix(found), damping_matrix(laws)) < 1e-6
+    assert found.operator_error < 1e-5
+    # a law with two derivatives has a jump at every contact, and no other has one where nothing slides
+    assert len(found.one_sided_particles) == (len(found) if "rescale" in law else 0)
+    assert found.residual == pytest.approx(laws.residual, abs=1e-9 * laws.contacts.normal_force.mean())
+    lmp.close()
+
+
+def test_a_contact_at_the_bound_is_seen(tmp_path):
+    """Its two particles have other derivatives forwards than backwards, and K is the mean of sticking and sliding."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = instance(tmp_path / "log.lammps")
+    command(lmp, """
+units lj
+dimension 2
+atom_style sphere
+boundary f f p
+newton off
+comm_modify vel yes
+region box block -4 4 -4 4 -0.5 0.5 units box
+create_box 1 box
+create_atoms 1 single 0 0 0
+create_atoms 1 single 0.99 0 0
+create_atoms 1 single -0.99 0 0
+set group all diameter 1.0
+set group all density 1
+pair_style gran/hooke/history 1e4 4e3 0 0 0.5 1
+pair_coeff * *
+group first id 1
+group held id 3
+fix move all nve/sphere
+timestep 1e-3
+""")  # fmt: skip
+    # particle 2 slides past the first, which then is at the bound with it, and nothing with the third
+    lmp.numpy.extract_atom("v")[1, 1] = 100.0
+    command(lmp, "unfix move\nfix slow all nve/noforce")
+    lmp.command("run 1 post no")
+    lmp.numpy.extract_atom("v")[:] = 0.0
+    lmp.command("unfix slow")
+    lmp.command("fix move all nve/sphere")
+    exact = [from_lammps(lmp, balance=np.inf, slides=slides) for slides in (False, True)]
+    assert exact[0].contacts.at_bound.sum() == 1
+    found = from_lammps(lmp, balance=np.inf, differences=True)
+    assert set(found.ids[found.one_sided_particles]) == {1, 2}
+    mean = 0.5 * sum(stiffness_matrix(each) for each in exact)
+    assert apart(stiffness_matrix(found), mean) < 1e-6
+    lmp.close()
+
+
+CONE = """
+units si
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -9 9 -9 9 -1 26 units box
+create_box 1 box
+region cone cone z 0 0 0.6 8 0 25 side in units box
+region pour cylinder z 0 0 2.4 9.5 24 units box
+create_atoms 1 random 126 4711 pour overlap 0.9 maxtry 2000
+set group all diameter 1.0
+set group all density 1.0
+neighbor 0.1 bin
+pair_style granular
+pair_coeff * * {model}
+fix cone all wall/gran/region granular {model} region cone
+fix load all gravity 1.0 vector 0 0 -1
+fix move all nve/sphere
+fix drag all viscous 0.5
+timestep 0.0005
+thermo 100000
+run 60000
+"""
+
+
+def test_cohesive_spheres_in_a_cone(tmp_path):
+    """JKR, rolling and twisting friction in a region: LAMMPS moves as K and C say, and a file has them to the bit."""
+    from faultgouge import relax
+    from faultgouge.pywrap import compare_motion, from_lammps
+
+    lmp = instance(tmp_path / "log.lammps")
+    model = "jkr 1e5 0.3 0.3 20.0 tangential mindlin NULL 1.0 0.5 rolling sds 2e3 20 0.3 twisting marshall"
+    command(lmp, CONE.format(model=model))
+    relax(lmp)
+    found = from_lammps(lmp)
+    assert found.operators == "differences"
+    assert "K and C by differences of forces" in repr(found)
+    assert len(found.contacts) > 100  # of pairs; the region hands out none
+    assert found.contacts.normal_force.min() < 0  # cohesion
+    assert found.operator_error < 1e-5
+    # in proportion to the time step, as LAMMPS takes dashpots at the half step; extrapolated to none
+    runs = [compare_motion(lmp, found, 0.005, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
+    assert runs[0].difference / runs[1].difference == pytest.approx(2, rel=0.1)
+    rest = 2 * runs[1].velocity - runs[0].velocity - runs[0].linear_velocity
+    assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
+    said = spectrum(found)
+    assert len(said.pairs) == 0
+    write_snapshot(tmp_path / "cone.h5", found)
+    assert read_snapshot(tmp_path / "cone.h5") == found
+    with pytest.raises(ValueError, match="leave parting and sliding out"):
+        stiffness_matrix(found, parting=0.0)
+    lmp.close()

@@ -1,0 +1,133 @@
+"""Shear cells with a lid that moves as one body: LAMMPS's own motion beside that of the projected operators."""
+
+import numpy as np
+import pytest
+from granular_packings import command, instance
+
+from faultgouge.analysis import stiffness_matrix
+from faultgouge.analysis.files.snapshot_file import read_snapshot, write_snapshot
+
+CELL = """
+units lj
+atom_style sphere
+atom_modify map array
+boundary p p f
+newton off
+comm_modify vel yes
+region box block 0 3.3 0 3.3 -1 12 units box
+create_box 2 box
+{spheres}
+set group all diameter 1.0
+set group all density 1.0
+group lid type 2
+group filling type 1
+neigh_modify exclude group lid lid
+pair_style gran/hertz/history 1e4 3e3 20 10 0.5 1
+pair_coeff * *
+fix floor all wall/gran hertz/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL contacts
+fix load all gravity 1.0 vector 0 0 -1
+fix move filling nve/sphere
+{lid}
+fix drag all viscous 1.0
+timestep 0.001
+thermo 100000
+run 20000
+"""
+
+PLACES = np.array([(x, y, z) for z in range(4) for y in range(3) for x in range(3)]) * 1.1 + 0.55
+PLACES[:27, :2] += np.random.default_rng(3).uniform(-0.04, 0.04, (27, 2))
+SPHERES = "\n".join(f"create_atoms {1 + (k >= 27)} single {x} {y} {z} units box" for k, (x, y, z) in enumerate(PLACES))
+
+
+def cell(tmp_path, lid: str, **changes: str):
+    """A LAMMPS with 27 spheres under a lid of nine."""
+    lmp = instance(tmp_path / "log.lammps")
+    text = CELL.format(lid=lid, spheres=SPHERES)
+    for before, after in changes.items():
+        text = text.replace(before, after)
+    command(lmp, text)
+    return lmp
+
+
+CONFINED = "fix push lid addforce 0.05 0 -2.0"
+LIDS = {
+    "aveforce": f"fix body lid nve\n{CONFINED}\nfix stiff lid aveforce 0.0 0.0 0.0",
+    "aveforce, sideways held": f"fix body lid nve\n{CONFINED}\nfix hold lid setforce NULL 0.0 NULL\n"
+    "fix stiff lid aveforce 0.0 NULL 0.0",
+}
+
+
+@pytest.mark.parametrize("lid", LIDS)
+def test_a_lid_moves_as_one(tmp_path, lid):
+    from faultgouge import relax
+    from faultgouge.pywrap import compare_motion, from_lammps
+
+    lmp = cell(tmp_path, LIDS[lid])
+    assert relax(lmp) < 1e-8
+    found = from_lammps(lmp)
+    on_lid = found.kind == 2
+    count, leader = int(on_lid.sum()), int(np.flatnonzero(found.kind == 2)[0])
+    assert count == 9
+    assert found.operators == "differences"
+    assert found.operator_error < 1e-5
+    free = {"aveforce": "xyz", "aveforce, sideways held": "xz"}[lid]
+    n, mass = len(found), found.coordinate_mass
+    for k, axis in enumerate("xyzuvw"):
+        rows = np.diff(found.stiffness.indptr)[k * n : (k + 1) * n]
+        assert (rows[leader] > 0) == (axis in free)
+        assert not rows[on_lid & (np.arange(n) != leader)].any()
+        if axis in free:
+            assert mass[k * n + leader] == pytest.approx(found.mass[on_lid].sum())
+    translation, rotation = found.vectors(np.eye(len(mass))["xyz".index(free[-1]) * n + leader])
+    assert np.ptp(translation[on_lid], axis=0).max() == 0 == np.abs(rotation).max()
+    assert np.count_nonzero(translation) == count
+    runs = [compare_motion(lmp, found, 0.02, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
+    assert runs[0].difference / runs[1].difference == pytest.approx(2, rel=0.1)
+    rest = 2 * runs[1].velocity - runs[0].velocity - runs[0].linear_velocity
+    assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
+    write_snapshot(tmp_path / "cell.h5", found)
+    assert read_snapshot(tmp_path / "cell.h5") == found
+    lmp.close()
+
+
+def test_particles_of_different_mass_under_one_mean_force(tmp_path):
+    """fix aveforce gives them the same force: a lid of two masses deforms as the inverse masses."""
+    from faultgouge import relax
+    from faultgouge.pywrap import compare_motion, from_lammps
+
+    lmp = cell(tmp_path, LIDS["aveforce"] + "\nset atom 30*32 density 2.0")
+    relax(lmp)
+    found = from_lammps(lmp)
+    assert len(set(found.mass[found.kind == 2].round(10))) == 2
+    runs = [compare_motion(lmp, found, 0.02, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
+    rest = 2 * runs[1].velocity - runs[0].velocity - runs[0].linear_velocity
+    assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
+    lmp.close()
+
+
+def test_a_body_that_may_rotate_is_refused(tmp_path):
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    lmp = cell(tmp_path, f"{CONFINED}\nfix body lid rigid single", **{"run 20000": "run 10"})
+    with pytest.raises(SnapshotError, match="for a lid that does not rotate use fix nve and fix aveforce"):
+        from_lammps(lmp)
+    lmp.close()
+
+
+def test_a_spring_of_each_sphere_is_in_the_operator(tmp_path):
+    """fix spring/self adds its constant to every translation of K, and a wall without contacts is taken as it is."""
+    from faultgouge import relax
+    from faultgouge.pywrap import from_lammps
+
+    lmp = cell(tmp_path, "fix lid lid nve/sphere", **{" contacts": ""})
+    relax(lmp)
+    laws = from_lammps(lmp)
+    assert laws.operators == "laws"
+    assert laws.contacts.wall.sum() == 9
+    command(lmp, "fix hold all spring/self 7.0")
+    found = from_lammps(lmp)
+    assert found.operators == "differences"
+    added = stiffness_matrix(found) - stiffness_matrix(laws)
+    expected = np.concatenate([np.full(3 * len(found), 7.0), np.zeros(3 * len(found))])
+    assert np.abs(added.toarray() - np.diag(expected)).max() < 1e-5 * abs(laws.contacts.normal_stiffness).max()
+    lmp.close()
