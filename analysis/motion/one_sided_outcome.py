@@ -63,7 +63,7 @@ def _chunks(system: OneSidedSystem, columns: int, time: float | None) -> tuple[f
 
 
 def follow_pushes(
-    system: OneSidedSystem, sticking: float, sticking_grows: bool, time: float | None = None
+    system: OneSidedSystem, sticking: float, sticking_grows: bool, time: float | None = None, pushes: int = PUSHES
 ) -> dict[str, Any]:
     """Whether one-sided motion grows from some pushes: `Stability.one_sided`.
 
@@ -75,16 +75,18 @@ def follow_pushes(
         Growth rate with sticking contacts, 1 / time, and whether they grow.
     time : float, optional
         How long; until the motion has settled by default.
+    pushes : int
+        How many; the opposite of each is followed, too.
     """
     configuration = system.motion.configuration
     rng = np.random.Generator(np.random.PCG64(0))
-    push = np.zeros((configuration.coordinates, PUSHES))
+    push = np.zeros((configuration.coordinates, pushes))
     push[: configuration.dimension * len(configuration)] = rng.standard_normal(
-        (configuration.dimension * len(configuration), PUSHES)
+        (configuration.dimension * len(configuration), pushes)
     )
     state = system.start(np.hstack([push, -push]))
-    chunk, most = _chunks(system, 2 * PUSHES, time)
-    times, sizes, slid = [0.0], [np.zeros(2 * PUSHES)], [state.p.copy()]
+    chunk, most = _chunks(system, 2 * pushes, time)
+    times, sizes, slid = [0.0], [np.zeros(2 * pushes)], [state.p.copy()]
     grows: bool | None = None
     for number in range(most):
         for look in range(LOOKS):
@@ -107,6 +109,7 @@ def follow_pushes(
         "error": error if grows else None,
         "amplification": float(d.max()),
         "time": float(t[-1]),
+        "pushes": 2 * pushes,
     }
 
 
