@@ -258,8 +258,8 @@ def stability(
     return Stability(
         stable=None if why or not len(contacts) else not grows, growth_rate=rate, undamped=undamped,
         at_bound=int(contacts.at_bound.sum()), one_sided=one_sided, rising=rising, sticking=sticking, sliding=sliding,
-        asymmetry=asymmetry(configuration), dissipative=damped, free=own.free, searched=own.searched, contacts=len(contacts),
-        reasons=tuple(why),
+        asymmetry=asymmetry(configuration), dissipative=damped, free=own.free, searched=own.searched,
+        contacts=len(contacts), reasons=tuple(why),
     )  # fmt: skip
 
 

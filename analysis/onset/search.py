@@ -118,6 +118,9 @@ class Onset(TableDisplay):
     def __repr__(self) -> str:
         return f"<Onset: {self.describe()}, {len(self.windows)} windows>"
 
+    def __str__(self) -> str:
+        return self.describe()
+
     def describe(self) -> str:
         """F_x^c with its error, in words; or that, and why, the packing is unstable at the smallest load."""
         first = self.windows[0]
