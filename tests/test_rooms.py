@@ -24,7 +24,7 @@ FLOORS = {
         ("analysis",),
         ("figures", "pywrap"),
         ("assessment", "studies"),
-        ("signal_guard", "notebook"),
+        ("signal_guard", "notebook", "stored_files"),
         ("commands", "exit_status"),
         ("cli",),
         ("__main__",),
