@@ -14,7 +14,8 @@ have three components; those of disks lie in the plane, and disks turn about z.
 motion continues: `sliding` chooses.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
 
@@ -31,6 +32,7 @@ from .arrays import (
     integers,
     number,
     positive_each,
+    real,
     same_bits,
     set_frozen,
 )
@@ -41,6 +43,12 @@ WALL = -1
 AT_COULOMBS_BOUND = 1 - 1e-6
 """Share of mu f_n from which on a contact counts as one at the bound. A packing at rest has a residual of 1e-6 of its
 forces or less, and a dashpot has carried that much of the tangential force."""
+
+UNIT = 1e-6
+"""Error of a unit vector, and of a direction in the plane, that text of seven digits has."""
+
+PERPENDICULAR = 1e-2
+"""Share of a tangential force that may be along the normal: LAMMPS turns histories a step behind their contacts."""
 
 PER_CONTACT = {
     "i": (), "j": (), "normal": (3,), "distance": (), "overlap": (), "slip_arm": (2,), "lever_arm": (2,),
@@ -101,7 +109,9 @@ class LinearisedContacts:
     Raises
     ------
     ValueError
-        If a shape does not fit, or a number is not finite.
+        If a shape does not fit, a number is not finite, or a value is none that a contact can have: a normal that is
+        no unit vector, a tangential force along the normal, a distance that is not positive, or a negative arm, bound
+        or index.
     """
 
     i: Indices
@@ -133,12 +143,13 @@ class LinearisedContacts:
         count = len(values["i"])
         values |= {name: booleans(name, given[name], count) for name in BOOLEAN}
         for name in ("distance", "friction"):  # may be infinite
-            values[name] = np.array(given[name], dtype=np.float64)
+            values[name] = real(name, given[name])
             floats(name, np.where(values[name] == np.inf, 0.0, values[name]), (count,))
         for name in PER_CONTACT.keys() - values.keys():
             values[name] = floats(name, given[name], (count, *PER_CONTACT[name]))
         if len(values["i"]) != len(values["j"]) or np.any(values["i"] == values["j"]):
             raise ValueError("Every contact has two different partners, i and j.")
+        _check_contacts(values)
         set_frozen(self, **{name: values[name] for name in PER_CONTACT})
 
     def __len__(self) -> int:
@@ -219,11 +230,17 @@ class Configuration:
         The particles of a driven layer, on each of which fx acts; none by default.
     drag_rate : float
         1/tau of the drag -(m/tau) v and -(I/tau) omega on every particle, 1 / time; none by default.
+    proof : float, optional
+        Relative difference of a short motion of the other code from that of this configuration; None without such a
+        motion. The proof is no property of the packing, and does not count when two configurations are compared.
+    remarks : sequence of str
+        What is to be known of its origin, such as laws that are others than their commands say; not compared either.
 
     Raises
     ------
     ValueError
-        If a shape does not fit, a number is not finite or has the wrong sign, or a contact names no particle.
+        If a shape does not fit, a number is not finite or has the wrong sign, a contact names no particle or leaves
+        the plane of disks, or two particles have one ID.
     """
 
     dimension: int
@@ -243,6 +260,8 @@ class Configuration:
     load_error: float
     top: NDArray[np.bool_]
     drag_rate: float
+    proof: float | None = field(compare=False)
+    remarks: tuple[str, ...] = field(compare=False)
 
     def __init__(
         self,
@@ -264,6 +283,8 @@ class Configuration:
         load_error: float = 0.0,
         top: ArrayLike | None = None,
         drag_rate: float = 0.0,
+        proof: float | None = None,
+        remarks: Iterable[str] = (),
     ) -> None:
         n = len(np.atleast_1d(np.asarray(radius)))
         if dimension not in (2, 3) or n == 0:
@@ -286,9 +307,12 @@ class Configuration:
             load_error=number("load_error", load_error),
             top=booleans("top", np.zeros(n, bool) if top is None else top, n),
             drag_rate=number("drag_rate", drag_rate),
+            proof=None if proof is None else number("proof", proof),
+            remarks=tuple(remarks),
         )
         if len(contacts) and max(contacts.i.max(), contacts.j.max()) >= n:
             raise ValueError(f"A contact names a particle beyond the last one, {n - 1}.")
+        _check_particles(self)
 
     def __len__(self) -> int:
         return len(self.radius)
@@ -307,7 +331,8 @@ class Configuration:
         slide = ", which slide" if self.contacts.sliding.any() else ", which stick" if bound else ""
         return (
             f"<Configuration: {len(self)} {what}, {count - walls} contacts between them and {walls} with walls, "
-            f"{bound} at Coulomb's bound{slide}, {len(self.rattlers)} rattlers, residual {self.residual:.3g}>"
+            f"{bound} at Coulomb's bound{slide}, {len(self.rattlers)} rattlers, residual {self.residual:.3g}, "
+            f"{'not proved' if self.proof is None else f'proof {self.proof:.1g}'}>"
         )
 
     @property
@@ -399,6 +424,42 @@ class Configuration:
         """The reverse of `vectors`."""
         d = self.dimension
         return np.concatenate([translation[:, :d].T.ravel(), rotation[:, d - self.axes :].T.ravel()])
+
+
+def _check_contacts(values: dict[str, NDArray]) -> None:
+    """Refuse values that no contact can have; a ValueError names the first contact that has one."""
+    normal, tangential, force = values["normal"], values["tangential_force"], values["normal_force"]
+    along = np.abs(np.einsum("ca,ca->c", normal, tangential))
+    tilted = along > PERPENDICULAR * np.linalg.norm(tangential, axis=1) + UNIT * np.abs(force)
+    _refuse_first(values["i"] < 0, "i = {} is no particle", values["i"])
+    _refuse_first(values["j"] < WALL, "j = {} is no particle; -1 is a wall", values["j"])
+    _refuse_first(np.abs(np.linalg.norm(normal, axis=1) - 1) > UNIT, "the normal {} is no unit vector", normal)
+    _refuse_first(tilted, "the tangential force {} has a part along the normal", tangential)
+    _refuse_first(values["distance"] <= 0, "the distance {} is not positive", values["distance"])
+    _refuse_first(values["friction"] < 0, "friction = {} is negative", values["friction"])
+    for name in ("slip_arm", "lever_arm"):
+        _refuse_first(np.any(values[name] < 0, axis=1), f"{name} = {{}} is negative", values[name])
+
+
+def _check_particles(made: Configuration) -> None:
+    """Refuse contacts of disks that leave the plane, and IDs and types that do not fit."""
+    n, c = len(made), made.contacts
+    if len(made.ids) != n or len(made.kind) != n:
+        raise ValueError(f"ids and kind must be lists of {n} integers, one for each particle.")
+    unique, count = np.unique(made.ids, return_counts=True)
+    if len(unique) < n:
+        raise ValueError(f"Two particles have the ID {unique[count > 1][0]}: give each its own.")
+    if made.dimension == 2:
+        scale = np.abs(c.normal_force) + np.linalg.norm(c.tangential_force, axis=1)
+        _refuse_first(np.abs(c.normal[:, 2]) > UNIT, "the normal {} of disks is not in the plane", c.normal)
+        outside = np.abs(c.tangential_force[:, 2]) > UNIT * scale
+        _refuse_first(outside, "the tangential force {} on a disk is not in the plane", c.tangential_force)
+
+
+def _refuse_first(wrong: NDArray[np.bool_], says: str, values: NDArray) -> None:
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise ValueError(f"Contact {k}: {says.format(values[k])}.")
 
 
 class HasConfiguration(Protocol):

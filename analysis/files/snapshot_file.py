@@ -64,6 +64,10 @@ def write_snapshot(
         group = file.create_group("snapshot")
         for name in SCALARS:
             group.attrs[name] = getattr(snapshot, name)
+        if snapshot.proof is not None:
+            group.attrs["proof"] = snapshot.proof
+        if snapshot.remarks:
+            group.attrs["remarks"] = list(snapshot.remarks)
         for name in ARRAYS:
             group.create_dataset(name, data=getattr(snapshot, name))
         for name in PER_CONTACT:
@@ -110,7 +114,9 @@ def read_snapshot(path: Path) -> Configuration:
             arrays = {name: dataset(group, name, size)[()] for name in ARRAYS if name in group or name not in LATER}
             stored = [name for name in SCALARS if name in group.attrs or name not in LATER]
             numbers = {name: group.attrs[name].item() for name in stored}
-            return Configuration(contacts=contacts, **arrays, **numbers)
+            proof = group.attrs["proof"].item() if "proof" in group.attrs else None
+            remarks = [str(each) for each in group.attrs.get("remarks", ())]
+            return Configuration(contacts=contacts, **arrays, **numbers, proof=proof, remarks=remarks)
         except Exception as error:  # h5py raises nearly every exception there is, depending on what is damaged
             said = (str(error).strip() or type(error).__name__).rstrip(".")
             raise PackingFileError(f"{path} holds no snapshot that can be read: {said}.") from error

@@ -23,7 +23,6 @@ from :math:`\pm \mathbf v_0`, integrated to ten digits.
 """
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,8 +34,8 @@ from ...analysis.arrays import Floats, Indices
 from ...analysis.motion.eigenvalues import active_coordinates, mass_weighted
 from ...analysis.operators.linearised_contacts import rescaling_operators
 from .granular_commands import SnapshotError
-from .lammps_arrays import owned_array, rows_of, set_velocity
-from .look_in_a_copy import can_copy, in_a_copy, quieten
+from .lammps_steps import steps_in_a_copy
+from .look_in_a_copy import can_copy
 
 ACCURACY = 1e-10
 """Error of a step in the motion with two derivatives, as a share of the largest velocity."""
@@ -109,7 +108,7 @@ def compare_motion(
     root = np.sqrt(snapshot.coordinate_mass)
     start = np.zeros(snapshot.coordinates)
     start[active] = amplitude * np.random.Generator(np.random.PCG64(seed)).standard_normal(len(active))
-    there, back = (in_a_copy(partial(_run, lmp, snapshot, sign * start, step, steps)) for sign in (1, -1))
+    there, back = (steps_in_a_copy(lmp, snapshot, sign * start, step, steps).velocity for sign in (1, -1))
     velocity = (0.5 * (there - back) * root)[active]
     linear = _linear_velocity(snapshot, stiffness, active, (start * root)[active], step * steps)
     difference = float(np.linalg.norm(velocity - linear) / np.linalg.norm(linear))
@@ -147,15 +146,3 @@ def _linear_velocity(
             raise SnapshotError(f"The predicted motion was not found: {found.message} Compare over a shorter time.")
         ends.append(found.y[len(start) :, 0])
     return np.asarray(0.5 * (ends[0] - ends[1]))
-
-
-def _run(lmp: Any, snapshot: Configuration, velocity: Floats, step: float, steps: int) -> Floats:
-    """Velocities of the coordinates after some steps of LAMMPS."""
-    lmp.command("log none")
-    quieten(lmp, drag=True)
-    set_velocity(lmp, snapshot, velocity)
-    lmp.command(f"timestep {step:.17g}")
-    lmp.command(f"run {steps} post no")
-    rows = rows_of(lmp, snapshot)
-    rotation = owned_array(lmp, "omega")[rows] * snapshot.radius[:, None]
-    return snapshot.join_vectors(owned_array(lmp, "v")[rows], rotation)

@@ -38,6 +38,7 @@ from ...analysis import Configuration, LinearisedContacts, MindlinLaw
 from ...analysis.arrays import Floats, Indices, derive_frozen
 from ...analysis.configuration import PER_CONTACT, WALL
 from ...analysis.packing.linearise import linearise_contacts
+from .acting_fixes import check_holding
 from .contact_law_measurement import MeasuredLaw, State, measure_law
 from .granular_commands import (
     GIVE_LINES,
@@ -53,7 +54,9 @@ from .granular_commands import (
 )
 from .instance_queries import Styles, communicator, log_of, only_log, styles_of
 from .lammps_arrays import Arrays, arrays_at_rest, given_back
+from .law_remarks import remark_on
 from .look_in_a_copy import can_copy, in_a_copy, quieten
+from .motion_proof import prove as prove_motion
 
 BALANCE = 1e-4
 """Share of the mean contact force that may be out of balance: then the motion is that of a packing which comes to rest
@@ -71,7 +74,12 @@ KnownLaws = dict[tuple[Any, ...], MeasuredLaw]
 
 
 def from_lammps(
-    lmp: Any, commands: Iterable[str] | None = None, *, slides: bool = False, balance: float = BALANCE
+    lmp: Any,
+    commands: Iterable[str] | None = None,
+    *,
+    slides: bool = False,
+    balance: float = BALANCE,
+    prove: bool = True,
 ) -> Configuration:
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
 
@@ -90,6 +98,11 @@ def from_lammps(
         Whether contacts at Coulomb's bound slide; they stick by default.
     balance : float
         Residual that is allowed, as a share of the mean contact force.
+    prove : bool
+        Whether ten steps of LAMMPS in a copy of the process are compared with those of the result, drag left out: its
+        `proof` is their relative difference (:mod:`~faultgouge.pywrap.granular.motion_proof`). A packing of more than
+        1e-3 is refused, and 1e-5 or less is usual. `proof` is None on several ranks or with threads, where no copy can
+        be made, and for a packing whose residual exceeds the default balance.
 
     Returns
     -------
@@ -99,20 +112,26 @@ def from_lammps(
     ------
     SnapshotError
         If the packing cannot be taken: it moves, or has rolling or twisting friction, cohesion, no history, walls
-        without contacts, moving or curved walls, or bodies; or the commands are not those of the instance.
+        without contacts, moving or curved walls, or bodies; or the commands are not those of the instance; or LAMMPS's
+        forces do not change as K says.
     """
-    return take_snapshot(lmp, commands, {}, slides=slides, balance=balance)
+    return take_snapshot(lmp, commands, {}, slides=slides, balance=balance, prove=prove)
 
 
 def take_snapshot(
-    lmp: Any, commands: Iterable[str] | None, laws: KnownLaws, *, slides: bool, balance: float
+    lmp: Any, commands: Iterable[str] | None, laws: KnownLaws, *, slides: bool, balance: float, prove: bool
 ) -> Configuration:
     """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
     given = None if commands is None else read_commands(commands)
     look = partial(_look, lmp, given)
-    snapshot = _snapshot(lmp, *(in_a_copy(look) if can_copy(lmp) else look()), laws)
+    deck, fixes, found = in_a_copy(look) if can_copy(lmp) else look()
+    snapshot = _snapshot(lmp, deck, found, laws)
     contacts = snapshot.contacts
     force = contacts.normal_force.mean() if len(contacts) else 0.0
+    proves = prove and can_copy(lmp) and snapshot.residual <= BALANCE * force
+    if not proves:
+        check_holding(fixes)
+    _check_friction(contacts)
     if snapshot.residual > balance * force:
         advice = (
             "run on with drag (fix viscous, and fix viscous/sphere for rotation) until it rests, or allow more by "
@@ -124,13 +143,17 @@ def take_snapshot(
             f"The packing moves: its residual is {snapshot.residual / force:.3g} of the mean contact force, and "
             f"{balance:g} is allowed; {advice}."
         )
+    if proves:
+        proof = prove_motion(lmp, snapshot, fixes, extrapolates=deck.style == OWN)
+        snapshot = derive_frozen(snapshot, proof=proof)
     if slides:
         return derive_frozen(snapshot, contacts=derive_frozen(contacts, sliding=contacts.at_bound))
     return snapshot
 
 
-def _look(lmp: Any, given: Commands | None) -> tuple[Commands, Arrays]:
-    """The commands, and the arrays of all ranks in the order of the particles' IDs; in a copy if there can be one."""
+def _look(lmp: Any, given: Commands | None) -> tuple[Commands, dict[str, str], Arrays]:
+    """The commands, the styles of fixes, and the arrays of all ranks in the order of the particles' IDs; in a copy if
+    there can be one."""
     world, copied = communicator(lmp), can_copy(lmp)
     if given is None:
         lines = log_of(lmp) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
@@ -153,7 +176,7 @@ def _look(lmp: Any, given: Commands | None) -> tuple[Commands, Arrays]:
     found = {name: _join_ranks([each[name] for each in every]) for name in mine}
     order = np.argsort(found["id"], kind="stable")
     by_contact = ("contacts", "partners")
-    return given, {name: rows if name in by_contact else rows[order] for name, rows in found.items()}
+    return given, styles.fixes, {name: rows if name in by_contact else rows[order] for name, rows in found.items()}
 
 
 def _join_ranks(parts: list[Floats]) -> Floats:
@@ -184,13 +207,14 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> C
     low, high, xy, yz, xz, periodic, _ = lmp.extract_box()
     size = np.subtract(high, low)
     box = np.array([[size[0], 0, 0], [xy, size[1], 0], [xz, yz, size[2]]])
+    contacts, remarks = _contacts(lmp, commands, found, frozen, laws, box)
     made = Configuration(
         dimension=dimension,
         position=found["x"][:, :dimension],
         radius=found["radius"],
         mass=found["rmass"],
         inertia=factor * found["rmass"] * found["radius"] ** 2,
-        contacts=_contacts(lmp, commands, found, frozen, laws, box),
+        contacts=contacts,
         box=box,
         origin=np.array(low),
         periodic=np.array(periodic, dtype=bool),
@@ -198,11 +222,26 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> C
         free=free,
         ids=found["id"].astype(np.int64),
         kind=found["type"].astype(np.int64),
+        remarks=remarks,
     )
     total = np.stack([found["f"], found["torque"]], axis=1)
     load = np.where(free[:, None, None], total - made.contact_force, -made.contact_force)
     _check_torques(load[free, 1] / made.radius[free, None], made.contacts)
     return derive_frozen(made, load=load)
+
+
+def _check_friction(contacts: LinearisedContacts) -> None:
+    """Refuse tangential forces beyond Coulomb's bound, which is that of the commands."""
+    size = np.linalg.norm(contacts.tangential_force, axis=1)
+    beyond = size > contacts.friction + AGREES * (contacts.friction + contacts.normal_force)
+    if np.any(beyond):
+        most = np.max(size[beyond] / contacts.normal_force[beyond])
+        mu = np.min(contacts.friction[beyond] / contacts.normal_force[beyond])
+        raise SnapshotError(
+            f"{np.count_nonzero(beyond)} contacts carry more than Coulomb's bound of the commands, up to |f_t| = "
+            f"{most:.3g} f_n with mu = {mu:.3g}: the commands are not those of the instance; {GIVE_LINES}, as they "
+            "hold now."
+        )
 
 
 TWICE = "particles touch each other twice, of which LAMMPS mixes the histories: take a box that is wider"
@@ -268,10 +307,10 @@ class _OneLaw(NamedTuple):
 
 def _contacts(
     lmp: Any, commands: Commands, found: Arrays, frozen: NDArray[np.bool_], laws: KnownLaws, box: Floats
-) -> LinearisedContacts:
-    """Contacts between particles, then those with each wall."""
+) -> tuple[LinearisedContacts, tuple[str, ...]]:
+    """Contacts between particles, then those with each wall; and remarks on their laws."""
     pairs, walls = _pairs(found, box), [name.removeprefix("wall ") for name in found if name.startswith("wall ")]
-    parts = []
+    parts, remarks = [], []
     if commands.style == OWN:
         parts.append(_linearise_smooth(_smooth_law(commands.pair[0].split()[2:]), pairs))
         for name in walls:
@@ -285,15 +324,18 @@ def _contacts(
                 continue
             # a law is that of its commands, which a user may change
             key = (*commands.pair, commands.fixes.get(name), name)
+            state = _median_state(group, found)
             if key not in laws:
-                laws[key] = measure_law(lmp, commands, name, _median_state(group, found), group.who)
+                laws[key] = measure_law(lmp, commands, name, state, group.who)
+            remarks.append(remark_on(laws[key], commands, name, state))
             parts.append(_linearise_measured(laws[key], group, found, frozen))
     values = {name: [getattr(each, name) for each in parts] for name in PER_CONTACT}
     if not parts:
         values = {
             name: [np.zeros((0, *shape), bool if name == "sliding" else float)] for name, shape in PER_CONTACT.items()
         }
-    return LinearisedContacts(**{name: np.concatenate(each) for name, each in values.items()})
+    contacts = LinearisedContacts(**{name: np.concatenate(each) for name, each in values.items()})
+    return contacts, tuple(remark for remark in remarks if remark)
 
 
 def _geometry(

@@ -34,6 +34,21 @@ TANGENTIAL = (
 )  # fmt: skip
 
 
+MOVING = {
+    "rigid": "holds particles together in bodies, whose modes are not those of particles: leave it out",
+    "poems": "holds particles together in bodies, whose modes are not those of particles: leave it out",
+    "move": "moves particles: unfix it, and let the packing come to rest",
+    "deform": "moves the box: unfix it, and let the packing come to rest",
+    "press/berendsen": "moves the box: unfix it, and let the packing come to rest",
+    "nph": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
+    "npt": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
+    "nvt": "has a thermostat: use fix nve/sphere in its place, and let the packing come to rest",
+    "propel/self": "pushes particles along their velocities as soon as they move: unfix it",
+    "wall/gran/region": "has curved walls: use planes of fix wall/gran",
+}
+"""Fixes, by the beginnings of their styles, with which no packing can be taken, and why."""
+
+
 class SnapshotError(FaultgougeError):
     """A packing of LAMMPS cannot be taken as it stands: one sentence with what would do."""
 
@@ -154,27 +169,10 @@ def _check_model(words: list[str], line: str) -> None:
 
 
 def check_fixes(styles: dict[str, str], commands: Commands) -> None:
-    """Refuse fixes, by ID and style, that move or hold particles, walls or the box as contacts do not tell."""
-    refused = {
-        "rigid": "holds particles together in bodies, whose modes are not those of particles: leave it out",
-        "poems": "holds particles together in bodies, whose modes are not those of particles: leave it out",
-        "move": "moves particles: unfix it, and let the packing come to rest",
-        "deform": "moves the box: unfix it, and let the packing come to rest",
-        "press/berendsen": "moves the box: unfix it, and let the packing come to rest",
-        "nph": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
-        "npt": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
-        "nvt": "has a thermostat: use fix nve/sphere in its place, and let the packing come to rest",
-        "setforce": "holds some coordinates: use fix freeze, or leave the particles out of fix nve/sphere",
-        "lineforce": "holds some coordinates: leave it out",
-        "planeforce": "holds some coordinates: leave it out",
-        "aveforce": "shares forces among particles: leave it out",
-        "spring": "pulls at particles as contacts do not tell: leave it out",
-        "indent": "pushes particles as contacts do not tell: leave it out",
-        "wall/gran/region": "has curved walls: use planes of fix wall/gran",
-    }
+    """Refuse fixes, by ID and style, that hold or move particles, walls or the box whatever their numbers are."""
     for name, style in styles.items():
         plain = without_suffix(style)
-        for begin, says in refused.items():
+        for begin, says in MOVING.items():
             if plain.startswith(begin):
                 raise SnapshotError(f"fix {name} {style} {says}.")
         if plain.startswith("wall/") and plain not in WALLS:

@@ -19,10 +19,11 @@ def communicator(lmp: Any) -> MPI.Comm:
 
 
 class Styles(NamedTuple):
-    """Pair style, styles of the fixes by ID, and atom style of an instance."""
+    """Pair style, styles and groups of the fixes by ID, and atom style of an instance."""
 
     pair: str
     fixes: dict[str, str]
+    groups: dict[str, str]
     atom: str
 
 
@@ -34,10 +35,11 @@ def styles_of(lmp: Any) -> Styles:
         lmp.command(f'info fixes system out overwrite "{path}"')
         said = world.bcast(Path(path).read_text() if world.rank == 0 else None, root=0)
         world.barrier()
-    fixes = dict(re.findall(r"^ *Fix\[ *\d+\]: *(\w+), *style = ([^,\s]+)", said, re.MULTILINE))
+    fixes = re.findall(r"^ *Fix\[ *\d+\]: *(\w+), *style = ([^,\s]+), *group = (\S+)", said, re.MULTILINE)
     values = dict(re.findall(r"^ *(Atoms|Atom style) *= *(.*?) *$", said, re.MULTILINE))
     # Atoms = N, types = T, style = that of the pairs
-    return Styles(values["Atoms"].rpartition("style = ")[2], fixes, values["Atom style"])
+    styles, groups = ({name: each[k] for name, *each in fixes} for k in (0, 1))
+    return Styles(values["Atoms"].rpartition("style = ")[2], styles, groups, values["Atom style"])
 
 
 def explain_error(error: Exception) -> str:

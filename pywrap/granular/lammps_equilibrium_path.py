@@ -95,8 +95,8 @@ def lammps_path(
     Raises
     ------
     SnapshotError
-        If the instance has several ranks or threads. ``path(value)`` raises it as `from_lammps` does, and where a load
-        changes no force.
+        If the instance has several ranks or threads. ``path(value)`` raises it as `from_lammps` does, with the proof at
+        the first value alone, and where a load changes no force.
     NoEquilibriumError
         By ``path(value)``, where the packing flows: its particles have moved by their diameter in the mean, or do not
         come to rest.
@@ -230,7 +230,8 @@ class _Relaxation:
             found = self.relax(value) if relaxes else self.displace_to_balance()
             if found is None:
                 return None
-            self.found = found
+            # the first of all others, which are forked from it
+            self.found = found = self.look(prove=True) if self.found is None else found
             change = in_a_copy(lambda: self.force_change(value))
         except Exception as error:  # LAMMPS, and a user's function, raise what they choose
             if not relaxes:
@@ -251,9 +252,9 @@ class _Relaxation:
         elif self.lmp.set_internal_variable(self.apply, value) != 0:
             self.lmp.command(f"variable {self.apply} equal {value:.17g}")
 
-    def look(self) -> Configuration:
+    def look(self, *, prove: bool = False) -> Configuration:
         """The packing as it stands, moving or not."""
-        return take_snapshot(self.lmp, self.commands, self.laws, slides=self.slides, balance=np.inf)
+        return take_snapshot(self.lmp, self.commands, self.laws, slides=self.slides, balance=np.inf, prove=prove)
 
     def force_change(self, value: float) -> float:
         """Largest change of a force per value, of particles that stay where they are."""

@@ -313,3 +313,54 @@ def test_contacts_that_are_none(change):
     values = {name: getattr(make(3).contacts, name) for name in PER_CONTACT}
     with pytest.raises(ValueError, match=r"shape|finite|integers"):
         LinearisedContacts(**values | change)
+
+
+def one_contact(**change):
+    """A configuration of two disks, or spheres, with one contact, but for some values."""
+    contacts = {
+        "i": [0], "j": [1], "normal": [[0, 1, 0]], "distance": [0.99], "overlap": [0.01], "slip_arm": [[0.5, 0.5]],
+        "lever_arm": [[0.5, 0.5]], "lever_slope": [0], "normal_force": [1], "tangential_force": [[0.1, 0, 0]],
+        "normal_stiffness": [100], "tangential_stiffness": [30], "closing": [[0, 0, 0]], "parting": [[0, 0, 0]],
+        "friction": [0.5], "sliding": [False], "normal_dashpot": [0], "tangential_dashpot": [0],
+    }  # fmt: skip
+    d = change.get("dimension", 2)
+    particles = {
+        "dimension": d, "position": np.zeros((2, d)), "radius": [0.5, 0.5], "mass": [1, 1], "inertia": [0.1, 0.1],
+        "box": np.eye(3), "origin": np.zeros(3), "periodic": [False] * 3, "load": np.zeros((2, 2, 3)),
+    }  # fmt: skip
+    made = LinearisedContacts(**contacts | {name: value for name, value in change.items() if name in contacts})
+    return Configuration(contacts=made, **particles | {n: each for n, each in change.items() if n not in contacts})
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"normal": [[0, 2, 0]]}, r"Contact 0: the normal .* is no unit vector"),
+        ({"normal": [[0, 0, 0]]}, r"no unit vector"),
+        ({"normal": [[0, 0.8, 0.6]]}, r"normal .* of disks is not in the plane"),
+        ({"tangential_force": [[0.1, 0, 0.1]]}, r"tangential force .* on a disk is not in the plane"),
+        ({"tangential_force": [[0, 0.1, 0]]}, r"has a part along the normal"),
+        ({"distance": [-1]}, r"the distance -1.0 is not positive"),
+        ({"slip_arm": [[0.5, -0.5]]}, r"slip_arm = .* is negative"),
+        ({"lever_arm": [[-0.5, 0.5]]}, r"lever_arm = .* is negative"),
+        ({"friction": [-0.5]}, r"friction = -0.5 is negative"),
+        ({"friction": [0.5 + 1j]}, r"friction holds complex values"),
+        ({"i": [-3]}, r"i = -3 is no particle"),
+        ({"j": [-2]}, r"j = -2 is no particle; -1 is a wall"),
+        ({"mass": [1 + 1j, 1]}, r"mass holds complex values"),
+        ({"mass": np.ma.masked_array([1.0, 1.0], [True, False])}, r"mass holds masked values"),
+        ({"ids": [7, 7]}, r"Two particles have the ID 7"),
+        ({"kind": [1]}, r"ids and kind must be lists of 2 integers"),
+    ],
+)
+def test_values_that_no_packing_has(change, says):
+    with pytest.raises(ValueError, match=says) as refusal:
+        one_contact(**change)
+    assert "\n" not in str(refusal.value)
+
+
+def test_values_that_packings_have():
+    """A tilted normal of spheres, a masked array without masks, and infinite bounds and distances."""
+    assert len(one_contact().contacts) == 1
+    one_contact(dimension=3, normal=[[0, 0.8, 0.6]], distance=[np.inf], friction=[np.inf])
+    one_contact(mass=np.ma.masked_array([1.0, 1.0], [False, False]), j=[-1])

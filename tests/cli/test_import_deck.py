@@ -251,3 +251,23 @@ def test_contacts_at_the_bound_stick_or_slide(faultgouge_here, tmp_path):
         assert f"{count} of {len(c)} contacts are at Coulomb's bound; they {acts} here" in done.stdout + done.stderr
         found[acts] = json.loads(faultgouge_here("spectrum", f"{acts}.h5", "--json").stdout)["eigenvalues"]
     assert found["stick"] != found["slide"]
+
+
+def test_laws_that_are_others_than_their_lines_say(faultgouge_here, tmp_path):
+    """A wall of hooke/history has another tangential stiffness in LAMMPS of 22 Jul 2025, one of hertz/history not."""
+    from faultgouge.analysis.files.snapshot_file import read_snapshot
+
+    deck = DECK.format(**FLAT, word="contacts")
+    hooke = deck.replace("wall/gran hertz/history ${kn}", "wall/gran hooke/history 1e3")
+    for name, text in (("hertz", deck), ("hooke", hooke)):
+        (tmp_path / f"{name}.in").write_text(text)
+        said = faultgouge_here("import", f"{name}.in", "-o", f"{name}.h5").stdout
+        found = read_snapshot(tmp_path / f"{name}.h5")
+        c = found.contacts
+        measured = c.tangential_stiffness[c.wall].mean() / (2 / 7 * 1e3)
+        share = re.search(r"fix floor: LAMMPS has a tangential stiffness (\S+) times that of the line", said)
+        differs = name == "hooke" and abs(measured - 1) > 0.01
+        assert bool(share) == bool(found.remarks) == differs
+        if share:
+            assert float(share[1]) == pytest.approx(measured, rel=0.3)  # that of the contact of the median overlap
+        assert f"proof {found.proof:.1g}" in said

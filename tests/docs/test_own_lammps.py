@@ -25,7 +25,7 @@ def test_script_of_the_page(tmp_path):
     done = subprocess.run([sys.executable, "look.py"], cwd=tmp_path, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     assert "40 spheres" in done.stdout
-    assert "LAMMPS moves as K and C say: True" in done.stdout
+    assert "LAMMPS moves as K and C say: True True" in done.stdout
     assert "<Spectrum: every motion decays with the packing's dissipation, D as exp(-0.05" in done.stdout
     assert "K alone has 42 complex pairs, D as exp(0.318" in done.stdout
 

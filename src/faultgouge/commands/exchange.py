@@ -139,6 +139,8 @@ def _import_deck(file: Path, output: Path, slides: bool) -> None:
         snapshot = run_deck(file, slides=slides)
     if is_root():
         write_snapshot(output, snapshot, {"deck": file.read_text(errors="replace")})
+    for remark in snapshot.remarks:
+        print_line(remark)
     print_line(f"{repr(snapshot).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
 
 

@@ -62,6 +62,8 @@ def test_tilt_of_a_slope(tmp_path):
             assert each.load[:, 0].sum(axis=0) == pytest.approx(
                 [weight * value / np.hypot(value, 1), -weight / np.hypot(value, 1), 0], abs=1e-9
             )
+        assert found[0.0].proof < 1e-5  # the first, from which the others come
+        assert found[0.1].proof is None
         assert path(0.02) is found[0.02]
         assert path(0.05) == found[0.05]  # from 0.02 both times, to the bit
         with pytest.raises(NoEquilibriumError, match=r"flows at 0\.9"):
