@@ -34,7 +34,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis import Configuration, LinearisedContacts, MindlinLaw
+from ...analysis import BadInputError, Configuration, LinearisedContacts, MindlinLaw
 from ...analysis.arrays import Floats, Indices, derive_frozen
 from ...analysis.configuration import PER_CONTACT, WALL
 from ...analysis.packing.linearise import linearise_contacts
@@ -89,7 +89,7 @@ def from_lammps(
     slides : bool
         Whether contacts at Coulomb's bound slide; they stick by default.
     balance : float
-        Residual that is allowed, as a share of the mean contact force.
+        Residual that is allowed, as a share of the mean contact force; not negative.
 
     Returns
     -------
@@ -104,10 +104,17 @@ def from_lammps(
     return take_snapshot(lmp, commands, {}, slides=slides, balance=balance)
 
 
+def check_balance(balance: float) -> None:
+    """Refuse a residual that is no number from 0 on: every packing would be at rest, or none."""
+    if not balance >= 0:
+        raise BadInputError(f"balance = {balance:g} is refused: give a share of the mean contact force, from 0 on.")
+
+
 def take_snapshot(
     lmp: Any, commands: Iterable[str] | None, laws: KnownLaws, *, slides: bool, balance: float
 ) -> Configuration:
     """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
+    check_balance(balance)
     given = None if commands is None else read_commands(commands)
     look = partial(_look, lmp, given)
     snapshot = _snapshot(lmp, *(in_a_copy(look) if can_copy(lmp) else look()), laws)

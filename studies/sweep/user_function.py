@@ -20,7 +20,6 @@ import inspect
 import json
 import re
 import sys
-import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -29,6 +28,7 @@ from types import ModuleType
 from typing import Any
 
 from ...analysis import FaultgougeError
+from ...analysis.errors import place_in_user_code
 from ...pywrap import Scene, SceneError
 from ..packing_tools import Start
 from .imported_code import code_digest
@@ -67,10 +67,8 @@ class UserFunction:
         except FaultgougeError:
             raise
         except (Exception, SystemExit) as error:  # whatever it is, the other scenes are computed
-            line = traceback.extract_tb(error.__traceback__)[-1]
             raise UserFunctionError(
-                f"{self.function.__name__} failed with {type(error).__name__}: {error} ({Path(line.filename).name}, "
-                f"line {line.lineno})"
+                f"{self.function.__name__} failed with {type(error).__name__}: {error}{place_in_user_code(error)}"
             ) from error
         return _as_row(row, self.function.__name__)
 

@@ -426,6 +426,27 @@ def test_our_own_style():
 
 
 @pytest.mark.slow
+def test_a_comparison_that_proves_nothing_is_refused(beds):
+    """And a comparison says over how many periods it went."""
+    from faultgouge.analysis import BadInputError
+    from faultgouge.pywrap import compare_motion, from_lammps
+
+    lmp = beds("gran/hertz/history", 3, True)
+    bed = from_lammps(lmp)
+    good = {"time": 0.2, "amplitude": 1e-5, "timestep": 1e-4}
+    wrong = {"time": (-1.0, 0.0, np.nan, np.inf), "timestep": (-1e-4, 0.0, np.nan), "amplitude": (0.0, np.nan, np.inf)}
+    for name, values in wrong.items():
+        for value in values:
+            with pytest.raises(BadInputError, match=f"^{name} = {value:g} is refused"):
+                compare_motion(lmp, bed, **(good | {name: value}))
+    with pytest.raises(BadInputError, match="balance = nan is refused"):
+        from_lammps(lmp, balance=np.nan)
+    found = compare_motion(lmp, bed, **good)
+    assert found.periods == pytest.approx(0.2 * largest_frequency(bed) / (2 * np.pi), rel=1e-9)
+    assert "after t = 0.2, 1." in str(found)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["gran/hertz/history", "mindlin"])
 def test_lammps_rests_below_the_largest_stable_time_step_and_blows_up_above(beds, law):
     """Within half a per cent, by dashpots that take a tenth of the step."""

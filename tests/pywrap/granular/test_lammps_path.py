@@ -165,6 +165,39 @@ def test_force_on_a_layer(tmp_path):
 
 
 @pytest.mark.slow
+def test_what_is_wrong_with_a_path_is_said(tmp_path):
+    """An error of the user's function with its line in the user's file, and a path that is closed."""
+    from faultgouge.analysis import BadInputError
+    from faultgouge.pywrap import SnapshotError, lammps_path
+
+    lmp = layer(tmp_path)
+    (tmp_path / "load.py").write_text(
+        "import numpy as np\n"
+        "def divides(lmp, value):\n    return 1 / 0\n"
+        "def library(lmp, value):\n    np.linalg.inv(np.zeros((2, 2)))\n"
+        "def ends(lmp, value):\n    raise SystemExit(3)\n"
+        "def lammps(lmp, value):\n\n    lmp.command('fix pull nobody addforce 1 0 0')\n"
+    )
+    own: dict = {}
+    exec(compile((tmp_path / "load.py").read_text(), str(tmp_path / "load.py"), "exec"), own)
+    for name, says in {
+        "divides": r"^At 0\.1: apply failed with ZeroDivisionError: division by zero \(load\.py, line 3\)\.$",
+        "library": r"^At 0\.1: apply failed with LinAlgError: Singular matrix \(load\.py, line 5\)\.$",
+        "ends": r"^At 0\.1: apply failed with SystemExit: 3 \(load\.py, line 7\)\.$",
+        "lammps": r"^At 0\.1: LAMMPS stopped: .*nobody.* \(load\.py, line 10\)\.$",
+    }.items():
+        with lammps_path(lmp, own[name]) as path, pytest.raises(SnapshotError, match=says):
+            path(0.1)
+    with pytest.raises(SnapshotError, match=r"The path is closed: ask it inside of its `with` block"):
+        path(0.1)
+    path.close()  # a second time does no harm
+    for balance in (np.nan, -1.0):
+        with pytest.raises(BadInputError, match="balance = "):
+            lammps_path(lmp, "slope", balance=balance)
+    lmp.close()
+
+
+@pytest.mark.slow
 def test_strain_of_a_periodic_box(tmp_path):
     """By change_box, which moves the particles along; the shear stress of the contacts rises with the strain."""
     from faultgouge.pywrap import lammps_path
