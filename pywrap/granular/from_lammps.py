@@ -125,8 +125,7 @@ def take_snapshot(
             "run on with drag (fix viscous, and fix viscous/sphere for rotation) until it rests, or allow more by "
             "from_lammps(lmp, balance=...)"
         )
-        if _touch_twice(contacts):
-            advice = TWICE
+        advice = _known_cause(contacts) or advice
         raise SnapshotError(
             f"The packing moves: its residual is {snapshot.residual / force:.3g} of the mean contact force, and "
             f"{balance:g} is allowed; {advice}."
@@ -212,6 +211,12 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> C
     return derive_frozen(made, load=load)
 
 
+LOST = (
+    "have no tangential force, as where histories are lost: LAMMPS reads none from a restart file if another instance "
+    "of a granular style was there before in the process, and not all across a periodic boundary or with newton off; "
+    "read the file in a process of its own, and run on with drag (fix viscous) until the packing rests"
+)
+
 TWICE = "particles touch each other twice, of which LAMMPS mixes the histories: take a box that is wider"
 
 
@@ -219,6 +224,14 @@ def _touch_twice(contacts: LinearisedContacts) -> bool:
     """Whether two particles touch each other through two periodic images."""
     pairs = np.sort(np.column_stack([contacts.i, contacts.j])[~contacts.wall], axis=1)
     return len(np.unique(pairs, axis=0)) < len(pairs)
+
+
+def _known_cause(contacts: LinearisedContacts) -> str | None:
+    """Why forces are out of balance though the packing may be at rest; None if nothing tells."""
+    if _touch_twice(contacts):
+        return TWICE
+    lost = np.count_nonzero((contacts.friction > 0) & ~contacts.tangential_force.any(axis=1))
+    return f"{lost} of {len(contacts)} contacts {LOST}" if lost else None
 
 
 def _check_torques(others: Floats, contacts: LinearisedContacts) -> None:
@@ -232,7 +245,7 @@ def _check_torques(others: Floats, contacts: LinearisedContacts) -> None:
             "either something else turns them, which is not linearised here, or this release of LAMMPS hands out "
             "contacts in a way that is not known here; releases of 29 Aug 2024 to 22 Jul 2025 are"
         )
-        reason = TWICE if _touch_twice(contacts) else reason
+        reason = _known_cause(contacts) or reason
         raise SnapshotError(f"The torques on particles are not those of their contacts: {reason}.")
 
 

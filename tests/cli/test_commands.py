@@ -366,6 +366,17 @@ def test_onset_with_dissipation_as_json(faultgouge_here, tmp_path):
 
 
 @pytest.mark.slow
+def test_a_lack_of_memory_is_no_fault_of_the_program(capsys):
+    from faultgouge.exit_status import fail
+
+    with pytest.raises(MemoryError) as lack:
+        np.empty(1 << 55)
+    with pytest.raises(SystemExit) as end:
+        fail(lack.value)
+    assert end.value.code == 1
+    assert "Error: there is not enough memory (Unable to allocate 256. PiB for an array" in capsys.readouterr().err
+
+
 def test_every_command_has_help_with_an_example(faultgouge, faultgouge_here):
     commands = ["settle", "ramp", "perturb", "onset", "spectrum", "explain", "report", "stability", "reproduce"]
     commands += ["import", "export", "movie", "view", "sweep", "modes", "eruptions"]

@@ -225,6 +225,28 @@ def stress(found) -> np.ndarray:
 
 
 @pytest.mark.slow
+def test_histories_that_a_restart_file_has_lost_are_named(tmp_path):
+    """Another granular instance was there in the process, and LAMMPS reads no history at all."""
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    lmp = periodic(tmp_path)
+    count = len(from_lammps(lmp).contacts)
+    lmp.command(f"write_restart {tmp_path / 'state.restart'}")
+    lmp.close()
+    again = instance(tmp_path / "log.again")
+    for line in (
+        "newton off", "comm_modify vel yes", f"read_restart {tmp_path / 'state.restart'}",
+        f"pair_style gran/{LAW.replace(' 0.5 1', ' 2.0 1')}", "pair_coeff * *", "fix move all nve/sphere disc",
+    ):  # fmt: skip
+        again.command(line)
+    with pytest.raises(
+        SnapshotError, match=f"{count} of {count} contacts have no tangential force, as where histories"
+    ):
+        from_lammps(again)
+    again.close()
+
+
+@pytest.mark.slow
 def test_moduli_along_a_path_of_strain_are_those_of_a_run(tmp_path):
     """By the function of the how-to: as LAMMPS's own slow run with fix deform. By change_box they are others."""
     from faultgouge.pywrap import from_lammps, lammps_path
