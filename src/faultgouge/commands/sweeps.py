@@ -150,7 +150,9 @@ def modes(
         return
     keeps(f"{output}/{LINES} has the scenes that have ended; the same command continues from there", output)
     result = count_modes(wanted, output, part, say, lambda rows, count: progress(rows, "scenes", count), workers)
-    if is_root():
+    if is_root() and not result:
+        print_line("this part of the sweep has no scenes")
+    elif is_root():
         _show_modes(result["rows"])
         failed = [each["says"] for each in result["packings"] if each["says"] is not None]
         print_line(f"packings: {len(result['packings'])}, failed: {len(failed)}; written: {output}/modes.json")
