@@ -176,7 +176,7 @@ class Sweep:
             )
         return SweepPoint(number, values, scene, None, digest([*self._known_as, with_contents(scene)]))
 
-    @property
+    @cached_property
     def _known_as(self) -> tuple[str, str]:
         """What stands for task and program in the keys of rows: of a function name and code, wherever its file is."""
         task = f"{self.task.rpartition(':')[2]} {self.code}" if self.code else self.task

@@ -89,6 +89,23 @@ def test_a_row_is_known_by_what_the_task_imports_of_its_own(folder):
         assert (keys(sweep_of(folder, "imports")) == before) is same
 
 
+def test_a_row_of_a_function_of_a_package_is_known_by_the_modules_of_the_package(tmp_path, monkeypatch):
+    package = tmp_path / "grains_of_mine"
+    package.mkdir()
+    monkeypatch.syspath_prepend(tmp_path)
+    (package / "__init__.py").write_text("")
+    (package / "tasks.py").write_text("import beside\nfrom . import numbers\ndef task(scene):\n    return {}\n")
+    (package / "numbers.py").write_text("one = 1")
+    (tmp_path / "beside.py").write_text("two = 2")
+    found = []
+    for name, text in ((None, ""), ("beside.py", "two = 3"), ("grains_of_mine/numbers.py", "one = 2")):
+        if name:
+            (tmp_path / name).write_text(text)
+        user_function.cache_clear()
+        found += keys(Sweep.from_mapping({"task": "grains_of_mine.tasks:task", "scene": SMALL}, TASKS))
+    assert found[0] == found[1] != found[2]
+
+
 def test_a_row_is_known_by_the_version_of_the_program(folder, monkeypatch):
     before = keys(sweep_of(folder, "ends"))
     monkeypatch.setattr(sweep_plan, "version", lambda _: "0.9")
