@@ -143,7 +143,7 @@ def read_results(*paths: Path) -> dict[str, Row]:
         for row in result_rows.read_keyed_rows(path, "key", "a sweep"):
             key = row["key"]
             if key in rows and rows[key]["says"] is None:
-                if row["says"] is None and _result(row) != _result(rows[key]):
+                if row["says"] is None and _as_text(row["result"]) != _as_text(rows[key]["result"]):
                     values = ", ".join(f"{name} = {value}" for name, value in row["values"].items())
                     raise SceneError(
                         f"{places[key]} and {path} have different results of one scene ({values}; key {key}): take the "
@@ -154,9 +154,9 @@ def read_results(*paths: Path) -> dict[str, Row]:
     return rows
 
 
-def _result(row: Row) -> str:
-    """The result of a row as text, in which nan equals nan."""
-    return json.dumps(row["result"], sort_keys=True)
+def _as_text(value: dict[str, Any] | None) -> str:
+    """A row, or its result, as text, in which nan equals nan."""
+    return json.dumps(value, sort_keys=True)
 
 
 def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep, list[Row]]:
@@ -192,7 +192,7 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
         table = [known[key] for key in request["keys"] if key in known]
         write_json(output / ASKED, request | {"shard": [1, 1]})
         for row in table:
-            if kept.get(row["key"]) != row:
+            if _as_text(kept.get(row["key"])) != _as_text(row):
                 result_rows.append_row(output / LINES, row)
         sweep = Sweep(request["task"], request["sweep"], request["scene"])
         write_tables(table, sweep.names, output)

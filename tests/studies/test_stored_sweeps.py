@@ -40,6 +40,9 @@ def imports(scene):
     from tools.numbers import number
     return {"number": number}
 
+def nothing(scene):
+    return {"number": float("nan")}
+
 def fails(scene):
     return {"number": 1 / 0}
 """
@@ -174,6 +177,14 @@ def test_merge_keeps_the_rows_of_its_target(folder):
     with pytest.raises(SceneError, match=r"precious is of another sweep than .*part1"):
         merge([one, two], folder / "precious", id)
     assert {path: path.read_bytes() for path in (folder / "precious").iterdir()} == files
+
+
+def test_a_result_that_is_no_number_is_the_same_result_again(folder):
+    parts, whole = shards(folder, "nothing"), folder / "whole"
+    merge(parts, whole, id)
+    before = (whole / "results.jsonl").read_text()
+    merge([*parts, whole], whole, id)
+    assert (whole / "results.jsonl").read_text() == before
 
 
 def test_merge_reads_a_part_that_is_being_written(folder):
