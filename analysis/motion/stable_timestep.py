@@ -21,7 +21,7 @@ one of two:
 
 With :math:`a = dt^2 x^H K x` and :math:`g = dt\, x^H C x` of an eigenvector, :math:`x^H M x = 1`, the factor z of a
 step is a root of :math:`(z-1)^2 + g (z-1) + a z`, or of :math:`z (z-1)^2 + \frac12 g (3 z - 1)(z - 1) + a z^2`. For
-symmetric K and C that are not negative, a and g are real and not negative. Then (Jury) all roots are inside of the unit
+symmetric K and C that are not negative, a and g are real and not negative. Then (Jury) no root is outside of the unit
 circle if, and only if, the polynomial at z = -1 has the sign that it has at dt = 0: for :math:`a + 2 g < 4`, or
 :math:`a + 4 g < 4`. So a motion begins to alternate in sign and to grow when :math:`4 M - 2 c\, dt\, C - dt^2 K`
 becomes singular, with c = 1 for the half step and c = 2 for the extrapolated velocity. It follows that dt = 2/mu with
