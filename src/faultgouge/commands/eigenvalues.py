@@ -23,6 +23,7 @@ from .terminal import (
     read_scene,
     report_fallback,
     say,
+    say_work,
     status,
     stored_configuration,
     stored_files,
@@ -245,12 +246,13 @@ def onset(
     from faultgouge.analysis.progress import show_progress
     from faultgouge.pywrap.settling.settle import shared_bed
 
-    wanted = read_scene(scene, "onset", "onset --all" if every else "onset")
+    wanted = read_scene(scene, "onset")
     part = None if modes is None else _modes(modes)
     if part is not None and wanted.damping is not None:
         raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
     if every:
         _check_all_windows(wanted, part)
+    say_work(wanted, "onset --all" if every else "onset")
     if output:
         lock_output(context, output, scene, *stored_files(wanted))
     folder = _search_folder(slices, output)
