@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..configuration import Configuration
+from ..errors import BadInputError
 from ..packing.packing import Floats, Packing
 from .matrix_functions import BlockDiagonal, first_order
 from .oscillator import Oscillator
@@ -181,13 +182,13 @@ def linear_response(
     return LinearMotion.of(packing).response(times, force=force, omega=omega, initial=initial, dt=dt)
 
 
-def layer_force(packing: Packing, amplitude: float) -> Floats:
+def layer_force(packing: Packing | Configuration, amplitude: float) -> Floats:
     """Force vector for a force along x on the upper layer.
 
     Parameters
     ----------
     packing : Packing
-        The configuration.
+        With an upper layer.
     amplitude : float
         Force a on each disk of the layer.
 
@@ -195,7 +196,17 @@ def layer_force(packing: Packing, amplitude: float) -> Floats:
     -------
     ndarray, shape (3N,)
         Force on the coordinates (x.., y.., R theta..).
+
+    Raises
+    ------
+    BadInputError
+        If the packing has no upper layer, as no Configuration has.
     """
+    if not packing.top.any():
+        raise BadInputError(
+            "layer_force acts on an upper layer, and this packing has none: put together the force on its coordinates, "
+            f"an array of shape {(packing.coordinates,)}."
+        )
     force = np.zeros(packing.coordinates)
     force[: len(packing)] = amplitude * packing.top
     return force

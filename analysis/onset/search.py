@@ -116,7 +116,7 @@ class Onset(TableDisplay):
     ends: float | None = None
 
     def __repr__(self) -> str:
-        return f"<Onset: {self.describe()}, {len(self.windows)} windows>"
+        return f"<Onset: {self.describe()}, windows: {self.window_count}>"
 
     def __str__(self) -> str:
         return self.describe()
@@ -135,6 +135,11 @@ class Onset(TableDisplay):
         return windows_rows(self.windows)
 
     @property
+    def window_count(self) -> str:
+        """The number of windows in words, as far as they were counted."""
+        return str(len(self.windows)) if self.complete else "not counted, as the search ended with the first"
+
+    @property
     def fx_c(self) -> float:
         """F_x^c, the first onset, force per top disk."""
         return self.windows[0].fx_onset
@@ -145,12 +150,13 @@ class Onset(TableDisplay):
         return self.windows[0].error
 
     def as_dict(self) -> dict[str, Any]:
-        """fx_c, error, error_of_path, windows, doubtful, modes, unstable_at_start, branch_ends: numbers, for JSON."""
+        """fx_c, error, error_of_path, windows, complete, doubtful, modes, unstable_at_start, branch_ends, for JSON."""
         return {
             "fx_c": self.fx_c,
             "error": self.error,
             "error_of_path": self.windows[0].path_error,
             "windows": [window.as_dict() for window in self.windows],
+            "complete": self.complete,
             "doubtful": [list(increment) for increment in self.doubtful],
             "modes": None if self.modes is None else list(self.modes),
             "unstable_at_start": None if self.at_start is None else asdict(self.at_start),

@@ -34,7 +34,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis import Configuration, LinearisedContacts, MindlinLaw
+from ...analysis import BadInputError, Configuration, LinearisedContacts, MindlinLaw
 from ...analysis.arrays import Floats, Indices, derive_frozen
 from ...analysis.configuration import PER_CONTACT, WALL
 from ...analysis.packing.linearise import linearise_contacts
@@ -97,7 +97,7 @@ def from_lammps(
     slides : bool
         Whether contacts at Coulomb's bound slide; they stick by default.
     balance : float
-        Residual that is allowed, as a share of the mean contact force.
+        Residual that is allowed, as a share of the mean contact force; not negative.
     prove : bool
         Whether ten steps of LAMMPS in a copy of the process are compared with those of the result, drag left out: its
         `proof` is their relative difference (:mod:`~faultgouge.pywrap.granular.motion_proof`). A packing of more than
@@ -118,10 +118,17 @@ def from_lammps(
     return take_snapshot(lmp, commands, {}, slides=slides, balance=balance, prove=prove)
 
 
+def check_balance(balance: float) -> None:
+    """Refuse a residual that is no number from 0 on: every packing would be at rest, or none."""
+    if not balance >= 0:
+        raise BadInputError(f"balance = {balance:g} is refused: give a share of the mean contact force, from 0 on.")
+
+
 def take_snapshot(
     lmp: Any, commands: Iterable[str] | None, laws: KnownLaws, *, slides: bool, balance: float, prove: bool
 ) -> Configuration:
     """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
+    check_balance(balance)
     given = None if commands is None else read_commands(commands)
     look = partial(_look, lmp, given)
     deck, fixes, found = in_a_copy(look) if can_copy(lmp) else look()
@@ -137,8 +144,7 @@ def take_snapshot(
             "run on with drag (fix viscous, and fix viscous/sphere for rotation) until it rests, or allow more by "
             "from_lammps(lmp, balance=...)"
         )
-        if _touch_twice(contacts):
-            advice = TWICE
+        advice = _known_cause(contacts) or advice
         raise SnapshotError(
             f"The packing moves: its residual is {snapshot.residual / force:.3g} of the mean contact force, and "
             f"{balance:g} is allowed; {advice}."
@@ -244,6 +250,12 @@ def _check_friction(contacts: LinearisedContacts) -> None:
         )
 
 
+LOST = (
+    "have no tangential force, as where histories are lost: LAMMPS reads none from a restart file if another instance "
+    "of a granular style was there before in the process, and not all across a periodic boundary or with newton off; "
+    "read the file in a process of its own, and run on with drag (fix viscous) until the packing rests"
+)
+
 TWICE = "particles touch each other twice, of which LAMMPS mixes the histories: take a box that is wider"
 
 
@@ -251,6 +263,14 @@ def _touch_twice(contacts: LinearisedContacts) -> bool:
     """Whether two particles touch each other through two periodic images."""
     pairs = np.sort(np.column_stack([contacts.i, contacts.j])[~contacts.wall], axis=1)
     return len(np.unique(pairs, axis=0)) < len(pairs)
+
+
+def _known_cause(contacts: LinearisedContacts) -> str | None:
+    """Why forces are out of balance though the packing may be at rest; None if nothing tells."""
+    if _touch_twice(contacts):
+        return TWICE
+    lost = np.count_nonzero((contacts.friction > 0) & ~contacts.tangential_force.any(axis=1))
+    return f"{lost} of {len(contacts)} contacts {LOST}" if lost else None
 
 
 def _check_torques(others: Floats, contacts: LinearisedContacts) -> None:
@@ -264,7 +284,7 @@ def _check_torques(others: Floats, contacts: LinearisedContacts) -> None:
             "either something else turns them, which is not linearised here, or this release of LAMMPS hands out "
             "contacts in a way that is not known here; releases of 29 Aug 2024 to 22 Jul 2025 are"
         )
-        reason = TWICE if _touch_twice(contacts) else reason
+        reason = _known_cause(contacts) or reason
         raise SnapshotError(f"The torques on particles are not those of their contacts: {reason}.")
 
 

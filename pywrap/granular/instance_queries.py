@@ -42,7 +42,7 @@ def styles_of(lmp: Any) -> Styles:
     return Styles(values["Atoms"].rpartition("style = ")[2], styles, groups, values["Atom style"])
 
 
-def explain_error(error: Exception) -> str:
+def explain_error(error: BaseException) -> str:
     """A sentence of an error that LAMMPS has raised."""
     lines = [line.strip().removeprefix("ERROR: ") for line in str(error).splitlines() if line.strip()]
     reason = re.sub(r" \(\S+:\d+\)", "", "; ".join(lines) or type(error).__name__)

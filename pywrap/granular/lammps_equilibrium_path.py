@@ -34,10 +34,10 @@ from scipy.sparse import csc_array, eye_array
 
 from ...analysis import Configuration, NoEquilibriumError, negative_eigenvalues, stiffness_matrix
 from ...analysis.arrays import derive_frozen
-from ...analysis.errors import FaultgougeError
+from ...analysis.errors import FaultgougeError, place_in_user_code
 from ...analysis.factors.sparse_lu import general_lu
 from ...parent_death import end_with
-from .from_lammps import KnownLaws, take_snapshot
+from .from_lammps import KnownLaws, check_balance, take_snapshot
 from .granular_commands import INTEGRATORS, SnapshotError, read_commands, without_suffix
 from .instance_queries import explain_error, log_of, log_path
 from .lammps_arrays import owned_array, rows_of, set_velocity
@@ -88,7 +88,7 @@ def lammps_path(
     commands, slides
         As of :func:`~faultgouge.pywrap.from_lammps`.
     balance : float
-        Largest residual at rest, as a share of the mean contact force.
+        Largest residual at rest, as a share of the mean contact force; not negative.
     steps : int
         Time steps after which a packing that is not at rest flows.
 
@@ -97,12 +97,15 @@ def lammps_path(
     SnapshotError
         If the instance has several ranks or threads. ``path(value)`` raises it as `from_lammps` does, with the proof at
         the first value alone, and where a load changes no force.
+    BadInputError
+        If `balance` is no such number.
     NoEquilibriumError
         By ``path(value)``, where the packing flows: its particles have moved by their diameter in the mean, or do not
         come to rest.
     """
     if not can_copy(lmp):
         raise SnapshotError("lammps_path keeps copies of the process: use one rank and one thread.")
+    check_balance(balance)
     given = None if commands is None else list(commands)
     return LammpsPath(_Relaxation(lmp, apply, given, slides, balance, steps))
 
@@ -123,6 +126,8 @@ class LammpsPath:
 
     def __call__(self, value: float) -> Configuration:
         """The packing in equilibrium at a value."""
+        if not self._end.alive:
+            raise SnapshotError("The path is closed: ask it inside of its `with` block, or make a new one.")
         value = float(value)
         below, there, snapshot = next(each for each in reversed(self._kept) if each[0] <= value or each[0] == -np.inf)
         if snapshot is not None and below == value:
@@ -248,7 +253,14 @@ class _Relaxation:
     def set(self, value: float) -> None:
         """Set the load."""
         if not isinstance(self.apply, str):
-            self.apply(self.lmp, value)
+            try:
+                self.apply(self.lmp, value)
+            except FaultgougeError:
+                raise
+            except (Exception, SystemExit) as error:  # of whatever kind: the function is the user's
+                of_lammps = str(error).startswith("ERROR")
+                what = explain_error(error) if of_lammps else f"apply failed with {type(error).__name__}: {error}"
+                raise SnapshotError(f"At {value:g}: {what.rstrip('.')}{place_in_user_code(error)}.") from None
         elif self.lmp.set_internal_variable(self.apply, value) != 0:
             self.lmp.command(f"variable {self.apply} equal {value:.17g}")
 

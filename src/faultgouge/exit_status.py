@@ -71,6 +71,9 @@ def _sentence(error: Exception) -> str:
         return f"{error.filename}: {error.strerror}" if error.filename else f"{error.strerror}"
     if isinstance(error, FaultgougeError):
         return str(error).strip()
+    if isinstance(error, MemoryError):
+        what = str(error) or "a request was refused"
+        return f"there is not enough memory ({what}): take a smaller packing, or a machine with more memory"
     places = traceback.extract_tb(error.__traceback__)
     where = f"{Path(places[-1].filename).name}:{places[-1].lineno}" if places else "unknown place"
     return f"this should not have happened ({type(error).__name__} at {where}: {error}): please report it"

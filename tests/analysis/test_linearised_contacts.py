@@ -6,13 +6,17 @@ from packing_snapshot import snapshot_of
 from scipy.linalg import expm
 
 from faultgouge.analysis import (
+    BadInputError,
     Configuration,
     LinearisedContacts,
     damping_matrix,
     eigenvalues,
     find_onset,
+    largest_damping_rate,
+    layer_force,
     linear_response,
     normal_modes,
+    solid_fraction,
     spectrum,
     stable_timestep,
     stiffness_matrix,
@@ -247,6 +251,24 @@ def test_the_analysis_takes_a_snapshot_as_a_packing(bed):
     # the matrices that are handed in are those that count
     assert stable_timestep(bed, stiffness_matrix(bed), damping_matrix(bed)) == step
     assert stable_timestep(bed, 4 * stiffness_matrix(bed), 2 * damping_matrix(bed)) == pytest.approx(step / 2, rel=1e-7)
+
+
+def test_numbers_of_a_layer_are_right_of_a_configuration_or_refused(bed):
+    """The largest rate of dashpots and the volume fraction of a periodic box; no force on a layer that is not there."""
+    rates = np.linalg.eigvals(damping_matrix(bed).toarray() / bed.coordinate_mass[:, None])
+    assert largest_damping_rate(bed) == pytest.approx(rates.real.max(), rel=1e-9)
+    none = derive_frozen(bed.contacts, normal_dashpot=np.zeros(15 + 2), tangential_dashpot=np.zeros(15 + 2))
+    assert largest_damping_rate(derive_frozen(bed, contacts=none)) == 0
+    d = bed.dimension
+    box = np.diag([9.0, 8.0, 7.0])
+    box[1, 0] = 2.0  # sheared
+    closed = derive_frozen(bed, box=box, periodic=np.ones(3, dtype=bool))
+    volume = np.pi * np.sum(bed.radius**2) / 72 if d == 2 else 4 / 3 * np.pi * np.sum(bed.radius**3) / 504
+    assert solid_fraction(closed) == pytest.approx(volume, rel=1e-14)
+    with pytest.raises(BadInputError, match="this one is open along y"):
+        solid_fraction(derive_frozen(closed, periodic=np.array([True, False, True])))
+    with pytest.raises(BadInputError, match="acts on an upper layer, and this packing has none"):
+        layer_force(bed, 1.0)
 
 
 def test_rescaling_is_half_of_the_difference_of_both_derivatives(bed):

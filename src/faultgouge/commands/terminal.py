@@ -48,14 +48,21 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON."
 
 def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
     """What a command reads of a scene, a TOML file; if its task is long, what is to be done and how long is said."""
-    from faultgouge.pywrap.scenes.estimate import describe_work
     from faultgouge.pywrap.scenes.scene import Scene
 
     scene = Scene.from_toml(path, command=command)
-    ahead = describe_work(scene, task) if task is not None else ""
+    if task is not None:
+        say_work(scene, task)
+    return scene
+
+
+def say_work(scene: Scene, task: Task) -> None:
+    """Say what a long task has to do with a scene, and how long that takes; it is refused if it is too much."""
+    from faultgouge.pywrap.scenes.estimate import describe_work
+
+    ahead = describe_work(scene, task)
     if ahead:
         say(ahead)
-    return scene
 
 
 def stored_snapshot(file: Path) -> Configuration | None:

@@ -9,7 +9,7 @@ import pytest
 from granular_packings import ALMOST_NONE, LAWS, RESCALED, command, instance, start, with_law
 from packing_snapshot import snapshot_of
 
-from faultgouge.analysis import damping_matrix, spectrum, stiffness_matrix
+from faultgouge.analysis import damping_matrix, largest_frequency, spectrum, stable_timestep, stiffness_matrix
 
 
 @pytest.fixture(scope="module")
@@ -423,6 +423,45 @@ def test_our_own_style():
     assert abs(stiffness_matrix(snapshot_of(calm)) - one).max() < 1e-14 * abs(one).max()
     assert abs(damping_matrix(packing) - damping_matrix(found)).max() < 1e-8 * abs(damping_matrix(packing)).max()
     lmp.close()
+
+
+@pytest.mark.slow
+def test_a_comparison_that_proves_nothing_is_refused(beds):
+    """And a comparison says over how many periods it went."""
+    from faultgouge.analysis import BadInputError
+    from faultgouge.pywrap import compare_motion, from_lammps
+
+    lmp = beds("gran/hertz/history", 3, True)
+    bed = from_lammps(lmp)
+    good = {"time": 0.2, "amplitude": 1e-5, "timestep": 1e-4}
+    wrong = {"time": (-1.0, 0.0, np.nan, np.inf), "timestep": (-1e-4, 0.0, np.nan), "amplitude": (0.0, np.nan, np.inf)}
+    for name, values in wrong.items():
+        for value in values:
+            with pytest.raises(BadInputError, match=f"^{name} = {value:g} is refused"):
+                compare_motion(lmp, bed, **(good | {name: value}))
+    with pytest.raises(BadInputError, match="balance = nan is refused"):
+        from_lammps(lmp, balance=np.nan)
+    found = compare_motion(lmp, bed, **good)
+    assert found.periods == pytest.approx(0.2 * largest_frequency(bed) / (2 * np.pi), rel=1e-9)
+    assert "after t = 0.2, 1." in str(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["gran/hertz/history", "mindlin"])
+def test_lammps_rests_below_the_largest_stable_time_step_and_blows_up_above(beds, law):
+    """Within half a per cent, by dashpots that take a tenth of the step."""
+    from faultgouge.pywrap import compare_motion, from_lammps
+
+    lmp = beds(law, 3, True)
+    bed = from_lammps(lmp)
+    limit = stable_timestep(bed)
+    assert limit < 0.95 * stable_timestep(largest_frequency(bed))
+    size = {}
+    for share in (0.995, 1.005):
+        motion = compare_motion(lmp, bed, 120 * share * limit, 1e-9, timestep=share * limit)
+        size[share] = np.linalg.norm(motion.velocity) / (1e-9 * len(motion.velocity) ** 0.5)
+    assert size[0.995] < 0.3
+    assert size[1.005] > 10
 
 
 @pytest.mark.slow
