@@ -25,9 +25,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..configuration import Configuration
+from ..configuration import HasConfiguration
 from ..errors import BadInputError
-from ..packing.packing import Floats, Packing
+from ..packing.packing import Floats
 from .matrix_functions import BlockDiagonal, first_order
 from .oscillator import Oscillator
 from .state_space import StateSpace, driven_motion, released_motion
@@ -82,12 +82,12 @@ class LinearMotion:
         Of A without dissipation, of the first-order system with it.
     """
 
-    packing: Packing | Configuration
+    packing: HasConfiguration
     system: StateSpace
     modes: BlockDiagonal
 
     @classmethod
-    def of(cls, packing: Packing | Configuration) -> "LinearMotion":
+    def of(cls, packing: HasConfiguration) -> "LinearMotion":
         """Decompose a packing; errors as of `linear_response`."""
         system = StateSpace.of(packing)
         if packing.damped:
@@ -140,7 +140,7 @@ class LinearMotion:
 
 
 def linear_response(
-    packing: Packing | Configuration,
+    packing: HasConfiguration,
     times: ArrayLike,
     *,
     force: ArrayLike | None = None,
@@ -182,7 +182,7 @@ def linear_response(
     return LinearMotion.of(packing).response(times, force=force, omega=omega, initial=initial, dt=dt)
 
 
-def layer_force(packing: Packing | Configuration, amplitude: float) -> Floats:
+def layer_force(packing: HasConfiguration, amplitude: float) -> Floats:
     """Force vector for a force along x on the upper layer.
 
     Parameters
@@ -212,7 +212,7 @@ def layer_force(packing: Packing | Configuration, amplitude: float) -> Floats:
     return force
 
 
-def coordinates(packing: Packing | Configuration, name: str, values: ArrayLike) -> Floats:
+def coordinates(packing: HasConfiguration, name: str, values: ArrayLike) -> Floats:
     """Numbers of all coordinates as an array of shape (3N,); a ValueError if they have another shape."""
     vector = np.asarray(values, dtype=np.float64)
     if vector.shape != (packing.coordinates,):

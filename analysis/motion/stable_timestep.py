@@ -45,7 +45,6 @@ sums of :math:`M^{-1/2} K M^{-1/2}` and :math:`M^{-1/2} C M^{-1/2}`,
 The step 2/mu of this bound is stable for certain, and shorter than the limit.
 """
 
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -53,10 +52,12 @@ from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from ..configuration import Configuration
-from ..operators.damping import coordinate_mass, damping_matrix
+from ..arrays import derive_frozen
+from ..configuration import HasConfiguration
+from ..operators.damping import coordinate_mass
+from ..operators.linearised_contacts import assembled_damping
 from ..operators.stiffness import stiffness_matrix
-from ..packing.packing import Floats, Packing
+from ..packing.packing import Floats
 
 FEW, MANY = 40, 10_000
 """Coordinates up to which a time step is that of all eigenvalues, and from which on it has fewer digits."""
@@ -107,7 +108,7 @@ WEIGHT = {"half-step": 1.0, "extrapolated": 2.0}
 
 
 def stable_timestep(
-    of: float | Packing | Configuration,
+    of: float | HasConfiguration,
     stiffness: csr_array | None = None,
     damping: csr_array | None = None,
     dashpot_velocity: DashpotVelocity | None = None,
@@ -121,8 +122,8 @@ def stable_timestep(
     stiffness, damping : scipy.sparse.csr_array, optional
         K and C of the configuration, where they are assembled already.
     dashpot_velocity : {"half-step", "extrapolated"}, optional
-        The velocity that dashpots feel; by default "extrapolated" for a Packing and "half-step" for a Configuration,
-        as in LAMMPS's own styles. A Configuration of mindlin/smooth does not know its style: give "extrapolated".
+        The velocity that dashpots feel; by default "extrapolated" for the law of this package, and "half-step", as in
+        LAMMPS's own styles, for all others.
 
     Returns
     -------
@@ -136,15 +137,16 @@ def stable_timestep(
     scipy.sparse.linalg.ArpackError
         If the iteration does not converge.
     """
-    if not isinstance(of, Packing | Configuration):
-        return StableTimestep(2.0 / of)
+    if isinstance(of, float | int | np.floating):
+        return StableTimestep(2.0 / float(of))
     if stiffness is None:
         stiffness = stiffness_matrix(of)
     if not stiffness.nnz:
         return StableTimestep(np.inf)
-    ours = isinstance(of, Packing)
+    c = of.configuration.contacts
+    ours = len(c) > 0 and not c.viscous_slider.any()
     if damping is None and of.damped:
-        damping = damping_matrix(replace(of, drag_time=None) if isinstance(of, Packing) else of)
+        damping = assembled_damping(derive_frozen(of.configuration, drag_rate=0.0))  # drag is integrated exactly
     if damping is not None:
         damping = WEIGHT[dashpot_velocity or ("extrapolated" if ours else "half-step")] * damping
     scale = 1.0 / np.sqrt(coordinate_mass(of))

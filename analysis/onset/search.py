@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
-from ..configuration import Configuration
+from ..configuration import Configuration, HasConfiguration
 from ..errors import FaultgougeError, NoEquilibriumError, TurningPointError
 from ..motion.buckling import negative_eigenvalues
 from ..motion.spectrum import Spectrum, spectrum
-from ..packing.packing import Floats, Packing
+from ..packing.packing import Floats
 from ..progress import Watch, show_progress
 from ..table_display import TableDisplay
 from ..uncertain_digits import with_uncertainty
@@ -71,7 +71,7 @@ class Instability:
     growth_rate: float
 
     @classmethod
-    def of(cls, packing: Packing | Configuration) -> "Instability":
+    def of(cls, packing: HasConfiguration) -> "Instability":
         """Count what all eigenvalues of a packing show, without contacts whose force is unknown."""
         return cls.from_spectrum(spectrum(force_bearing(packing)))
 
@@ -164,9 +164,7 @@ class Onset(TableDisplay):
         }
 
 
-def takes_all_modes(
-    packing: Packing | Configuration, modes: tuple[int, int] | None = None, limits: Limits = LIMITS
-) -> bool:
+def takes_all_modes(packing: HasConfiguration, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
     """Whether a packing is small enough for all of its modes to be searched, and for all windows to be found."""
     return modes is None and packing.coordinates <= 3 * limits.all_windows
 
@@ -210,7 +208,7 @@ def _narrowest(loads: Floats, limits: Limits) -> float:
 
 
 def find_onset(
-    equilibrium: Callable[[float], Packing | Configuration],
+    equilibrium: Callable[[float], HasConfiguration],
     forces: ArrayLike,
     *,
     narrowest: float | None = None,
@@ -322,7 +320,7 @@ def find_onset(
     return Onset(windows, complete, doubtful, modes, unstable, float(ends) if ends < np.inf else None)
 
 
-def _complex_at_start(start: Packing | Configuration, limits: Limits) -> Spectrum | None:
+def _complex_at_start(start: HasConfiguration, limits: Limits) -> Spectrum | None:
     """The spectrum of a packing at the smallest load, if it has a complex pair.
 
     None if it has none, or if the packing is too large for all eigenvalues to be asked for. Of a symmetric operator,
@@ -339,13 +337,13 @@ def _symmetric(matrix: csr_array) -> bool:
     return bool(abs(matrix - matrix.T).max() <= 1e-14 * abs(matrix).max())
 
 
-def _fastest(start: Packing | Configuration, found: Spectrum) -> Window:
+def _fastest(start: HasConfiguration, found: Spectrum) -> Window:
     """The window of the complex pair that grows fastest at the smallest load."""
     pair = max(found.pairs, key=lambda each: each.growth_rate)
     return _at_start(start, pair.eigenvalue.real, pair.overlap)
 
 
-def _at_start(start: Packing | Configuration, eigenvalue: float, overlap: float) -> Window:
+def _at_start(start: HasConfiguration, eigenvalue: float, overlap: float) -> Window:
     """A window that is open at the smallest load."""
     return Window.between(Edge(start.fx, 0.0, eigenvalue, overlap, "start"), None)
 

@@ -18,21 +18,20 @@ velocity: the force stays at the bound if the contact continues to slide, and th
 back. C uses the first case, as the stability operator does for the slip of such a contact.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import eigs, eigsh
+from scipy.sparse.linalg import eigs
 
-from ..configuration import Configuration
+from ..arrays import derive_frozen
+from ..configuration import HasConfiguration
 from ..packing.law import Derivatives
 from ..packing.packing import Floats, Packing
 from .linearised_contacts import assembled_damping
 from .stiffness import assemble_stiffness, contact_terms
 
 
-def damping_matrix(packing: Packing | Configuration, sliding: ArrayLike = False) -> csr_array:
+def damping_matrix(packing: HasConfiguration, sliding: ArrayLike = False) -> csr_array:
     """Assemble C = -dF/d(dq/dt).
 
     Parameters
@@ -48,8 +47,8 @@ def damping_matrix(packing: Packing | Configuration, sliding: ArrayLike = False)
         Force time / length, in the order (x.., y.., R theta..), or as in :mod:`~faultgouge.analysis.configuration`.
         For a Packing, C is symmetric and positive semidefinite. Without dashpots and drag, C is empty.
     """
-    if isinstance(packing, Configuration):
-        return assembled_damping(packing)
+    if not isinstance(packing, Packing):
+        return assembled_damping(packing.configuration)
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry
@@ -63,7 +62,7 @@ def damping_matrix(packing: Packing | Configuration, sliding: ArrayLike = False)
     return csr_array(matrix + diags_array(coordinate_mass(packing) / packing.drag_time))
 
 
-def largest_damping_rate(packing: Packing | Configuration) -> float:
+def largest_damping_rate(packing: HasConfiguration) -> float:
     """Largest eigenvalue of M^-1 C of the dashpots without drag, 1 / time; 0 without dashpots.
 
     Parameters
@@ -71,17 +70,16 @@ def largest_damping_rate(packing: Packing | Configuration) -> float:
     packing : Packing or Configuration
         The configuration.
     """
-    matrix = damping_matrix(packing if isinstance(packing, Configuration) else replace(packing, drag_time=None))
+    matrix = assembled_damping(derive_frozen(packing.configuration, drag_rate=0.0))
     if matrix.nnz == 0:
         return 0.0
     scale = diags_array(1 / np.sqrt(coordinate_mass(packing)))
     # a fixed start makes the result the same on every rank
     weighted, start = scale @ matrix @ scale, np.random.Generator(np.random.PCG64(0)).standard_normal(matrix.shape[0])
-    if isinstance(packing, Configuration):  # arms of torques that are not those of slips leave C not symmetric
-        return float(eigs(weighted, 1, which="LR", v0=start, return_eigenvectors=False)[0].real)
-    return float(eigsh(weighted, 1, which="LA", v0=start, return_eigenvectors=False)[0])
+    # arms of torques that are not those of slips leave C not symmetric
+    return float(eigs(weighted, 1, which="LR", v0=start, return_eigenvectors=False)[0].real)
 
 
-def coordinate_mass(packing: Packing | Configuration) -> Floats:
+def coordinate_mass(packing: HasConfiguration) -> Floats:
     """Masses of all coordinates."""
     return packing.coordinate_mass

@@ -12,12 +12,12 @@ fill the plane less well, is included. :func:`solid_fraction_below_top` also inc
 
 import numpy as np
 
-from ..configuration import Configuration
+from ..configuration import Configuration, HasConfiguration
 from ..errors import BadInputError
 from .packing import Packing
 
 
-def solid_fraction(packing: Packing | Configuration) -> float:
+def solid_fraction(packing: HasConfiguration) -> float:
     """Volume fraction phi of a layer, up to the mean height of the centres of its upper layer, or of a periodic box.
 
     Parameters
@@ -36,8 +36,8 @@ def solid_fraction(packing: Packing | Configuration) -> float:
     BadInputError
         If a Configuration is not periodic along an axis: nothing says where it ends there.
     """
-    if isinstance(packing, Configuration):
-        return _solid_in_box(packing)
+    if not isinstance(packing, Packing):
+        return _solid_in_box(packing.configuration)
     heights = packing.position[:, 1]
     return _solid_below(packing, float(heights[packing.top].mean() if packing.top.any() else heights.max()))
 
