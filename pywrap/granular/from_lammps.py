@@ -51,7 +51,7 @@ from .granular_commands import (
     read_commands,
     without_suffix,
 )
-from .instance_queries import Styles, communicator, log_of, only_log, styles_of
+from .instance_queries import OpenFile, Styles, communicator, log_of, only_log, open_files, styles_of
 from .lammps_arrays import Arrays, arrays_at_rest, given_back
 from .look_in_a_copy import can_copy, in_a_copy, quieten
 
@@ -109,7 +109,7 @@ def take_snapshot(
 ) -> Configuration:
     """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
     given = None if commands is None else read_commands(commands)
-    look = partial(_look, lmp, given)
+    look = partial(_look, lmp, given, open_files())
     snapshot = _snapshot(lmp, *(in_a_copy(look) if can_copy(lmp) else look()), laws)
     contacts = snapshot.contacts
     force = contacts.normal_force.mean() if len(contacts) else 0.0
@@ -129,11 +129,11 @@ def take_snapshot(
     return snapshot
 
 
-def _look(lmp: Any, given: Commands | None) -> tuple[Commands, Arrays]:
+def _look(lmp: Any, given: Commands | None, files: dict[int, OpenFile]) -> tuple[Commands, Arrays]:
     """The commands, and the arrays of all ranks in the order of the particles' IDs; in a copy if there can be one."""
     world, copied = communicator(lmp), can_copy(lmp)
     if given is None:
-        lines = log_of(lmp) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
+        lines = log_of(lmp, files) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
         if lines is None:
             raise SnapshotError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
         given = read_commands(lines, log=True)
