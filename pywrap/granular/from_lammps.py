@@ -110,16 +110,15 @@ def take_snapshot(
     """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
     given = None if commands is None else read_commands(commands)
     look = partial(_look, lmp, given, open_files())
-    snapshot = _snapshot(lmp, *(in_a_copy(look) if can_copy(lmp) else look()), laws)
+    told, found = in_a_copy(look) if can_copy(lmp) else look()
+    snapshot = _snapshot(lmp, told, found, laws)
     contacts = snapshot.contacts
     force = contacts.normal_force.mean() if len(contacts) else 0.0
     if snapshot.residual > balance * force:
-        advice = (
+        advice = _known_cause(told, contacts) or (
             "run on with drag (fix viscous, and fix viscous/sphere for rotation) until it rests, or allow more by "
             "from_lammps(lmp, balance=...)"
         )
-        if _touch_twice(contacts):
-            advice = TWICE
         raise SnapshotError(
             f"The packing moves: its residual is {snapshot.residual / force:.3g} of the mean contact force, and "
             f"{balance:g} is allowed; {advice}."
@@ -201,7 +200,7 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> C
     )
     total = np.stack([found["f"], found["torque"]], axis=1)
     load = np.where(free[:, None, None], total - made.contact_force, -made.contact_force)
-    _check_torques(load[free, 1] / made.radius[free, None], made.contacts)
+    _check_torques(load[free, 1] / made.radius[free, None], commands, made.contacts)
     return derive_frozen(made, load=load)
 
 
@@ -214,18 +213,30 @@ def _touch_twice(contacts: LinearisedContacts) -> bool:
     return len(np.unique(pairs, axis=0)) < len(pairs)
 
 
-def _check_torques(others: Floats, contacts: LinearisedContacts) -> None:
+def _known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
+    """Why LAMMPS may have other contact forces than those it came to rest with; empty if no cause is known."""
+    if _touch_twice(contacts):
+        return TWICE
+    if commands.write_restart and commands.style != OWN:
+        return (
+            f"{commands.write_restart!r} stands after the last run, where LAMMPS forgets tangential histories if "
+            "its lists of neighbours have changed since: have the run itself write the restart, by `restart N FILE` "
+            "before it"
+        )
+    return ""
+
+
+def _check_torques(others: Floats, commands: Commands, contacts: LinearisedContacts) -> None:
     """Refuse torques besides those of the contacts: in all that is taken here contacts alone turn particles."""
     forces = (
         AGREES * np.abs(contacts.tangential_force).max(initial=0.0),
         ROUNDING * contacts.normal_force.max(initial=0.0),
     )
     if np.abs(others).max() > sum(forces):
-        reason = (
+        reason = _known_cause(commands, contacts) or (
             "either something else turns them, which is not linearised here, or this release of LAMMPS hands out "
             "contacts in a way that is not known here; releases of 29 Aug 2024 to 22 Jul 2025 are"
         )
-        reason = TWICE if _touch_twice(contacts) else reason
         raise SnapshotError(f"The torques on particles are not those of their contacts: {reason}.")
 
 

@@ -105,6 +105,8 @@ def given_back(lmp: Any) -> Iterator[None]:
     lmp.command("fix faultgouge_h all keep/histories")
     try:
         yield
+        # lists of neighbours as they were: where others were asked for since, write_restart forgets histories
+        _run_zero_steps(lmp)
     finally:
         place = order[np.searchsorted(whole["id"][order], owned_array(lmp, "id"))] if len(order) else order
         for name in ATOM_ARRAYS:

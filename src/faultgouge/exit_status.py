@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from .mpi_rank import is_root, size
+from .signal_guard import has_ended
 
 MEETING = 3.0
 """Seconds within which all ranks come to an error that all of them meet."""
@@ -35,6 +36,7 @@ def fail(error: Exception) -> NoReturn:
     if alone:
         from mpi4py import MPI
 
+        has_ended()
         time.sleep(HEARD)
         MPI.COMM_WORLD.Abort(code)
     sys.exit(code)

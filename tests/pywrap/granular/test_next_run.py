@@ -107,6 +107,6 @@ def test_with_two_threads(tmp_path):
 
 @pytest.mark.ranks
 @pytest.mark.parametrize(("ranks", "threads"), [(2, 1), (1, 2), (1, 1)])
-def test_a_look_after_a_run_that_has_ended_early(tmp_path, ranks, threads):
-    """LAMMPS skips the runs that follow, and the look has its zero steps all the same."""
-    run_script(tmp_path, threads, script="ended_run.py", ranks=ranks)
+def test_runs_that_end_early_and_restarts(tmp_path, ranks, threads):
+    """LAMMPS skips the runs that follow, and the look has its zero steps all the same; no restart loses histories."""
+    run_script(tmp_path, threads, script="after_a_look.py", ranks=ranks)

@@ -1,4 +1,4 @@
-"""A look after a run that LAMMPS has ended early: python ended_run.py THREADS, on some ranks."""
+"""A look after a run that LAMMPS has ended early, and a restart after a look: python after_a_look.py THREADS."""
 
 import sys
 
@@ -41,3 +41,11 @@ for how, lines in ENDS.items():
     assert lmp.extract_global("ntimestep") == step
     command(lmp, "timer timeout unlimited\nrun 10")
     assert lmp.extract_global("ntimestep") == step + 10
+
+# LAMMPS forgets the histories of contacts in write_restart if other lists of neighbours were asked for since the run
+before = state(lmp, WORLD)
+from_lammps(lmp, given, balance=np.inf)
+command(lmp, "write_restart packing.restart\nrun 0")
+after = state(lmp, WORLD)
+forces = slice(10, 16)
+assert np.abs(after[:, forces] - before[:, forces]).max() < 1e-9 * np.abs(before[:, forces]).max()
