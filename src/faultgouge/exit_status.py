@@ -10,6 +10,7 @@ ranks.
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 import traceback
@@ -63,6 +64,14 @@ def _print(sentence: str) -> None:
     print(sentence, file=sys.stderr, flush=True)
 
 
+def _is_folder_gone() -> bool:
+    """Whether somebody has deleted the folder in which this process works."""
+    try:
+        return not os.getcwd()
+    except FileNotFoundError:
+        return True
+
+
 def _sentence(error: Exception) -> str:
     show = getattr(error, "format_message", None)
     if show:
@@ -70,7 +79,10 @@ def _sentence(error: Exception) -> str:
     from faultgouge.analysis import FaultgougeError
 
     if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename}: {error.strerror}" if error.filename else f"{error.strerror}"
+        if error.filename:
+            return f"{error.filename}: {error.strerror}"
+        gone = "the folder in which this command was called has been deleted: go to another one"
+        return gone if _is_folder_gone() else error.strerror
     if isinstance(error, FaultgougeError):
         return str(error).strip()
     places = traceback.extract_tb(error.__traceback__)

@@ -68,7 +68,7 @@ def raise_interrupt_in(error: BaseException) -> None:
 def keeps(words: str, path: str | os.PathLike[str] = "") -> None:
     """Set what is said at an interrupt: what is kept, and how to go on; and the file or folder that must be there."""
     place = os.path.abspath(path) if path else ""
-    _shared[:CLOSED] = f"{place}\0{words}".encode()[: CLOSED - 1].ljust(CLOSED, b"\0")
+    _shared[:CLOSED] = f"{place}\0{words}".encode(errors="surrogateescape")[: CLOSED - 1].ljust(CLOSED, b"\0")
 
 
 def has_ended() -> None:
@@ -193,7 +193,7 @@ def _end(status: int, now: float) -> NoReturn:
 
 
 def _kept() -> str:
-    place, words, *_ = _shared[:CLOSED].decode(errors="replace").split("\0")
+    place, words, *_ = _shared[:CLOSED].decode(errors="surrogateescape").split("\0")
     if place and not os.path.exists(place):
         return f"{place} is not there, and the same command starts from the beginning"
     return words

@@ -1,11 +1,16 @@
 """faultgouge import DECK.in, and what takes the file that it leaves."""
 
 import json
+import os
 import re
+import subprocess
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from reference_layer import BIN
+
+from faultgouge.analysis.files.snapshot_file import read_snapshot
 
 DECK = """
 units lj
@@ -38,7 +43,6 @@ ROUND = {"d": 3, "z": "f", "box": "-2 2 0 4", "a": "0 0.5", "b": "0 1.3", "plane
 @pytest.mark.parametrize("shape", [FLAT, ROUND], ids=["disks", "spheres"])
 def test_deck(faultgouge_here, tmp_path, shape):
     from faultgouge.analysis import eigenvalues
-    from faultgouge.analysis.files.snapshot_file import read_snapshot
 
     folder = tmp_path / "own"
     folder.mkdir()
@@ -284,6 +288,35 @@ def test_empty_deck(faultgouge, tmp_path, ranks):
     assert "No pair_style is in the log" in faultgouge("import", "empty.in", ranks=ranks, code=2).stderr
 
 
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_closed_streams(tmp_path, closed):
+    """No file of results is taken for a stream that was closed."""
+    (tmp_path / "pile.in").write_text(DECK.format(**FLAT, word="contacts"))
+    done = subprocess.run(f"{BIN}/faultgouge import pile.in -o pile.h5 {closed}", shell=True, cwd=tmp_path, check=False)
+    assert done.returncode == 0
+    assert read_snapshot(tmp_path / "pile.h5").residual < 1e-6
+
+
+def test_deleted_folder(tmp_path):
+    """Of the shell in which the command is called."""
+    (tmp_path / "pile.in").write_text(DECK.format(**FLAT, word="contacts"))
+    (tmp_path / "gone").mkdir()
+    words = f"cd gone && rmdir ../gone && {BIN}/faultgouge import {tmp_path}/pile.in"
+    done = subprocess.run(words, shell=True, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == ("Error: the folder in which this command was called has been deleted: go to another one\n")
+
+
+def test_names_that_the_locale_cannot_decode(tmp_path):
+    (tmp_path / "häufchen.in").write_text(DECK.format(**FLAT, word="contacts"))
+    words = [BIN / "faultgouge", "import", "häufchen.in", "-o", "häufchen.h5"]
+    plain = os.environ | {"LC_ALL": "C", "PYTHONUTF8": "0"}
+    done = subprocess.run(words, cwd=tmp_path, env=plain, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.decode().endswith("written to häufchen.h5\n")
+    assert len(read_snapshot(tmp_path / "häufchen.h5")) == 3
+
+
 def two_on_three():
     """A row of three in a periodic box, and two above."""
     layers = [(-1.0, 0.5), (0.0, 0.5), (1.0, 0.5), (-0.5, 1.36), (0.5, 1.36)]
@@ -314,8 +347,6 @@ def test_deck_of_another_name(faultgouge_here, tmp_path):
 
 def test_contacts_at_the_bound_stick_or_slide(faultgouge_here, tmp_path):
     """Friction a little below what the packing uses: LAMMPS cuts these contacts to the bound."""
-    from faultgouge.analysis.files.snapshot_file import read_snapshot
-
     deck = two_on_three()
     (tmp_path / "rough.in").write_text(deck)
     faultgouge_here("import", "rough.in", "-o", "rough.h5")
