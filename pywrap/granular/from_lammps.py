@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from ...analysis import Configuration, LinearisedContacts, MindlinLaw
 from ...analysis.arrays import Floats, Indices, derive_frozen
-from ...analysis.configuration import PER_CONTACT, WALL
+from ...analysis.configuration import BOOLEAN, PER_CONTACT, WALL
 from ...analysis.packing.linearise import linearise_contacts
 from .contact_law_measurement import MeasuredLaw, State, measure_law
 from .granular_commands import (
@@ -302,7 +302,7 @@ def _contacts(
     values = {name: [getattr(each, name) for each in parts] for name in PER_CONTACT}
     if not parts:
         values = {
-            name: [np.zeros((0, *shape), bool if name == "sliding" else float)] for name, shape in PER_CONTACT.items()
+            name: [np.zeros((0, *shape), bool if name in BOOLEAN else float)] for name, shape in PER_CONTACT.items()
         }
     return LinearisedContacts(**{name: np.concatenate(each) for name, each in values.items()})
 

@@ -90,7 +90,7 @@ def _is_open(descriptor: int) -> bool:
     return True
 
 
-def log_of(lmp: Any, files: dict[str, OpenFile]) -> list[str] | None:
+def log_of(lmp: Any, files: dict[int, OpenFile]) -> list[str] | None:
     """The lines of an instance's log, as of :func:`log_file`."""
     file = log_file(lmp, files)
     return None if file is None else _lines_of(file)

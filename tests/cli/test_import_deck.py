@@ -288,6 +288,19 @@ def test_empty_deck(faultgouge, tmp_path, ranks):
     assert "No pair_style is in the log" in faultgouge("import", "empty.in", ranks=ranks, code=2).stderr
 
 
+def test_packing_in_which_nothing_touches(faultgouge_here, tmp_path):
+    far = DECK.format(**FLAT, word="contacts").replace("0.5 0 units", "0.7 0 units").replace("-0.45", "-0.8")
+    far = far.replace("single 0.45", "single 0.8").replace("1.3", "2.5").replace("run 6000", "run 0")
+    (tmp_path / "far.in").write_text(far)
+    assert "3 disks, 0 contacts" in faultgouge_here("import", "far.in", "-o", "far.h5").stdout
+    for words in (("draw", "-o", "far.png"), ("export", "-o", "far.vtp")):
+        command, *output = words
+        for mode in ("pair", "0"):
+            says = faultgouge_here(command, "far.h5", "--mode", mode, *output, code=None).stderr
+            assert f"--mode {mode}: the packing has 0 modes" in says
+    assert "no frame 3: leave --frame out" in faultgouge_here("draw", "far.h5", "--frame", "3", code=2).stderr
+
+
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
 def test_closed_streams(tmp_path, closed):
     """No file of results is taken for a stream that was closed."""

@@ -281,6 +281,8 @@ def modes_of(packing: Packing | Configuration, which: str) -> tuple[list[Mode], 
 
     modes = normal_modes(packing)
     if which == "pair":
+        if len(modes.values) < 2:
+            raise ModeError(f"--mode pair: the packing has {len(modes.values)} modes, and a pair is two of them")
         return unstable_pair(packing, modes, [pair.eigenvalue for pair in spectrum(packing).pairs])
     if not which.isdecimal():
         raise typer.BadParameter(f"--mode {which}: give pair, or the number of a mode, from 0")
