@@ -16,9 +16,9 @@ import numpy as np
 
 from ..configuration import PER_CONTACT, Configuration, LinearisedContacts
 from ..errors import PackingFileError
-from .atomic_write import has_checksum
+from .atomic_write import BEGINNINGS, has_checksum
 from .checksummed_file import new_file, open_checksummed, write
-from .plain_file import check_plain
+from .plain_file import open_plain
 from .runfile_header import CHECKSUM, CREATOR, program_version
 from .runfile_validation import check_places, dataset
 
@@ -81,14 +81,26 @@ def write_snapshot(
 
 
 def holds_snapshot(path: Path) -> bool:
-    """Whether a file is an HDF5 file with a snapshot in it; false for whatever cannot be read."""
+    """Whether a file is an HDF5 file with a snapshot in it; false for what is no HDF5 file.
+
+    Raises
+    ------
+    PackingFileError
+        If the file has changed since it was sealed.
+    """
     import h5py
 
     try:
-        check_plain(path)
+        with open_plain(path) as stream:
+            if not stream.read(max(map(len, BEGINNINGS))).startswith(BEGINNINGS):
+                return False
+    except OSError:
+        return False
+    has_checksum(path)  # before HDF5 sees what has changed
+    try:
         with h5py.File(path, "r", locking=False) as file:
             return "snapshot" in file
-    except OSError:
+    except (OSError, RuntimeError):  # a damaged file without a checksum, which the reader of a run refuses
         return False
 
 

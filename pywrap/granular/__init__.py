@@ -4,8 +4,7 @@
 it, and `law_remarks` compares both. `instance_queries` and `lammps_arrays` read an instance, `look_in_a_copy` leaves it
 as it was, and `from_lammps` puts a Configuration together. `motion_proof` compares a few of LAMMPS's own steps
 (`lammps_steps`) with those of the Configuration, and `acting_fixes` explains why they differ; `compare_motion` compares
-a longer motion. `lammps_equilibrium_path` makes a path along a load, and `run_deck` runs the deck of a user, which
-`deck_trial` has tried without its runs.
+a longer motion. `lammps_equilibrium_path` makes a path along a load, and `run_deck` runs the deck of a user, once.
 
 May import: lammps.
 """

@@ -36,7 +36,7 @@ from numpy.typing import NDArray
 
 from ...analysis import BadInputError, Configuration, LinearisedContacts, MindlinLaw
 from ...analysis.arrays import Floats, Indices, derive_frozen
-from ...analysis.configuration import PER_CONTACT, WALL
+from ...analysis.configuration import BOOLEAN, PER_CONTACT, WALL
 from ...analysis.packing.linearise import linearise_contacts
 from .acting_fixes import check_holding
 from .contact_law_measurement import MeasuredLaw, State, measure_law
@@ -52,7 +52,7 @@ from .granular_commands import (
     read_commands,
     without_suffix,
 )
-from .instance_queries import Styles, communicator, log_of, only_log, styles_of
+from .instance_queries import OpenFile, Styles, communicator, log_of, only_log, open_files, styles_of
 from .lammps_arrays import Arrays, arrays_at_rest, given_back
 from .law_remarks import remark_on
 from .look_in_a_copy import can_copy, in_a_copy, quieten
@@ -130,7 +130,7 @@ def take_snapshot(
     """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
     check_balance(balance)
     given = None if commands is None else read_commands(commands)
-    look = partial(_look, lmp, given)
+    look = partial(_look, lmp, given, open_files())
     deck, fixes, found = in_a_copy(look) if can_copy(lmp) else look()
     snapshot = _snapshot(lmp, deck, found, laws)
     contacts = snapshot.contacts
@@ -140,11 +140,10 @@ def take_snapshot(
         check_holding(fixes)
     _check_friction(contacts)
     if snapshot.residual > balance * force:
-        advice = (
+        advice = _known_cause(deck, contacts) or (
             "run on with drag (fix viscous, and fix viscous/sphere for rotation) until it rests, or allow more by "
             "from_lammps(lmp, balance=...)"
         )
-        advice = _known_cause(contacts) or advice
         raise SnapshotError(
             f"The packing moves: its residual is {snapshot.residual / force:.3g} of the mean contact force, and "
             f"{balance:g} is allowed; {advice}."
@@ -157,12 +156,12 @@ def take_snapshot(
     return snapshot
 
 
-def _look(lmp: Any, given: Commands | None) -> tuple[Commands, dict[str, str], Arrays]:
+def _look(lmp: Any, given: Commands | None, files: dict[int, OpenFile]) -> tuple[Commands, dict[str, str], Arrays]:
     """The commands, the styles of fixes, and the arrays of all ranks in the order of the particles' IDs; in a copy if
     there can be one."""
     world, copied = communicator(lmp), can_copy(lmp)
     if given is None:
-        lines = log_of(lmp) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
+        lines = log_of(lmp, files) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
         if lines is None:
             raise SnapshotError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
         given = read_commands(lines, log=True)
@@ -232,7 +231,7 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> C
     )
     total = np.stack([found["f"], found["torque"]], axis=1)
     load = np.where(free[:, None, None], total - made.contact_force, -made.contact_force)
-    _check_torques(load[free, 1] / made.radius[free, None], made.contacts)
+    _check_torques(load[free, 1] / made.radius[free, None], commands, made.contacts)
     return derive_frozen(made, load=load)
 
 
@@ -265,26 +264,31 @@ def _touch_twice(contacts: LinearisedContacts) -> bool:
     return len(np.unique(pairs, axis=0)) < len(pairs)
 
 
-def _known_cause(contacts: LinearisedContacts) -> str | None:
-    """Why forces are out of balance though the packing may be at rest; None if nothing tells."""
+def _known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
+    """Why forces are out of balance though the packing may be at rest; empty if no cause is known."""
     if _touch_twice(contacts):
         return TWICE
+    if commands.write_restart and commands.style != OWN:
+        return (
+            f"{commands.write_restart!r} stands after the last run, where LAMMPS forgets tangential histories if "
+            "its lists of neighbours have changed since: have the run itself write the restart, by `restart N FILE` "
+            "before it"
+        )
     lost = np.count_nonzero((contacts.friction > 0) & ~contacts.tangential_force.any(axis=1))
-    return f"{lost} of {len(contacts)} contacts {LOST}" if lost else None
+    return f"{lost} of {len(contacts)} contacts {LOST}" if lost else ""
 
 
-def _check_torques(others: Floats, contacts: LinearisedContacts) -> None:
+def _check_torques(others: Floats, commands: Commands, contacts: LinearisedContacts) -> None:
     """Refuse torques besides those of the contacts: in all that is taken here contacts alone turn particles."""
     forces = (
         AGREES * np.abs(contacts.tangential_force).max(initial=0.0),
         ROUNDING * contacts.normal_force.max(initial=0.0),
     )
     if np.abs(others).max() > sum(forces):
-        reason = (
+        reason = _known_cause(commands, contacts) or (
             "either something else turns them, which is not linearised here, or this release of LAMMPS hands out "
             "contacts in a way that is not known here; releases of 29 Aug 2024 to 22 Jul 2025 are"
         )
-        reason = _known_cause(contacts) or reason
         raise SnapshotError(f"The torques on particles are not those of their contacts: {reason}.")
 
 
@@ -352,7 +356,7 @@ def _contacts(
     values = {name: [getattr(each, name) for each in parts] for name in PER_CONTACT}
     if not parts:
         values = {
-            name: [np.zeros((0, *shape), bool if name == "sliding" else float)] for name, shape in PER_CONTACT.items()
+            name: [np.zeros((0, *shape), bool if name in BOOLEAN else float)] for name, shape in PER_CONTACT.items()
         }
     contacts = LinearisedContacts(**{name: np.concatenate(each) for name, each in values.items()})
     return contacts, tuple(remark for remark in remarks if remark)

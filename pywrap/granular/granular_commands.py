@@ -55,10 +55,12 @@ class SnapshotError(FaultgougeError):
 
 @dataclass(frozen=True)
 class Commands:
-    """What a deck says of contacts and of motion: pair_style with the pair_coeff that hold, and fixes by their IDs."""
+    """What a deck says of contacts and of motion: pair_style with the pair_coeff that hold, and fixes by their IDs; and
+    the write_restart that comes after the last run."""
 
     pair: tuple[str, ...]
     fixes: dict[str, str]
+    write_restart: str = ""
 
     @property
     def style(self) -> str:
@@ -79,7 +81,7 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
     SnapshotError
         If no line is a pair_style, or a line that a user gives has a variable in it.
     """
-    style = ""
+    style = restart = ""
     coefficients: list[str] = []
     fixes: dict[str, str] = {}
     whole = re.sub(r"&[ \t]*\n", " ", lines if isinstance(lines, str) else "\n".join(lines))
@@ -104,21 +106,25 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
             fixes[words[1]] = " ".join(words)
         elif words[0] == "unfix" and len(words) == 2:
             fixes.pop(words[1], None)
+        elif words[0] in ("run", "minimize", "write_restart"):
+            restart = text.strip() if words[0] == "write_restart" else ""
     if not style:
         where = "The log of this LAMMPS has" if log else "The commands have"
         raise SnapshotError(f"{where} no pair_style: {GIVE_LINES}.")
-    return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes)
+    return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes, restart)
 
 
-def logged_text(log: Path, folder: Path) -> str:
-    """The log, and those to which the deck turns by `log`, one after the other."""
-    text, read = "", set()
-    while log not in read and log.is_file():
+def logged_text(text: str, folder: Path) -> str:
+    """The text of a log, and of those to which a deck in a folder turns by `log`, one after the other."""
+    whole, read = text, set[Path]()
+    while (last := text.rstrip().rpartition("\n")[2].split())[:1] == ["log"] and len(last) > 1:
+        log = folder / last[1]
+        if log in read or not log.is_file():
+            break
         read.add(log)
-        text += log.read_text(errors="replace")
-        last = text.rstrip().rpartition("\n")[2].split()
-        log = folder / last[1] if last[:1] == ["log"] and len(last) > 1 else log
-    return text
+        text = log.read_text(errors="replace")
+        whole += text
+    return whole
 
 
 def commands_in(text: str) -> list[str]:

@@ -39,7 +39,7 @@ from ...analysis.factors.sparse_lu import general_lu
 from ...parent_death import end_with
 from .from_lammps import KnownLaws, check_balance, take_snapshot
 from .granular_commands import INTEGRATORS, SnapshotError, read_commands, without_suffix
-from .instance_queries import explain_error, log_of, log_path
+from .instance_queries import OpenFile, explain_error, log_file, log_of, open_files
 from .lammps_arrays import owned_array, rows_of, set_velocity
 from .look_in_a_copy import can_copy, in_a_copy, quieten, silent_copy
 
@@ -116,10 +116,11 @@ class LammpsPath:
     def __init__(self, relaxation: "_Relaxation") -> None:
         folder = TemporaryDirectory(prefix="faultgouge")
         here, there = Pipe()
+        files = open_files()
         first = silent_copy()
         if first == 0:
             here.close()
-            _wait_for_loads(relaxation, there, Path(folder.name))
+            _wait_for_loads(relaxation, there, Path(folder.name), files)
         there.close()
         self._kept: list[Kept] = [(-np.inf, here, None)]
         self._end = weakref.finalize(self, _end, self._kept, first, os.getpid(), folder)
@@ -184,18 +185,18 @@ def _end(kept: list[Kept], first: int, owner: int, folder: "TemporaryDirectory[s
     folder.cleanup()
 
 
-def _wait_for_loads(relaxation: "_Relaxation", there: Connection, folder: Path) -> NoReturn:
+def _wait_for_loads(relaxation: "_Relaxation", there: Connection, folder: Path, files: dict[int, OpenFile]) -> NoReturn:
     """The life of the first copy of the process, and of all copies of it, each of which relaxes at one load."""
     try:
-        _own_log(relaxation.lmp, folder)
+        _own_log(relaxation.lmp, folder, files)
         quieten(relaxation.lmp)
         while (load := there.recv()) is not None:
-            end, this = Connection(recv_handle(there)), os.getpid()
+            end, this, files = Connection(recv_handle(there)), os.getpid(), open_files()
             if silent_copy() == 0:
                 end_with(this)  # which ends with the path, also while this copy relaxes
                 there.close()
                 there = end
-                _own_log(relaxation.lmp, folder)
+                _own_log(relaxation.lmp, folder, files)
                 there.send(relaxation.result(*load))
             else:
                 end.close()  # else nobody sees that the copy has died
@@ -205,12 +206,12 @@ def _wait_for_loads(relaxation: "_Relaxation", there: Connection, folder: Path) 
         os._exit(0)
 
 
-def _own_log(lmp: Any, folder: Path) -> None:
+def _own_log(lmp: Any, folder: Path, files: dict[int, OpenFile]) -> None:
     """Go on in a copy of the log, where there is one: copies of a process must not write to the same file."""
-    before = log_path(lmp)
+    before = log_file(lmp, files)
     if before is not None:
         own = folder / f"log.{os.getpid()}"
-        shutil.copyfile(before, own)
+        shutil.copyfile(before.path, own)
         lmp.command(f'log "{own}" append')
 
 
@@ -291,7 +292,8 @@ class _Relaxation:
         # what no contact feels has zero rows, and stays where it is
         solver = general_lu(csc_array(stiffness + 1e-9 * abs(stiffness).max() * eye_array(start.coordinates)))
         allowed = self.balance * float(start.contacts.normal_force.mean())
-        given = self.commands or in_a_copy(lambda: log_of(lmp)) or []
+        files = open_files()
+        given = self.commands or in_a_copy(lambda: log_of(lmp, files)) or []
         fixes = read_commands(given, log=self.commands is None).fixes
         moving = {name: line for name, line in fixes.items() if without_suffix(line.split()[3]) in INTEGRATORS}
         for name in moving:

@@ -184,7 +184,7 @@ def export(
             raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")
         _export_frames(file, frames, output)
         return
-    snapshot = stored_snapshot(file)
+    snapshot = stored_snapshot(file, frame)
     if snapshot is None:
         check_writer(output, mode is not None)
     else:

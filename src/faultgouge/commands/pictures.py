@@ -83,7 +83,7 @@ def draw(
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
     lock_output(context, output, file)
-    snapshot, series, cycle = snapshot_of_disks(file), None, []
+    snapshot, series, cycle = snapshot_of_disks(file, -1 if frame is None else frame), None, []
     packing = snapshot or stored_packing(file, -1 if frame is None else frame)
     if snapshot is None and frame is None and mode is None:
         series, cycle = stored_series(file), _cycle(file)
@@ -281,6 +281,8 @@ def modes_of(packing: Packing | Configuration, which: str) -> tuple[list[Mode], 
 
     modes = normal_modes(packing)
     if which == "pair":
+        if len(modes.values) < 2:
+            raise ModeError(f"--mode pair: the packing has {len(modes.values)} modes, and a pair is two of them")
         return unstable_pair(packing, modes, [pair.eigenvalue for pair in spectrum(packing).pairs])
     if not which.isdecimal():
         raise typer.BadParameter(f"--mode {which}: give pair, or the number of a mode, from 0")

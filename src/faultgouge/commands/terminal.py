@@ -65,18 +65,23 @@ def say_work(scene: Scene, task: Task) -> None:
         say(ahead)
 
 
-def stored_snapshot(file: Path) -> Configuration | None:
-    """The snapshot of a run.h5 that holds one; None of all other files."""
+def stored_snapshot(file: Path, frame: int = -1) -> Configuration | None:
+    """The snapshot of a run.h5 that holds one; None of all other files. It is the file's only frame."""
+    from faultgouge.analysis import BadInputError
     from faultgouge.analysis.files.snapshot_file import holds_snapshot, read_snapshot
 
-    return read_snapshot(file) if holds_snapshot(file) else None
+    if not holds_snapshot(file):
+        return None
+    if frame not in (-1, 0):
+        raise BadInputError(f"{file} has one packing, and no frame {frame}: leave --frame out.")
+    return read_snapshot(file)
 
 
-def snapshot_of_disks(file: Path) -> Configuration | None:
+def snapshot_of_disks(file: Path, frame: int = -1) -> Configuration | None:
     """The snapshot of a run.h5 that holds one of disks; None of all other files; spheres are refused."""
     from faultgouge.analysis import BadInputError
 
-    snapshot = stored_snapshot(file)
+    snapshot = stored_snapshot(file, frame)
     if snapshot is not None and snapshot.dimension == 3:
         raise BadInputError(
             f"{file} holds spheres: `faultgouge export {file} --mode 0 -o packing.vtp` shows them in ParaView, and "
