@@ -43,6 +43,10 @@ MOST_DECADES = 25.0
 STEADY = 0.3
 """A motion still grows if D gains this share of its mean rate, in each quarter of the second half of the time."""
 
+EXPONENTIAL = 0.85
+"""Ratio of the rates of growth in the last two quarters of the time from which growth is exponential: of any power of the
+time it is 0.71."""
+
 SETTLED = 1e-3
 """Change of p in a quarter of the time, as a share of the largest p, below which sliders may be at rest."""
 
@@ -140,11 +144,17 @@ def _outcome(time: Floats, size: Floats, slid: list[Floats], sticking_grows: boo
 
 
 def _still_grows(time: Floats, gained: Floats) -> bool:
-    """Whether D gains at a steady rate in the second half of the time, so that it did not saturate."""
+    """Whether D gains at a steady rate in the second half of the time.
+
+    D that saturates does not, nor D that grows as a power of the time: motion that no force opposes drifts, and is
+    accelerated by what sliders have let go.
+    """
     parts = np.array_split(np.arange(len(time) // 2, len(time)), 4)
     mean = gained[-1] / time[-1]
-    steps = [(gained[part[-1]] - gained[part[0] - 1]) / (time[part[-1]] - time[part[0] - 1]) for part in parts]
-    return bool(min(steps) > STEADY * mean)
+    steps = np.array(
+        [(gained[part[-1]] - gained[part[0] - 1]) / (time[part[-1]] - time[part[0] - 1]) for part in parts]
+    )
+    return bool(steps.min() > STEADY * mean and steps[2:].sum() > EXPONENTIAL * steps[:2].sum())
 
 
 def _rate(time: Floats, size: Floats) -> tuple[float, float]:
