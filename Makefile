@@ -95,6 +95,8 @@ wheel-aarch64: $(VENV)/.plugin
 docs: $(VENV)/.installed
 	$(PIP) -r docs/requirements.txt
 	$(BIN)/python -m sphinx -q -W -b html docs docs/_build/html
+	$(PIP) --group test
+	$(PYTEST) tests/docs/test_built_pages.py
 
 clean:
 	rm -rf $(VENV) build dist results report stability .pytest_cache .hypothesis .mypy_cache .ruff_cache
