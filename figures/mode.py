@@ -15,7 +15,15 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from faultgouge.analysis import BadInputError, Configuration, Eigenpairs, Packing, closest_to_meeting
+from faultgouge.analysis import (
+    BadInputError,
+    Configuration,
+    Eigenpairs,
+    Packing,
+    closest_to_meeting,
+    normal_modes,
+    spectrum,
+)
 from faultgouge.analysis.arrays import Floats
 
 from .packing import WIDTH, PackingArtist, View
@@ -23,8 +31,12 @@ from .style import EDGE, INK, styled
 
 Complexes = NDArray[np.complex128]
 
-LONGEST = 1.6
-"""Length of the longest arrow, in units of the largest radius."""
+TYPICAL, LONGEST = 1.2, 4.0
+"""Length that three quarters of the arrows do not exceed, and length of the longest arrow at most, in units of the mean
+radius: a few disks that move far leave the arrows of all others to be seen."""
+
+MOVING = 0.5
+"""Largest displacement of a disk in a film, in units of the largest radius."""
 
 SYMMETRIC = 1e-6
 """Cosine of two modes up to which they are taken for orthogonal: far above rounding, and an epsilon that no coalescence
@@ -178,7 +190,7 @@ class ModeArtist:
         self, axes: Axes, packing: Packing | Configuration, mode: Mode, points: float | None = None, moves: bool = False
     ) -> None:
         self.mode, self.moves = mode, moves
-        self.reach = LONGEST * packing.radius.max() * (0.3 if moves else 1.0)
+        self.reach = MOVING * packing.radius.max() if moves else _arrow_scale(packing, mode)
         self.artist = PackingArtist(
             axes, packing, view=View.of(packing, margin=self.reach if moves else 0.0), points=points
         )
@@ -190,8 +202,9 @@ class ModeArtist:
         if not moves:
             still = np.zeros(len(disk))
             self.arrows = axes.quiver(
-                *self.artist.view.place.T, still, still, angles="xy", scale_units="xy", scale=1, color=INK, width=0.005
-            )
+                *self.artist.view.place.T, still, still, angles="xy", scale_units="xy", scale=1, color=INK, width=0.007,
+                headwidth=3.2, headlength=3.6, headaxislength=3.2, minlength=0.8,
+            )  # fmt: skip
             self.arrows.set(zorder=5)
         self.rotates = np.abs(mode.displacement[2]).max() or 1.0
 
@@ -213,6 +226,55 @@ class ModeArtist:
             self.artist.move(self.reach * moved[:2].T)
         else:
             self.arrows.set_UVC(*(self.reach * moved[:2, disk]))
+
+
+def _arrow_scale(packing: Packing | Configuration, mode: Mode) -> float:
+    """Length of an arrow for a displacement of one, length."""
+    largest = np.sqrt(np.sum(np.abs(mode.displacement[:2]) ** 2, axis=0))
+    typical, radius = np.quantile(np.delete(largest, packing.rattlers), 0.75), packing.radius.mean()
+    return float(radius * min(TYPICAL / max(typical, PURE_ROTATION), LONGEST / max(largest.max(), PURE_ROTATION)))
+
+
+def modes_of(packing: Packing | Configuration, number: int | None = None) -> tuple[list[Mode], str]:
+    """A mode of a packing by its number, or those of `unstable_pair`; with what they are.
+
+    Raises
+    ------
+    ModeError
+        If the packing has no such mode.
+    """
+    modes = normal_modes(packing)
+    if number is None:
+        if len(modes.values) < 2:
+            raise ModeError(f"the packing has {len(modes.values)} modes, and a pair is two of them")
+        return unstable_pair(packing, modes, [pair.eigenvalue for pair in spectrum(packing).pairs])
+    if not 0 <= number < len(modes.values):
+        raise ModeError(f"mode {number}: the packing has {len(modes.values)} modes, counted from 0")
+    return [Mode.of(packing, modes, number)], f"mode {number} of {len(modes.values)}"
+
+
+def draw_mode(packing: Packing | Configuration, number: int | None = None) -> Figure:
+    """Draw a mode: arrows for displacements, colours for rotations.
+
+    Parameters
+    ----------
+    packing : Packing or Configuration
+        The packing, of disks.
+    number : int, optional
+        Which mode, counted by the real part of the eigenvalue from 0. By default the fastest growing complex pair, at
+        two moments a quarter of a period apart; without one, the two real modes that are closest to meeting.
+
+    Returns
+    -------
+    Figure
+        With the eigenvalue, the participation ratio and the share of rotation above.
+
+    Raises
+    ------
+    BadInputError
+        If the packing has no such mode.
+    """
+    return draw_modes(packing, *modes_of(packing, number))
 
 
 @styled

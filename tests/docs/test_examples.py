@@ -77,7 +77,7 @@ def test_table_of_another_code(printed):
 
 
 def test_wave(printed):
-    """The response to a small pulse is in proportion to the pulse: of ten times the height to 1e-3, the nonlinear part."""
+    """The response to a small pulse is in proportion to the pulse; the tolerance leaves room for the nonlinear part."""
     assert number(printed("wave"), "moves the layer") == pytest.approx(10, abs=0.01)
 
 

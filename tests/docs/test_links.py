@@ -185,8 +185,8 @@ def test_the_exceptional_point(faultgouge, tmp_path):
     sections = {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": 1e-3, "until": 0.02}}
     (tmp_path / "scene.toml").write_text(toml(sections))
     found = json.loads(faultgouge("onset", "scene.toml", "--json").stdout)
-    # the same search in the same arithmetic, printed with ten digits
-    assert number(text, "a hundred disks: F_x^c =") == pytest.approx(found["fx_c"], abs=5e-12)
+    # other equilibria between the same loads, printed with ten digits; the command states the error
+    assert number(text, "a hundred disks: F_x^c =") == pytest.approx(found["fx_c"], abs=found["error"] + 5e-12)
 
 
 @pytest.mark.long

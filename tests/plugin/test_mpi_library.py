@@ -1,4 +1,4 @@
-"""LAMMPS starts whatever is imported first: the entry point of the plugin loads the MPI library of the wheel of MPICH."""
+"""LAMMPS starts whatever is imported first: the entry point of the plugin loads the library of the wheel of MPICH."""
 
 import os
 import subprocess

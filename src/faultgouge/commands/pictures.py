@@ -276,16 +276,8 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
 
 def modes_of(packing: Packing | Configuration, which: str) -> tuple[list[Mode], str]:
     """The modes that --mode asks for, and what they are."""
-    from faultgouge.analysis import normal_modes, spectrum
-    from faultgouge.figures.mode import Mode, ModeError, unstable_pair
+    from faultgouge.figures.mode import modes_of as find_modes
 
-    modes = normal_modes(packing)
-    if which == "pair":
-        if len(modes.values) < 2:
-            raise ModeError(f"--mode pair: the packing has {len(modes.values)} modes, and a pair is two of them")
-        return unstable_pair(packing, modes, [pair.eigenvalue for pair in spectrum(packing).pairs])
-    if not which.isdecimal():
+    if which != "pair" and not which.isdecimal():
         raise typer.BadParameter(f"--mode {which}: give pair, or the number of a mode, from 0")
-    if int(which) >= len(modes.values):
-        raise ModeError(f"--mode {which}: the packing has {len(modes.values)} modes, counted from 0")
-    return [Mode.of(packing, modes, int(which))], f"mode {which} of {len(modes.values)}"
+    return find_modes(packing, None if which == "pair" else int(which))
