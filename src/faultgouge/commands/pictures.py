@@ -127,10 +127,20 @@ def movie(
         tuple[float, float] | None,
         typer.Option(metavar="T0 T1", help="First and last time of the run to show; all by default."),
     ] = None,
-    dots: Annotated[int, typer.Option(min=30, max=400, help="Dots per inch; a film is some five inches wide.")] = 110,
+    dots: Annotated[
+        int | None,
+        typer.Option(min=30, max=800, help="Dots per inch; 110 for a .gif, 1080 lines for an .mp4.", show_default=False),
+    ] = None,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="The film: .gif or .mp4; of spheres .xyz or .pvd.")
-    ] = Path("film.gif"),
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            help="The film: .mp4 or .gif; of spheres .xyz or .pvd. By default film.mp4, or film.gif without "
+            "imageio-ffmpeg.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Make a film of an undamped run, of a mode, or of a ramp.
 
@@ -142,8 +152,12 @@ def movie(
     (.xyz) or ParaView (.pvd).
     """
     from faultgouge.analysis import PackingFileError
-    from faultgouge.figures.writers import check_name, write_film
+    from faultgouge.figures.film import DOTS
+    from faultgouge.figures.writers import check_name, usual_suffix, write_film
 
+    output = output or Path("film").with_suffix(usual_suffix())
+    if dots is None and output.suffix.lower() == ".gif":
+        dots = DOTS
     snapshot = stored_snapshot(file)
     if snapshot is not None and mode is None:
         raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
@@ -254,7 +268,7 @@ def _cycle(file: Path) -> list[Packing]:
         return [run.packing(k) for k in range(len(run))] if turning_points(run.fx) else []
 
 
-def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] | None, dots: int) -> Film:
+def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] | None, dots: int | None) -> Film:
     """The run if the file has its trajectory, else its ramp."""
     from faultgouge.analysis import PackingFileError, RunFile
     from faultgouge.figures.film import RampFilm, RunFilm, RunMotion
