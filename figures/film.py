@@ -276,7 +276,9 @@ class RampFilm(Film):
     """
 
     @styled
-    def __init__(self, packings: Sequence[Packing], frames: int, color: str = "mobilised", dots: int | None = DOTS) -> None:
+    def __init__(
+        self, packings: Sequence[Packing], frames: int, color: str = "mobilised", dots: int | None = DOTS
+    ) -> None:
         self._packings, self._color = packings, color
         self._which = np.linspace(0, len(packings) - 1, frames).round().astype(int)
         first = packings[0]

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from faultgouge.analysis import BadInputError, Configuration, Packing
 from faultgouge.analysis.arrays import Floats, Indices
+from faultgouge.analysis.counted import counted
 
 from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER, figure_of, styled
 
@@ -369,13 +370,15 @@ def in_words(packing: Packing | Configuration) -> str:
         c = packing.contacts
         slide = ", which slide" if c.sliding.any() else ", which stick" if c.at_bound.any() else ""
         return (
-            f"{len(packing)} disks as LAMMPS left them: {len(c)} contacts ({int(c.wall.sum())} with walls), "
-            f"{len(packing.rattlers)} rattlers; {int(c.at_bound.sum())} contacts at Coulomb's bound{slide}"
+            f"{counted(len(packing), 'disk')} as LAMMPS left them: {counted(len(c), 'contact')} "
+            f"({int(c.wall.sum())} with walls), {counted(len(packing.rattlers), 'rattler')}; "
+            f"{counted(int(c.at_bound.sum()), 'contact')} at Coulomb's bound{slide}"
         )
     sliding = int(np.count_nonzero(_slip_share(packing) >= 1))
     return (
-        f"F_x = {packing.fx:g}, F_y = {packing.fy:g}: {len(packing)} disks, {len(packing.contacts)} contacts "
-        f"({sliding} slide), {len(packing.rattlers)} rattlers"
+        f"F_x = {packing.fx:g}, F_y = {packing.fy:g}: {counted(len(packing), 'disk')}, "
+        f"{counted(len(packing.contacts), 'contact')} "
+        f"({sliding} slide), {counted(len(packing.rattlers), 'rattler')}"
     )
 
 

@@ -12,6 +12,7 @@ from ..mpi_rank import is_root
 from .terminal import (
     Frame,
     PackingFile,
+    counted,
     growth_in,
     lock_output,
     print_line,
@@ -129,7 +130,7 @@ def movie(
     ] = None,
     dots: Annotated[
         int | None,
-        typer.Option(min=30, max=800, help="Dots per inch; 110 for a .gif, 1080 lines for an .mp4.", show_default=False),
+        typer.Option(min=30, max=800, help="Dots per inch: 110 for .gif, 1080 lines for .mp4.", show_default=False),
     ] = None,
     output: Annotated[
         Path | None,
@@ -181,7 +182,7 @@ def movie(
         film = _film_of_file(file, count, color.value, span, dots)
     write_film(film, output, rate, lambda frames, total: progress(frames, "frames", total))
     width, height = film.size
-    print_line(f"{count} frames of {width} x {height} dots; written to {output}")
+    print_line(f"{counted(count, 'frame')} of {width} x {height} dots; written to {output}")
 
 
 @app.command(epilog="Example: faultgouge view run.h5 -o page.html")
@@ -254,7 +255,7 @@ def _frames_of_spheres(
             raise BadInputError("--mode pair: the packing has no complex pair; give the number of a mode, from 0")
         vectors = ModeVectors(f"mode_{mode.number}", mode.eigenvalue, mode.displacement)
         write_mode_frames(output, snapshot, vectors, count, periods)
-        print_line(f"{count} frames of {mode.plain}; written to {output}")
+        print_line(f"{counted(count, 'frame')} of {mode.plain}; written to {output}")
 
 
 def _cycle(file: Path) -> list[Packing]:

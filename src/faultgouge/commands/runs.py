@@ -17,6 +17,7 @@ from .terminal import (
     Out,
     ScenePath,
     check_output,
+    counted,
     growth_in,
     lock_output,
     print_json,
@@ -67,7 +68,8 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
             record.finish()
     packing = last.packing
     print_line(
-        f"{len(packing)} disks, {len(packing.contacts)} contacts, {len(packing.rattlers)} rattlers; "
+        f"{counted(len(packing), 'disk')}, {counted(len(packing.contacts), 'contact')}, "
+        f"{counted(len(packing.rattlers), 'rattler')}; "
         f"residual {last.residual:.2g} (rounding floor {last.floor:.2g}); written to {output}"
     )
 

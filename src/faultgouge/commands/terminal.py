@@ -96,6 +96,13 @@ def stored_files(scene: Scene) -> list[Path]:
     return [Path(each) for each in (file, signal) if each is not None]
 
 
+def counted(number: int, noun: str, plural: str | None = None) -> str:
+    """A number with its noun, see `faultgouge.analysis.counted`, which is imported with all of the analysis."""
+    from faultgouge.analysis import counted
+
+    return counted.counted(number, noun, plural)
+
+
 def stored_packing(file: Path, frame: int = -1) -> Packing:
     """A packing of a run.h5, or of the dumps that decks write."""
     from faultgouge.analysis import RunFile, read_dump
@@ -104,7 +111,8 @@ def stored_packing(file: Path, frame: int = -1) -> Packing:
         return read_dump(file, frame=frame)
     with RunFile(file) as run:
         if not run.complete:
-            say(f"{file} is of a run that is not finished: {len(run)} equilibria, up to F_x = {run.fx[-1]:g}")
+            stored = counted(len(run), "equilibrium", "equilibria")
+            say(f"{file} is of a run that is not finished: {stored}, up to F_x = {run.fx[-1]:g}")
         return run.packing(frame)
 
 
