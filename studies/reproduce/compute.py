@@ -80,11 +80,9 @@ def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering
 
     The series go to run.h5.
     """
-    run, fx, mu_ss = (
-        runs[0],
-        require_section(scene.perturb, "perturb").fx,
-        require_section(scene.friction, "friction").mu_ss,
-    )
+    run, mu_ss = runs[0], require_section(scene.friction, "friction").mu_ss
+    fx = require_section(scene.perturb, "perturb").fx
+    assert fx is not None  # the protocol has chosen it
     # exact but for the product's rounding
     weakened = [each for each in runs if np.isclose(each.mu, run.mu * mu_ss, rtol=1e-12)]
     if weakened and weakened[0].onset.windows[0].kind != "start" and fx <= weakened[0].onset.fx_c:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ...analysis import OnsetError
 from ...analysis.files.atomic_write import make_folder, write_json, write_text
-from ...pywrap import Scene
+from ...pywrap import Scene, SceneError
+from ...pywrap.onset.load_at_onset import load_at_onset
 from ...pywrap.onset.undamped import OnsetRun
+from ...pywrap.scenes.validation import require_section
 from ...pywrap.settling.settle import settle_bed
 from ..executors import Say
 from ..study import draw_all
@@ -53,8 +56,13 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
         if triggered is not None:
             say("the packing to be triggered")
             another = _ramps(triggered, path, say)
-        say(f"triggering at F_x = {shaken.perturb.fx:g}")
-        found = triggering_run(shaken, another or runs, path)
+        try:
+            shaken = _with_load(shaken, another or runs)
+        except (SceneError, OnsetError) as error:
+            found = str(error)
+        else:
+            say(f"triggering at F_x = {require_section(shaken.perturb, 'perturb').fx:g}")
+            found = triggering_run(shaken, another or runs, path)
         if isinstance(found, str):
             summary["triggering"] = {"says": found}
         else:
@@ -66,6 +74,15 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     write_json(output / "summary.json", summary)
     write_text(output / "report.md", report(scene, runs, growth, found, another))
     return summary
+
+
+def _with_load(scene: Scene, runs: list[OnsetRun]) -> Scene:
+    """The scene with the load of its undamped runs, which the onsets choose if perturb.fx does not."""
+    perturb = require_section(scene.perturb, "perturb")
+    if perturb.fx is not None:
+        return scene
+    fx = load_at_onset(scene, {run.mu: run.onset for run in runs})
+    return scene.model_copy(update={"perturb": perturb.model_copy(update={"fx": fx})})
 
 
 def _ramps(scene: Scene, path: Path, say: Say) -> list[OnsetRun]:
