@@ -27,6 +27,7 @@ from faultgouge.analysis import (
 from faultgouge.analysis.arrays import Floats
 
 from .packing import WIDTH, PackingArtist, View
+from .spheres import add_scale_of_turns, draw_turns, new_figure
 from .style import EDGE, INK, styled
 
 Complexes = NDArray[np.complex128]
@@ -44,6 +45,9 @@ is near."""
 
 PURE_ROTATION = 1e-9
 """Displacements that are smaller than this share of the rotations are rounding: a sphere spins about its contact."""
+
+
+TWO_MOMENTS = "two moments, a quarter of a period apart"
 
 
 class ModeError(BadInputError):
@@ -155,7 +159,7 @@ def unstable_pair(
     if len(believed):
         number = int(np.argmin(np.abs(modes.values - believed[0])))
         mode = Mode.of(packing, modes, number)
-        return [mode], "the complex pair: two moments, a quarter of a period apart"
+        return [mode], f"the complex pair: {TWO_MOMENTS}"
     first, second, cosine = closest_to_meeting(modes)
     if cosine < SYMMETRIC:
         raise ModeError(
@@ -230,7 +234,7 @@ class ModeArtist:
 
 def _arrow_scale(packing: Packing | Configuration, mode: Mode) -> float:
     """Length of an arrow for a displacement of one, length."""
-    largest = np.sqrt(np.sum(np.abs(mode.displacement[:2]) ** 2, axis=0))
+    largest = np.sqrt(np.sum(np.abs(mode.displacement[: packing.dimension]) ** 2, axis=0))
     typical, radius = np.quantile(np.delete(largest, packing.rattlers), 0.75), packing.radius.mean()
     return float(radius * min(TYPICAL / max(typical, PURE_ROTATION), LONGEST / max(largest.max(), PURE_ROTATION)))
 
@@ -259,7 +263,7 @@ def draw_mode(packing: Packing | Configuration, number: int | None = None) -> Fi
     Parameters
     ----------
     packing : Packing or Configuration
-        The packing, of disks.
+        The packing.
     number : int, optional
         Which mode, counted by the real part of the eigenvalue from 0. By default the fastest growing complex pair, at
         two moments a quarter of a period apart; without one, the two real modes that are closest to meeting.
@@ -295,6 +299,8 @@ def draw_modes(packing: Packing | Configuration, modes: Sequence[Mode], words: s
     Figure
         A complex mode also a quarter of a period later.
     """
+    if isinstance(packing, Configuration) and packing.dimension == 3:
+        return _draw_modes_of_spheres(packing, modes, words)
     panels = [(mode, phase) for mode in modes for phase in ((0.0, np.pi / 2) if mode.is_complex else (0.0,))]
     figure, axes, points = side_by_side(packing, len(panels))
     for one, (mode, phase) in zip(axes, panels, strict=True):
@@ -305,6 +311,21 @@ def draw_modes(packing: Packing | Configuration, modes: Sequence[Mode], words: s
         scale = "on the scale of the left picture" if magnified == 1 else f"arrows and colours times {magnified:g}"
         one.set_title(f"a quarter of a period later\n{scale}" if later else mode.words, fontsize=7)
     finish(figure, axes, packing, words)
+    return figure
+
+
+def _draw_modes_of_spheres(packing: Configuration, modes: Sequence[Mode], words: str) -> Figure:
+    """Modes of spheres side by side, each at its largest displacement."""
+    figure = new_figure(packing, len(modes))
+    axes = figure.subplots(1, len(modes), squeeze=False)[0]
+    for one, mode in zip(axes, modes, strict=True):
+        moved = mode.at(0.0)
+        turns = np.linalg.norm(moved[3:], axis=0).max() or 1.0
+        moved = np.concatenate([moved[:3], moved[3:] / turns])
+        draw_turns(one, packing, moved, _arrow_scale(packing, mode))
+        one.set_title(mode.words, fontsize=7)
+    figure.suptitle(words.replace(TWO_MOMENTS, "at its largest displacement"), fontsize=8)
+    add_scale_of_turns(figure, axes)
     return figure
 
 

@@ -14,6 +14,7 @@ from ...pywrap.scenes.validation import require_section
 from ...pywrap.settling.settle import settle_bed
 from ..executors import Say
 from ..study import draw_all
+from ..triggering.compute import Triggering
 from ..triggering.compute import summary as triggering_summary
 from ..triggering.draw import figures as triggering_figures
 from .compute import growth_run, pair_curve, recorded_ramp, summary_of, triggering_run
@@ -56,13 +57,7 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
         if triggered is not None:
             say("the packing to be triggered")
             another = _ramps(triggered, path, say)
-        try:
-            shaken = _with_load(shaken, another or runs)
-        except (SceneError, OnsetError) as error:
-            found = str(error)
-        else:
-            say(f"triggering at F_x = {require_section(shaken.perturb, 'perturb').fx:g}")
-            found = triggering_run(shaken, another or runs, path)
+        found = _trigger(shaken, another or runs, path, say)
         if isinstance(found, str):
             summary["triggering"] = {"says": found}
         else:
@@ -76,13 +71,18 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     return summary
 
 
-def _with_load(scene: Scene, runs: list[OnsetRun]) -> Scene:
-    """The scene with the load of its undamped runs, which the onsets choose if perturb.fx does not."""
+def _trigger(scene: Scene, runs: list[OnsetRun], path: Path, say: Say) -> Triggering | str:
+    """The triggering at perturb.fx, or where the onsets say without it; or why there is nothing to trigger."""
     perturb = require_section(scene.perturb, "perturb")
-    if perturb.fx is not None:
-        return scene
-    fx = load_at_onset(scene, {run.mu: run.onset for run in runs})
-    return scene.model_copy(update={"perturb": perturb.model_copy(update={"fx": fx})})
+    fx = perturb.fx
+    if fx is None:
+        try:
+            fx = load_at_onset(scene, {run.mu: run.onset for run in runs})
+        except (SceneError, OnsetError) as error:
+            return str(error)
+        scene = scene.model_copy(update={"perturb": perturb.model_copy(update={"fx": fx})})
+    say(f"triggering at F_x = {fx:g}")
+    return triggering_run(scene, runs, path)
 
 
 def _ramps(scene: Scene, path: Path, say: Say) -> list[OnsetRun]:

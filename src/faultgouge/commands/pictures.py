@@ -84,7 +84,7 @@ def draw(
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
     lock_output(context, output, file)
-    snapshot, series, cycle = snapshot_of_disks(file, -1 if frame is None else frame), None, []
+    snapshot, series, cycle = stored_snapshot(file, -1 if frame is None else frame), None, []
     packing = snapshot or stored_packing(file, -1 if frame is None else frame)
     if snapshot is None and frame is None and mode is None:
         series, cycle = stored_series(file), _cycle(file)

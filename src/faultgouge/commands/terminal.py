@@ -84,8 +84,9 @@ def snapshot_of_disks(file: Path, frame: int = -1) -> Configuration | None:
     snapshot = stored_snapshot(file, frame)
     if snapshot is not None and snapshot.dimension == 3:
         raise BadInputError(
-            f"{file} holds spheres: `faultgouge export {file} --mode 0 -o packing.vtp` shows them in ParaView, and "
-            f"-o packing.xyz in OVITO; `faultgouge movie {file} --mode 0 -o mode.xyz` moves a mode."
+            f"{file} holds spheres: `faultgouge draw {file}` draws them; `faultgouge export {file} -o packing.vtp` "
+            f"shows them in ParaView, and -o packing.xyz in OVITO; `faultgouge movie {file} --mode 0 -o mode.xyz` "
+            "moves a mode."
         )
     return snapshot
 
