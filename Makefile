@@ -115,7 +115,7 @@ $(VENV)/.plugin: $(VENV)/bin/python $(PLUGIN)
 	$(PIP) --group build
 	$(PIP) --no-build-isolation .
 	mkdir -p src/faultgouge/lib
-	cd $(VENV) && install "$$(bin/python -c 'import faultgouge.plugin as p; print(p.directory())')"/*.so $(CURDIR)/src/faultgouge/lib
+	cd $(VENV) && install "$$(bin/python -I -c 'import faultgouge.plugin as p; print(p.directory())')"/*.so $(CURDIR)/src/faultgouge/lib
 	$(COMPILE)
 	touch $@
 
