@@ -24,6 +24,7 @@ from .runs.run_recorder import Record
 from .runs.undamped import Sample, perturb
 from .scenes.scene import Scene
 from .scenes.validation import SceneError
+from .settling.relax import bring_to_rest
 from .settling.settle import settle
 
 __all__ = [
@@ -38,6 +39,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "SnapshotError",
+    "bring_to_rest",
     "compare_motion",
     "equilibrate",
     "from_lammps",

@@ -30,7 +30,7 @@ FLOORS = {
         ("__main__",),
     ),
     "faultgouge.analysis": (
-        ("uncertain_digits", "errors", "progress", "table_display"),
+        ("counted", "uncertain_digits", "errors", "progress", "table_display"),
         ("arrays",),
         ("configuration",),
         ("packing",),

@@ -139,6 +139,7 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ),
         # names
         ({"packing.dsks": 10}, "packing.dsks is no key of [packing]: the nearest is packing.disks."),
+        ({"law.friction": 0.5}, "law.friction is no key of [law]: the nearest is law.mu."),
         ({"packing.kn": 1.0}, "packing.kn is no key of [packing]: the nearest is law.kn."),
         ({"kn": 200000.0}, "kn stands outside of its section: move it below [law]."),
         ({"precison": "double"}, "precison is no key of a scene: the nearest is precision."),

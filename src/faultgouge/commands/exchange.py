@@ -14,6 +14,7 @@ from .terminal import (
     NONE_GIVEN,
     Frame,
     PackingFile,
+    counted,
     lock_output,
     print_line,
     progress,
@@ -122,9 +123,9 @@ def import_(
         _store(output, packing, assumed)
     if assumed:
         say(f"{file} gives no tangential forces: they are taken as zero, and nothing can be said of the stability")
-    contacts_of = f"{len(packing.contacts)} contacts, {len(packing.rattlers)} rattlers"
+    contacts_of = f"{counted(len(packing.contacts), 'contact')}, {counted(len(packing.rattlers), 'rattler')}"
     print_line(
-        f"{len(packing)} disks, {int(packing.top.sum())} of them the upper layer, {contacts_of}; residual "
+        f"{counted(len(packing), 'disk')}, {int(packing.top.sum())} of them the upper layer, {contacts_of}; residual "
         f"{packing.residual:.2g}; written to {output}"
     )
 
@@ -216,7 +217,7 @@ def _export_frames(file: Path, says: str, output: Path) -> None:
         numbers = choose_frames(run, says)
         write_frames(output, progress(frames_of(run, numbers), "frames", len(numbers)))
         what = "an undamped run" if "trajectory" in run.names_of_series else "equilibria"
-    print_line(f"{len(numbers)} frames of {what}; written to {output}")
+    print_line(f"{counted(len(numbers), 'frame')} of {what}; written to {output}")
 
 
 def _place_disks(file: Path, frame: int | None, floor: float, width: str | None, contacts: Path | None) -> Disks:

@@ -9,7 +9,7 @@ import typer
 
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
-from .terminal import Folder, Workers, print_line, progress, say, table_of
+from .terminal import Folder, Workers, counted, print_line, progress, say, table_of
 
 if TYPE_CHECKING:
     from faultgouge.studies.sweep.sweep_plan import Sweep
@@ -62,7 +62,8 @@ def sweep(
     if is_root():
         failed = sum(row["says"] is not None for row in rows)
         print_line(
-            f"{len(rows)} scenes, {failed} of them failed; written: {output}/results.csv{draw_sweep(rows, output, say)}"
+            f"{counted(len(rows), 'scene')}, {failed} of them failed; "
+            f"written: {output}/results.csv{draw_sweep(rows, output, say)}"
         )
         _summarise(wanted.task, rows, output)
         require_result(rows)

@@ -84,8 +84,9 @@ def snapshot_of_disks(file: Path, frame: int = -1) -> Configuration | None:
     snapshot = stored_snapshot(file, frame)
     if snapshot is not None and snapshot.dimension == 3:
         raise BadInputError(
-            f"{file} holds spheres: `faultgouge export {file} --mode 0 -o packing.vtp` shows them in ParaView, and "
-            f"-o packing.xyz in OVITO; `faultgouge movie {file} --mode 0 -o mode.xyz` moves a mode."
+            f"{file} holds spheres: `faultgouge draw {file}` draws them; `faultgouge export {file} -o packing.vtp` "
+            f"shows them in ParaView, and -o packing.xyz in OVITO; `faultgouge movie {file} --mode 0 -o mode.xyz` "
+            "moves a mode."
         )
     return snapshot
 
@@ -96,6 +97,13 @@ def stored_files(scene: Scene) -> list[Path]:
     return [Path(each) for each in (file, signal) if each is not None]
 
 
+def counted(number: int, noun: str, plural: str | None = None) -> str:
+    """A number with its noun, see `faultgouge.analysis.counted`, which is imported with all of the analysis."""
+    from faultgouge.analysis import counted
+
+    return counted.counted(number, noun, plural)
+
+
 def stored_packing(file: Path, frame: int = -1) -> Packing:
     """A packing of a run.h5, or of the dumps that decks write."""
     from faultgouge.analysis import RunFile, read_dump
@@ -104,7 +112,8 @@ def stored_packing(file: Path, frame: int = -1) -> Packing:
         return read_dump(file, frame=frame)
     with RunFile(file) as run:
         if not run.complete:
-            say(f"{file} is of a run that is not finished: {len(run)} equilibria, up to F_x = {run.fx[-1]:g}")
+            stored = counted(len(run), "equilibrium", "equilibria")
+            say(f"{file} is of a run that is not finished: {stored}, up to F_x = {run.fx[-1]:g}")
         return run.packing(frame)
 
 
