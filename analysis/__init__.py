@@ -35,6 +35,7 @@ from .motion.stability import Stability, stability
 from .motion.stable_timestep import rayleigh_timestep, stable_timestep
 from .motion.transient import NoGainError, TransientGain, transient_gain
 from .onset import Onset, OnsetError, Window, complex_windows, find_onset
+from .onset.pair_form import pair_eigenvalues
 from .operators.damping import damping_matrix, largest_damping_rate
 from .operators.stiffness import stiffness_matrix
 from .packing.contacts import FLOOR, Contacts
@@ -98,6 +99,7 @@ __all__ = [
     "negative_eigenvalues",
     "normal_modes",
     "one_sided_motion",
+    "pair_eigenvalues",
     "rayleigh_timestep",
     "read_dump",
     "read_packing",

@@ -26,8 +26,9 @@ Data = TypeVar("Data", bound="DataclassInstance")
 
 
 def same_bits(one: Any, other: Any) -> bool:
-    """Whether two of a dataclass have the same bits in every field; -0.0 is not 0.0, and a missing array no zeros."""
-    for name in one.__dataclass_fields__:
+    """Whether two of a dataclass have the same bits in every field that is compared; -0.0 is not 0.0, and a missing
+    array no zeros."""
+    for name in (field.name for field in one.__dataclass_fields__.values() if field.compare):
         a, b = getattr(one, name), getattr(other, name)
         if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
             same = a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes()
@@ -99,9 +100,16 @@ def booleans(name: str, value: ArrayLike, count: int) -> NDArray[np.bool_]:
     return array
 
 
+def real(name: str, value: ArrayLike) -> Floats:
+    """A copy as doubles; a ValueError if values are complex, or masked."""
+    if np.iscomplexobj(value) or np.ma.is_masked(value):
+        raise ValueError(f"{name} holds {'complex' if np.iscomplexobj(value) else 'masked'} values; give real numbers.")
+    return np.array(value, dtype=np.float64)
+
+
 def floats(name: str, value: ArrayLike, shape: Iterable[int]) -> Floats:
-    """A copy as doubles; a ValueError if it has another shape, or a value that is not finite."""
-    array = np.array(value, dtype=np.float64)
+    """A copy as doubles; a ValueError if it has another shape, or a value that is not finite and real."""
+    array = real(name, value)
     if array.shape != tuple(shape):
         raise ValueError(f"{name} has shape {array.shape}; {tuple(shape)} is needed.")
     if not np.isfinite(array).all():

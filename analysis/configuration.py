@@ -22,7 +22,8 @@ The operators are those of Q: P_1^T K P, and C likewise, where P_1 is 1 where P 
 moves, and the coordinate k itself by 1. The mass of Q_k is the sum of masses times P.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, Protocol
 
@@ -40,6 +41,7 @@ from .arrays import (
     integers,
     number,
     positive_each,
+    real,
     same_bits,
     set_frozen,
     square,
@@ -51,6 +53,12 @@ WALL = -1
 AT_COULOMBS_BOUND = 1 - 1e-6
 """Share of mu f_n from which on a contact counts as one at the bound. A packing at rest has a residual of 1e-6 of its
 forces or less, and a dashpot has carried that much of the tangential force."""
+
+UNIT = 1e-6
+"""Error of a unit vector, and of a direction in the plane, that text of seven digits has."""
+
+PERPENDICULAR = 1e-2
+"""Share of a tangential force that may be along the normal: LAMMPS turns histories a step behind their contacts."""
 
 PER_CONTACT = {
     "i": (), "j": (), "normal": (3,), "distance": (), "overlap": (), "slip_arm": (2,), "lever_arm": (2,),
@@ -111,7 +119,9 @@ class LinearisedContacts:
     Raises
     ------
     ValueError
-        If a shape does not fit, or a number is not finite.
+        If a shape does not fit, a number is not finite, or a value is none that a contact can have: a normal that is
+        no unit vector, a tangential force along the normal, a distance that is not positive, or a negative arm, bound
+        or index.
     """
 
     i: Indices
@@ -143,12 +153,13 @@ class LinearisedContacts:
         count = len(values["i"])
         values |= {name: booleans(name, given[name], count) for name in BOOLEAN}
         for name in ("distance", "friction"):  # may be infinite
-            values[name] = np.array(given[name], dtype=np.float64)
+            values[name] = real(name, given[name])
             floats(name, np.where(values[name] == np.inf, 0.0, values[name]), (count,))
         for name in PER_CONTACT.keys() - values.keys():
             values[name] = floats(name, given[name], (count, *PER_CONTACT[name]))
         if len(values["i"]) != len(values["j"]) or np.any(values["i"] == values["j"]):
             raise ValueError("Every contact has two different partners, i and j.")
+        _check_contacts(values)
         set_frozen(self, **{name: values[name] for name in PER_CONTACT})
 
     def __len__(self) -> int:
@@ -238,11 +249,17 @@ class Configuration:
         share of the largest entry; zero by default.
     constraint : scipy.sparse.csr_array, shape (coordinates, coordinates), optional
         P of q = P Q; the identity by default, and only where `stiffness` is given.
+    proof : float, optional
+        Relative difference of a short motion of the other code from that of this configuration; None without such a
+        motion. The proof is no property of the packing, and does not count when two configurations are compared.
+    remarks : sequence of str
+        What is to be known of its origin, such as laws that are others than their commands say; not compared either.
 
     Raises
     ------
     ValueError
-        If a shape does not fit, a number is not finite or has the wrong sign, or a contact names no particle.
+        If a shape does not fit, a number is not finite or has the wrong sign, a contact names no particle or leaves
+        the plane of disks, or two particles have one ID.
     """
 
     dimension: int
@@ -267,6 +284,8 @@ class Configuration:
     operator_error: float
     jump: Floats
     constraint: csr_array | None
+    proof: float | None = field(compare=False)
+    remarks: tuple[str, ...] = field(compare=False)
 
     def __init__(
         self,
@@ -293,6 +312,8 @@ class Configuration:
         operator_error: float = 0.0,
         jump: ArrayLike | None = None,
         constraint: csr_array | None = None,
+        proof: float | None = None,
+        remarks: Iterable[str] = (),
     ) -> None:
         n = len(np.atleast_1d(np.asarray(radius)))
         if dimension not in (2, 3) or n == 0:
@@ -322,9 +343,12 @@ class Configuration:
             operator_error=number("operator_error", operator_error),
             jump=floats("jump", np.zeros(n) if jump is None else jump, (n,)),
             **{name: None if each is None else square(name, each, size) for name, each in matrices.items()},
+            proof=None if proof is None else number("proof", proof),
+            remarks=tuple(remarks),
         )
         if len(contacts) and max(contacts.i.max(), contacts.j.max()) >= n:
             raise ValueError(f"A contact names a particle beyond the last one, {n - 1}.")
+        _check_particles(self)
 
     def __len__(self) -> int:
         return len(self.radius)
@@ -348,7 +372,8 @@ class Configuration:
             state = f"{walls} known with walls, K and C by differences of forces to {self.operator_error:.1g}{sided}"
         return (
             f"<Configuration: {len(self)} {what}, {count - walls} contacts between them and {state}, "
-            f"{len(self.rattlers)} rattlers, residual {self.residual:.3g}>"
+            f"{len(self.rattlers)} rattlers, residual {self.residual:.3g}, "
+            f"{'not proved' if self.proof is None else f'proof {self.proof:.1g}'}>"
         )
 
     @property
@@ -430,6 +455,18 @@ class Configuration:
         return frozen(total)
 
     @property
+    def coordinate_force(self) -> Floats:
+        """F and T/R of `net_force` on the coordinates, sums where several move as one, shape (axes N,)."""
+        forces = self.join_vectors(self.net_force[:, 0], self.net_force[:, 1] / self.radius[:, None])
+        return forces if self.constraint is None else np.asarray((self.constraint != 0).T @ forces)
+
+    @property
+    def coordinate_free(self) -> NDArray[np.bool_]:
+        """Which coordinates move, and lead where several move as one, shape (axes N,)."""
+        free = np.tile(self.free, self.axes)
+        return free if self.constraint is None else np.asarray(abs(self.constraint).sum(axis=0) > 0)
+
+    @property
     def residual(self) -> float:
         """Largest |(F, T/R)| on a particle that moves and has a contact, force; zero if none has."""
         return float(self.particle_residual.max(initial=0.0))
@@ -437,11 +474,7 @@ class Configuration:
     @property
     def particle_residual(self) -> Floats:
         """|(F, T/R)| on each particle, force, shape (N,); zero if it does not move, or has no contact."""
-        force = self.net_force.copy()
-        force[:, 1] /= self.radius[:, None]
-        if self.constraint is not None:
-            forces = (self.constraint != 0).T @ self.join_vectors(force[:, 0], force[:, 1])
-            force = np.stack(self._apart(forces), axis=1)
+        force = np.stack(self._apart(self.coordinate_force), axis=1)
         size = np.where(self.free, np.sqrt(np.sum(force * force, axis=(1, 2))), 0.0)
         size[self.rattlers] = 0.0
         return size
@@ -479,8 +512,78 @@ class Configuration:
         return np.concatenate([translation[:, :d].T.ravel(), rotation[:, d - self.axes :].T.ravel()])
 
 
+def _check_contacts(values: dict[str, NDArray]) -> None:
+    """Refuse values that no contact can have; a ValueError names the first contact that has one."""
+    normal, tangential, force = values["normal"], values["tangential_force"], values["normal_force"]
+    along = np.abs(np.einsum("ca,ca->c", normal, tangential))
+    tilted = along > PERPENDICULAR * np.linalg.norm(tangential, axis=1) + UNIT * np.abs(force)
+    _refuse_first(values["i"] < 0, "i = {} is no particle", values["i"])
+    _refuse_first(values["j"] < WALL, "j = {} is no particle; -1 is a wall", values["j"])
+    _refuse_first(np.abs(np.linalg.norm(normal, axis=1) - 1) > UNIT, "the normal {} is no unit vector", normal)
+    _refuse_first(tilted, "the tangential force {} has a part along the normal", tangential)
+    _refuse_first(values["distance"] <= 0, "the distance {} is not positive", values["distance"])
+    _refuse_first(values["friction"] < 0, "friction = {} is negative", values["friction"])
+    for name in ("slip_arm", "lever_arm"):
+        _refuse_first(np.any(values[name] < 0, axis=1), f"{name} = {{}} is negative", values[name])
+
+
+def _check_particles(made: Configuration) -> None:
+    """Refuse contacts of disks that leave the plane, and IDs and types that do not fit."""
+    n, c = len(made), made.contacts
+    if len(made.ids) != n or len(made.kind) != n:
+        raise ValueError(f"ids and kind must be lists of {n} integers, one for each particle.")
+    unique, count = np.unique(made.ids, return_counts=True)
+    if len(unique) < n:
+        raise ValueError(f"Two particles have the ID {unique[count > 1][0]}: give each its own.")
+    if made.dimension == 2:
+        scale = np.abs(c.normal_force) + np.linalg.norm(c.tangential_force, axis=1)
+        _refuse_first(np.abs(c.normal[:, 2]) > UNIT, "the normal {} of disks is not in the plane", c.normal)
+        outside = np.abs(c.tangential_force[:, 2]) > UNIT * scale
+        _refuse_first(outside, "the tangential force {} on a disk is not in the plane", c.tangential_force)
+
+
+def _refuse_first(wrong: NDArray[np.bool_], says: str, values: NDArray) -> None:
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise ValueError(f"Contact {k}: {says.format(values[k])}.")
+
+
 class HasConfiguration(Protocol):
-    """What an analysis takes: a Configuration, or a Packing, which has one."""
+    """What an analysis takes: a Configuration, or a Packing, which has one. Members are those of a Configuration."""
 
     @property
     def configuration(self) -> Configuration: ...
+    @property
+    def dimension(self) -> int: ...
+    @property
+    def axes(self) -> int: ...
+    @property
+    def coordinates(self) -> int: ...
+    @property
+    def coordinate_mass(self) -> Floats: ...
+    @property
+    def position(self) -> Floats: ...
+    @property
+    def radius(self) -> Floats: ...
+    @property
+    def mass(self) -> Floats: ...
+    @property
+    def top(self) -> NDArray[np.bool_]: ...
+    @property
+    def damped(self) -> bool: ...
+    @property
+    def normal_force(self) -> Floats: ...
+    @property
+    def mobilised(self) -> Floats: ...
+    @property
+    def rattlers(self) -> Indices: ...
+    @property
+    def residual(self) -> float: ...
+    @property
+    def fx(self) -> float: ...
+    @property
+    def load_error(self) -> float: ...
+    @property
+    def contact_states(self) -> bytes: ...
+    def loaded(self, least: float) -> "HasConfiguration": ...
+    def __len__(self) -> int: ...

@@ -5,6 +5,20 @@ it: the failure of an engine, a lost rank or a full disk must always reach the c
 the command is a bug in this program.
 """
 
+import traceback
+from pathlib import Path
+
+
+def place_in_user_code(error: BaseException) -> str:
+    """Where a function of the user's has failed, as " (FILE, line N)", for whoever has called it and caught the error.
+
+    The line is that of the function's own file, also where a library that it calls has raised the error. Empty if the
+    function has no lines, such as one in C.
+    """
+    _, *frames = traceback.extract_tb(error.__traceback__)
+    own = [each for each in frames if each.filename == frames[0].filename]
+    return f" ({Path(own[-1].filename).name}, line {own[-1].lineno})" if own else ""
+
 
 class FaultgougeError(Exception):
     """Base class of all errors of the package; its text is the sentence for the user.

@@ -101,9 +101,13 @@ def keep_numbers_whole(app, doctree):
             cell["classes"].append("number")
 
 
-def plain_title(app, pagename, templatename, context, doctree):
-    """The title of a browser's tab is text: no formula is set there."""
-    context["title"] = context.get("title", "").replace(r"\(F_x^c\)", "Fₓᶜ")
+def add_address(app, docname, source):
+    """The line that clones the sources, as soon as CITATION.cff has the address of the repository."""
+    if docname == "install":
+        citation = (Path(__file__).parents[1] / "CITATION.cff").read_text()
+        address = re.search(r"^repository-code: *(\S+)", citation, re.MULTILINE)
+        line = f"    git clone {address[1]} faultgouge\n    cd faultgouge" if address else ""
+        source[0] = re.sub(r"<!-- git clone.*?-->", line, source[0])
 
 
 def make_live_page(app, exception):
@@ -118,7 +122,7 @@ def make_live_page(app, exception):
 
 
 def setup(app):
-    app.connect("html-page-context", plain_title)
+    app.connect("source-read", add_address)
     app.connect("build-finished", make_live_page)
     app.connect("doctree-read", keep_numbers_whole)
     app.connect("autodoc-process-docstring", keep_first_line, priority=90)

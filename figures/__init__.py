@@ -6,9 +6,10 @@ may have any units.
 """
 
 from .cycle import draw_cycle
+from .mode import draw_mode
 from .packing import draw_packing
 from .pair import PairCurve, draw_pair
 from .series import draw_series
 from .style import save
 
-__all__ = ["PairCurve", "draw_cycle", "draw_packing", "draw_pair", "draw_series", "save"]
+__all__ = ["PairCurve", "draw_cycle", "draw_mode", "draw_packing", "draw_pair", "draw_series", "save"]

@@ -34,7 +34,10 @@ from .style import BULK, EDGE, INK, styled
 Frame = NDArray[np.uint8]
 
 DOTS = 110
-"""Dots an inch of a frame, unless others are asked for."""
+"""Dots an inch of a frame of a GIF, unless others are asked for: a GIF of more dots is too large for a page."""
+
+LINES = 1080
+"""Lines of a frame of an MP4 at least, unless dots are asked for."""
 
 LARGEST_SHOWN = 0.6
 """The largest displacement on the screen, in units of the smallest radius: disks stay beside their neighbours."""
@@ -124,12 +127,13 @@ class Film(ABC):
         What changes from frame to frame.
     count : int
         How many frames there are.
-    dots : int
-        Dots an inch.
+    dots : int, optional
+        Dots an inch; by default so many that a frame has `LINES` lines.
     """
 
-    def __init__(self, figure: Figure, moving: Sequence[Artist], count: int, dots: int = DOTS) -> None:
+    def __init__(self, figure: Figure, moving: Sequence[Artist], count: int, dots: int | None = DOTS) -> None:
         self.count, self._moving = count, list(moving)
+        dots = dots or int(np.ceil(LINES / figure.get_size_inches()[1]))
         figure.set_dpi(dots)
         # films in MP4 need an even number of dots
         width, height = (2 * round(size * dots / 2) for size in figure.get_size_inches())
@@ -174,7 +178,7 @@ class RunFilm(Film):
     """
 
     @styled
-    def __init__(self, motion: RunMotion, frames: int, dots: int = DOTS) -> None:
+    def __init__(self, motion: RunMotion, frames: int, dots: int | None = DOTS) -> None:
         wanted = np.linspace(motion.time[0], motion.time[-1], frames)
         self._sample = np.clip(np.searchsorted(motion.time, wanted), 0, len(motion.time) - 1)
         self._motion, self._factor, self._msd = motion, motion.magnification(), motion.msd
@@ -185,6 +189,8 @@ class RunFilm(Film):
         self._artist.chains.set(color=EDGE, linewidth=0.5, zorder=2)
         self._artist.disks.set(array=np.zeros(len(view.disk)), cmap=DISPLACEMENT_COLOURS, norm=Normalize(0, 1))
         self._says = axes.text(0.5, 1.01, "", transform=axes.transAxes, ha="center", va="bottom", fontsize=8)
+        key = "red: moves farthest; grey: rests"
+        axes.text(0.5, -0.02, key, transform=axes.transAxes, ha="center", va="top", fontsize=7)
         seen = self._msd > 0
         beside.plot(motion.time[seen], self._msd[seen], color=BULK, linewidth=1.2)
         (self._line,) = beside.plot([], [], color="C1", linewidth=1.0)
@@ -204,7 +210,8 @@ class RunFilm(Film):
         factor = self._factor[k]
         moved = factor * self._motion.displacement[k]
         self._artist.move(moved)
-        share = np.linalg.norm(moved, axis=1) / (LARGEST_SHOWN * self._motion.packing.radius.min())
+        share = np.linalg.norm(moved, axis=1)
+        share = share / (share.max() or 1.0)
         self._artist.disks.set_array(share[self._artist.view.disk])
         self._says.set_text(
             rf"$t = {self._motion.time[k]:.3f}$, displacements $\times\,10^{{{round(np.log10(factor))}}}$"
@@ -236,7 +243,7 @@ class ModeFilm(Film):
         words: str,
         frames: int,
         periods: int,
-        dots: int = DOTS,
+        dots: int | None = DOTS,
     ) -> None:
         figure, axes, points = side_by_side(packing, len(modes))
         self._artists = [
@@ -269,7 +276,9 @@ class RampFilm(Film):
     """
 
     @styled
-    def __init__(self, packings: Sequence[Packing], frames: int, color: str = "mobilised", dots: int = DOTS) -> None:
+    def __init__(
+        self, packings: Sequence[Packing], frames: int, color: str = "mobilised", dots: int | None = DOTS
+    ) -> None:
         self._packings, self._color = packings, color
         self._which = np.linspace(0, len(packings) - 1, frames).round().astype(int)
         first = packings[0]
@@ -324,7 +333,7 @@ def _two_panels(packing: Packing, scale: bool = False) -> tuple[Figure, Axes, Ax
     view = View.of(packing)
     ratio = (view.ceiling - view.bottom) / (view.right - view.left)
     across = min(2.4, 3.2 / ratio)
-    size: dict[str, Any] = {"figsize": (across + 2.5 + (0.7 if scale else 0.0), max(2.0, across * ratio + 0.3))}
+    size: dict[str, Any] = {"figsize": (across + 2.5 + (0.7 if scale else 0.0), max(2.0, across * ratio + 0.45))}
     figure = Figure(**size)
     figure.set_layout_engine("constrained", h_pad=0.07)
     left, right = figure.subplots(1, 2, width_ratios=(across + (0.7 if scale else 0.0), 2.3))

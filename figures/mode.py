@@ -15,16 +15,29 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from faultgouge.analysis import BadInputError, Configuration, Eigenpairs, Packing, closest_to_meeting
+from faultgouge.analysis import (
+    BadInputError,
+    Configuration,
+    Eigenpairs,
+    Packing,
+    closest_to_meeting,
+    normal_modes,
+    spectrum,
+)
 from faultgouge.analysis.arrays import Floats
 
 from .packing import WIDTH, PackingArtist, View
+from .spheres import add_scale_of_turns, draw_turns, new_figure
 from .style import EDGE, INK, styled
 
 Complexes = NDArray[np.complex128]
 
-LONGEST = 1.6
-"""Length of the longest arrow, in units of the largest radius."""
+TYPICAL, LONGEST = 1.2, 4.0
+"""Length that three quarters of the arrows do not exceed, and length of the longest arrow at most, in units of the mean
+radius: a few disks that move far leave the arrows of all others to be seen."""
+
+MOVING = 0.5
+"""Largest displacement of a disk in a film, in units of the largest radius."""
 
 SYMMETRIC = 1e-6
 """Cosine of two modes up to which they are taken for orthogonal: far above rounding, and an epsilon that no coalescence
@@ -32,6 +45,9 @@ is near."""
 
 PURE_ROTATION = 1e-9
 """Displacements that are smaller than this share of the rotations are rounding: a sphere spins about its contact."""
+
+
+TWO_MOMENTS = "two moments, a quarter of a period apart"
 
 
 class ModeError(BadInputError):
@@ -143,7 +159,7 @@ def unstable_pair(
     if len(believed):
         number = int(np.argmin(np.abs(modes.values - believed[0])))
         mode = Mode.of(packing, modes, number)
-        return [mode], "the complex pair: two moments, a quarter of a period apart"
+        return [mode], f"the complex pair: {TWO_MOMENTS}"
     first, second, cosine = closest_to_meeting(modes)
     if cosine < SYMMETRIC:
         raise ModeError(
@@ -178,7 +194,7 @@ class ModeArtist:
         self, axes: Axes, packing: Packing | Configuration, mode: Mode, points: float | None = None, moves: bool = False
     ) -> None:
         self.mode, self.moves = mode, moves
-        self.reach = LONGEST * packing.radius.max() * (0.3 if moves else 1.0)
+        self.reach = MOVING * packing.radius.max() if moves else _arrow_scale(packing, mode)
         self.artist = PackingArtist(
             axes, packing, view=View.of(packing, margin=self.reach if moves else 0.0), points=points
         )
@@ -190,8 +206,9 @@ class ModeArtist:
         if not moves:
             still = np.zeros(len(disk))
             self.arrows = axes.quiver(
-                *self.artist.view.place.T, still, still, angles="xy", scale_units="xy", scale=1, color=INK, width=0.005
-            )
+                *self.artist.view.place.T, still, still, angles="xy", scale_units="xy", scale=1, color=INK, width=0.007,
+                headwidth=3.2, headlength=3.6, headaxislength=3.2, minlength=0.8,
+            )  # fmt: skip
             self.arrows.set(zorder=5)
         self.rotates = np.abs(mode.displacement[2]).max() or 1.0
 
@@ -215,6 +232,55 @@ class ModeArtist:
             self.arrows.set_UVC(*(self.reach * moved[:2, disk]))
 
 
+def _arrow_scale(packing: Packing | Configuration, mode: Mode) -> float:
+    """Length of an arrow for a displacement of one, length."""
+    largest = np.sqrt(np.sum(np.abs(mode.displacement[: packing.dimension]) ** 2, axis=0))
+    typical, radius = np.quantile(np.delete(largest, packing.rattlers), 0.75), packing.radius.mean()
+    return float(radius * min(TYPICAL / max(typical, PURE_ROTATION), LONGEST / max(largest.max(), PURE_ROTATION)))
+
+
+def modes_of(packing: Packing | Configuration, number: int | None = None) -> tuple[list[Mode], str]:
+    """A mode of a packing by its number, or those of `unstable_pair`; with what they are.
+
+    Raises
+    ------
+    ModeError
+        If the packing has no such mode.
+    """
+    modes = normal_modes(packing)
+    if number is None:
+        if len(modes.values) < 2:
+            raise ModeError(f"the packing has {len(modes.values)} modes, and a pair is two of them")
+        return unstable_pair(packing, modes, [pair.eigenvalue for pair in spectrum(packing).pairs])
+    if not 0 <= number < len(modes.values):
+        raise ModeError(f"mode {number}: the packing has {len(modes.values)} modes, counted from 0")
+    return [Mode.of(packing, modes, number)], f"mode {number} of {len(modes.values)}"
+
+
+def draw_mode(packing: Packing | Configuration, number: int | None = None) -> Figure:
+    """Draw a mode: arrows for displacements, colours for rotations.
+
+    Parameters
+    ----------
+    packing : Packing or Configuration
+        The packing.
+    number : int, optional
+        Which mode, counted by the real part of the eigenvalue from 0. By default the fastest growing complex pair, at
+        two moments a quarter of a period apart; without one, the two real modes that are closest to meeting.
+
+    Returns
+    -------
+    Figure
+        With the eigenvalue, the participation ratio and the share of rotation above.
+
+    Raises
+    ------
+    BadInputError
+        If the packing has no such mode.
+    """
+    return draw_modes(packing, *modes_of(packing, number))
+
+
 @styled
 def draw_modes(packing: Packing | Configuration, modes: Sequence[Mode], words: str) -> Figure:
     """Modes side by side, with their numbers below.
@@ -233,6 +299,8 @@ def draw_modes(packing: Packing | Configuration, modes: Sequence[Mode], words: s
     Figure
         A complex mode also a quarter of a period later.
     """
+    if isinstance(packing, Configuration) and packing.dimension == 3:
+        return _draw_modes_of_spheres(packing, modes, words)
     panels = [(mode, phase) for mode in modes for phase in ((0.0, np.pi / 2) if mode.is_complex else (0.0,))]
     figure, axes, points = side_by_side(packing, len(panels))
     for one, (mode, phase) in zip(axes, panels, strict=True):
@@ -243,6 +311,21 @@ def draw_modes(packing: Packing | Configuration, modes: Sequence[Mode], words: s
         scale = "on the scale of the left picture" if magnified == 1 else f"arrows and colours times {magnified:g}"
         one.set_title(f"a quarter of a period later\n{scale}" if later else mode.words, fontsize=7)
     finish(figure, axes, packing, words)
+    return figure
+
+
+def _draw_modes_of_spheres(packing: Configuration, modes: Sequence[Mode], words: str) -> Figure:
+    """Modes of spheres side by side, each at its largest displacement."""
+    figure = new_figure(packing, len(modes))
+    axes = figure.subplots(1, len(modes), squeeze=False)[0]
+    for one, mode in zip(axes, modes, strict=True):
+        moved = mode.at(0.0)
+        turns = np.linalg.norm(moved[3:], axis=0).max() or 1.0
+        moved = np.concatenate([moved[:3], moved[3:] / turns])
+        draw_turns(one, packing, moved, _arrow_scale(packing, mode))
+        one.set_title(mode.words, fontsize=7)
+    figure.suptitle(words.replace(TWO_MOMENTS, "at its largest displacement"), fontsize=8)
+    add_scale_of_turns(figure, axes)
     return figure
 
 

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
 from matplotlib.colors import Colormap, LogNorm, Normalize
 from matplotlib.figure import Figure
@@ -27,7 +28,9 @@ from numpy.typing import NDArray
 
 from faultgouge.analysis import BadInputError, Configuration, Packing
 from faultgouge.analysis.arrays import Floats, Indices
+from faultgouge.analysis.counted import counted
 
+from .spheres import SpheresArtist, new_figure
 from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER, figure_of, styled
 
 LEAST_SHARE = 1e-4
@@ -298,12 +301,9 @@ class PackingArtist:
     def _chains(self, axes: Axes, color: str) -> LineCollection:
         packing, view = self.packing, self.view
         force = packing.normal_force
-        style: dict[str, Any] = {"colors": INK}
-        if color != "none":
-            _, values_of, scale_of, colours = COLOURS[color]
-            values = values_of(packing)
-            if values.any():
-                style = {"array": values[view.contact], "cmap": colours, "norm": scale_of(values)}
+        style = _style_of_bars(packing, color)
+        if "array" in style:
+            style["array"] = style["array"][view.contact]
         chains = LineCollection(
             list(np.stack([view.start, view.end], axis=1)),
             linewidths=self.widest * (force / force.max(initial=np.finfo(float).tiny))[view.contact],
@@ -325,7 +325,7 @@ def draw_packing(
     Parameters
     ----------
     packing : Packing or Configuration
-        Any configuration of disks.
+        Any configuration of disks, or of spheres (:mod:`~faultgouge.figures.spheres`).
     axes : Axes, optional
         Where to draw; a figure of its own, with a legend, by default.
     color : {"mobilised", "slip", "force", "none"}
@@ -340,6 +340,8 @@ def draw_packing(
     """
     if color != "none" and color not in COLOURS:
         raise ValueError(f"color = {color!r} is none of {', '.join(COLOURS)}, none.")
+    if isinstance(packing, Configuration) and packing.dimension == 3:
+        return _draw_spheres(packing, axes, color, caption)
     if axes is not None:
         artist = PackingArtist(axes, packing, color)
         _draw_load(axes, artist)
@@ -355,12 +357,42 @@ def draw_packing(
     axes = figure.add_subplot()
     artist = PackingArtist(axes, packing, color, view, points=72 * across / (view.right - view.left))
     _draw_load(axes, artist)
-    if artist.chains.get_array() is not None:
-        bar = figure.colorbar(artist.chains, ax=axes, shrink=0.7, aspect=28, pad=0.03)
-        bar.set_label(COLOURS[color][0])
-        bar.outline.set_linewidth(0.4)
+    _add_colours(figure, axes, artist.chains, color)
     _add_key(figure, artist)
     return figure
+
+
+def _draw_spheres(packing: Configuration, axes: Axes | None, color: str, caption: bool) -> Figure:
+    """Spheres with their force chains."""
+    figure = new_figure(packing, 1) if axes is None else figure_of(axes)
+    here = figure.add_subplot() if axes is None else axes
+    chains = SpheresArtist(here, packing).chains(here, _style_of_bars(packing, color), widest=9.0)
+    if axes is None:
+        if caption:
+            figure.suptitle(in_words(packing).replace("; ", "\n"), fontsize=7.5)
+        _add_colours(figure, here, chains, color)
+        here.set_title("width of a bar: normal force", fontsize=7, y=-0.1)
+    return figure
+
+
+def _add_colours(figure: Figure, axes: Axes, chains: LineCollection, color: str) -> None:
+    """The scale of the colours of the bars."""
+    if chains.get_array() is None:
+        return
+    scale = ScalarMappable(chains.norm, chains.get_cmap())
+    bar = figure.colorbar(scale, ax=axes, shrink=0.7, aspect=28, pad=0.03)
+    bar.set_label(COLOURS[color][0])
+    bar.outline.set_linewidth(0.4)
+
+
+def _style_of_bars(packing: Packing | Configuration, color: str) -> dict[str, Any]:
+    """Colours of the bars of all contacts."""
+    if color != "none":
+        _, values_of, scale_of, colours = COLOURS[color]
+        values = values_of(packing)
+        if values.any():
+            return {"array": values, "cmap": colours, "norm": scale_of(values)}
+    return {"colors": INK}
 
 
 def in_words(packing: Packing | Configuration) -> str:
@@ -368,14 +400,17 @@ def in_words(packing: Packing | Configuration) -> str:
     if isinstance(packing, Configuration):
         c = packing.contacts
         slide = ", which slide" if c.sliding.any() else ", which stick" if c.at_bound.any() else ""
+        noun = "disk" if packing.dimension == 2 else "sphere"
         return (
-            f"{len(packing)} disks as LAMMPS left them: {len(c)} contacts ({int(c.wall.sum())} with walls), "
-            f"{len(packing.rattlers)} rattlers; {int(c.at_bound.sum())} contacts at Coulomb's bound{slide}"
+            f"{counted(len(packing), noun)} as LAMMPS left them: {counted(len(c), 'contact')} "
+            f"({int(c.wall.sum())} with walls), {counted(len(packing.rattlers), 'rattler')}; "
+            f"{counted(int(c.at_bound.sum()), 'contact')} at Coulomb's bound{slide}"
         )
     sliding = int(np.count_nonzero(_slip_share(packing) >= 1))
     return (
-        f"F_x = {packing.fx:g}, F_y = {packing.fy:g}: {len(packing)} disks, {len(packing.contacts)} contacts "
-        f"({sliding} slide), {len(packing.rattlers)} rattlers"
+        f"F_x = {packing.fx:g}, F_y = {packing.fy:g}: {counted(len(packing), 'disk')}, "
+        f"{counted(len(packing.contacts), 'contact')} "
+        f"({sliding} slide), {counted(len(packing.rattlers), 'rattler')}"
     )
 
 

@@ -1,6 +1,7 @@
 """Films as files: GIF by Pillow, MP4 by the ffmpeg of imageio-ffmpeg."""
 
 from collections.abc import Callable, Iterable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,11 @@ def write_film(film: Film, path: Path, rate: float = 10.0, progress: Progress = 
     write = _gif if path.suffix.lower() == ".gif" else _mp4
     with replace_whole(path) as new:
         write(film, new, rate, progress)
+
+
+def usual_suffix() -> str:
+    """.mp4 where imageio-ffmpeg is installed, which takes a tenth of the size of a GIF and all colours; else .gif."""
+    return ".mp4" if find_spec("imageio_ffmpeg") else ".gif"
 
 
 def check_name(path: Path) -> None:

@@ -25,6 +25,7 @@ from .runs.run_recorder import Record
 from .runs.undamped import Sample, perturb
 from .scenes.scene import Scene
 from .scenes.validation import SceneError
+from .settling.relax import bring_to_rest
 from .settling.settle import settle
 
 __all__ = [
@@ -39,6 +40,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "SnapshotError",
+    "bring_to_rest",
     "compare_motion",
     "equilibrate",
     "from_lammps",

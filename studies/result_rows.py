@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -18,7 +17,9 @@ from ..pywrap import Scene, SceneError
 
 
 def read_keyed_rows(path: Path, key: str, what: str) -> list[dict[str, Any]]:
-    """The rows of a file, each with a key; none if there is no file. A last line that a kill has cut is taken off.
+    """The rows of a file, each with a key; none if there is no file. The file stays as it is.
+
+    A last line without its end, which a kill has cut or another process is writing, is no row.
 
     Raises
     ------
@@ -31,11 +32,8 @@ def read_keyed_rows(path: Path, key: str, what: str) -> list[dict[str, Any]]:
         data = read_plain(path)
     except OSError as error:
         raise SceneError(f"{path} cannot be read ({error.strerror}): take it out, or give another folder") from None
-    complete = data[: data.rfind(b"\n") + 1]
-    if complete != data:
-        os.truncate(path, len(complete))
     rows = []
-    for number, line in enumerate(complete.splitlines(), 1):
+    for number, line in enumerate(data[: data.rfind(b"\n") + 1].splitlines(), 1):
         try:
             rows.append(json.loads(line))
             rows[-1][key]
@@ -57,10 +55,19 @@ def row_columns(rows: Sequence[Mapping[str, Any]], *names: str) -> Floats:
 
 
 def append_row(path: Path, row: Mapping[str, Any]) -> None:
-    """Write a row; it is in the file when this returns. A folder that is missing is made."""
+    """Write a row; it is in the file when this returns. A folder that is missing is made.
+
+    A last line that a kill has cut is taken off first. One process writes at a time.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a") as file:
-        file.write(json.dumps(row) + "\n")
+    with path.open("a+b") as file:
+        size = file.tell()
+        if size:
+            file.seek(size - 1)
+            if file.read(1) != b"\n":
+                file.seek(0)
+                file.truncate(file.read().rfind(b"\n") + 1)
+        file.write(json.dumps(row).encode() + b"\n")
 
 
 def keep_rows(path: Path, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:

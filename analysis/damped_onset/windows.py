@@ -27,6 +27,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..counted import counted
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..onset.limits import LIMITS
 from ..onset.march import check_increasing, march
@@ -145,7 +146,8 @@ def march_along_ramp(
     windows: tuple[DampedWindow, ...] = ()
     for below, above in pairwise(loads.tolist()):
         for load in [*sorted(look(below, above)), above]:
-            so_far = f"; {len(windows)} windows so far, the first from {windows[0].fx_onset:.8g}" if windows else ""
+            found = counted(len(windows), "window")
+            so_far = f"; {found} so far, the first from {windows[0].fx_onset:.8g}" if windows else ""
             report_progress(f"motion that grows up to F_x = {load:.6g} of {loads[-1]:.6g}{so_far}")
             try:
                 there = oracle.at(load)

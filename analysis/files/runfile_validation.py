@@ -60,6 +60,11 @@ def check(file: h5py.File, path: Path, size: int) -> None:
         creator = file.get("h5md/creator")
         if creator is None or creator.attrs.get("name") != "faultgouge":
             raise PackingFileError(f"{path} is an HDF5 file, but not a run of faultgouge.")
+        if "snapshot" in file:
+            raise PackingFileError(
+                f"{path} holds a packing as LAMMPS left it, and no run of this program's own: the commands spectrum, "
+                "draw, movie, view and export take it."
+            )
         check_places(file)
         disks, frames = _check_position(file, size)
         _check_parameters(file, disks)

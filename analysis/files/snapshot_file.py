@@ -19,9 +19,9 @@ from scipy.sparse import csr_array
 
 from ..configuration import PER_CONTACT, Configuration, LinearisedContacts
 from ..errors import PackingFileError
-from .atomic_write import has_checksum
+from .atomic_write import BEGINNINGS, has_checksum
 from .checksummed_file import new_file, open_checksummed, write
-from .plain_file import check_plain
+from .plain_file import open_plain
 from .runfile_header import CHECKSUM, CREATOR, program_version
 from .runfile_validation import check_places, dataset
 
@@ -75,6 +75,10 @@ def write_snapshot(
         group = file.create_group("snapshot")
         for name in SCALARS:
             group.attrs[name] = getattr(snapshot, name)
+        if snapshot.proof is not None:
+            group.attrs["proof"] = snapshot.proof
+        if snapshot.remarks:
+            group.attrs["remarks"] = list(snapshot.remarks)
         for name in ARRAYS:
             group.create_dataset(name, data=getattr(snapshot, name))
         contacts = {f"contacts/{name}": getattr(snapshot.contacts, name) for name in PER_CONTACT}
@@ -88,14 +92,26 @@ def write_snapshot(
 
 
 def holds_snapshot(path: Path) -> bool:
-    """Whether a file is an HDF5 file with a snapshot in it; false for whatever cannot be read."""
+    """Whether a file is an HDF5 file with a snapshot in it; false for what is no HDF5 file.
+
+    Raises
+    ------
+    PackingFileError
+        If the file has changed since it was sealed.
+    """
     import h5py
 
     try:
-        check_plain(path)
+        with open_plain(path) as stream:
+            if not stream.read(max(map(len, BEGINNINGS))).startswith(BEGINNINGS):
+                return False
+    except OSError:
+        return False
+    has_checksum(path)  # before HDF5 sees what has changed
+    try:
         with h5py.File(path, "r", locking=False) as file:
             return "snapshot" in file
-    except OSError:
+    except (OSError, RuntimeError):  # a damaged file without a checksum, which the reader of a run refuses
         return False
 
 
@@ -122,7 +138,9 @@ def read_snapshot(path: Path) -> Configuration:
             stored = [name for name in SCALARS if name in group.attrs or name not in LATER]
             numbers = {name: group.attrs[name].item() for name in stored}
             matrices = {name: _matrix(group[name], size) for name in MATRICES if name in group}
-            return Configuration(contacts=contacts, **arrays, **numbers, **matrices)
+            proof = group.attrs["proof"].item() if "proof" in group.attrs else None
+            remarks = [str(each) for each in group.attrs.get("remarks", ())]
+            return Configuration(contacts=contacts, **arrays, **numbers, **matrices, proof=proof, remarks=remarks)
         except Exception as error:  # h5py raises nearly every exception there is, depending on what is damaged
             said = (str(error).strip() or type(error).__name__).rstrip(".")
             raise PackingFileError(f"{path} holds no snapshot that can be read: {said}.") from error

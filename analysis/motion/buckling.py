@@ -15,9 +15,9 @@ eigenvalues lie within c/2 of -c/2, where Arnoldi's iteration with that shift fi
 import numpy as np
 from scipy.sparse import csc_array, eye_array
 
-from ..configuration import Configuration
+from ..configuration import HasConfiguration
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
-from ..packing.packing import Floats, Packing
+from ..packing.packing import Floats
 from .eigenpairs import eigenpairs
 from .eigenvalues import SAFETY, is_negative, operator_rounding, zero_uncertainty
 from .spectrum import DENSE, dynamical_matrix, spectrum
@@ -29,7 +29,7 @@ FIRST = 16
 """Eigenvalues that are asked for at first; twice as many until the interval is covered."""
 
 
-def negative_eigenvalues(packing: Packing | Configuration) -> Floats:
+def negative_eigenvalues(packing: HasConfiguration) -> Floats:
     """The real negative eigenvalues of a packing, beyond the uncertainty of rounding and of forces out of balance.
 
     If the symmetric part of the operator is positive definite, a sparse factorisation shows that there are none.

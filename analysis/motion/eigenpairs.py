@@ -9,10 +9,10 @@ import numpy as np
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from ..configuration import Configuration
+from ..configuration import HasConfiguration
 from ..factors.sparse_lu import general_lu
 from ..operators.stiffness import stiffness_matrix
-from ..packing.packing import Floats, Packing
+from ..packing.packing import Floats
 from .eigenvalues import SAFETY, Complexes, all_modes, mass_weighted, unit_rounding
 from .spectrum import dynamical_matrix, participation_ratio, rotation_share
 
@@ -56,7 +56,7 @@ class Eigenpairs:
         return np.abs(np.sum(self.left.conj() * self.right, axis=0))
 
 
-def normal_modes(packing: Packing | Configuration) -> Eigenpairs:
+def normal_modes(packing: HasConfiguration) -> Eigenpairs:
     """Compute every mode with its left and right vectors, by LAPACK's dense solver.
 
     Parameters
@@ -107,7 +107,7 @@ def closest_to_meeting(modes: Eigenpairs) -> tuple[int, int, float]:
     return int(real[first]), int(real[second]), float(cosine[first, second])
 
 
-def eigenpairs(packing: Packing | Configuration, near: complex, count: int, tolerance: float = 0.0) -> Eigenpairs:
+def eigenpairs(packing: HasConfiguration, near: complex, count: int, tolerance: float = 0.0) -> Eigenpairs:
     """Compute the eigenvalues nearest to a shift, with left and right vectors, by shift-invert Arnoldi (ARPACK).
 
     One sparse LU factorisation of :math:`A - \\sigma` serves the right vectors and, transposed, the left

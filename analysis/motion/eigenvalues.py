@@ -12,8 +12,7 @@ from scipy.linalg import eig
 from scipy.sparse import csr_array
 
 from ..arrays import Complexes, Floats, Indices
-from ..configuration import Configuration
-from ..packing.packing import Packing
+from ..configuration import HasConfiguration
 
 SAFETY = 50.0
 """Imaginary parts count from this many times their rounding uncertainty.
@@ -28,7 +27,7 @@ IN_BALANCE = 1e-4
 1e-6; a packing before it is brought to rest, 1e-2 and more."""
 
 
-def mass_weighted(stiffness: csr_array, packing: Packing | Configuration) -> csr_array:
+def mass_weighted(stiffness: csr_array, packing: HasConfiguration) -> csr_array:
     """M^(-1/2) K M^(-1/2), zero rows and all; 1 / time^2."""
     scale = 1.0 / np.sqrt(packing.coordinate_mass)
     rows = np.repeat(scale, np.diff(stiffness.indptr))
@@ -63,20 +62,20 @@ def unit_rounding(matrix: Floats | Complexes) -> float:
     return float(0.5 * np.finfo(np.float64).eps * np.linalg.norm(matrix))
 
 
-def operator_rounding(packing: Packing | Configuration, matrix: Floats | Complexes) -> float:
+def operator_rounding(packing: HasConfiguration, matrix: Floats | Complexes) -> float:
     """Backward error of eigenvalues over SAFETY: of the solver, or of the differences by which a K was measured."""
-    error = packing.operator_error if isinstance(packing, Configuration) else 0.0
-    return max(unit_rounding(matrix), error * float(np.linalg.norm(matrix)) / SAFETY)
+    error = packing.configuration.operator_error * float(np.linalg.norm(matrix))
+    return max(unit_rounding(matrix), error / SAFETY)
 
 
-def in_balance(packing: Packing | Configuration) -> bool:
+def in_balance(packing: HasConfiguration) -> bool:
     """Whether what is left of the forces on a particle is rounding, of a dump's digits at most."""
-    if isinstance(packing, Configuration) and packing.stiffness is not None and not len(packing.contacts):
+    if not len(packing.normal_force) and packing.configuration.stiffness is not None:
         return True  # no force is known to compare with; whoever measured K has looked
     return packing.residual <= IN_BALANCE * float(packing.normal_force.max(initial=0.0))
 
 
-def zero_uncertainty(packing: Packing | Configuration, rounding: float) -> float:
+def zero_uncertainty(packing: HasConfiguration, rounding: float) -> float:
     """Uncertainty of an eigenvalue of zero that is perfectly conditioned, 1 / time^2.
 
     A motion that stretches no contact has the eigenvalue zero as the forces F of the contacts cancel, whose parts in A

@@ -39,7 +39,15 @@ from .eigenvalues import (
     operator_rounding,
     zero_uncertainty,
 )
+from .fastest_growing import fastest_growing
 from .state_space import StateSpace
+
+SLICED = 2000
+"""Coordinates beyond which eigenvalues without dissipation are taken in slices, for which `spectrum` is."""
+
+DENSE = 600
+"""Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, five seconds; of more the fastest
+growing ones."""
 
 FREE = 1e-6
 """Eigenvalues s below this share of the largest are those of motions that no force opposes: rounding leaves sqrt(u) of
@@ -58,15 +66,18 @@ class Rates:
         Those with Re s > 0 beyond rounding.
     free : int
         Number of motions that no force opposes, and that drift.
+    searched : float
+        Growth rate of D, 1 / time, below which growth was not looked for; 0 where all eigenvalues are known.
     """
 
     values: Complexes
     grows: NDArray[np.bool_]
     free: int
+    searched: float = 0.0
 
     @property
     def growth_rate(self) -> float:
-        """Of D, 1 / time: the largest 2 Re s, zero where nothing grows or decays beyond rounding."""
+        """Of D, 1 / time: the largest 2 Re s; zero where no eigenvalue is known, as none was found to grow."""
         return 2 * float(self.values.real.max(initial=-np.inf)) if len(self.values) else 0.0
 
 
@@ -132,10 +143,20 @@ class Motion:
 
     @cached_property
     def rates(self) -> Rates:
-        """All eigenvalues s, by LAPACK."""
-        if not len(self.active):
+        """Eigenvalues s: all, by LAPACK, or of large systems those of the fastest growing motions."""
+        size = len(self.active)
+        if not size:
             return Rates(np.zeros(0, complex), np.zeros(0, bool), 0)
+        if size > (DENSE if self.dissipative else SLICED):
+            return self._fastest()
         return self._damped_rates() if self.dissipative else self._undamped_rates()
+
+    def _fastest(self) -> Rates:
+        """Of motions that surely grow; the others are not known."""
+        found = fastest_growing(self.stiffness, self.damping if self.dissipative else None)
+        values = found.values if self.dissipative else 1j * np.sqrt(found.values.astype(complex))
+        values = np.where(values.real < 0, -values, values)
+        return Rates(values, np.ones(len(values), bool), 0, found.limit)
 
     def _undamped_rates(self) -> Rates:
         values, left, right = all_modes(self.stiffness)

@@ -167,18 +167,45 @@ class OneSidedSystem:
         if count < 1:
             return
         load = None if rise is None else self._weight.T @ rise
-        dt = (time - state.time) / count
-        force = self._force(state, state.v, load)
+        self.take_steps(state, (time - state.time) / count, count, rise=load)
+        state.time = time
+
+    def take_steps(
+        self,
+        state: OneSidedState,
+        dt: float,
+        count: int,
+        *,
+        rise: Floats | None = None,
+        constant: Floats | float = 0.0,
+        extrapolates: bool = False,
+    ) -> None:
+        """Take steps of velocity Verlet.
+
+        Parameters
+        ----------
+        state : OneSidedState
+            Changes in place.
+        dt : float
+            The step, time.
+        count : int
+            Number of steps.
+        rise, constant : ndarray, shape (E, P), optional
+            Mass-weighted forces, per time, and those that are always there.
+        extrapolates : bool
+            Whether dashpots feel 2 v(n + 1/2) - v(n), as those of mindlin/smooth do, in place of v(n + 1/2).
+        """
+        force = self._force(state, state.v, rise) + constant
         for _ in range(count):
+            before = state.v.copy() if extrapolates else 0.0
             state.v += 0.5 * dt * force
             change = dt * state.v
             state.z += change
             state.time += dt
             if len(state.r):
                 state.r += np.abs(self.rescaled[0] @ change)
-            force = self._force(state, state.v, load)
+            force = self._force(state, 2 * state.v - before if extrapolates else state.v, rise) + constant
             state.v += 0.5 * dt * force
-        state.time = time
 
     @property
     def remembers_nothing(self) -> bool:

@@ -43,6 +43,10 @@ MOST_DECADES = 25.0
 STEADY = 0.3
 """A motion still grows if D gains this share of its mean rate, in each quarter of the second half of the time."""
 
+EXPONENTIAL = 0.85
+"""Ratio of the rates of growth in the last two quarters of the time from which growth is exponential: of any power of the
+time it is 0.71."""
+
 SETTLED = 1e-3
 """Change of p in a quarter of the time, as a share of the largest p, below which sliders may be at rest."""
 
@@ -63,7 +67,7 @@ def _chunks(system: OneSidedSystem, columns: int, time: float | None) -> tuple[f
 
 
 def follow_pushes(
-    system: OneSidedSystem, sticking: float, sticking_grows: bool, time: float | None = None
+    system: OneSidedSystem, sticking: float, sticking_grows: bool, time: float | None = None, pushes: int = PUSHES
 ) -> dict[str, Any]:
     """Whether one-sided motion grows from some pushes: `Stability.one_sided`.
 
@@ -75,16 +79,18 @@ def follow_pushes(
         Growth rate with sticking contacts, 1 / time, and whether they grow.
     time : float, optional
         How long; until the motion has settled by default.
+    pushes : int
+        How many; the opposite of each is followed, too.
     """
     configuration = system.motion.configuration
     rng = np.random.Generator(np.random.PCG64(0))
-    push = np.zeros((configuration.coordinates, PUSHES))
+    push = np.zeros((configuration.coordinates, pushes))
     push[: configuration.dimension * len(configuration)] = rng.standard_normal(
-        (configuration.dimension * len(configuration), PUSHES)
+        (configuration.dimension * len(configuration), pushes)
     )
     state = system.start(np.hstack([push, -push]))
-    chunk, most = _chunks(system, 2 * PUSHES, time)
-    times, sizes, slid = [0.0], [np.zeros(2 * PUSHES)], [state.p.copy()]
+    chunk, most = _chunks(system, 2 * pushes, time)
+    times, sizes, slid = [0.0], [np.zeros(2 * pushes)], [state.p.copy()]
     grows: bool | None = None
     for number in range(most):
         for look in range(LOOKS):
@@ -107,6 +113,7 @@ def follow_pushes(
         "error": error if grows else None,
         "amplification": float(d.max()),
         "time": float(t[-1]),
+        "pushes": 2 * pushes,
     }
 
 
@@ -137,11 +144,17 @@ def _outcome(time: Floats, size: Floats, slid: list[Floats], sticking_grows: boo
 
 
 def _still_grows(time: Floats, gained: Floats) -> bool:
-    """Whether D gains at a steady rate in the second half of the time, so that it did not saturate."""
+    """Whether D gains at a steady rate in the second half of the time.
+
+    D that saturates does not, nor D that grows as a power of the time: motion that no force opposes drifts, and is
+    accelerated by what sliders have let go.
+    """
     parts = np.array_split(np.arange(len(time) // 2, len(time)), 4)
     mean = gained[-1] / time[-1]
-    steps = [(gained[part[-1]] - gained[part[0] - 1]) / (time[part[-1]] - time[part[0] - 1]) for part in parts]
-    return bool(min(steps) > STEADY * mean)
+    steps = np.array(
+        [(gained[part[-1]] - gained[part[0] - 1]) / (time[part[-1]] - time[part[0] - 1]) for part in parts]
+    )
+    return bool(steps.min() > STEADY * mean and steps[2:].sum() > EXPONENTIAL * steps[:2].sum())
 
 
 def _rate(time: Floats, size: Floats) -> tuple[float, float]:

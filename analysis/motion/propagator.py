@@ -7,9 +7,9 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse.linalg import svds
 
-from ..configuration import Configuration
+from ..configuration import HasConfiguration
 from ..errors import FaultgougeError
-from ..packing.packing import Floats, Indices, Packing
+from ..packing.packing import Floats, Indices
 from .eigenvalues import Complexes
 from .matrix_functions import WELL_CONDITIONED, BlockDiagonal, Function, second_order
 from .motion import Motion
@@ -60,7 +60,7 @@ class NoGainError(FaultgougeError):
     """The packing has no transient gain: it is unstable, or has no energy."""
 
 
-def stable_motion(packing: Packing | Configuration) -> LinearMotion:
+def stable_motion(packing: HasConfiguration) -> LinearMotion:
     """The motion of a packing; NoGainError if the packing is unstable."""
     if Motion.of(packing).rates.grows.any():
         raise NoGainError("the packing is unstable: some motion grows for ever, and no gain is the largest")

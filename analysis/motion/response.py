@@ -25,8 +25,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..configuration import Configuration
-from ..packing.packing import Floats, Packing
+from ..configuration import HasConfiguration
+from ..errors import BadInputError
+from ..packing.packing import Floats
 from .matrix_functions import BlockDiagonal, first_order
 from .oscillator import Oscillator
 from .state_space import StateSpace, driven_motion, released_motion
@@ -81,12 +82,12 @@ class LinearMotion:
         Of A without dissipation, of the first-order system with it.
     """
 
-    packing: Packing | Configuration
+    packing: HasConfiguration
     system: StateSpace
     modes: BlockDiagonal
 
     @classmethod
-    def of(cls, packing: Packing | Configuration) -> "LinearMotion":
+    def of(cls, packing: HasConfiguration) -> "LinearMotion":
         """Decompose a packing; errors as of `linear_response`."""
         system = StateSpace.of(packing)
         if packing.damped:
@@ -139,7 +140,7 @@ class LinearMotion:
 
 
 def linear_response(
-    packing: Packing | Configuration,
+    packing: HasConfiguration,
     times: ArrayLike,
     *,
     force: ArrayLike | None = None,
@@ -181,13 +182,13 @@ def linear_response(
     return LinearMotion.of(packing).response(times, force=force, omega=omega, initial=initial, dt=dt)
 
 
-def layer_force(packing: Packing, amplitude: float) -> Floats:
+def layer_force(packing: HasConfiguration, amplitude: float) -> Floats:
     """Force vector for a force along x on the upper layer.
 
     Parameters
     ----------
     packing : Packing
-        The configuration.
+        With an upper layer.
     amplitude : float
         Force a on each disk of the layer.
 
@@ -195,13 +196,23 @@ def layer_force(packing: Packing, amplitude: float) -> Floats:
     -------
     ndarray, shape (3N,)
         Force on the coordinates (x.., y.., R theta..).
+
+    Raises
+    ------
+    BadInputError
+        If the packing has no upper layer, as no Configuration has.
     """
+    if not packing.top.any():
+        raise BadInputError(
+            "layer_force acts on an upper layer, and this packing has none: put together the force on its coordinates, "
+            f"an array of shape {(packing.coordinates,)}."
+        )
     force = np.zeros(packing.coordinates)
     force[: len(packing)] = amplitude * packing.top
     return force
 
 
-def coordinates(packing: Packing | Configuration, name: str, values: ArrayLike) -> Floats:
+def coordinates(packing: HasConfiguration, name: str, values: ArrayLike) -> Floats:
     """Numbers of all coordinates as an array of shape (3N,); a ValueError if they have another shape."""
     vector = np.asarray(values, dtype=np.float64)
     if vector.shape != (packing.coordinates,):

@@ -44,9 +44,9 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
-from ..configuration import Configuration, HasConfiguration
+from ..configuration import HasConfiguration
 from ..operators.stiffness import Form, stiffness_matrix
-from ..packing.packing import Floats, Indices, Packing
+from ..packing.packing import Floats, Indices
 from ..table_display import TableDisplay
 from .all_eigenvalues import all_eigenvalues
 from .block_arnoldi import Marked, SpectrumError
@@ -272,7 +272,7 @@ def rotation_share(right: Complexes | Floats, axes: int = 3) -> Floats:
     return energy[axes // 2 + axes % 2 :].sum(axis=0) / energy.sum(axis=0)
 
 
-def dynamical_matrix(packing: Packing | Configuration, form: Form = "consistent") -> tuple[csr_array, Indices]:
+def dynamical_matrix(packing: HasConfiguration, form: Form = "consistent") -> tuple[csr_array, Indices]:
     """A = M^(-1/2) K M^(-1/2) without its zero rows.
 
     Parameters
@@ -295,7 +295,7 @@ def dynamical_matrix(packing: Packing | Configuration, form: Form = "consistent"
     return matrix[active][:, active], active
 
 
-def eigenvalues(packing: Packing | Configuration, form: Form = "consistent") -> Complexes:
+def eigenvalues(packing: HasConfiguration, form: Form = "consistent") -> Complexes:
     """Compute every eigenvalue without vectors, by LAPACK's dense solver, in a third of the time of :func:`spectrum`.
 
     Without vectors it is not known which complex pairs exceed their rounding uncertainty.
@@ -320,7 +320,7 @@ def _sort_eigenvalues(values: Complexes) -> Complexes:
     return np.asarray(values[np.lexsort((values.imag, values.real))], dtype=np.complex128)
 
 
-def spectrum(packing: Packing | Configuration, form: Form = "consistent") -> Spectrum:
+def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     """Compute every eigenvalue, and left and right vectors of those that are complex or negative.
 
     LAPACK's dense solver serves up to `SLICED` coordinates. Beyond, :mod:`~faultgouge.analysis.motion.all_eigenvalues`
@@ -415,7 +415,7 @@ def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:
     return np.asarray(2.0 / dt * np.arcsin(0.5 * dt * root), dtype=np.complex128)
 
 
-def largest_frequency(packing: Packing | Configuration) -> float:
+def largest_frequency(packing: HasConfiguration) -> float:
     """omega_max = max sqrt|lambda|; to `LIMIT`, by Arnoldi's iteration (ARPACK), beyond `DENSE` coordinates.
 
     Returns

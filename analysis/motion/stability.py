@@ -20,10 +20,14 @@ from ..arrays import Floats, floats
 from ..configuration import Configuration, HasConfiguration
 from ..operators.asymmetry import asymmetry
 from .eigenvalues import in_balance
-from .motion import Motion
+from .motion import Motion, Rates
 from .one_sided import OneSidedSystem
 from .one_sided_outcome import PUSHES, STEP, follow_load, follow_pushes
 from .spectrum import Spectrum, spectrum
+
+LARGE = 6000
+"""Coordinates beyond which the fastest growing motions stand for all eigenvalues, and one push and its opposite for
+several, in larger steps."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +51,13 @@ class WithoutDissipation:
     ----------
     growth_rate : float
         Of D, 1 / time.
-    pairs, negative : int
-        Complex pairs, and negative eigenvalues.
+    pairs, negative : int or None
+        Complex pairs, and negative eigenvalues; of large packings these are not counted.
     """
 
     growth_rate: float
-    pairs: int
-    negative: int
+    pairs: int | None
+    negative: int | None
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,8 @@ class Stability:
         Whether there are dashpots or drag.
     free : int
         Motions that no force opposes.
+    searched : float
+        Growth rate of D, 1 / time, below which linear growth was not looked for; 0 if all eigenvalues are known.
     contacts : int
         Number of contacts; where K is given, and walls hand out no contacts, of particles that feel something.
     reasons : tuple of str
@@ -101,6 +107,7 @@ class Stability:
     asymmetry: dict[str, float]
     dissipative: bool
     free: int
+    searched: float
     contacts: int
     reasons: tuple[str, ...] = field(default=())
 
@@ -125,21 +132,25 @@ class Stability:
             return f"unstable: small motion grows{how}, D as exp({self.growth_rate:.6g} t)"
         if self.one_sided is not None:
             return (
-                f"stable: each of {2 * PUSHES} pushes comes to rest{free}; D reaches "
+                f"stable: each of {self.one_sided['pushes']} pushes comes to rest{free}; D reaches "
                 f"{self.one_sided['amplification']:.3g} times the mean square velocity of the push (followed for t = "
                 f"{self.one_sided['time']:.4g})"
             )
         if self.dissipative and self.growth_rate < 0:
             return f"stable: every motion decays, the slowest with D as exp({self.growth_rate:.6g} t){free}"
+        if self.searched:
+            return (
+                f"stable: no motion was found to grow; growth of D below exp({self.searched:.2g} t) was not looked for"
+            )
         return f"stable: no motion grows{free}"
 
     @property
     def _without_loss(self) -> Iterator[str]:
         u = self.undamped
-        if self.dissipative and (u.pairs or u.negative):
+        if self.dissipative and u.growth_rate > 0:
             counts = {"complex pair": u.pairs, "negative eigenvalue": u.negative}
             what = " and ".join(_number(count, name) for name, count in counts.items() if count)
-            yield f"without dissipation: {what}, D as exp({u.growth_rate:.6g} t)"
+            yield f"without dissipation: {what or 'small motion grows'}, D as exp({u.growth_rate:.6g} t)"
 
     @property
     def _has_two_neighbours(self) -> bool:
@@ -182,6 +193,7 @@ class Stability:
             "sliding": vars(self.sliding),
             "asymmetry": self.asymmetry,
             "free": self.free,
+            "searched": self.searched,
             "reasons": list(self.reasons),
         }
 
@@ -220,16 +232,20 @@ def stability(
     """
     configuration = packing.configuration
     direction = None if rise is None else _direction(configuration, rise)
-    found = spectrum(configuration) if spectrum_of_stiffness is None else spectrum_of_stiffness
-    undamped = WithoutDissipation(found.growth_rate(), len(found.pairs), len(found.negative))
+    large = configuration.coordinates > LARGE
+    found = spectrum(configuration) if spectrum_of_stiffness is None and not large else spectrum_of_stiffness
     contacts, damped = configuration.contacts, configuration.damped
-    why = [*reasons, *_what_is_wrong(configuration, found)]
-    sticking, free, grows = _linear(configuration, found, damped)
+    undamped, own = _without_dissipation(configuration, found)
+    if damped:
+        own = Motion.of(configuration).rates
+    sticking, grows = LinearNeighbour(own.growth_rate), bool(own.grows.any())
+    why = [*reasons, *_what_is_wrong(configuration, undamped)]
     sliding, one_sided, rising = sticking, None, None
     if contacts.one_sided.any():
         sliding = LinearNeighbour(Motion.of(configuration, sliding=True).rates.growth_rate)
         if not why:
-            one_sided = follow_pushes(OneSidedSystem.of(configuration, STEP), sticking.growth_rate, grows, time)
+            system = OneSidedSystem.of(configuration, (2 if large else 1) * STEP)
+            one_sided = follow_pushes(system, sticking.growth_rate, grows, time, 1 if large else PUSHES)
             if one_sided["grows"] is None:
                 why.append(
                     f"the motion of contacts at Coulomb's bound has not settled within t = {one_sided['time']:.4g}, "
@@ -245,14 +261,14 @@ def stability(
     return Stability(
         stable=None if why or not touching else not grows, growth_rate=rate, undamped=undamped,
         at_bound=int(contacts.at_bound.sum()), one_sided=one_sided, rising=rising, sticking=sticking, sliding=sliding,
-        asymmetry=shares, dissipative=damped, free=free, contacts=touching,
-        reasons=tuple(why),
+        asymmetry=shares, dissipative=damped, free=own.free, searched=own.searched,
+        contacts=touching, reasons=tuple(why),
     )  # fmt: skip
 
 
-def _what_is_wrong(configuration: Configuration, found: Spectrum) -> Iterator[str]:
+def _what_is_wrong(configuration: Configuration, undamped: WithoutDissipation) -> Iterator[str]:
     """Why no verdict is possible."""
-    if not np.all(np.isfinite(found.eigenvalues)):
+    if not np.isfinite(undamped.growth_rate):
         yield "numbers of the operator overflow"
     sided = configuration.one_sided_particles
     if len(sided):
@@ -268,12 +284,17 @@ def _what_is_wrong(configuration: Configuration, found: Spectrum) -> Iterator[st
         )
 
 
-def _linear(configuration: Configuration, found: Spectrum, damped: bool) -> tuple[LinearNeighbour, int, bool]:
-    """Growth rate, free motions and whether something grows, of sticking contacts."""
-    if not damped:
-        return LinearNeighbour(found.growth_rate()), found.free, bool(len(found.unstable))
-    rates = Motion.of(configuration).rates
-    return LinearNeighbour(rates.growth_rate), rates.free, bool(rates.grows.any())
+def _without_dissipation(configuration: Configuration, found: Spectrum | None) -> tuple[WithoutDissipation, Rates]:
+    """Of sticking contacts: what grows without dissipation, and its eigenvalues s."""
+    if found is None:
+        rates = Motion.of(configuration, dissipation=False).rates
+        return WithoutDissipation(rates.growth_rate, None, None), rates
+    if not np.all(np.isfinite(found.eigenvalues)):
+        return WithoutDissipation(np.nan, 0, 0), Rates(np.zeros(0, complex), np.zeros(0, bool), 0)
+    unstable = 1j * np.sqrt(found.unstable)
+    grows = np.ones(len(unstable), bool)
+    rates = Rates(np.where(unstable.real < 0, -unstable, unstable), grows, found.free)
+    return WithoutDissipation(found.growth_rate(), len(found.pairs), len(found.negative)), rates
 
 
 def _direction(configuration: Configuration, rise: str | ArrayLike) -> Floats:

@@ -1,8 +1,32 @@
 r"""The largest stable time step of velocity Verlet.
 
-Without dissipation it is :math:`2/\omega_{max}`. Dashpots use the velocity of the half step, as in all granular styles
-of LAMMPS: a motion begins to alternate in sign and to grow when :math:`4 M - 2\,dt\, C - dt^2 K` becomes singular, so
-that dt = 2/mu with the largest mu of :math:`\mu^2 M - \mu C - K`.
+Without dissipation it is :math:`2/\omega_{max}`. With dashpots it depends on the velocity that they feel. A step is
+
+.. math:: q_{n+1} = q_n + dt\, u_n, \qquad u_{n+1} = u_n - dt\, M^{-1} (K q_{n+1} + C w_{n+1}),
+
+with the velocity :math:`u_n` in the middle of step n. LAMMPS asks for forces when only this velocity is known, and w is
+one of two:
+
+- **half-step**: :math:`w_{n+1} = u_n`, in all granular styles of LAMMPS. Then
+
+  .. math:: \begin{pmatrix} q \\ u \end{pmatrix}_{n+1} = \begin{pmatrix} 1 & dt \\ -dt\, A & 1 - dt\, G - dt^2 A
+      \end{pmatrix} \begin{pmatrix} q \\ u \end{pmatrix}_n, \qquad A = M^{-1} K,\quad G = M^{-1} C .
+
+- **extrapolated**: :math:`w_{n+1} = 2 u_n - v_n`, of fix dashpot/velocities in this package, with the velocity at the
+  end of a step, :math:`v_n = \frac12 (u_{n-1} + u_n)`. Then :math:`w_{n+1} = \frac12 (3 u_n - u_{n-1})`, and
+
+  .. math:: \begin{pmatrix} q_{n+1} \\ u_{n+1} \\ u_n \end{pmatrix} = \begin{pmatrix} 1 & dt & 0 \\
+      -dt\, A & 1 - \frac32 dt\, G - dt^2 A & \frac12 dt\, G \\ 0 & 1 & 0 \end{pmatrix}
+      \begin{pmatrix} q_n \\ u_n \\ u_{n-1} \end{pmatrix} .
+
+With :math:`a = dt^2 x^H K x` and :math:`g = dt\, x^H C x` of an eigenvector, :math:`x^H M x = 1`, the factor z of a
+step is a root of :math:`(z-1)^2 + g (z-1) + a z`, or of :math:`z (z-1)^2 + \frac12 g (3 z - 1)(z - 1) + a z^2`. For
+symmetric K and C that are not negative, a and g are real and not negative. Then (Jury) no root is outside of the unit
+circle if, and only if, the polynomial at z = -1 has the sign that it has at dt = 0: for :math:`a + 2 g < 4`, or
+:math:`a + 4 g < 4`. So a motion begins to alternate in sign and to grow when :math:`4 M - 2 c\, dt\, C - dt^2 K`
+becomes singular, with c = 1 for the half step and c = 2 for the extrapolated velocity. It follows that dt = 2/mu with
+the largest mu of :math:`\mu^2 M - c \mu C - K`. Drag does not limit the step of this package, which lets velocities
+decay by a factor.
 
 Of many coordinates mu is found by Arnoldi's iteration (ARPACK) with :math:`M^{-1/2} (K + \mu C) M^{-1/2}`, whose
 largest eigenvalue is :math:`\mu^2`. Masses are applied to vectors, and K + mu C is one matrix.
@@ -21,15 +45,18 @@ sums of :math:`M^{-1/2} K M^{-1/2}` and :math:`M^{-1/2} C M^{-1/2}`,
 The step 2/mu of this bound is stable for certain, and shorter than the limit.
 """
 
+from typing import Literal
+
 import numpy as np
 from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from ..configuration import Configuration
+from ..arrays import derive_frozen
+from ..configuration import Configuration, HasConfiguration
 from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import stiffness_matrix
-from ..packing.packing import Floats, Packing
+from ..packing.packing import Floats
 
 FEW, MANY = 40, 10_000
 """Coordinates up to which a time step is that of all eigenvalues, and from which on it has fewer digits."""
@@ -75,8 +102,18 @@ class StableTimestep(float):
         return made
 
 
+DashpotVelocity = Literal["half-step", "extrapolated"]
+"""The velocity that dashpots feel."""
+
+WEIGHT = {"half-step": 1.0, "extrapolated": 2.0}
+"""c, the weight of dashpots in the limit."""
+
+
 def stable_timestep(
-    of: float | Packing | Configuration, stiffness: csr_array | None = None, damping: csr_array | None = None
+    of: float | HasConfiguration,
+    stiffness: csr_array | None = None,
+    damping: csr_array | None = None,
+    dashpot_velocity: DashpotVelocity | None = None,
 ) -> StableTimestep:
     r"""The largest stable time step of velocity Verlet.
 
@@ -86,6 +123,9 @@ def stable_timestep(
         omega_max, radian / time, or a configuration with its dashpots.
     stiffness, damping : scipy.sparse.csr_array, optional
         K and C of the configuration, where they are assembled already.
+    dashpot_velocity : {"half-step", "extrapolated"}, optional
+        The velocity that dashpots feel; by default "extrapolated" for the law of this package, and "half-step", as in
+        LAMMPS's own styles, for all others.
 
     Returns
     -------
@@ -99,14 +139,18 @@ def stable_timestep(
     scipy.sparse.linalg.ArpackError
         If the iteration does not converge.
     """
-    if not isinstance(of, Packing | Configuration):
-        return StableTimestep(2.0 / of)
+    if isinstance(of, float | int | np.floating):
+        return StableTimestep(2.0 / float(of))
     if stiffness is None:
         stiffness = stiffness_matrix(of)
     if not stiffness.nnz:
         return StableTimestep(np.inf)
+    c = of.configuration.contacts
+    ours = len(c) > 0 and not c.viscous_slider.any()
     if damping is None and of.damped:
-        damping = damping_matrix(of)
+        damping = damping_matrix(derive_frozen(of.configuration, drag_rate=0.0))  # drag is integrated exactly
+    if damping is not None:
+        damping = WEIGHT[dashpot_velocity or ("extrapolated" if ours else "half-step")] * damping
     scale = 1.0 / np.sqrt(coordinate_mass(of))
     found = (_of_all_eigenvalues if len(scale) <= FEW else _of_arnoldi)(scale, stiffness, damping)
     # rounding may take the limit below the bound where the two are the same

@@ -25,10 +25,10 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
-from ..configuration import Configuration
+from ..configuration import HasConfiguration
 from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import stiffness_matrix
-from ..packing.packing import Floats, Indices, Packing
+from ..packing.packing import Floats, Indices
 from .eigenvalues import Complexes, active_coordinates, mass_weighted
 
 SOFTEST = 1e-6
@@ -63,7 +63,7 @@ class StateSpace:
     positive: bool
 
     @classmethod
-    def of(cls, packing: Packing | Configuration) -> "StateSpace":
+    def of(cls, packing: HasConfiguration) -> "StateSpace":
         """Set up the system of a packing.
 
         Parameters

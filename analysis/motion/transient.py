@@ -38,8 +38,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..configuration import Configuration
-from ..packing.packing import Floats, Packing
+from ..configuration import HasConfiguration
+from ..packing.packing import Floats
 from .propagator import ACCURACY, NoGainError, Norm, Propagator, stable_motion
 from .response import LinearMotion
 
@@ -115,7 +115,7 @@ class TransientGain:
         return np.asarray(push / np.linalg.norm(push))
 
 
-def transient_gain(packing: Packing | Configuration, norm: Norm = "displacement") -> TransientGain:
+def transient_gain(packing: HasConfiguration, norm: Norm = "displacement") -> TransientGain:
     """The largest transient gain of a stable packing, with its dashpots and drag.
 
     Parameters
@@ -139,7 +139,7 @@ def transient_gain(packing: Packing | Configuration, norm: Norm = "displacement"
     return _gain(stable_motion(packing), norm)
 
 
-def transient_gains(packing: Packing | Configuration) -> tuple[TransientGain, TransientGain]:
+def transient_gains(packing: HasConfiguration) -> tuple[TransientGain, TransientGain]:
     """The gains in displacement and in energy, with the modes computed once; as of :func:`transient_gain`."""
     motion = stable_motion(packing)
     return _gain(motion, "displacement"), _gain(motion, "energy")
@@ -167,7 +167,7 @@ def _gain(motion: LinearMotion, norm: Norm) -> TransientGain:
     return TransientGain(size**2, time, displacement, velocity, norm, length, bound, packing.dimension)
 
 
-def _zero_gain(packing: Packing | Configuration, norm: Norm, window: float, bound: float) -> TransientGain:
+def _zero_gain(packing: HasConfiguration, norm: Norm, window: float, bound: float) -> TransientGain:
     """No start grows: K is symmetric, or what it feeds is less than the dissipation takes."""
     rest, start = np.zeros((2, packing.coordinates))
     start[0] = 1.0

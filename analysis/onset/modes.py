@@ -13,19 +13,19 @@ from typing import TypeAlias, TypeVar, cast
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..configuration import Configuration
+from ..configuration import HasConfiguration
 from ..motion.eigenvalues import Complexes, all_modes, exceeds_rounding, mass_weighted, unit_rounding
 from ..operators.stiffness import stiffness_matrix
-from ..packing.packing import Floats, Indices, Packing
+from ..packing.packing import Floats, Indices
 from .eigenvalue_pair import Pair
 from .limits import LIMITS, Limits
 
 Members = tuple[int, int]  # the numbers of the two modes of a pair
 Operator: TypeAlias = Floats | csr_array
-AnyConfiguration = TypeVar("AnyConfiguration", bound=Packing | Configuration)
+AnyConfiguration = TypeVar("AnyConfiguration", bound=HasConfiguration)
 
 
-def full_operator(packing: Packing | Configuration, limits: Limits = LIMITS) -> csr_array:
+def full_operator(packing: HasConfiguration, limits: Limits = LIMITS) -> csr_array:
     """A = M^(-1/2) K M^(-1/2) of the contacts that bear a force, of all coordinates, with its zero rows; 1 / time^2."""
     packing = force_bearing(packing, limits)
     return mass_weighted(stiffness_matrix(packing), packing)
@@ -44,7 +44,7 @@ def force_bearing(packing: AnyConfiguration, limits: Limits = LIMITS) -> AnyConf
     )
 
 
-def contact_states(packing: Packing | Configuration, limits: Limits = LIMITS) -> bytes:
+def contact_states(packing: HasConfiguration, limits: Limits = LIMITS) -> bytes:
     """Which contacts bear a force, and which of them slide to which side; equal for equal states."""
     return force_bearing(packing, limits).contact_states
 

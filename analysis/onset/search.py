@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
-from ..configuration import Configuration
+from ..configuration import Configuration, HasConfiguration
 from ..errors import FaultgougeError, NoEquilibriumError, TurningPointError
 from ..motion.buckling import negative_eigenvalues
 from ..motion.spectrum import Spectrum, spectrum
-from ..packing.packing import Floats, Packing
+from ..packing.packing import Floats
 from ..progress import Watch, show_progress
 from ..table_display import TableDisplay
 from ..uncertain_digits import with_uncertainty
@@ -71,7 +71,7 @@ class Instability:
     growth_rate: float
 
     @classmethod
-    def of(cls, packing: Packing | Configuration) -> "Instability":
+    def of(cls, packing: HasConfiguration) -> "Instability":
         """Count what all eigenvalues of a packing show, without contacts whose force is unknown."""
         return cls.from_spectrum(spectrum(force_bearing(packing)))
 
@@ -116,7 +116,10 @@ class Onset(TableDisplay):
     ends: float | None = None
 
     def __repr__(self) -> str:
-        return f"<Onset: {self.describe()}, {len(self.windows)} windows>"
+        return f"<Onset: {self.describe()}, windows: {self.window_count}>"
+
+    def __str__(self) -> str:
+        return self.describe()
 
     def describe(self) -> str:
         """F_x^c with its error, in words; or that, and why, the packing is unstable at the smallest load."""
@@ -132,6 +135,11 @@ class Onset(TableDisplay):
         return windows_rows(self.windows)
 
     @property
+    def window_count(self) -> str:
+        """The number of windows in words, as far as they were counted."""
+        return str(len(self.windows)) if self.complete else "not counted, as the search ended with the first"
+
+    @property
     def fx_c(self) -> float:
         """F_x^c, the first onset, force per top disk."""
         return self.windows[0].fx_onset
@@ -142,12 +150,13 @@ class Onset(TableDisplay):
         return self.windows[0].error
 
     def as_dict(self) -> dict[str, Any]:
-        """fx_c, error, error_of_path, windows, doubtful, modes, unstable_at_start, branch_ends: numbers, for JSON."""
+        """fx_c, error, error_of_path, windows, complete, doubtful, modes, unstable_at_start, branch_ends, for JSON."""
         return {
             "fx_c": self.fx_c,
             "error": self.error,
             "error_of_path": self.windows[0].path_error,
             "windows": [window.as_dict() for window in self.windows],
+            "complete": self.complete,
             "doubtful": [list(increment) for increment in self.doubtful],
             "modes": None if self.modes is None else list(self.modes),
             "unstable_at_start": None if self.at_start is None else asdict(self.at_start),
@@ -155,9 +164,7 @@ class Onset(TableDisplay):
         }
 
 
-def takes_all_modes(
-    packing: Packing | Configuration, modes: tuple[int, int] | None = None, limits: Limits = LIMITS
-) -> bool:
+def takes_all_modes(packing: HasConfiguration, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
     """Whether a packing is small enough for all of its modes to be searched, and for all windows to be found."""
     return modes is None and packing.coordinates <= 3 * limits.all_windows
 
@@ -201,7 +208,7 @@ def _narrowest(loads: Floats, limits: Limits) -> float:
 
 
 def find_onset(
-    equilibrium: Callable[[float], Packing | Configuration],
+    equilibrium: Callable[[float], HasConfiguration],
     forces: ArrayLike,
     *,
     narrowest: float | None = None,
@@ -313,7 +320,7 @@ def find_onset(
     return Onset(windows, complete, doubtful, modes, unstable, float(ends) if ends < np.inf else None)
 
 
-def _complex_at_start(start: Packing | Configuration, limits: Limits) -> Spectrum | None:
+def _complex_at_start(start: HasConfiguration, limits: Limits) -> Spectrum | None:
     """The spectrum of a packing at the smallest load, if it has a complex pair.
 
     None if it has none, or if the packing is too large for all eigenvalues to be asked for. Of a symmetric operator,
@@ -330,13 +337,13 @@ def _symmetric(matrix: csr_array) -> bool:
     return bool(abs(matrix - matrix.T).max() <= 1e-14 * abs(matrix).max())
 
 
-def _fastest(start: Packing | Configuration, found: Spectrum) -> Window:
+def _fastest(start: HasConfiguration, found: Spectrum) -> Window:
     """The window of the complex pair that grows fastest at the smallest load."""
     pair = max(found.pairs, key=lambda each: each.growth_rate)
     return _at_start(start, pair.eigenvalue.real, pair.overlap)
 
 
-def _at_start(start: Packing | Configuration, eigenvalue: float, overlap: float) -> Window:
+def _at_start(start: HasConfiguration, eigenvalue: float, overlap: float) -> Window:
     """A window that is open at the smallest load."""
     return Window.between(Edge(start.fx, 0.0, eigenvalue, overlap, "start"), None)
 

@@ -18,21 +18,20 @@ velocity: the force stays at the bound if the contact continues to slide, and th
 back. C uses the first case, as the stability operator does for the slip of such a contact.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import eigsh
+from scipy.sparse.linalg import eigs
 
-from ..configuration import Configuration
+from ..arrays import derive_frozen
+from ..configuration import HasConfiguration
 from ..packing.law import Derivatives
 from ..packing.packing import Floats, Packing
 from .linearised_contacts import assembled_damping
 from .stiffness import assemble_stiffness, contact_terms
 
 
-def damping_matrix(packing: Packing | Configuration, sliding: ArrayLike = False) -> csr_array:
+def damping_matrix(packing: HasConfiguration, sliding: ArrayLike = False) -> csr_array:
     """Assemble C = -dF/d(dq/dt).
 
     Parameters
@@ -48,8 +47,9 @@ def damping_matrix(packing: Packing | Configuration, sliding: ArrayLike = False)
         Force time / length, in the order (x.., y.., R theta..), or as in :mod:`~faultgouge.analysis.configuration`.
         For a Packing, C is symmetric and positive semidefinite. Without dashpots and drag, C is empty.
     """
-    if isinstance(packing, Configuration):
-        return assembled_damping(packing) if packing.damping is None else packing.damping.copy()
+    if not isinstance(packing, Packing):
+        given = packing.configuration.damping
+        return assembled_damping(packing.configuration) if given is None else given.copy()
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry
@@ -63,23 +63,24 @@ def damping_matrix(packing: Packing | Configuration, sliding: ArrayLike = False)
     return csr_array(matrix + diags_array(coordinate_mass(packing) / packing.drag_time))
 
 
-def largest_damping_rate(packing: Packing) -> float:
-    """Largest eigenvalue of M^-1 C of the dashpots, 1 / time, which limits the time step; drag does not limit it.
+def largest_damping_rate(packing: HasConfiguration) -> float:
+    """Largest eigenvalue of M^-1 C of the dashpots without drag, 1 / time; 0 without dashpots.
 
     Parameters
     ----------
-    packing : Packing
+    packing : Packing or Configuration
         The configuration.
     """
-    matrix = damping_matrix(replace(packing, drag_time=None))
+    matrix = damping_matrix(derive_frozen(packing.configuration, drag_rate=0.0))
     if matrix.nnz == 0:
         return 0.0
     scale = diags_array(1 / np.sqrt(coordinate_mass(packing)))
     # a fixed start makes the result the same on every rank
-    found = eigsh(scale @ matrix @ scale, 1, which="LA", v0=np.ones(matrix.shape[0]), return_eigenvectors=False)
-    return float(found[0])
+    weighted, start = scale @ matrix @ scale, np.random.Generator(np.random.PCG64(0)).standard_normal(matrix.shape[0])
+    # arms of torques that are not those of slips leave C not symmetric
+    return float(eigs(weighted, 1, which="LR", v0=start, return_eigenvectors=False)[0].real)
 
 
-def coordinate_mass(packing: Packing | Configuration) -> Floats:
+def coordinate_mass(packing: HasConfiguration) -> Floats:
     """Masses of all coordinates."""
     return packing.coordinate_mass

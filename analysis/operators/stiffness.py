@@ -46,7 +46,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array
 
-from ..configuration import Configuration
+from ..configuration import HasConfiguration
 from ..packing.law import Derivatives
 from ..packing.packing import Floats, Indices, Packing
 from .linearised_contacts import assembled_stiffness
@@ -59,7 +59,7 @@ SIGNS = np.einsum("pa,qb->pqab", SIDES, SIDES)
 
 
 def stiffness_matrix(
-    packing: Packing | Configuration,
+    packing: HasConfiguration,
     form: Form = "consistent",
     coupled: NDArray[np.bool_] | None = None,
     parting: ArrayLike = 0.5,
@@ -98,17 +98,18 @@ def stiffness_matrix(
     """
     if form not in ("consistent", "paper"):
         raise ValueError(f'form = "{form}" must be "consistent" or "paper".')
-    if isinstance(packing, Configuration):
+    if not isinstance(packing, Packing):  # the assembly below is for disks of one law alone, and three times faster
         if form == "paper" or coupled is not None:
             raise ValueError("The operator of a Configuration is the consistent one, of all of its contacts.")
-        if packing.stiffness is not None:
-            if np.any(np.asarray(parting) != 0.5) or np.any(sliding):
-                raise ValueError(
-                    "K of this configuration is a difference of forces, the mean of closing and parting, and of both "
-                    "sides of Coulomb's bound: leave parting and sliding out."
-                )
-            return packing.stiffness.copy()
-        return assembled_stiffness(packing, parting)
+        given = packing.configuration.stiffness
+        if given is None:
+            return assembled_stiffness(packing.configuration, parting)
+        if np.any(np.asarray(parting) != 0.5) or np.any(sliding):
+            raise ValueError(
+                "K of this configuration is a difference of forces, the mean of closing and parting, and of both "
+                "sides of Coulomb's bound: leave parting and sliding out."
+            )
+        return given.copy()
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry

@@ -35,6 +35,7 @@ from ..arrays import (
     set_frozen,
 )
 from ..configuration import Configuration
+from ..counted import counted
 from .compensated import Pair
 from .contacts import Contacts
 from .geometry import ContactGeometry, check_box, contact_geometry
@@ -148,7 +149,8 @@ class Packing:
         load = f"fx = {self.fx:g}, fy = {self.fy:g}"
         digits = ", compensated" if self.compensated else ""
         return (
-            f"<Packing: {len(self)} disks, {len(self.contacts)} contacts, {int(self.top.sum())} in the upper "
+            f"<Packing: {counted(len(self), 'disk')}, {counted(len(self.contacts), 'contact')}, "
+            f"{int(self.top.sum())} in the upper "
             f"layer, {box}, mu = {self.law.mu:g}, {load}{digits}>"
         )
 

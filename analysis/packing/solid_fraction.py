@@ -12,24 +12,47 @@ fill the plane less well, is included. :func:`solid_fraction_below_top` also inc
 
 import numpy as np
 
+from ..configuration import Configuration, HasConfiguration
+from ..errors import BadInputError
 from .packing import Packing
 
 
-def solid_fraction(packing: Packing) -> float:
-    """Volume fraction phi of a layer, up to the mean height of the centres of its upper layer.
+def solid_fraction(packing: HasConfiguration) -> float:
+    """Volume fraction phi of a layer, up to the mean height of the centres of its upper layer, or of a periodic box.
 
     Parameters
     ----------
-    packing : Packing
-        With an upper layer; without one, H is the largest height of a centre.
+    packing : Packing or Configuration
+        A Packing without an upper layer has the largest height of a centre as H. A Configuration, which has no layer,
+        is periodic along all of its axes, and phi is the share of its box that particles take.
 
     Returns
     -------
     float
-        NaN if the centres are not above the floor y = 0.
+        NaN if the centres of a Packing are not above the floor y = 0.
+
+    Raises
+    ------
+    BadInputError
+        If a Configuration is not periodic along an axis: nothing says where it ends there.
     """
+    if not isinstance(packing, Packing):
+        return _solid_in_box(packing.configuration)
     heights = packing.position[:, 1]
     return _solid_below(packing, float(heights[packing.top].mean() if packing.top.any() else heights.max()))
+
+
+def _solid_in_box(configuration: Configuration) -> float:
+    """The volume of all particles over that of the periodic box, of disks the areas."""
+    d = configuration.dimension
+    edges = [axis for axis, closed in zip("xyz"[:d], configuration.periodic[:d], strict=True) if not closed]
+    if edges:
+        raise BadInputError(
+            "solid_fraction of a Configuration is that of a periodic box, and this one is open along "
+            f"{', '.join(edges)}: take the volume of its particles over that which you count as theirs."
+        )
+    volume = np.pi * configuration.radius**2 if d == 2 else 4 / 3 * np.pi * configuration.radius**3
+    return float(volume.sum() / abs(np.linalg.det(configuration.box[:d, :d])))
 
 
 def solid_fraction_below_top(packing: Packing) -> float:

@@ -5,9 +5,8 @@ A packing and its unstable mode
 This example settles forty disks, and shears them to a load at which one pair of eigenvalues is complex.
 """
 
-from faultgouge.analysis import normal_modes, spectrum
-from faultgouge.figures import draw_packing
-from faultgouge.figures.mode import draw_modes, unstable_pair
+from faultgouge.analysis import spectrum
+from faultgouge.figures import draw_mode, draw_packing
 from faultgouge.pywrap import Scene, reach
 
 scene = Scene.from_mapping({"packing": {"seed": 4, "disks": 40, "width": 7.5}, "law": {"kn": 2e5}, "load": {"fy": 3.0}})
@@ -31,5 +30,4 @@ print(f"D grows as exp({found.growth_rate():.4f} t)")
 # %%
 # Arrows are displacements and colours rotations, at two moments that are a quarter of a period apart.
 
-modes, words = unstable_pair(packing, normal_modes(packing), [pair.eigenvalue for pair in found.pairs])
-motion = draw_modes(packing, modes, words)
+motion = draw_mode(packing)

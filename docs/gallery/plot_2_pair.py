@@ -7,10 +7,9 @@ Two real eigenvalues of the stability operator merge at the onset :math:`F_x^c` 
 
 import numpy as np
 
-from faultgouge.analysis.onset.pair_form import pair_eigenvalues
+from faultgouge.analysis import find_onset, pair_eigenvalues
 from faultgouge.figures import PairCurve, draw_pair
-from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset.undamped import onset_run
+from faultgouge.pywrap import Engine, Scene, equilibrate, ramp
 
 scene = Scene.from_mapping(
     {
@@ -20,15 +19,22 @@ scene = Scene.from_mapping(
         "ramp": {"step": 1e-3, "until": 0.05},
     }
 )
-run = onset_run(scene, mu=1.0)
-print(run)
+states = list(ramp(scene))
+loads = np.array([each.fx for each in states])
+with Engine(states[0].packing) as engine:
+
+    def packing_at(fx):
+        """The equilibrium at fx, from the one below it: friction remembers the way."""
+        return equilibrate(engine, [each for each in states if each.fx <= fx][-1], fx=fx).packing
+
+    onset = find_onset(packing_at, loads)
+print(onset)
 
 # %%
 # The pair is followed from the onset to smaller loads and to larger ones.
 
-first = run.onset.windows[0]
-packings = [each.packing for each in run.equilibria]
-loads = np.array([each.fx for each in run.equilibria])
+first = onset.windows[0]
+packings = [each.packing for each in states]
 above = loads > first.fx_onset
 before = pair_eigenvalues([each for each, up in zip(packings, above, strict=True) if not up][::-1], first.eigenvalue)
 after = pair_eigenvalues([each for each, up in zip(packings, above, strict=True) if up], first.eigenvalue)

@@ -256,8 +256,9 @@ def _check_plane(source: str, columns: Mapping[str, Floats], radius: Floats) -> 
     z = columns.get("z", columns.get("zu"))
     if z is not None and len(z) and np.ptp(z) > FLAT * radius.min():
         raise PackingFileError(
-            f"{source} is of three dimensions: z goes from {z.min():g} to {z.max():g}, and disks lie in a plane; "
-            "give a run of dimension 2."
+            f"{source} is of three dimensions (z goes from {z.min():g} to {z.max():g}), and what such a file has is "
+            "read as disks in a plane: give a run of dimension 2, or, for spheres, a LAMMPS deck with their contact "
+            "law, `faultgouge import DECK.in`."
         )
 
 

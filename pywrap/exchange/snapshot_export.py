@@ -12,6 +12,7 @@ import numpy as np
 
 from ...analysis import BadInputError, Configuration
 from ...analysis.arrays import Floats
+from ...analysis.counted import counted
 from ...analysis.files.atomic_write import replace_whole
 from .export_quantities import ModeVectors
 from .vtp import write_frame_list, write_poly_data, write_xml
@@ -38,7 +39,8 @@ def write_snapshot_for_others(path: Path, snapshot: Configuration, modes: Sequen
         write_xml(path, _poly_data(snapshot, _in_space(snapshot), modes))
     else:
         _write_xyz(path, snapshot, [(_in_space(snapshot), modes)])
-    return f"{len(snapshot)} particles, {len(snapshot.contacts)} contacts, {len(modes)} modes"
+    what = {"particle": len(snapshot), "contact": len(snapshot.contacts), "mode": len(modes)}
+    return ", ".join(counted(number, noun) for noun, number in what.items())
 
 
 FARTHEST = 0.5

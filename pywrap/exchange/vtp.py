@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Packing
+from ...analysis.counted import counted
 from ...analysis.files.atomic_write import make_folder, write_whole
 from . import export_quantities
 from .export_quantities import Frame, ModeVectors
@@ -35,7 +36,7 @@ def write_vtp(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> 
     (frame,) = frames
     packing = frame.packing
     write_xml(path, _tree(frame, modes))
-    return f"{len(packing)} disks and {len(packing.contacts)} contacts, in float64"
+    return f"{counted(len(packing), 'disk')} and {counted(len(packing.contacts), 'contact')}, in float64"
 
 
 def write_pvd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:

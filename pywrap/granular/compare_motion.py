@@ -23,20 +23,19 @@ from :math:`\pm \mathbf v_0`, integrated to ten digits.
 """
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.sparse import block_array, csr_array, diags_array
 from scipy.sparse.linalg import expm_multiply
 
-from ...analysis import Configuration, damping_matrix, stiffness_matrix
+from ...analysis import BadInputError, Configuration, damping_matrix, largest_frequency, stiffness_matrix
 from ...analysis.arrays import Floats, Indices
 from ...analysis.motion.eigenvalues import active_coordinates, mass_weighted
 from ...analysis.operators.linearised_contacts import rescaling_operators
 from .granular_commands import SnapshotError
-from .lammps_arrays import owned_array, rows_of, set_velocity
-from .look_in_a_copy import can_copy, in_a_copy, quieten
+from .lammps_steps import steps_in_a_copy
+from .look_in_a_copy import can_copy
 
 ACCURACY = 1e-10
 """Error of a step in the motion with two derivatives, as a share of the largest velocity."""
@@ -55,6 +54,9 @@ class MotionComparison:
     velocity, linear_velocity : ndarray, shape (E,)
         Velocities of LAMMPS and of the linearised packing, times the root of the masses, of the coordinates that feel
         a force.
+    periods : float
+        How many periods of the fastest vibration without dashpots the time has. A time far below one compares the
+        acceleration alone; slow vibrations are compared over a share of a period.
     """
 
     difference: float
@@ -62,9 +64,16 @@ class MotionComparison:
     timestep: float
     velocity: Floats
     linear_velocity: Floats
+    periods: float
 
     def __float__(self) -> float:
         return self.difference
+
+    def __str__(self) -> str:
+        return (
+            f"relative difference {self.difference:.2g} after t = {self.time:.4g}, {self.periods:.3g} periods of the "
+            "fastest vibration"
+        )
 
 
 def compare_motion(
@@ -83,10 +92,10 @@ def compare_motion(
     time : float
         How long, positive.
     amplitude : float
-        Size of the random velocities, length / time: so small that displacements stay far below all overlaps. With
-        `granular` not much smaller than that, or histories that do not turn are seen.
+        Size of the random velocities, length / time, positive: so small that displacements stay far below all overlaps.
+        With `granular` not much smaller than that, or histories that do not turn are seen.
     timestep : float, optional
-        Time step of LAMMPS; that of the instance by default.
+        Time step of LAMMPS, positive; that of the instance by default.
     seed : int
         Of the velocities.
 
@@ -99,21 +108,27 @@ def compare_motion(
     ------
     SnapshotError
         If the instance has several ranks or threads, or other particles than the snapshot.
+    BadInputError
+        If a time, the step or the amplitude is not positive and finite: nothing would move, and nothing be compared.
     """
     if not can_copy(lmp):
         raise SnapshotError("compare_motion runs LAMMPS in copies of the process: use one rank and one thread.")
     step = float(lmp.extract_global("dt")) if timestep is None else float(timestep)
+    for name, value in (("time", time), ("timestep", step), ("amplitude", amplitude)):
+        if not 0 < value < np.inf:
+            raise BadInputError(f"{name} = {value:g} is refused: nothing would be compared; give a number above 0.")
     steps = max(1, round(time / step))
     stiffness = mass_weighted(stiffness_matrix(snapshot), snapshot)
     active = active_coordinates(stiffness)
     root = np.sqrt(snapshot.coordinate_mass)
     start = np.zeros(snapshot.coordinates)
     start[active] = amplitude * np.random.Generator(np.random.PCG64(seed)).standard_normal(len(active))
-    there, back = (in_a_copy(partial(_run, lmp, snapshot, sign * start, step, steps)) for sign in (1, -1))
+    there, back = (steps_in_a_copy(lmp, snapshot, sign * start, step, steps).velocity for sign in (1, -1))
     velocity = (0.5 * (there - back) * root)[active]
     linear = _linear_velocity(snapshot, stiffness, active, (start * root)[active], step * steps)
     difference = float(np.linalg.norm(velocity - linear) / np.linalg.norm(linear))
-    return MotionComparison(difference, step * steps, step, velocity, linear)
+    periods = step * steps * largest_frequency(snapshot) / (2 * np.pi)
+    return MotionComparison(difference, step * steps, step, velocity, linear, periods)
 
 
 def _linear_velocity(
@@ -147,15 +162,3 @@ def _linear_velocity(
             raise SnapshotError(f"The predicted motion was not found: {found.message} Compare over a shorter time.")
         ends.append(found.y[len(start) :, 0])
     return np.asarray(0.5 * (ends[0] - ends[1]))
-
-
-def _run(lmp: Any, snapshot: Configuration, velocity: Floats, step: float, steps: int) -> Floats:
-    """Velocities of the coordinates after some steps of LAMMPS."""
-    lmp.command("log none")
-    quieten(lmp, drag=True)
-    set_velocity(lmp, snapshot, velocity)
-    lmp.command(f"timestep {step:.17g}")
-    lmp.command(f"run {steps} post no")
-    rows = rows_of(lmp, snapshot)
-    rotation = owned_array(lmp, "omega")[rows] * snapshot.radius[:, None]
-    return snapshot.join_vectors(owned_array(lmp, "v")[rows], rotation)

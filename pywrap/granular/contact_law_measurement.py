@@ -36,6 +36,9 @@ OVERLAP_RANGE = 1e-3, 0.1
 """Overlaps at which laws are measured, in units of a radius: an overlap of 1e-10, as of spheres that barely touch, has
 lost ten digits, and one beyond a tenth is that of no contact."""
 
+STIFF = 20
+"""Slips that are tried, each a hundredth of what the last one would need at most: one is the rule."""
+
 
 class State(NamedTuple):
     """One contact: radii, masses (of a wall 0 and infinite) and overlap."""
@@ -100,11 +103,11 @@ class TwoParticleLammps:
 
     def __init__(self, lmp: Any, commands: Commands, name: tuple[int, int] | str, size: float) -> None:
         self.lammps = start_lammps(MPI.COMM_SELF, None)
-        words = commands.fixes[name].split() if isinstance(name, str) else []
+        words = _one_plane(commands.fixes[name].split()) if isinstance(name, str) else []
         self.wall, self.types = bool(words), (1, 1) if isinstance(name, str) else name
         self.axis, self.sign, self.place = 0, 1.0, 0.0
         if self.wall:
-            at = next(k for k, word in enumerate(words) if word in ("xplane", "yplane", "zplane"))
+            at = _place_of_planes(words)
             self.axis = "xyz".index(words[at][0])
             self.sign, plane = (1.0, words[at + 1]) if words[at + 1] != "NULL" else (-1.0, words[at + 2])
             self.place = float(plane)
@@ -164,6 +167,17 @@ class TwoParticleLammps:
         """f_n on the first particle, and the size of f_t."""
         f = self.array("f")[0]
         return float(self.sign * f[self.axis]), float(abs(f[self.across]))
+
+
+def _place_of_planes(words: list[str]) -> int:
+    """Which word of a wall is xplane, yplane or zplane; its lower and its upper plane follow."""
+    return next(k for k, word in enumerate(words) if word in ("xplane", "yplane", "zplane"))
+
+
+def _one_plane(words: list[str]) -> list[str]:
+    """A wall with the lower one of its two planes: in a narrow slot a particle would touch the other one, too."""
+    upper = _place_of_planes(words) + 2
+    return words if words[upper - 1] == "NULL" else [*words[:upper], "NULL", *words[upper + 1 :]]
 
 
 def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state: State, who: str) -> MeasuredLaw:
@@ -234,6 +248,8 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
     """What one contact has of a MeasuredLaw's fields, by its forces at rest and in motion."""
     state = bench.place_at(wanted)
     fn, delta = bench.force()[0], state.overlap
+    if not fn > 0:
+        raise SnapshotError("A contact law has no normal force that pushes: it cannot be measured.")
     # a time step so long that dashpots are weak beside slips
     step = 1e3 * np.sqrt(state.mass * delta / fn)
     bench.run(f"timestep {step:.17g}")
@@ -248,10 +264,12 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
     # far below the bound: LAMMPS's classic models forget most of a slip that was cut there
     slip = 1e-8 * min(mu, 1.0) * delta
     ft = _push_contact(bench, wanted, slip / step)
-    while ft > 0.1 * mu * fn:  # a stiff spring: once more, with less
-        slip *= 0.01 * mu * fn / ft
+    for _ in range(STIFF):
+        if ft <= 0.1 * mu * fn:
+            break
+        slip *= 0.01 * mu * fn / ft  # a stiff spring: once more, with less
         ft = _push_contact(bench, wanted, slip / step)
-    if ft == 0:
+    if not 0 < ft <= 0.1 * mu * fn:
         raise SnapshotError("A contact law has friction without a tangential stiffness: use one with a history.")
     arm = abs(bench.array("torque")[0, bench.about] / bench.array("f")[0, bench.across])
     lever = float(state.radii[0] - arm) / delta

@@ -278,6 +278,8 @@ def _bonded(lmp: Any, ids: Indices) -> tuple[Indices, Indices]:
     found = [np.zeros((0, 2), np.int64)]
     if lmp.extract_setting("molecule_flag"):
         for each in (lmp.numpy.gather_bonds(), lmp.numpy.gather_angles()):
+            if not len(each):
+                continue
             members = np.asarray(each).reshape(len(each), -1)[:, 1:]
             found += [members[:, pair] for pair in combinations(range(members.shape[1]), 2)]
     i, j = np.searchsorted(ids, np.concatenate(found)).T

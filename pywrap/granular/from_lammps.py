@@ -38,10 +38,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array
 
-from ...analysis import Configuration, LinearisedContacts, MindlinLaw
+from ...analysis import BadInputError, Configuration, LinearisedContacts, MindlinLaw
 from ...analysis.arrays import Floats, Indices, derive_frozen
-from ...analysis.configuration import PER_CONTACT, WALL
+from ...analysis.configuration import BOOLEAN, PER_CONTACT, WALL
 from ...analysis.packing.linearise import linearise_contacts
+from .acting_fixes import check_holding
 from .contact_law_measurement import MeasuredLaw, State, measure_law
 from .force_differences import HOLDS, MOVES, Particles, measure_operators
 from .granular_commands import (
@@ -58,10 +59,13 @@ from .granular_commands import (
     read_commands,
     without_suffix,
 )
-from .instance_queries import Styles, communicator, log_of, only_log, styles_of
+from .instance_queries import OpenFile, Styles, communicator, log_of, only_log, open_files, styles_of
 from .lammps_arrays import Arrays, arrays_at_rest, contacts_of_plane, given_back
+from .law_remarks import remark_on
 from .look_in_a_copy import can_copy, in_a_copy, quieten
 from .mobility import MOBILE, mobility
+from .motion_proof import BOUND, GOOD, NotProvedError
+from .motion_proof import prove as prove_motion
 
 BALANCE = 1e-4
 """Share of the mean contact force that may be out of balance: then the motion is that of a packing which comes to rest
@@ -74,6 +78,9 @@ ROUNDING = 1e-14
 """Rounding of an overlap, as a share of the distance of two centres: some units in the last place of coordinates that
 may be ten times as large."""
 
+BY_CONTACT = ("contacts", "partners")
+"""Arrays with a row for each contact; all others have one for each particle."""
+
 KnownLaws = dict[tuple[Any, ...], MeasuredLaw]
 """By their commands, and the two types or the ID of a wall's fix."""
 
@@ -84,6 +91,7 @@ def from_lammps(
     *,
     slides: bool = False,
     balance: float = BALANCE,
+    prove: bool = True,
     differences: bool = False,
 ) -> Configuration:
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
@@ -102,7 +110,12 @@ def from_lammps(
     slides : bool
         Whether contacts at Coulomb's bound slide; they stick by default.
     balance : float
-        Residual that is allowed, as a share of the mean contact force.
+        Residual that is allowed, as a share of the mean contact force; not negative.
+    prove : bool
+        Whether ten steps of LAMMPS in a copy of the process are compared with those of the result, drag left out: its
+        `proof` is their relative difference (:mod:`~faultgouge.pywrap.granular.motion_proof`). A packing of more than
+        1e-3 is refused, and 1e-5 or less is usual. `proof` is None on several ranks or with threads, where no copy can
+        be made, and for a packing whose residual exceeds the default balance.
     differences : bool
         Whether K and C are found by differences of LAMMPS's forces even where all laws of contacts are measured.
 
@@ -116,9 +129,15 @@ def from_lammps(
     ------
     SnapshotError
         If the packing cannot be taken: it moves, or has moving walls or bodies that rotate; or the commands are not
-        those of the instance.
+        those of the instance; or LAMMPS's forces do not change as K says.
     """
-    return take_snapshot(lmp, commands, {}, slides=slides, balance=balance, differences=differences)
+    return take_snapshot(lmp, commands, {}, slides=slides, balance=balance, prove=prove, differences=differences)
+
+
+def check_balance(balance: float) -> None:
+    """Refuse a residual that is no number from 0 on: every packing would be at rest, or none."""
+    if not balance >= 0:
+        raise BadInputError(f"balance = {balance:g} is refused: give a share of the mean contact force, from 0 on.")
 
 
 def take_snapshot(
@@ -128,15 +147,16 @@ def take_snapshot(
     *,
     slides: bool,
     balance: float,
+    prove: bool,
     differences: bool = False,
 ) -> Configuration:
     """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
+    check_balance(balance)
     given = None if commands is None else read_commands(commands)
-    look = partial(_look, lmp, given)
     try:
         if differences:
             raise NotLinearisedError("K and C by differences of forces are asked for.")
-        snapshot = _snapshot(lmp, *(in_a_copy(look) if can_copy(lmp) else look()), laws)
+        return _by_laws(lmp, given, laws, slides=slides, balance=balance, prove=prove)
     except NotLinearisedError as reason:
         if not can_copy(lmp):
             raise
@@ -145,12 +165,44 @@ def take_snapshot(
                 f"{str(reason).rstrip('.')}; so K is found by differences of forces, which have no choice between "
                 "sticking and sliding contacts: leave slides out."
             ) from reason
-        snapshot = configuration_by_differences(lmp, given)
+        if not isinstance(reason, NotProvedError):
+            return _by_differences(lmp, given, balance=balance, prove=prove)
+        # what acts on velocities, or on particles far apart, is not in differences either, and has been named
+        with suppress(SnapshotError):
+            found = _by_differences(lmp, given, balance=balance, prove=prove)
+            if found.proof is not None and max(found.proof / BOUND, found.operator_error / GOOD) <= 1:
+                return found
+        raise
+
+
+def _by_laws(
+    lmp: Any, given: Commands | None, laws: KnownLaws, *, slides: bool, balance: float, prove: bool
+) -> Configuration:
+    """A Configuration whose contacts have the laws that LAMMPS shows; a NotLinearisedError if something else acts."""
+    look = partial(_look, lmp, given, open_files())
+    deck, fixes, found = in_a_copy(look) if can_copy(lmp) else look()
+    snapshot = _snapshot(lmp, deck, found, laws)
     contacts = snapshot.contacts
-    _check_balance(snapshot, balance)
+    proves = prove and can_copy(lmp) and _rests(snapshot)
+    if not proves:
+        check_holding(fixes)
+    _check_friction(contacts)
+    _check_balance(snapshot, balance, deck)
+    if proves:
+        snapshot = _proved(lmp, snapshot, deck, fixes)
     if slides:
         return derive_frozen(snapshot, contacts=derive_frozen(contacts, sliding=contacts.at_bound))
     return snapshot
+
+
+def _rests(snapshot: Configuration) -> bool:
+    """Whether a packing is so near to rest that a motion may prove K."""
+    return snapshot.residual <= BALANCE * force_scale(snapshot)
+
+
+def _proved(lmp: Any, snapshot: Configuration, commands: Commands, fixes: dict[str, str]) -> Configuration:
+    """A Configuration with its proof."""
+    return derive_frozen(snapshot, proof=prove_motion(lmp, snapshot, fixes, extrapolates=commands.style == OWN))
 
 
 def force_scale(snapshot: Configuration) -> float:
@@ -164,7 +216,7 @@ def force_scale(snapshot: Configuration) -> float:
     )
 
 
-def _check_balance(snapshot: Configuration, balance: float) -> None:
+def _check_balance(snapshot: Configuration, balance: float, commands: Commands) -> None:
     """Refuse a packing that moves, with the particle that is farthest from rest."""
     force = force_scale(snapshot)
     if snapshot.residual <= balance * force:
@@ -174,48 +226,64 @@ def _check_balance(snapshot: Configuration, balance: float) -> None:
     place = ", ".join(f"{x:.6g}" for x in snapshot.position[worst])
     others = int(np.sum(size > balance * force)) - 1
     also = f", and {others} more {'are' if others > 1 else 'is'} out of balance" if others else ""
-    advice = (
+    advice = _known_cause(commands, snapshot.contacts) or (
         "bring it to rest by faultgouge.relax(lmp) or a longer run with drag (fix viscous, and fix viscous/sphere for "
         "rotation), or allow more by from_lammps(lmp, balance=...), in a command --balance"
     )
     raise SnapshotError(
         f"The packing moves: the residual of particle {snapshot.ids[worst]} at ({place}) is {size[worst] / force:.3g} "
-        f"of the mean contact force, and {balance:g} is allowed{also}; "
-        f"{TWICE if _touch_twice(snapshot.contacts) else advice}."
+        f"of the mean contact force, and {balance:g} is allowed{also}; {advice}."
     )
 
 
-def configuration_by_differences(lmp: Any, given: Commands | None) -> Configuration:
+class _Still(NamedTuple):
+    """Particles as they stand, without K and C: both are empty.
+
+    `constraint` is P of q = P Q, which the configuration has only where P says more than which particles are free.
+    `commands` and `fixes` are those of the instance.
+    """
+
+    configuration: Configuration
+    constraint: csr_array
+    commands: Commands
+    fixes: dict[str, str]
+
+
+def _by_differences(lmp: Any, given: Commands | None, *, balance: float, prove: bool) -> Configuration:
     """A Configuration whose K and C are differences of LAMMPS's forces, on one rank.
 
     Its contacts are those of pairs that touch, with their forces as far as LAMMPS hands them out.
     """
-    made, constraint = _particles_and_constraint(lmp, given)
-    scale = force_scale(made) or None
+    still = _still(lmp, given)
+    made, scale = still.configuration, force_scale(still.configuration) or None
     place = np.zeros((len(made), 3))
     place[:, : made.dimension] = made.position
-    particles = Particles(made.dimension, made.ids, place, made.radius, constraint)
+    particles = Particles(made.dimension, made.ids, place, made.radius, still.constraint)
     measured = measure_operators(lmp, particles, scale)
-    return derive_frozen(
+    made = derive_frozen(
         made,
         stiffness=measured.stiffness,
         damping=measured.damping,
         operator_error=measured.error,
         jump=measured.jump,
     )
+    _check_balance(made, balance, still.commands)
+    return _proved(lmp, made, still.commands, still.fixes) if prove and _rests(made) else made
 
 
 def particles_at_rest(lmp: Any, given: Commands | None) -> Configuration:
     """The particles of an instance as they stand, and the forces of pairs, without K and C: both are empty."""
-    return _particles_and_constraint(lmp, given)[0]
+    return _still(lmp, given).configuration
 
 
-def _particles_and_constraint(lmp: Any, given: Commands | None) -> tuple[Configuration, csr_array]:
-    """A Configuration without K and C, and P of q = P Q, which it has only where P says more than which are free."""
+def _still(lmp: Any, given: Commands | None) -> _Still:
+    """The particles of an instance, and what moves or holds them."""
+    files = open_files()
     columns = ["dx dy dz force p1 p2 p3", "dx dy dz force", "dx dy dz"]
     while True:  # not every pair style hands all of these out
         try:
-            commands, found, members = in_a_copy(partial(_look_at_forces, lmp, given, columns[0]))
+            look = partial(_look_at_forces, lmp, given, files, columns[0])
+            commands, fixes, found, members = in_a_copy(look)
             break
         except SnapshotError:
             columns.pop(0)
@@ -237,7 +305,7 @@ def _particles_and_constraint(lmp: Any, given: Commands | None) -> tuple[Configu
         radius=found["radius"],
         mass=found["rmass"],
         inertia=factor * found["rmass"] * found["radius"] ** 2,
-        contacts=_forces_of_pairs(found, box),
+        contacts=_forces_of_pairs(found, box, commands.style),
         box=box,
         origin=origin,
         periodic=periodic,
@@ -250,15 +318,17 @@ def _particles_and_constraint(lmp: Any, given: Commands | None) -> tuple[Configu
         constraint=constraint if abs(constraint - alone).nnz else None,
     )
     total = np.stack([found["f"], found["torque"]], axis=1)
-    return derive_frozen(made, load=np.where(free[:, None, None], total, 0.0) - made.contact_force), constraint
+    load = np.where(free[:, None, None], total, 0.0) - made.contact_force
+    return _Still(derive_frozen(made, load=load), constraint, commands, fixes)
 
 
 def _look_at_forces(
-    lmp: Any, given: Commands | None, columns: str
-) -> tuple[Commands, Arrays, dict[str, NDArray[np.bool_]]]:
-    """The commands, the particles, and who is in the groups of the fixes that move or hold them; in a copy."""
+    lmp: Any, given: Commands | None, files: dict[int, OpenFile], columns: str
+) -> tuple[Commands, dict[str, str], Arrays, dict[str, NDArray[np.bool_]]]:
+    """The commands, the styles of fixes, the particles, and who is in the groups of the fixes that move or hold them;
+    in a copy."""
     if given is None:
-        lines = log_of(lmp)
+        lines = log_of(lmp, files)
         if lines is None:
             raise SnapshotError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
         given = read_commands(lines, log=True)
@@ -266,7 +336,6 @@ def _look_at_forces(
     styles = styles_of(lmp)
     with suppress(NotLinearisedError):
         check_instance(lmp, styles, given)
-    check_rest(styles.fixes, given)
     moving = {name for name, style in styles.fixes.items() if style.startswith((*MOVES, *HOLDS))}
     for name in moving:
         style = styles.fixes[name]
@@ -283,10 +352,11 @@ def _look_at_forces(
     found = arrays_at_rest(lmp, groups, [], columns)
     order = np.argsort(found["id"], kind="stable")
     members = {name: found.pop(f"group {name}")[order] for name in groups}
-    return given, {n: rows if n in ("contacts", "partners") else rows[order] for n, rows in found.items()}, members
+    found = {name: rows if name in BY_CONTACT else rows[order] for name, rows in found.items()}
+    return given, styles.fixes, found, members
 
 
-def _forces_of_pairs(found: Arrays, box: Floats) -> LinearisedContacts:
+def _forces_of_pairs(found: Arrays, box: Floats, style: str) -> LinearisedContacts:
     """Pairs that touch, with their forces alone: derivatives are zero, and no bound is known."""
     pairs = _pairs(found, box)
     count, columns = pairs.forces.shape
@@ -299,15 +369,17 @@ def _forces_of_pairs(found: Arrays, box: Floats) -> LinearisedContacts:
         **pairs.geometry, lever_arm=pairs.geometry["slip_arm"], lever_slope=none, normal_force=pairs.forces[:, 0],
         tangential_force=tangential, normal_stiffness=none, tangential_stiffness=none, closing=still, parting=still,
         friction=np.full(count, np.inf), sliding=np.zeros(count, bool), normal_dashpot=none, tangential_dashpot=none,
+        viscous_slider=np.full(count, style != OWN),
     )  # fmt: skip
     return made.chosen(made.normal_force != 0)
 
 
-def _look(lmp: Any, given: Commands | None) -> tuple[Commands, Arrays]:
-    """The commands, and the arrays of all ranks in the order of the particles' IDs; in a copy if there can be one."""
+def _look(lmp: Any, given: Commands | None, files: dict[int, OpenFile]) -> tuple[Commands, dict[str, str], Arrays]:
+    """The commands, the styles of fixes, and the arrays of all ranks in the order of the particles' IDs; in a copy if
+    there can be one."""
     world, copied = communicator(lmp), can_copy(lmp)
     if given is None:
-        lines = log_of(lmp) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
+        lines = log_of(lmp, files) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
         if lines is None:
             raise SnapshotError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
         given = read_commands(lines, log=True)
@@ -321,12 +393,7 @@ def _look(lmp: Any, given: Commands | None) -> tuple[Commands, Arrays]:
     columns = "dx dy dz force p3" if given.style == OWN else "dx dy dz force p1 p2 p3"
     if copied:
         quieten(lmp)
-    silent = [name for name in walls if given.style != OWN and "contacts" not in given.fixes[name].split()]
-    if silent and not copied:
-        raise SnapshotError(
-            f"fix {silent[0]} wall/gran does not hand out its contacts, and on several ranks or with threads they are "
-            "not found without it: write contacts at its end."
-        )
+    silent = _silent_walls(styles, given)
     with nullcontext() if copied else given_back(lmp):
         mine = arrays_at_rest(lmp, groups, [name for name in walls if name not in silent], columns)
     for name in silent:
@@ -334,8 +401,7 @@ def _look(lmp: Any, given: Commands | None) -> tuple[Commands, Arrays]:
     every = world.allgather(mine)
     found = {name: _join_ranks([each[name] for each in every]) for name in mine}
     order = np.argsort(found["id"], kind="stable")
-    by_contact = ("contacts", "partners")
-    return given, {name: rows if name in by_contact else rows[order] for name, rows in found.items()}
+    return given, styles.fixes, {name: rows if name in BY_CONTACT else rows[order] for name, rows in found.items()}
 
 
 def _join_ranks(parts: list[Floats]) -> Floats:
@@ -359,6 +425,18 @@ def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
         raise NotLinearisedError("Bonds hold particles together: take them out.")
     check_pair(commands, lmp.available_styles("pair"))
     check_fixes(styles.fixes, commands)
+    silent = _silent_walls(styles, commands)
+    if silent and not can_copy(lmp):
+        raise SnapshotError(
+            f"fix {silent[0]} wall/gran does not hand out its contacts, and on several ranks or with threads they are "
+            "not found without it: write contacts at its end."
+        )
+
+
+def _silent_walls(styles: Styles, commands: Commands) -> list[str]:
+    """IDs of walls that hand out no contacts."""
+    walls = [name for name, style in styles.fixes.items() if without_suffix(style) == "wall/gran"]
+    return [name for name in walls if "contacts" not in commands.fixes[name].split()]
 
 
 def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> Configuration:
@@ -367,13 +445,14 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> C
         raise SnapshotError("This LAMMPS has no particles.")
     free, frozen, factor = _mobility(commands, found)
     box, origin, periodic = _box(lmp)
+    contacts, remarks = _contacts(lmp, commands, found, frozen, laws, box)
     made = Configuration(
         dimension=dimension,
         position=found["x"][:, :dimension],
         radius=found["radius"],
         mass=found["rmass"],
         inertia=factor * found["rmass"] * found["radius"] ** 2,
-        contacts=_contacts(lmp, commands, found, frozen, laws, box),
+        contacts=contacts,
         box=box,
         origin=origin,
         periodic=periodic,
@@ -381,10 +460,11 @@ def _snapshot(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> C
         free=free,
         ids=found["id"].astype(np.int64),
         kind=found["type"].astype(np.int64),
+        remarks=remarks,
     )
     total = np.stack([found["f"], found["torque"]], axis=1)
     load = np.where(free[:, None, None], total - made.contact_force, -made.contact_force)
-    _check_torques(load[free, 1] / made.radius[free, None], made.contacts)
+    _check_torques(load[free, 1] / made.radius[free, None], commands, made.contacts)
     return derive_frozen(made, load=load)
 
 
@@ -396,6 +476,26 @@ def _box(lmp: Any) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     return edges, np.array(low), np.array(periodic, dtype=np.bool_)
 
 
+def _check_friction(contacts: LinearisedContacts) -> None:
+    """Refuse tangential forces beyond Coulomb's bound, which is that of the commands."""
+    size = np.linalg.norm(contacts.tangential_force, axis=1)
+    beyond = size > contacts.friction + AGREES * (contacts.friction + contacts.normal_force)
+    if np.any(beyond):
+        most = np.max(size[beyond] / contacts.normal_force[beyond])
+        mu = np.min(contacts.friction[beyond] / contacts.normal_force[beyond])
+        raise SnapshotError(
+            f"{np.count_nonzero(beyond)} contacts carry more than Coulomb's bound of the commands, up to |f_t| = "
+            f"{most:.3g} f_n with mu = {mu:.3g}: the commands are not those of the instance; {GIVE_LINES}, as they "
+            "hold now."
+        )
+
+
+LOST = (
+    "have no tangential force, as where histories are lost: LAMMPS reads none from a restart file if another instance "
+    "of a granular style was there before in the process, and not all across a periodic boundary or with newton off; "
+    "read the file in a process of its own, and run on with drag (fix viscous) until the packing rests"
+)
+
 TWICE = "particles touch each other twice, of which LAMMPS mixes the histories: take a box that is wider"
 
 
@@ -405,19 +505,36 @@ def _touch_twice(contacts: LinearisedContacts) -> bool:
     return len(np.unique(pairs, axis=0)) < len(pairs)
 
 
-def _check_torques(others: Floats, contacts: LinearisedContacts) -> None:
+def _known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
+    """Why forces are out of balance though the packing may be at rest; empty if no cause is known."""
+    if _touch_twice(contacts):
+        return TWICE
+    if commands.write_restart and commands.style != OWN:
+        return (
+            f"{commands.write_restart!r} stands after the last run, where LAMMPS forgets tangential histories if "
+            "its lists of neighbours have changed since: have the run itself write the restart, by `restart N FILE` "
+            "before it"
+        )
+    has_friction = (contacts.friction > 0) & np.isfinite(contacts.friction)  # infinite where no law is known
+    lost = np.count_nonzero(has_friction & ~contacts.tangential_force.any(axis=1))
+    return f"{lost} of {len(contacts)} contacts {LOST}" if lost else ""
+
+
+def _check_torques(others: Floats, commands: Commands, contacts: LinearisedContacts) -> None:
     """Refuse torques besides those of the contacts: in all that is taken here contacts alone turn particles."""
     forces = (
         AGREES * np.abs(contacts.tangential_force).max(initial=0.0),
         ROUNDING * contacts.normal_force.max(initial=0.0),
     )
     if np.abs(others).max() > sum(forces):
-        reason = (
+        known = _known_cause(commands, contacts)
+        reason = known or (
             "either something else turns them, which is not linearised here, or this release of LAMMPS hands out "
             "contacts in a way that is not known here; releases of 29 Aug 2024 to 22 Jul 2025 are"
         )
-        reason = TWICE if _touch_twice(contacts) else reason
-        raise NotLinearisedError(f"The torques on particles are not those of their contacts: {reason}.")
+        raise (SnapshotError if known else NotLinearisedError)(
+            f"The torques on particles are not those of their contacts: {reason}."
+        )
 
 
 def _mobility(commands: Commands, found: Arrays) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
@@ -459,10 +576,10 @@ class _OneLaw(NamedTuple):
 
 def _contacts(
     lmp: Any, commands: Commands, found: Arrays, frozen: NDArray[np.bool_], laws: KnownLaws, box: Floats
-) -> LinearisedContacts:
-    """Contacts between particles, then those with each wall."""
+) -> tuple[LinearisedContacts, tuple[str, ...]]:
+    """Contacts between particles, then those with each wall; and remarks on their laws."""
     pairs, walls = _pairs(found, box), [name.removeprefix("wall ") for name in found if name.startswith("wall ")]
-    parts = []
+    parts, remarks = [], []
     if commands.style == OWN:
         parts.append(_linearise_smooth(_smooth_law(commands.pair[0].split()[2:]), pairs))
         for name in walls:
@@ -476,15 +593,18 @@ def _contacts(
                 continue
             # a law is that of its commands, which a user may change
             key = (*commands.pair, commands.fixes.get(name), name)
+            state = _median_state(group, found)
             if key not in laws:
-                laws[key] = measure_law(lmp, commands, name, _median_state(group, found), group.who)
+                laws[key] = measure_law(lmp, commands, name, state, group.who)
+            remarks.append(remark_on(laws[key], commands, name, state))
             parts.append(_linearise_measured(laws[key], group, found, frozen))
     values = {name: [getattr(each, name) for each in parts] for name in PER_CONTACT}
     if not parts:
         values = {
-            name: [np.zeros((0, *shape), bool if name == "sliding" else float)] for name, shape in PER_CONTACT.items()
+            name: [np.zeros((0, *shape), bool if name in BOOLEAN else float)] for name, shape in PER_CONTACT.items()
         }
-    return LinearisedContacts(**{name: np.concatenate(each) for name, each in values.items()})
+    contacts = LinearisedContacts(**{name: np.concatenate(each) for name, each in values.items()})
+    return contacts, tuple(remark for remark in remarks if remark)
 
 
 def _geometry(

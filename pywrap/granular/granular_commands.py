@@ -44,10 +44,12 @@ class NotLinearisedError(SnapshotError):
 
 @dataclass(frozen=True)
 class Commands:
-    """What a deck says of contacts and of motion: pair_style with the pair_coeff that hold, and fixes by their IDs."""
+    """What a deck says of contacts and of motion: pair_style with the pair_coeff that hold, and fixes by their IDs; and
+    the write_restart that comes after the last run."""
 
     pair: tuple[str, ...]
     fixes: dict[str, str]
+    write_restart: str = ""
 
     @property
     def style(self) -> str:
@@ -68,7 +70,7 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
     SnapshotError
         If no line is a pair_style, or a line that a user gives has a variable in it.
     """
-    style = ""
+    style = restart = ""
     coefficients: list[str] = []
     fixes: dict[str, str] = {}
     whole = re.sub(r"&[ \t]*\n", " ", lines if isinstance(lines, str) else "\n".join(lines))
@@ -93,21 +95,25 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
             fixes[words[1]] = " ".join(words)
         elif words[0] == "unfix" and len(words) == 2:
             fixes.pop(words[1], None)
+        elif words[0] in ("run", "minimize", "write_restart"):
+            restart = text.strip() if words[0] == "write_restart" else ""
     if not style:
         where = "The log of this LAMMPS has" if log else "The commands have"
         raise SnapshotError(f"{where} no pair_style: {GIVE_LINES}.")
-    return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes)
+    return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes, restart)
 
 
-def logged_text(log: Path, folder: Path) -> str:
-    """The log, and those to which the deck turns by `log`, one after the other."""
-    text, read = "", set()
-    while log not in read and log.is_file():
+def logged_text(text: str, folder: Path) -> str:
+    """The text of a log, and of those to which a deck in a folder turns by `log`, one after the other."""
+    whole, read = text, set[Path]()
+    while (last := text.rstrip().rpartition("\n")[2].split())[:1] == ["log"] and len(last) > 1:
+        log = folder / last[1]
+        if log in read or not log.is_file():
+            break
         read.add(log)
-        text += log.read_text(errors="replace")
-        last = text.rstrip().rpartition("\n")[2].split()
-        log = folder / last[1] if last[:1] == ["log"] and len(last) > 1 else log
-    return text
+        text = log.read_text(errors="replace")
+        whole += text
+    return whole
 
 
 def commands_in(text: str) -> list[str]:
@@ -166,22 +172,9 @@ MOVING = {
     "nph": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
     "npt": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
     "nvt": "has a thermostat: use fix nve/sphere in its place, and let the packing come to rest",
+    "propel/self": "pushes particles along their velocities as soon as they move: unfix it",
 }
 """Fixes, by the beginnings of their styles, with which no packing of particles rests."""
-
-NO_CONTACTS = {
-    "setforce": "holds some coordinates: use fix freeze, or leave the particles out of fix nve/sphere",
-    "lineforce": "holds some coordinates: leave it out",
-    "planeforce": "holds some coordinates: leave it out",
-    "aveforce": "shares forces among particles: leave it out",
-    "spring": "pulls at particles as contacts do not tell: leave it out",
-    "indent": "pushes particles as contacts do not tell: leave it out",
-    "drag": "pulls at particles as contacts do not tell: leave it out",
-    "smd": "pulls at particles as contacts do not tell: leave it out",
-    "restrain": "pulls at particles as contacts do not tell: leave it out",
-    "wall/gran/region": "has curved walls: use planes of fix wall/gran",
-}
-"""Fixes, by the beginnings of their styles, whose forces are not those of contacts that are linearised here."""
 
 
 def check_rest(styles: dict[str, str], commands: Commands) -> None:
@@ -197,20 +190,15 @@ def check_rest(styles: dict[str, str], commands: Commands) -> None:
 
 
 def check_fixes(styles: dict[str, str], commands: Commands) -> None:
-    """Refuse fixes, by ID and style, that move or hold particles as contacts do not tell."""
+    """Refuse fixes, by ID and style, that hold or move particles or walls as contacts do not tell."""
     for name, style in styles.items():
         plain = without_suffix(style)
-        for begin, says in NO_CONTACTS.items():
-            if plain.startswith(begin):
-                raise NotLinearisedError(f"fix {name} {style} {says}.")
         if plain.startswith("wall/") and plain not in WALLS:
             raise NotLinearisedError(f"fix {name} {style} is no wall of contacts: use planes of fix wall/gran.")
         if plain.startswith("nve") and plain not in INTEGRATORS:
             raise NotLinearisedError(
                 f"fix {name} {style} does not turn particles by their contacts: use fix nve/sphere."
             )
-        if plain == "addforce" and "v_" in commands.fixes.get(name, ""):
-            raise NotLinearisedError(f"fix {name} {style} has a variable, which may depend on places.")
         if plain not in (*WALLS, *INTEGRATORS, "freeze"):
             continue
         line = commands.fixes.get(name)

@@ -5,10 +5,12 @@ import os
 import re
 from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from tempfile import TemporaryFile
+from typing import IO, Any, NamedTuple
 
 from mpi4py import MPI
+
+from .granular_commands import SnapshotError
 
 
 def communicator(lmp: Any) -> MPI.Comm:
@@ -19,57 +21,98 @@ def communicator(lmp: Any) -> MPI.Comm:
 
 
 class Styles(NamedTuple):
-    """Pair style, styles of the fixes by ID, and atom style of an instance."""
+    """Pair style, styles and groups of the fixes by ID, and atom style of an instance."""
 
     pair: str
     fixes: dict[str, str]
+    groups: dict[str, str]
     atom: str
 
 
 def styles_of(lmp: Any) -> Styles:
     """The styles of an instance, as LAMMPS's `info` says them."""
-    world = communicator(lmp)
-    with TemporaryDirectory(prefix="faultgouge") as folder:
-        path = world.bcast(f"{folder}/info", root=0)
-        lmp.command(f'info fixes system out overwrite "{path}"')
-        said = world.bcast(Path(path).read_text() if world.rank == 0 else None, root=0)
-        world.barrier()
-    fixes = dict(re.findall(r"^ *Fix\[ *\d+\]: *(\w+), *style = ([^,\s]+)", said, re.MULTILINE))
+    with TemporaryFile("w+") as answer:  # of rank 0, which alone writes and reads
+        lmp.command(f'info fixes system out overwrite "{name_of(answer)}"')
+        said = communicator(lmp).bcast(answer.read(), root=0)
+    fixes = re.findall(r"^ *Fix\[ *\d+\]: *(\w+), *style = ([^,\s]+), *group = (\S+)", said, re.MULTILINE)
     values = dict(re.findall(r"^ *(Atoms|Atom style) *= *(.*?) *$", said, re.MULTILINE))
     # Atoms = N, types = T, style = that of the pairs
-    return Styles(values["Atoms"].rpartition("style = ")[2], fixes, values["Atom style"])
+    styles, groups = ({name: each[k] for name, *each in fixes} for k in (0, 1))
+    return Styles(values["Atoms"].rpartition("style = ")[2], styles, groups, values["Atom style"])
 
 
-def explain_error(error: Exception) -> str:
+def explain_error(error: BaseException) -> str:
     """A sentence of an error that LAMMPS has raised."""
     lines = [line.strip().removeprefix("ERROR: ") for line in str(error).splitlines() if line.strip()]
     reason = re.sub(r" \(\S+:\d+\)", "", "; ".join(lines) or type(error).__name__)
     return f"LAMMPS stopped: {reason.rstrip('.')}."
 
 
-def log_path(lmp: Any) -> Path | None:
-    """An instance's log, which is closed by the question; None without a log."""
-    before = _open_files()  # a log of the command `log` does not begin as others do
-    lmp.command("log none")
-    closed = [path for descriptor, path in before.items() if descriptor not in _open_files()]
-    return Path(closed[0]) if len(closed) == 1 else None
+def name_of(file: IO[Any]) -> str:
+    """A name by which LAMMPS opens a file of this process: a file that has no name is left behind by no end of it."""
+    return f"/dev/fd/{file.fileno()}"
 
 
-def log_of(lmp: Any) -> list[str] | None:
-    """The lines of an instance's log, which is closed by the question; None without a log."""
-    path = log_path(lmp)
-    return None if path is None else path.read_text(errors="replace").splitlines()
+class OpenFile(NamedTuple):
+    """A file that this process has open for writing, and the place in it that is written next."""
+
+    path: str
+    place: int
+
+
+def open_files() -> dict[int, OpenFile]:
+    """Files that are open for writing, by their descriptors, where the system has a folder /proc."""
+    ctypes.CDLL(None).fflush(None)
+    found, listed = {}, Path("/proc/self/fd")
+    for each in listed.iterdir() if listed.is_dir() else ():
+        with suppress(OSError):
+            path = os.readlink(each)
+            if path.startswith("/") and os.path.isfile(path):
+                _, place, _, flags, *_ = Path(f"/proc/self/fdinfo/{each.name}").read_text().split()
+                if int(flags, 8) & os.O_ACCMODE != os.O_RDONLY:
+                    found[int(each.name)] = OpenFile(path, int(place))
+    return found
+
+
+def log_file(lmp: Any, files: dict[int, OpenFile]) -> OpenFile | None:
+    """An instance's log among files that were open, which is closed by the question; None without a log.
+
+    A copy of the process asks with the open files of the process itself.
+    """
+    lmp.command("log none")  # a log of the command `log` does not begin as others do
+    closed = [file for descriptor, file in files.items() if not _is_open(descriptor)]
+    return closed[0] if len(closed) == 1 else None
+
+
+def _is_open(descriptor: int) -> bool:
+    try:
+        os.fstat(descriptor)
+    except OSError:
+        return False
+    return True
+
+
+def log_of(lmp: Any, files: dict[int, OpenFile]) -> list[str] | None:
+    """The lines of an instance's log, as of :func:`log_file`."""
+    file = log_file(lmp, files)
+    return None if file is None else _lines_of(file)
 
 
 def only_log() -> list[str] | None:
     """The lines of the only open log of this process; None if there is none, or there are several."""
-    found = set(_open_logs().values())
-    return Path(found.pop()).read_text(errors="replace").splitlines() if len(found) == 1 else None
+    found = [file for file in open_files().values() if _begins_as_log(file.path)]
+    return _lines_of(found[0]) if len({file.path for file in found}) == 1 else None
 
 
-def _open_logs() -> dict[str, str]:
-    """Open files that begin as a log of LAMMPS does, by their descriptors."""
-    return {name: path for name, path in _open_files().items() if _begins_as_log(path)}
+def _lines_of(log: OpenFile) -> list[str]:
+    """The lines of a log; a SnapshotError where another LAMMPS writes to the same file."""
+    text = Path(log.path).read_text(errors="replace")
+    if "\0" in text or os.path.getsize(log.path) != log.place:
+        raise SnapshotError(
+            f"{log.path} is the log of another LAMMPS, too: give each LAMMPS a log of its own (-log FILE), or the "
+            f"lines as from_lammps(lmp, commands=[...])."
+        )
+    return text.splitlines()
 
 
 def _begins_as_log(path: str) -> bool:
@@ -78,15 +121,3 @@ def _begins_as_log(path: str) -> bool:
             return stream.read(8) == b"LAMMPS ("
     except OSError:
         return False
-
-
-def _open_files() -> dict[str, str]:
-    """Open files by their descriptors."""
-    ctypes.CDLL(None).fflush(None)
-    found, listed = {}, Path("/proc/self/fd")
-    for each in listed.iterdir() if listed.is_dir() else ():
-        with suppress(OSError):
-            path = os.readlink(each)
-            if path.startswith("/") and os.path.isfile(path):
-                found[each.name] = path
-    return found

@@ -22,6 +22,9 @@ Arrays = dict[str, Any]
 ATOM_ARRAYS = ("x", "image", "v", "omega", "f", "torque")
 """What `given_back` restores."""
 
+NO_FORCE = 1.2345678e300
+"""A number that is no force."""
+
 
 PLANES = ("xplane", "yplane", "zplane")
 
@@ -58,7 +61,7 @@ def arrays_at_rest(lmp: Any, groups: dict[str, str], walls: list[str], columns: 
     lmp.command(f"compute faultgouge_c all pair/local {columns} cutoff radius")
     lmp.command("compute faultgouge_i all property/local patom1 patom2 cutoff radius")
     try:
-        lmp.command("run 0 post no")
+        _run_zero_steps(lmp)
         names = ("id", "type", "x", "f", "torque", "radius", "rmass")
         found: Arrays = {name: np.array(owned_array(lmp, name)) for name in names}
         for name, key in (("c", "contacts"), ("i", "partners")):
@@ -113,6 +116,22 @@ def contacts_of_plane(lmp: Any, fix: str, line: str, found: Arrays) -> Floats:
     return rows
 
 
+def _run_zero_steps(lmp: Any) -> None:
+    """Run zero steps, even where LAMMPS skips runs without a word, since fix halt or timer timeout has ended one.
+
+    The forces tell whether LAMMPS has run.
+    """
+    owned_array(lmp, "f")[:] = NO_FORCE
+    lmp.command("run 0 post no")
+    if communicator(lmp).allreduce(int(np.any(owned_array(lmp, "f") == NO_FORCE))) == 0:
+        return
+    lmp.command("timer timeout unlimited")
+    try:
+        lmp.command("run 0 post no")
+    finally:
+        lmp.command("timer timeout 0")
+
+
 @contextmanager
 def given_back(lmp: Any) -> Iterator[None]:
     """Give all that moves, and histories, back to the instance at the end of a with block."""
@@ -124,6 +143,8 @@ def given_back(lmp: Any) -> Iterator[None]:
     lmp.command("fix faultgouge_h all keep/histories")
     try:
         yield
+        # lists of neighbours as they were: where others were asked for since, write_restart forgets histories
+        _run_zero_steps(lmp)
     finally:
         place = order[np.searchsorted(whole["id"][order], owned_array(lmp, "id"))] if len(order) else order
         for name in ATOM_ARRAYS:

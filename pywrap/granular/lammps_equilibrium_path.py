@@ -34,12 +34,12 @@ from scipy.sparse import csc_array, eye_array
 
 from ...analysis import Configuration, negative_eigenvalues, stiffness_matrix
 from ...analysis.arrays import derive_frozen
-from ...analysis.errors import FaultgougeError
+from ...analysis.errors import FaultgougeError, place_in_user_code
 from ...analysis.factors.sparse_lu import general_lu
 from ...parent_death import end_with
-from .from_lammps import KnownLaws, take_snapshot
+from .from_lammps import KnownLaws, check_balance, take_snapshot
 from .granular_commands import INTEGRATORS, SnapshotError, read_commands, without_suffix
-from .instance_queries import explain_error, log_of, log_path
+from .instance_queries import OpenFile, explain_error, log_file, log_of, open_files
 from .lammps_arrays import owned_array, rows_of, set_velocity
 from .look_in_a_copy import can_copy, in_a_copy, quieten, silent_copy
 from .relax import RATE, REST, bring_to_rest
@@ -78,21 +78,24 @@ def lammps_path(
     commands, slides
         As of :func:`~faultgouge.pywrap.from_lammps`.
     balance : float
-        Largest residual at rest, as a share of the mean contact force.
+        Largest residual at rest, as a share of the mean contact force; not negative.
     steps : int
         Time steps after which a packing that is not at rest flows.
 
     Raises
     ------
     SnapshotError
-        If the instance has several ranks or threads. ``path(value)`` raises it as `from_lammps` does, and where a load
-        changes no force.
+        If the instance has several ranks or threads. ``path(value)`` raises it as `from_lammps` does, with the proof at
+        the first value alone, and where a load changes no force.
+    BadInputError
+        If `balance` is no such number.
     NoEquilibriumError
         By ``path(value)``, where the packing flows: its particles have moved by their diameter in the mean, or do not
         come to rest.
     """
     if not can_copy(lmp):
         raise SnapshotError("lammps_path keeps copies of the process: use one rank and one thread.")
+    check_balance(balance)
     given = None if commands is None else list(commands)
     return LammpsPath(_Relaxation(lmp, apply, given, slides, balance, steps))
 
@@ -103,16 +106,19 @@ class LammpsPath:
     def __init__(self, relaxation: "_Relaxation") -> None:
         folder = TemporaryDirectory(prefix="faultgouge")
         here, there = Pipe()
+        files = open_files()
         first = silent_copy()
         if first == 0:
             here.close()
-            _wait_for_loads(relaxation, there, Path(folder.name))
+            _wait_for_loads(relaxation, there, Path(folder.name), files)
         there.close()
         self._kept: list[Kept] = [(-np.inf, here, None)]
         self._end = weakref.finalize(self, _end, self._kept, first, os.getpid(), folder)
 
     def __call__(self, value: float) -> Configuration:
         """The packing in equilibrium at a value."""
+        if not self._end.alive:
+            raise SnapshotError("The path is closed: ask it inside of its `with` block, or make a new one.")
         value = float(value)
         below, there, snapshot = next(each for each in reversed(self._kept) if each[0] <= value or each[0] == -np.inf)
         if snapshot is not None and below == value:
@@ -169,18 +175,18 @@ def _end(kept: list[Kept], first: int, owner: int, folder: "TemporaryDirectory[s
     folder.cleanup()
 
 
-def _wait_for_loads(relaxation: "_Relaxation", there: Connection, folder: Path) -> NoReturn:
+def _wait_for_loads(relaxation: "_Relaxation", there: Connection, folder: Path, files: dict[int, OpenFile]) -> NoReturn:
     """The life of the first copy of the process, and of all copies of it, each of which relaxes at one load."""
     try:
-        _own_log(relaxation.lmp, folder)
+        _own_log(relaxation.lmp, folder, files)
         quieten(relaxation.lmp)
         while (load := there.recv()) is not None:
-            end, this = Connection(recv_handle(there)), os.getpid()
+            end, this, files = Connection(recv_handle(there)), os.getpid(), open_files()
             if silent_copy() == 0:
                 end_with(this)  # which ends with the path, also while this copy relaxes
                 there.close()
                 there = end
-                _own_log(relaxation.lmp, folder)
+                _own_log(relaxation.lmp, folder, files)
                 there.send(relaxation.result(*load))
             else:
                 end.close()  # else nobody sees that the copy has died
@@ -190,12 +196,12 @@ def _wait_for_loads(relaxation: "_Relaxation", there: Connection, folder: Path) 
         os._exit(0)
 
 
-def _own_log(lmp: Any, folder: Path) -> None:
+def _own_log(lmp: Any, folder: Path, files: dict[int, OpenFile]) -> None:
     """Go on in a copy of the log, where there is one: copies of a process must not write to the same file."""
-    before = log_path(lmp)
+    before = log_file(lmp, files)
     if before is not None:
         own = folder / f"log.{os.getpid()}"
-        shutil.copyfile(before, own)
+        shutil.copyfile(before.path, own)
         lmp.command(f'log "{own}" append')
 
 
@@ -220,7 +226,8 @@ class _Relaxation:
             found = self.relax(value) if relaxes else self.displace_to_balance()
             if found is None:
                 return None
-            self.found = found
+            # the first of all others, which are forked from it
+            self.found = found = self.look(prove=True) if self.found is None else found
             change = in_a_copy(lambda: self.force_change(value))
         except Exception as error:  # LAMMPS, and a user's function, raise what they choose
             if not relaxes:
@@ -237,13 +244,30 @@ class _Relaxation:
     def set(self, value: float) -> None:
         """Set the load."""
         if not isinstance(self.apply, str):
-            self.apply(self.lmp, value)
+            try:
+                self.apply(self.lmp, value)
+            except FaultgougeError:
+                raise
+            except (Exception, SystemExit) as error:  # of whatever kind: the function is the user's
+                of_lammps = str(error).startswith("ERROR")
+                what = explain_error(error) if of_lammps else f"apply failed with {type(error).__name__}: {error}"
+                raise SnapshotError(f"At {value:g}: {what.rstrip('.')}{place_in_user_code(error)}.") from None
         elif self.lmp.set_internal_variable(self.apply, value) != 0:
             self.lmp.command(f"variable {self.apply} equal {value:.17g}")
 
-    def look(self) -> Configuration:
+    def look(self, *, prove: bool = False) -> Configuration:
         """The packing as it stands, moving or not."""
-        return take_snapshot(self.lmp, self.commands, self.laws, slides=self.slides, balance=np.inf)
+        # a proof may have shown at the first load that laws do not serve
+        differences = self.found is not None and self.found.operators == "differences"
+        return take_snapshot(
+            self.lmp,
+            self.commands,
+            self.laws,
+            slides=self.slides,
+            balance=np.inf,
+            prove=prove,
+            differences=differences,
+        )
 
     def force_change(self, value: float) -> float:
         """Largest change of a force per value, of particles that stay where they are."""
@@ -268,7 +292,8 @@ class _Relaxation:
         # what no contact feels has zero rows, and stays where it is
         solver = general_lu(csc_array(stiffness + 1e-9 * abs(stiffness).max() * eye_array(start.coordinates)))
         allowed = self.balance * float(start.contacts.normal_force.mean())
-        given = self.commands or in_a_copy(lambda: log_of(lmp)) or []
+        files = open_files()
+        given = self.commands or in_a_copy(lambda: log_of(lmp, files)) or []
         fixes = read_commands(given, log=self.commands is None).fixes
         moving = {name: line for name, line in fixes.items() if without_suffix(line.split()[3]) in INTEGRATORS}
         for name in moving:

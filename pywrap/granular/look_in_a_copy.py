@@ -1,19 +1,26 @@
 """Look into a LAMMPS instance in a copy of the process (`fork`).
 
 LAMMPS hands out contacts in a run alone, and a run of zero steps sorts particles, may cut a history once more at
-Coulomb's bound, and scales a rescaled one. In a copy, with dumps, averages and log closed, all of this may happen: the
-instance stays as it is. A copy of one of several ranks could not speak with the others, and a copy of a process has
-none of its threads (:mod:`~faultgouge.pywrap.granular.lammps_arrays`).
+Coulomb's bound, and scales a rescaled one. In a copy all of this may happen: the instance stays as it is. The copy
+shares open files with the process, down to the place at which each of them is written. So the first thing that the copy
+does is to put the null device in the place of every file that is open for writing, whoever has opened it: what LAMMPS,
+zlib or Python write as they close a dump or a log goes nowhere. A copy of one of several ranks could not speak with the
+others, and a copy of a process has none of its threads (:mod:`~faultgouge.pywrap.granular.lammps_arrays`).
 """
 
 import ctypes
+import fcntl
 import os
+import signal
+import stat
 from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing import Pipe
 from typing import Any, TypeVar
 
 from mpi4py import MPI
 
+from ...parent_death import end_with
 from .granular_commands import SnapshotError
 from .instance_queries import explain_error, styles_of
 
@@ -32,19 +39,31 @@ def can_copy(lmp: Any) -> bool:
     return hasattr(os, "fork") and MPI.COMM_WORLD.size == 1 and threads <= 1
 
 
-def silent_copy() -> int:
-    """Copy this process; its ID, or in the copy, which prints nothing, 0."""
+def silent_copy(*keep: int) -> int:
+    """Copy this process; its ID, or in the copy, which writes to no open file but the descriptors to keep, 0."""
     ctypes.CDLL(None).fflush(None)  # what is buffered would be written twice
     child = os.fork()
     if child == 0:
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, 1)
-        os.dup2(nowhere, 2)
+        _silence(keep)
     return child
 
 
+def _silence(keep: tuple[int, ...]) -> None:
+    """Put the null device in the place of all files, pipes and terminals that are open for writing."""
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for descriptor in map(int, os.listdir("/dev/fd")):
+        with suppress(OSError):  # that of the list itself is closed
+            writes = fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE != os.O_RDONLY
+            kind = os.fstat(descriptor).st_mode
+            shared = stat.S_ISREG(kind) or stat.S_ISFIFO(kind) or os.isatty(descriptor)
+            if writes and shared and descriptor not in keep:
+                os.dup2(nowhere, descriptor)
+    for descriptor in (1, 2):
+        os.dup2(nowhere, descriptor)
+
+
 def in_a_copy(work: Callable[[], Found]) -> Found:
-    """What some work finds in a copy of this process, whose traces end with it.
+    """What some work finds in a copy of this process, whose traces end with it; so does an interrupt of this process.
 
     Raises
     ------
@@ -52,9 +71,12 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
         With what went wrong in the copy.
     """
     here, there = Pipe(duplex=False)
-    child = silent_copy()
+    this = os.getpid()
+    child = silent_copy(there.fileno())
     if child == 0:
         try:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process decides what Ctrl-C ends
+            end_with(this)
             there.send(work())
         except Exception as error:  # whatever it is, the parent says it
             there.send(error if isinstance(error, SnapshotError) else SnapshotError(explain_error(error)))
@@ -65,8 +87,11 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
         found = here.recv()
     except EOFError:
         found = SnapshotError("LAMMPS ended while its packing was looked at; does the deck run on as it stands?")
-    here.close()
-    os.waitpid(child, 0)
+    finally:
+        here.close()
+        with suppress(ProcessLookupError):
+            os.kill(child, signal.SIGKILL)  # it has sent all that it has to say, unless there was an interrupt
+        os.waitpid(child, 0)
     if isinstance(found, SnapshotError):
         raise found
     return found

@@ -63,7 +63,7 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
         raise SnapshotError("relax looks at copies of the process: use one rank and one thread.")
     given = None if commands is None else list(commands)
     start = particles_at_rest(lmp, None if given is None else read_commands(given))
-    look = partial(take_snapshot, lmp, given, {}, slides=False, balance=np.inf)
+    look = partial(take_snapshot, lmp, given, {}, slides=False, balance=np.inf, prove=False)
     found, _ = bring_to_rest(lmp, look, start, balance, steps, RATE, "")
     return found.residual / (force_scale(found) or 1.0)
 

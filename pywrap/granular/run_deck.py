@@ -1,18 +1,58 @@
-"""Run a LAMMPS deck and take its last state as it stands."""
+"""Run a LAMMPS deck and take its last state as it stands.
 
+LAMMPS carries out each command of a deck once. It reads the deck in two parts. Between them, before the first run, its
+fixes and styles are looked at: what cannot be taken, and stays whatever the rest of the deck does, is refused before
+the runs. LAMMPS's log, and the parts, are files without a name, which no end of this program leaves behind.
+"""
+
+import ctypes
 import os
+import re
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryFile
+from typing import IO, Any, NamedTuple
 
 from mpi4py import MPI
 
 from ...analysis import BadInputError, Configuration
 from ..lammps.instance import lammps_instance
-from .deck_trial import try_without_runs
-from .from_lammps import BALANCE
-from .granular_commands import SnapshotError, commands_in, logged_text
-from .instance_queries import explain_error
+from .from_lammps import BALANCE, check_balance, check_instance
+from .granular_commands import NotLinearisedError, SnapshotError, commands_in, logged_text, read_commands
+from .instance_queries import communicator, explain_error, name_of, styles_of
 from .kept_state import take_or_keep
+from .look_in_a_copy import can_copy
+
+MARK = "faultgouge_rest_of_the_deck"
+"""Label of the first line of the second part of a deck."""
+
+RUN = re.compile(r"\s*(run|minimize)\b")
+
+CHANGES = re.compile(
+    r"\b(unfix|clear|pair_style|pair_coeff|include|python|plugin)\b|\bjump\s+(?!SELF\b)"
+    r"|^\s*\$|\b(then|else|every)\b.*[\"']\s*\$",
+    re.MULTILINE,
+)
+"""Commands that change what has been set up, or stand in a variable and may do so."""
+
+CONDITION = re.compile(r"""\b(el)?if\s+("[^"]*"|'[^']*'|\S+)""")
+
+
+class Deck(NamedTuple):
+    """The text of a deck up to its first run, and from there on."""
+
+    head: str
+    rest: str
+
+    @property
+    def ahead(self) -> str:
+        """What LAMMPS may still carry out after the head, with the lines to which a loop goes back."""
+        loop = re.search(r"(?m)^\s*label\b", self.head)
+        return (self.head[loop.start() :] if loop else "") + self.rest
+
+    @property
+    def second_part(self) -> str:
+        """A deck that begins with the rest, and has the labels of the head for the jumps of the rest."""
+        return f"jump SELF {MARK}\n{self.head}label {MARK}\n{self.rest}"
 
 
 def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE, keep: Path | None = None) -> Configuration:
@@ -23,29 +63,82 @@ def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE, keep
     Raises
     ------
     BadInputError
-        If the deck is missing, or what cannot be taken stands in its lines.
+        If the deck is missing, or before its first run has what cannot be taken.
     SnapshotError
         If LAMMPS stops, or the packing cannot be taken.
     """
+    check_balance(balance)
     if not path.is_file():
         raise BadInputError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
-    try_without_runs(path)
-    here = Path.cwd()
-    with TemporaryDirectory(prefix="faultgouge") as folder:
-        world = MPI.COMM_WORLD
-        log = Path(world.bcast(folder, root=0)) / "log.lammps"
-        lmp = lammps_instance(world, log)
-        try:
-            os.chdir(path.parent.resolve())
-            lmp.file(path.name)
-        except Exception as error:  # LAMMPS raises what its bindings choose
-            raise SnapshotError(f"{path}: {explain_error(error)}") from error
-        finally:
-            os.chdir(here)
-        lmp.command("log none")  # which writes it
-        lmp.command("timer timeout unlimited")  # else `run 0` is skipped where fix halt has ended the deck
-        text = world.bcast(logged_text(log, path.parent) if world.rank == 0 else None, root=0)
-        found = take_or_keep(lmp, commands_in(text), keep, slides=slides, balance=balance)
+    text = path.read_bytes().decode(errors="surrogateescape")
+    if re.search(r"(?m)^\s*quit\b", text) and not re.search(r"\bjump\b", text):
+        raise BadInputError(f"{path}: quit ends this program, too, before the packing is taken: leave it out.")
+    with TemporaryFile("w+", errors="replace") as log:
+        lmp = lammps_instance(MPI.COMM_WORLD, Path(name_of(log)))
+        deck = _divide(text)
+        if deck is None:
+            _carry_out(lmp, path, path.name)
+        else:
+            _carry_out_text(lmp, path, deck.head)
+            _refuse_what_stays(lmp, path, _text_of_logs(lmp, log, path), deck.ahead)
+            _carry_out_text(lmp, path, deck.second_part)
+        commands = commands_in(_text_of_logs(lmp, log, path))
+        found = take_or_keep(lmp, commands, keep, slides=slides, balance=balance)
         lmp.close()
-        world.barrier()
     return found
+
+
+def _divide(text: str) -> Deck | None:
+    """The parts of a deck; None if it jumps before its first run, or to its own beginning."""
+    lines = text.splitlines(keepends=True)
+    at, quoted, continued = 0, False, False
+    while at < len(lines) and (quoted or continued or not RUN.match(lines[at])):
+        quoted ^= lines[at].count('"""') % 2 == 1
+        continued = lines[at].rstrip().endswith("&")
+        at += 1
+    head, rest = "".join(lines[:at]), "".join(lines[at:])
+    if re.search(r"\bjump\b", head) or re.search(r"(?m)\bjump\s+(SELF\s*(?:[\"'#]|$)|\S*\$)", rest):
+        return None
+    return Deck(head if head.endswith("\n") else f"{head}\n", rest)
+
+
+def _carry_out_text(lmp: Any, path: Path, text: str) -> None:
+    """Have LAMMPS carry out a part of a deck."""
+    with TemporaryFile("w+", encoding="utf-8", errors="surrogateescape", newline="") as part:
+        part.write(text)
+        part.flush()
+        _carry_out(lmp, path, name_of(part))
+
+
+def _carry_out(lmp: Any, path: Path, name: str) -> None:
+    """Have LAMMPS read a file in the folder of a deck."""
+    here = Path.cwd()
+    try:
+        os.chdir(path.parent.resolve())
+        lmp.file(name)
+    except Exception as error:  # LAMMPS raises what its bindings choose
+        raise SnapshotError(f"{path}: {explain_error(error)}") from error
+    finally:
+        os.chdir(here)
+
+
+def _text_of_logs(lmp: Any, log: IO[str], path: Path) -> str:
+    """What LAMMPS has logged so far, on all ranks."""
+    ctypes.CDLL(None).fflush(None)
+    log.seek(0)
+    return communicator(lmp).bcast(logged_text(log.read(), path.parent), root=0)
+
+
+def _refuse_what_stays(lmp: Any, path: Path, text: str, ahead: str) -> None:
+    """Refuse what an instance cannot be taken with, unless a command ahead may change it."""
+    if CHANGES.search(CONDITION.sub("", ahead)):
+        return
+    try:
+        commands, styles = read_commands(commands_in(text), log=True), styles_of(lmp)
+        again = re.findall(r"\bfix\s+(\S+)\s", ahead)  # a fix takes the place of one with the same ID
+        if not any(name in styles.fixes or "$" in name for name in again):
+            check_instance(lmp, styles, commands)
+    except SnapshotError as error:
+        if isinstance(error, NotLinearisedError) and can_copy(lmp):
+            return  # K by differences of forces
+        raise BadInputError(f"{path}: {error}") from error

@@ -29,6 +29,7 @@ from ...analysis.onset.all_windows import windows_along
 from ...analysis.onset.modes import contact_states
 from ...analysis.onset.search import unit_of
 from ...analysis.progress import Watch, report_progress, show_progress
+from ...analysis.uncertain_digits import with_uncertainty
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
 from ..runs.equilibrium_path import EquilibriumPath, loads
@@ -78,6 +79,9 @@ class DampedOnset:
     def error(self) -> float:
         """Its uncertainty."""
         return self.windows[0].error
+
+    def __str__(self) -> str:
+        return f"F_x^c = {with_uncertainty(self.fx_c, self.error)}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers, for JSON."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from ...analysis.arrays import Floats
+from ...analysis.counted import counted
 from ...analysis.errors import TurningPointError
 from ...analysis.motion.eigenvalues import active_coordinates
 from ...analysis.onset import full_operator, takes_all_modes
@@ -52,8 +53,8 @@ class OnsetRun(TableDisplay):
 
     def __repr__(self) -> str:
         return (
-            f"<OnsetRun: mu = {self.mu:g}, {self.onset.describe()}, {len(self.onset.windows)} windows, "
-            f"{len(self.equilibria)} equilibria up to F_x = {self.equilibria[-1].fx:g}>"
+            f"<OnsetRun: mu = {self.mu:g}, {self.onset.describe()}, {counted(len(self.onset.windows), 'window')}, "
+            f"{counted(len(self.equilibria), 'equilibrium', 'equilibria')} up to F_x = {self.equilibria[-1].fx:g}>"
         )
 
     def _rows(self) -> dict[str, str]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from ...analysis import Packing, largest_damping_rate, largest_frequency, mean_square_displacement, stable_timestep
+from ...analysis import Packing, largest_frequency, mean_square_displacement, stable_timestep
 from ...analysis.arrays import Floats, Indices
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Dynamics, MotionState, Weakening
@@ -22,8 +22,8 @@ from ..scenes.sections import Friction, Perturb
 from ..scenes.validation import SceneError, require_section
 
 ACCURATE_SHARE = 0.05
-"""Time step of undamped runs in units of the stability limit 2/omega_max: the fastest mode is then resolved
-by 60 steps a period, and the dispersion of all others is smaller."""
+"""Time step of undamped runs in units of the stability limit, 2/omega_max without dashpots: the fastest mode is then
+resolved by 60 steps a period, and the dispersion of all others is smaller."""
 
 
 SHORTEST_PART, MOST_PARTS = 10_000, 100
@@ -80,23 +80,23 @@ def time_step(packing: Packing, wanted: float | None = None) -> float:
     packing : Packing
         The equilibrium.
     wanted : float, optional
-        A step of the user's; by default `ACCURATE_SHARE` of the limit. That is 2/omega_max without dashpots; where
-        these damp at a rate of up to gamma, it is the largest dt with gamma dt + (omega_max dt/2)^2 <= 1.
+        A step of the user's; by default `ACCURATE_SHARE` of the limit
+        (:func:`~faultgouge.analysis.stable_timestep`), which is 2/omega_max without dashpots.
 
     Raises
     ------
     SceneError
         If the step wanted is not below the limit: velocity Verlet would blow up.
     """
-    limit = stable_timestep(largest_frequency(packing))
-    damped = largest_damping_rate(packing) * limit
-    limit *= 0.5 * (np.sqrt(damped**2 + 4) - damped)
+    # the frequency of a small packing is right to the last digit
+    limit = float(stable_timestep(packing if packing.law.damped else largest_frequency(packing)))
     if wanted is None:
         return ACCURATE_SHARE * limit
     if wanted >= limit:
+        name = "with these dashpots" if packing.law.damped else "2/omega_max"
         raise SceneError(
-            f"perturb.time_step = {wanted:g} is over the limit 2/omega_max = {limit:.4g} of this packing, above which "
-            f"every run blows up: lower it, to {ACCURATE_SHARE * limit:.2g} for an accurate run"
+            f"perturb.time_step = {wanted:g} is over the limit {name} = {limit:.4g} of this packing, above "
+            f"which every run blows up: lower it, to {ACCURATE_SHARE * limit:.2g} for an accurate run"
         )
     return wanted
 

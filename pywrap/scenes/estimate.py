@@ -172,7 +172,9 @@ def estimate_work(scene: SceneKeys, task: Task) -> Estimate:
             first = _first_load(scene) * scene.load.fy / disks
             increments = min(increments, math.ceil(first / ramp.step))
     if task == "perturb" and perturb is not None:
-        increments = perturb.fx / (ramp.step if ramp is not None else scene.load.fy / 3000)
+        step = ramp.step if ramp is not None else scene.load.fy / 3000
+        fx = perturb.fx if perturb.fx is not None else _first_load(scene) * scene.load.fy / disks
+        increments = fx / step
     if ramp is not None and ramp.method == "overdamped":
         steps += increments * _overdamped_steps(scene)
     else:

@@ -43,9 +43,13 @@ class Scene(SceneKeys):
     @model_validator(mode="after")
     def _consistent(self) -> "Scene":
         perturb, ramp = self.perturb, self.ramp
-        if perturb and ramp and perturb.fx > max(0.0, ramp.first):
+        if perturb and ramp and perturb.fx is not None and perturb.fx > max(0.0, ramp.first):
             says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.first}: ramp further"
             raise refusal_sentence("perturb.fx", says)
+        if perturb and perturb.fx is None and ramp is None:
+            raise refusal_sentence(
+                "perturb.fx", "is missing: give it, or a section [ramp] in which the onset is sought"
+            )
         if perturb and isinstance(perturb.target, tuple):
             disks = self.packing.disks
             beyond = [disk for disk in perturb.target if disk >= disks]

@@ -231,8 +231,8 @@ class Perturb(SignalKeys, Inertia):
 
     Attributes
     ----------
-    fx : float
-        F_x of the equilibrium.
+    fx : float or None
+        F_x of the equilibrium. None: chosen by the onset (:mod:`~faultgouge.pywrap.onset.load_at_onset`).
     target : {"top", "all"} or tuple of int
         The forced disks: the upper layer, all, or those of the list, counted from 0. The paper does not say
         which.
@@ -240,7 +240,7 @@ class Perturb(SignalKeys, Inertia):
         Step of velocity Verlet, time. None: from the largest eigenvalue of K.
     """
 
-    fx: NotNegative
+    fx: NotNegative | None = None
     target: Literal["top", "all"] | tuple[int, ...] = "top"
     time_step: Positive | None = None
 

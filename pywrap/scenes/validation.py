@@ -117,6 +117,18 @@ def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[Section], ..
     return f"{place} = {reprlib.repr(error['input'])} is refused: {rule}"
 
 
+SAME_MEANING = {
+    "friction": "mu",
+    "friction_coefficient": "mu",
+    "stiffness": "kn",
+    "particles": "disks",
+    "grains": "disks",
+    "force": "fy",
+    "pressure": "fy",
+}
+"""Words for a key that are not written like the key."""
+
+
 def _unknown_key(path: list[str], stored: bool, sections: Mapping[str, tuple[type[Section], ...]]) -> str:
     *above, key = path
     homes = [name for name, models in sections.items() if any(key in model.model_fields for model in models)]
@@ -132,6 +144,8 @@ def _unknown_key(path: list[str], stored: bool, sections: Mapping[str, tuple[typ
         return f"{section}.{key} is no key of [{section}]: the nearest is {homes[0]}.{key}"
     keys = [name for model in sections[section] for name in model.model_fields]
     (nearest,) = get_close_matches(key, keys, 1, cutoff=0)
+    if SAME_MEANING.get(key) in keys:
+        nearest = SAME_MEANING[key]
     return f"{section}.{key} is no key of [{section}]: the nearest is {section}.{nearest}"
 
 

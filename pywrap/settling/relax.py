@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...analysis import BadInputError, NoEquilibriumError, Packing, nearest_image
+from ...analysis.counted import counted
 from ...analysis.progress import Watch, show_progress
 from ..equilibria.quasistatic import Equilibrium, equilibrate, idle_disks
 from ..equilibria.rattlers import clear_rattlers
@@ -74,8 +75,8 @@ def _what_moved(before: Packing, found: Equilibrium) -> str:
     return (
         f"brought to rest: the largest force on a disk was {largest_force(before):.3g} and is {found.residual:.2g}; "
         f"{far} of {len(after)} disks moved by more than {MOTION_LIMIT:.0%} of their radius, the farthest by "
-        f"{moved.max():.3g}, all by {np.sqrt(np.mean(moved**2)):.3g} (rms); {len(new - old)} contacts closed and "
-        f"{len(old - new)} opened"
+        f"{moved.max():.3g}, all by {np.sqrt(np.mean(moved**2)):.3g} (rms); "
+        f"{counted(len(new - old), 'contact')} closed and {len(old - new)} opened"
     )
 
 

@@ -1,11 +1,13 @@
-"""Remote triggering in a stressed layer of frictional disks.
+"""Stability of stressed layers of frictional grains: what they do, and why.
 
-``faultgouge.analysis`` computes the stability operator, spectrum, onset and growth of a configuration;
-``faultgouge.pywrap`` drives LAMMPS from a scene to stored configurations; ``faultgouge.studies`` computes and reports
-results; ``faultgouge.assessment`` measures errors, run time and limits.
+What most users need is here, and is imported when it is used. ``faultgouge.analysis`` has the stability operator,
+spectrum, onset and growth of a configuration; ``faultgouge.pywrap`` drives LAMMPS from a scene to stored
+configurations; ``faultgouge.studies`` computes and reports results; ``faultgouge.assessment`` measures errors, run time
+and limits.
 """
 
 import sys
+from importlib import import_module
 from typing import Any
 
 if "IPython" in sys.modules:
@@ -13,15 +15,24 @@ if "IPython" in sys.modules:
 
     show_pictures()
 
+OFFERS = {
+    "Scene": "pywrap", "settle": "pywrap", "ramp": "pywrap", "perturb": "pywrap", "from_lammps": "pywrap",
+    "relax": "pywrap",
+    "onset": "pywrap.onset.first_onset", "stability": "analysis", "spectrum": "analysis", "load": "stored_files",
+}  # fmt: skip
+"""Names of this package, and the modules that have them."""
+
 
 def __getattr__(name: str) -> Any:
-    if name == "relax":
-        from .pywrap import relax
-
-        return relax
+    if name in OFFERS:
+        return getattr(import_module(f"{__name__}.{OFFERS[name]}"), name)
     # the version when it is asked for: importlib.metadata takes as long to import as all that --help needs
     if name == "__version__":
         from importlib.metadata import version
 
         return version("faultgouge")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *OFFERS, "__version__"])

@@ -1,6 +1,7 @@
 """The command ``faultgouge``: :mod:`faultgouge.commands` has its parts, :mod:`faultgouge.exit_status` its errors."""
 
 import os
+import sys
 from typing import NoReturn
 
 from .signal_guard import guarded, raise_interrupt_in
@@ -13,7 +14,18 @@ def main() -> NoReturn:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     if os.name == "nt":
         raise SystemExit("Error: faultgouge does not run on Windows itself: install Linux's wheel in WSL.")
+    _open_streams()
     guarded(_command)
+
+
+def _open_streams() -> None:
+    """Give closed standard streams the null device: the next file to be opened would be taken for one of them."""
+    while (number := os.open(os.devnull, os.O_RDWR)) < 3:
+        pass
+    os.close(number)
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(number, "w" if number else "r"))
 
 
 def _command() -> None:

@@ -10,6 +10,7 @@ ranks.
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 import traceback
@@ -17,6 +18,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from .mpi_rank import is_root, size
+from .signal_guard import has_ended
 
 MEETING = 3.0
 """Seconds within which all ranks come to an error that all of them meet."""
@@ -35,6 +37,7 @@ def fail(error: Exception) -> NoReturn:
     if alone:
         from mpi4py import MPI
 
+        has_ended()
         time.sleep(HEARD)
         MPI.COMM_WORLD.Abort(code)
     sys.exit(code)
@@ -61,6 +64,14 @@ def _print(sentence: str) -> None:
     print(sentence, file=sys.stderr, flush=True)
 
 
+def _is_folder_gone() -> bool:
+    """Whether somebody has deleted the folder in which this process works."""
+    try:
+        return not os.getcwd()
+    except FileNotFoundError:
+        return True
+
+
 def _sentence(error: Exception) -> str:
     show = getattr(error, "format_message", None)
     if show:
@@ -68,9 +79,15 @@ def _sentence(error: Exception) -> str:
     from faultgouge.analysis import FaultgougeError
 
     if isinstance(error, OSError) and error.strerror:
-        return f"{error.filename}: {error.strerror}" if error.filename else f"{error.strerror}"
+        if error.filename:
+            return f"{error.filename}: {error.strerror}"
+        gone = "the folder in which this command was called has been deleted: go to another one"
+        return gone if _is_folder_gone() else error.strerror
     if isinstance(error, FaultgougeError):
         return str(error).strip()
+    if isinstance(error, MemoryError):
+        what = str(error) or "a request was refused"
+        return f"there is not enough memory ({what}): take a smaller packing, or a machine with more memory"
     places = traceback.extract_tb(error.__traceback__)
     where = f"{Path(places[-1].filename).name}:{places[-1].lineno}" if places else "unknown place"
     return f"this should not have happened ({type(error).__name__} at {where}: {error}): please report it"

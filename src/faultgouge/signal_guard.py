@@ -8,7 +8,8 @@ processes. Nothing is lost, because files of results are complete at any moment
 (:mod:`faultgouge.analysis.files.atomic_write`). The guard then prints what is kept, in words that the child has left in
 memory shared by both (`keeps`), and exits with 128 plus the number of the signal: 130, 143 or 129. When the guard ends,
 for any reason, the kernel kills the child. If a library (SIGSEGV, SIGABRT, or SIGKILL for lack of memory) or a limit of
-CPU time (SIGXCPU) ends the child, the guard prints a sentence as well.
+CPU time (SIGXCPU) ends the child, the guard prints a sentence as well; also if a library calls `exit`, as LAMMPS does
+at its command `quit`, with whatever code.
 
 Under mpiexec every rank has its guard. mpiexec passes a signal to all ranks, and kills the other ranks when the work of
 one rank has ended. The guards therefore end `TOGETHER`, and the work after them. Only rank 0 prints.
@@ -43,11 +44,12 @@ if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # `nohup` has a command g
 
 NOTHING = "nothing was written, and the same command starts from the beginning"
 _shared = mmap.mmap(-1, 4096)
-"""Shared by guard and work: what an interrupt leaves, as UTF-8, a place and words that each end with a zero, and
-`CLOSED`."""
+"""Shared by guard and work: what an interrupt leaves, as UTF-8, a place and words that each end with a zero, `CLOSED`
+and `ENDED`."""
 
-CLOSED = 4095
-"""The byte of the shared memory that is not zero once the work has closed its files after a signal."""
+CLOSED, ENDED = 4094, 4095
+"""The bytes of the shared memory that are not zero once the work has closed its files after a signal, and once it has
+come to its end and has said what there is to say."""
 
 
 class Interrupted(BaseException):
@@ -66,7 +68,12 @@ def raise_interrupt_in(error: BaseException) -> None:
 def keeps(words: str, path: str | os.PathLike[str] = "") -> None:
     """Set what is said at an interrupt: what is kept, and how to go on; and the file or folder that must be there."""
     place = os.path.abspath(path) if path else ""
-    _shared[:CLOSED] = f"{place}\0{words}".encode()[: CLOSED - 1].ljust(CLOSED, b"\0")
+    _shared[:CLOSED] = f"{place}\0{words}".encode(errors="surrogateescape")[: CLOSED - 1].ljust(CLOSED, b"\0")
+
+
+def has_ended() -> None:
+    """Tell the guard that the work has come to its end: what exits without this has been ended by a library."""
+    _shared[ENDED] = 1
 
 
 def guarded(work: Callable[[], None]) -> NoReturn:
@@ -103,6 +110,8 @@ def _work(work: Callable[[], None], guard: bool) -> NoReturn:
             parent_death.outlive()
         time.sleep(max(0.0, signalled.args[1] + LAST - time.monotonic()))
         os._exit(128 + signalled.args[0])
+    finally:
+        has_ended()
     sys.exit(0)
 
 
@@ -173,11 +182,18 @@ def _end(status: int, now: float) -> NoReturn:
     if code < 0:
         _say(f"a library has ended the command ({signal.Signals(-code).name}); please report it: {_kept()}")
         os._exit(1)
+    if not _shared[ENDED]:
+        if is_root():
+            _say(
+                "a library has ended the command, as LAMMPS does at quit, which a deck and what it includes are to "
+                f"leave out: {_kept()}"
+            )
+        os._exit(1)
     os._exit(code)
 
 
 def _kept() -> str:
-    place, words, *_ = _shared[:CLOSED].decode(errors="replace").split("\0")
+    place, words, *_ = _shared[:CLOSED].decode(errors="surrogateescape").split("\0")
     if place and not os.path.exists(place):
         return f"{place} is not there, and the same command starts from the beginning"
     return words

@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import NoEquilibriumError
+from ...analysis.counted import counted
 from ...analysis.motion.growth import ABOVE
 from ...pywrap import Scene, SceneError
 from ...pywrap.runs.equilibrium_path import loads
@@ -41,7 +42,7 @@ def _compute(scene: Scene, work: Work) -> Result:
             rows.append(longest=time, **found)
             work.say(
                 f"F_x = {found['fx']:g}: D up to {found['msd']:.2g}, the layer slips by {found['slip']:.2g}, "
-                f"{found['lost']} contacts open; {found['ends']} after t = {found['time']:.4g}"
+                f"{counted(found['lost'], 'contact')} open; {found['ends']} after t = {found['time']:.4g}"
             )
     runs = _runs(rows, settings.load, time)
     if not runs:

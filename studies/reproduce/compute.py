@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...analysis import Growth, Packing, RunFile, Spectrum, fit_growth, solid_fraction, spectrum
+from ...analysis.counted import counted
 from ...analysis.motion.growth import BELOW_TOP, growing_range
 from ...analysis.onset.pair_form import pair_eigenvalues
 from ...analysis.packing.packing import Floats
@@ -79,11 +80,9 @@ def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering
 
     The series go to run.h5.
     """
-    run, fx, mu_ss = (
-        runs[0],
-        require_section(scene.perturb, "perturb").fx,
-        require_section(scene.friction, "friction").mu_ss,
-    )
+    run, mu_ss = runs[0], require_section(scene.friction, "friction").mu_ss
+    fx = require_section(scene.perturb, "perturb").fx
+    assert fx is not None  # the protocol has chosen it
     # exact but for the product's rounding
     weakened = [each for each in runs if np.isclose(each.mu, run.mu * mu_ss, rtol=1e-12)]
     if weakened and weakened[0].onset.windows[0].kind != "start" and fx <= weakened[0].onset.fx_c:
@@ -94,7 +93,7 @@ def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering
     *_, start = reach(scene, fx)  # to the bit the one of `perturb`, and so is v_0
     modes = spectrum(start.packing)
     if not modes.is_stable:
-        what = f"{len(modes.pairs)} complex pairs and {len(modes.negative)} negative eigenvalues"
+        what = f"{counted(len(modes.pairs), 'complex pair')} and {counted(len(modes.negative), 'negative eigenvalue')}"
         return f"At F_x = {fx:g} the packing has {what} already: nothing is stable there to be triggered."
     lower = max(0.0, 2 * weakened[0].onset.fx_c - fx) if weakened else None
     control = None if lower is None else equilibrium_at(scene, run.equilibria, lower)

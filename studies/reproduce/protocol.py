@@ -5,12 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ...analysis import OnsetError
 from ...analysis.files.atomic_write import make_folder, write_json, write_text
-from ...pywrap import Scene
+from ...pywrap import Scene, SceneError
+from ...pywrap.onset.load_at_onset import load_at_onset
 from ...pywrap.onset.undamped import OnsetRun
+from ...pywrap.scenes.validation import require_section
 from ...pywrap.settling.settle import settle_bed
 from ..executors import Say
 from ..study import draw_all
+from ..triggering.compute import Triggering
 from ..triggering.compute import summary as triggering_summary
 from ..triggering.draw import figures as triggering_figures
 from .compute import growth_run, pair_curve, recorded_ramp, summary_of, triggering_run
@@ -53,8 +57,7 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
         if triggered is not None:
             say("the packing to be triggered")
             another = _ramps(triggered, path, say)
-        say(f"triggering at F_x = {shaken.perturb.fx:g}")
-        found = triggering_run(shaken, another or runs, path)
+        found = _trigger(shaken, another or runs, path, say)
         if isinstance(found, str):
             summary["triggering"] = {"says": found}
         else:
@@ -66,6 +69,20 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     write_json(output / "summary.json", summary)
     write_text(output / "report.md", report(scene, runs, growth, found, another))
     return summary
+
+
+def _trigger(scene: Scene, runs: list[OnsetRun], path: Path, say: Say) -> Triggering | str:
+    """The triggering at perturb.fx, or where the onsets say without it; or why there is nothing to trigger."""
+    perturb = require_section(scene.perturb, "perturb")
+    fx = perturb.fx
+    if fx is None:
+        try:
+            fx = load_at_onset(scene, {run.mu: run.onset for run in runs})
+        except (SceneError, OnsetError) as error:
+            return str(error)
+        scene = scene.model_copy(update={"perturb": perturb.model_copy(update={"fx": fx})})
+    say(f"triggering at F_x = {fx:g}")
+    return triggering_run(scene, runs, path)
 
 
 def _ramps(scene: Scene, path: Path, say: Say) -> list[OnsetRun]:

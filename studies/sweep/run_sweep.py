@@ -5,32 +5,42 @@
 Points are distributed to workers (:mod:`.workers`), each with one thread. The table does not depend on the number of
 workers, on shards, or on interruptions.
 
-A folder contains sweep.json (the request), results.jsonl and results.csv. Points of this sweep with a line in
-results.jsonl are not computed again. A last line that a kill has truncated is computed again.
+A folder contains sweep.json (the request, with the version of the program and the keys of the points), results.jsonl
+and results.csv. Points of this sweep with a line in results.jsonl are not computed again, but for points that failed
+for a reason that may have passed (:data:`.workers.FINAL`). A last line that a kill has truncated is computed again. Of
+several rows of a point a good one counts. No line is ever taken out: rows of other scenes, of other code or of another
+version stay in results.jsonl, and are not in the table.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
 
-from ...analysis.files.atomic_write import lock_output, make_folder, write_json, write_text
+from ...analysis import FaultgougeError
+from ...analysis.files.atomic_write import lock_output, make_folder, write_json
 from ...analysis.files.plain_file import read_plain_text
 from ...pywrap import SceneError
 from .. import result_rows
 from ..executors import Progress, Say, open_executor
-from .sweep_plan import Sweep, shard
+from .sweep_plan import Sweep, SweepPoint, shard
 from .table import Row, write_tables
-from .tasks import TASKS
 from .workers import compute_points
 
 LINES, ASKED = "results.jsonl", "sweep.json"
+
+
+class FailedSweepError(FaultgougeError):
+    """Every scene of a sweep has failed; rank 0 alone has the rows, and knows."""
+
+    one_rank = True
 
 
 def run_sweep(
@@ -81,11 +91,13 @@ def run_sweep(
             return []
         make_folder(output)
         with lock_output(output):
-            write_json(output / ASKED, sweep.as_dict() | {"shard": list(part)})
             known = read_results(output / LINES)
-            missing = [point for point in points if point.key not in known]
+            missing = missing_points(points, known)
+            _write_request(sweep, output, part)
             if len(missing) < len(points):
                 say(f"{len(points) - len(missing)} of {len(points)} points are in {output / LINES} already")
+            if others := known.keys() - {point.key for point in sweep.points}:
+                say(f"{len(others)} rows there are of other scenes, code or versions, and are not in the table")
             with closing(compute_points(pool, sweep.located_task, missing)) as ended:
                 for row in progress(result_rows.keep_rows(output / LINES, ended), len(missing)):
                     known[row["key"]] = row
@@ -94,20 +106,68 @@ def run_sweep(
     return table
 
 
-def read_results(path: Path) -> dict[str, Row]:
-    """The rows of results.jsonl by key."""
-    return {row["key"]: row for row in result_rows.read_keyed_rows(path, "key", "a sweep")}
+def _write_request(sweep: Sweep, output: Path, part: tuple[int, int]) -> None:
+    """Write sweep.json; its keys recognise the rows wherever the files of the scenes and of the task are."""
+    keys = [point.key for point in sweep.points]
+    request = sweep.as_dict() | {"version": version("faultgouge"), "keys": keys, "shard": list(part)}
+    write_json(output / ASKED, request)
+
+
+def missing_points(points: Iterable[SweepPoint], known: dict[str, Row]) -> list[SweepPoint]:
+    """The points to compute: those without a row, and those whose failure may have passed."""
+
+    def is_known(point: SweepPoint) -> bool:
+        row = known.get(point.key)
+        return row is not None and (row["says"] is None or row["final"])
+
+    return [point for point in points if not is_known(point)]
+
+
+def require_result(rows: Sequence[Row]) -> None:
+    """Raise FailedSweepError if there are rows, and each of them is that of a failure."""
+    if rows and all(row["says"] is not None for row in rows):
+        raise FailedSweepError(f"none of the {len(rows)} scenes has a result; the first says: {rows[0]['says']}")
+
+
+def read_results(*paths: Path) -> dict[str, Row]:
+    """The rows of one results.jsonl, or of several, by key: of several rows a good one, else the last.
+
+    Raises
+    ------
+    SceneError
+        If a line is no row, or two good rows of a key have different results.
+    """
+    rows: dict[str, Row] = {}
+    places: dict[str, Path] = {}
+    for path in paths:
+        for row in result_rows.read_keyed_rows(path, "key", "a sweep"):
+            key = row["key"]
+            if key in rows and rows[key]["says"] is None:
+                if row["says"] is None and _as_text(row["result"]) != _as_text(rows[key]["result"]):
+                    values = ", ".join(f"{name} = {value}" for name, value in row["values"].items())
+                    raise SceneError(
+                        f"{places[key]} and {path} have different results of one scene ({values}; key {key}): take the "
+                        "line of the wrong one out"
+                    )
+                continue
+            rows[key], places[key] = row, path
+    return rows
+
+
+def _as_text(value: dict[str, Any] | None) -> str:
+    """A row, or its result, as text, in which nan equals nan."""
+    return json.dumps(value, sort_keys=True)
 
 
 def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep, list[Row]]:
-    """Merge the folders of shards into one.
+    """Merge the folders of shards into one. The shards may still be running; their files are only read.
 
     Parameters
     ----------
     parts : sequence of Path
         Folders written by `sweep`.
     output : Path
-        The folder, made if need be.
+        The folder, made if need be. The rows that it has are kept: it is new, or of the same sweep.
     say : callable
         Takes a line of words.
 
@@ -120,33 +180,59 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
     Raises
     ------
     SceneError
-        If the parts do not belong together, or are not parts of a sweep.
+        If the parts, and what the folder has, do not belong together, or are not parts of a sweep.
     """
-    for part in parts:
-        if not (part / ASKED).is_file():
-            raise SceneError(
-                f"{part} is no folder of a sweep (it has no {ASKED}): give folders that `faultgouge sweep` has left"
-            )
-    asked = [_read(part / ASKED) for part in parts]
-    for part, each in zip(parts, asked, strict=True):
-        each.pop("shard", None)
-        if each != asked[0]:
-            raise SceneError(f"{part} is of another sweep than {parts[0]}: merge parts of one sweep")
-    code = asked[0].pop("code", "")
-    sweep = Sweep.from_mapping(asked[0], TASKS, name=str(parts[0] / ASKED), code=code)
-    known: dict[str, Row] = {}
-    for part in parts:
-        known |= read_results(part / LINES)
-    table = [known[point.key] for point in sweep.points if point.key in known]
+    request = _common_request(parts)
     make_folder(output)
     with lock_output(output):
-        write_json(output / ASKED, sweep.as_dict() | {"shard": [1, 1]})
-        write_text(output / LINES, "".join(json.dumps(row) + "\n" for row in table))
+        if (output / ASKED).exists() or (output / LINES).exists():
+            _common_request([*parts, output])
+        kept = read_results(output / LINES)
+        known = read_results(output / LINES, *(part / LINES for part in parts))
+        table = [known[key] for key in request["keys"] if key in known]
+        write_json(output / ASKED, request | {"shard": [1, 1]})
+        for row in table:
+            if _as_text(kept.get(row["key"])) != _as_text(row):
+                result_rows.append_row(output / LINES, row)
+        sweep = Sweep(request["task"], request["sweep"], request["scene"])
         write_tables(table, sweep.names, output)
-    say(f"{len(table)} of {len(sweep.points)} scenes from {len(parts)} folders; written: {output}/results.csv")
-    if len(table) < len(sweep.points):
-        say(f"the other {len(sweep.points) - len(table)} are in none of them: `faultgouge sweep` goes on from here")
+    count = len(request["keys"])
+    say(f"{len(table)} of {count} scenes from {len(parts)} folders; written: {output}/results.csv")
+    if len(table) < count:
+        say(f"the other {count - len(table)} are in none of them: `faultgouge sweep` goes on from here")
     return sweep, table
+
+
+def _common_request(folders: Sequence[Path]) -> dict[str, Any]:
+    """What the folders of a sweep ask for, whichever shard each has; SceneError if it is not the same."""
+    asked = [_read_request(folder) for folder in folders]
+    for folder, each in zip(folders, asked, strict=True):
+        if each["version"] != asked[0]["version"]:
+            raise SceneError(
+                f"{folder} is of version {each['version']}, and {folders[0]} of {asked[0]['version']}: run the same "
+                "sweep there again with one version"
+            )
+        if (each["task"], each["sweep"], each["keys"]) != tuple(asked[0][name] for name in ("task", "sweep", "keys")):
+            raise SceneError(
+                f"{folder} is of another sweep than {folders[0]}, of other scenes or other code: merge parts of one "
+                "sweep, into a new folder or one of this sweep"
+            )
+    return asked[0]
+
+
+def _read_request(folder: Path) -> dict[str, Any]:
+    """What sweep.json says."""
+    if not (folder / ASKED).is_file():
+        raise SceneError(
+            f"{folder} is no folder of a sweep (it has no {ASKED}): give folders that `faultgouge sweep` has left"
+        )
+    request = _read(folder / ASKED)
+    if not {"task", "sweep", "scene", "version", "keys"} <= request.keys():
+        raise SceneError(
+            f"{folder} is of version 1.0.0 or before, whose rows this version does not know: merge it with the version "
+            "that wrote it, or run the same sweep again"
+        )
+    return request
 
 
 def _read(path: Path) -> dict[str, Any]:

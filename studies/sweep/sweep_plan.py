@@ -10,17 +10,20 @@
     ...
 
 The points are the product of the lists, the last key varying fastest. Each point is a separate scene. Its key is a hash
-of the task and of the resolved scene, so that a result can be recognised in any sweep.
+of the task with its code, of the version of the program, and of the resolved scene with the contents of the files that
+it names, so that a result can be recognised in any sweep, and no other result is taken for it.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+from importlib.metadata import version
 from itertools import product
 from math import prod
 from pathlib import Path
@@ -29,6 +32,9 @@ from typing import Any
 from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.validation import read_toml
 from .user_function import is_user_function, locate, user_function
+
+FILES = (("packing", "file"), ("perturb", "signal"))
+"""Keys of a scene that name a file, of which a resolved scene has the path from the root."""
 
 MOST_POINTS = 1_000_000
 """Points of a sweep at the most: more is a slip of the pen."""
@@ -49,7 +55,7 @@ class SweepPoint:
     says : str or None
         Why not.
     key : str
-        Sixteen hexadecimal digits that stand for task and scene.
+        Sixteen hexadecimal digits that stand for task, version and scene.
     """
 
     number: int
@@ -63,7 +69,7 @@ class SweepPoint:
         """What decides how the packing settles; points of one settling share the settled packing."""
         if self.scene is None:
             return self.key
-        resolved = self.scene.resolved()
+        resolved = with_contents(self.scene)
         for section in ("ramp", "friction", "output"):
             resolved.pop(section, None)
         resolved["perturb"] = self.scene.inertia_factor
@@ -87,7 +93,7 @@ class Sweep:
     code : str
         For a function of the user, sixteen hexadecimal digits that identify its code; else empty.
     folder : Path
-        Folder to which the file name of such a function refers.
+        Folder to which the file name of such a function, and those in scenes, refer.
     """
 
     task: str
@@ -109,19 +115,17 @@ class Sweep:
         tasks: Mapping[str, object],
         folder: Path = Path(),
         name: str = "sweep",
-        code: str = "",
     ) -> Sweep:
         """Make a sweep from what a TOML file would hold; SceneError if it describes none.
 
-        A relative packing.file, and the file of a function, count from `folder`. A function whose `code` is given is
-        not looked for.
+        Relative names of files count from `folder`.
         """
         unknown = sorted(mapping.keys() - {"task", "sweep", "scene"})
         if unknown:
             raise SceneError(f"{name}: {unknown[0]} is no key of a sweep: it has task, [sweep] and [scene.SECTION].")
-        task = mapping.get("task")
+        task, code = mapping.get("task"), ""
         if isinstance(task, str) and is_user_function(task):
-            code = code or user_function(locate(task, folder)).code
+            code = user_function(locate(task, folder)).code
         elif task not in tasks:
             raise SceneError(
                 f"{name}: task = {task!r} is refused: give one of {', '.join(sorted(tasks))}, or a function of "
@@ -134,10 +138,7 @@ class Sweep:
         count = prod(map(len, axes.values()))
         if count > MOST_POINTS:
             raise SceneError(f"{name}: {count} scenes are more than {MOST_POINTS}: make several sweeps of it.")
-        scene = {part: _absolute(part, values, folder) for part, values in mapping.get("scene", {}).items()}
-        for key in axes.keys() & {"packing.file"}:
-            axes[key] = [str((folder / str(each)).resolve()) for each in axes[key]]
-        sweep = cls(str(task), axes, scene, code, folder)
+        sweep = cls(str(task), axes, dict(mapping.get("scene", {})), code, folder)
         says = [point.says for point in sweep.points]
         if all(each is not None for each in says):  # what is wrong with every scene is refused before any work is done
             raise SceneError(f"{name}: no point of the sweep is a scene that can be run: {says[0]}")
@@ -168,21 +169,22 @@ class Sweep:
             section, _, key = name.rpartition(".")
             (mapping.setdefault(section, {}) if section else mapping)[key] = value
         try:
-            scene = Scene.from_mapping(mapping, command=self.task)
+            scene = Scene.from_mapping(mapping, self.folder, command=self.task)
         except SceneError as error:
             return SweepPoint(
-                number, values, None, str(error).removeprefix("scene: "), digest([self._known_as, mapping])
+                number, values, None, str(error).removeprefix("scene: "), digest([*self._known_as, mapping])
             )
-        return SweepPoint(number, values, scene, None, digest([self._known_as, scene.resolved()]))
+        return SweepPoint(number, values, scene, None, digest([*self._known_as, with_contents(scene)]))
 
-    @property
-    def _known_as(self) -> str:
-        """What stands for the task in the keys of rows: of a function its name and its code, wherever its file is."""
-        return f"{self.task.rpartition(':')[2]} {self.code}" if self.code else self.task
+    @cached_property
+    def _known_as(self) -> tuple[str, str]:
+        """What stands for task and program in the keys of rows: of a function name and code, wherever its file is."""
+        task = f"{self.task.rpartition(':')[2]} {self.code}" if self.code else self.task
+        return task, version("faultgouge")
 
     def as_dict(self) -> dict[str, Any]:
         """The sweep as JSON holds it."""
-        return {"task": self.task, "sweep": self.axes, "scene": self.scene} | ({"code": self.code} if self.code else {})
+        return {"task": self.task, "sweep": self.axes, "scene": self.scene}
 
 
 def shard(points: tuple[SweepPoint, ...], part: tuple[int, int]) -> tuple[SweepPoint, ...]:
@@ -194,16 +196,26 @@ def shard(points: tuple[SweepPoint, ...], part: tuple[int, int]) -> tuple[SweepP
     return tuple(point for point in points if order[point.settling_key] % of == mine - 1)
 
 
+def with_contents(scene: Scene) -> dict[str, Any]:
+    """A resolved scene with the digests of its files in place of their names, which any other file could have."""
+    resolved = scene.resolved()
+    for section, key in FILES:
+        name = resolved.get(section, {}).get(key)
+        if isinstance(name, str) and os.path.isabs(name):
+            about = os.stat(name)
+            resolved[section][key] = _file_digest(name, about.st_ino, about.st_size, about.st_mtime_ns)
+    return resolved
+
+
+@cache
+def _file_digest(name: str, *_about: int) -> str:
+    """The digest of a file, read once until something about the file changes."""
+    return hashlib.sha256(Path(name).read_bytes()).hexdigest()[:16]
+
+
 def digest(value: Any) -> str:
     """Sixteen hexadecimal digits that stand for a value."""
     return hashlib.sha256(json.dumps(value, sort_keys=True, default=str).encode()).hexdigest()[:16]
-
-
-def _absolute(part: str, values: Any, folder: Path) -> Any:
-    """A section of a scene with the path of a stored packing made absolute."""
-    if part != "packing" or not isinstance(values, Mapping) or not isinstance(values.get("file"), str):
-        return dict(values) if isinstance(values, Mapping) else values
-    return dict(values) | {"file": str((folder / values["file"]).resolve())}
 
 
 def _split_keys(key: str) -> list[str]:

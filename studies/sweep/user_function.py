@@ -8,20 +8,18 @@ The function takes a scene and returns one row, a dict of numbers, words, lists 
 With a second parameter the function also receives the packing settled with the scene's first friction coefficient, an
 :class:`~faultgouge.pywrap.Equilibrium`. Scenes that settle to the same packing share it.
 
-A row is identified by the scene and by the code of the function's file. After a change of the code, the sweep computes
-its rows again; comments, docstrings and the layout of the file do not count as code.
+A row is identified by the scene and by the code of the function: its file, and the modules in the folder of this file
+that it imports, or that these import. Of "package.module:function" these are the modules of the package. After a change
+of the code, the sweep computes its rows again; comments, docstrings and the layout of a file do not count as code.
 """
 
 from __future__ import annotations
 
-import ast
-import hashlib
 import importlib.util
 import inspect
 import json
 import re
 import sys
-import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -30,8 +28,10 @@ from types import ModuleType
 from typing import Any
 
 from ...analysis import FaultgougeError
+from ...analysis.errors import place_in_user_code
 from ...pywrap import Scene, SceneError
 from ..packing_tools import Start
+from .imported_code import code_digest
 
 
 class UserFunctionError(FaultgougeError):
@@ -51,7 +51,7 @@ class UserFunction:
     takes_settled : bool
         Whether it has a second parameter.
     code : str
-        Sixteen hexadecimal digits that stand for the code of its file.
+        Sixteen hexadecimal digits that stand for the code of its file and of what that imports of its own.
     """
 
     name: str
@@ -66,11 +66,9 @@ class UserFunction:
             row = self.function(*given)
         except FaultgougeError:
             raise
-        except Exception as error:  # whatever it is, the other scenes are computed
-            line = traceback.extract_tb(error.__traceback__)[-1]
+        except (Exception, SystemExit) as error:  # whatever it is, the other scenes are computed
             raise UserFunctionError(
-                f"{self.function.__name__} failed with {type(error).__name__}: {error} ({Path(line.filename).name}, "
-                f"line {line.lineno})"
+                f"{self.function.__name__} failed with {type(error).__name__}: {error}{place_in_user_code(error)}"
             ) from error
         return _as_row(row, self.function.__name__)
 
@@ -105,16 +103,16 @@ def user_function(name: str) -> UserFunction:
         raise SceneError(
             f'task = "{name}": {wanted} takes {count} arguments: a task is {wanted}(scene) or {wanted}(scene, settled)'
         )
-    return UserFunction(name, function, count == 2, code_digest(Path(str(module.__file__))))
+    return UserFunction(name, function, count == 2, code_digest(*_own_modules(module, place)))
 
 
-def code_digest(file: Path) -> str:
-    """Sixteen hexadecimal digits that stand for the code of a file, without comments, docstrings and layout."""
-    tree = ast.parse(file.read_bytes())
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
-            node.body[0] = ast.Pass()
-    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()[:16]
+def _own_modules(module: ModuleType, place: str) -> tuple[Path, Path, str | None]:
+    """The file of a task, the folder in which its own modules are, and their package; None for all of the folder."""
+    file = Path(str(module.__file__))
+    if place.endswith(".py"):
+        return file, file.parent, None
+    above = len(place.split(".")) - (file.name != "__init__.py")
+    return file, file.parents[above], place.partition(".")[0]
 
 
 def _module(place: str, name: str) -> ModuleType:
@@ -139,7 +137,7 @@ def _module(place: str, name: str) -> ModuleType:
             sys.path.remove(str(path.parent))
     except SceneError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise SceneError(f'task = "{name}": {place} cannot be imported ({type(error).__name__}: {error})') from None
     return module
 

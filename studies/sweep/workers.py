@@ -20,8 +20,8 @@ from mpi4py import MPI
 from scipy.sparse.linalg import ArpackError
 from threadpoolctl import threadpool_limits
 
-from ...analysis import FaultgougeError, Packing
-from ...pywrap import Equilibrium, Scene, settle
+from ...analysis import FaultgougeError, NoEquilibriumError, Packing
+from ...pywrap import Equilibrium, Scene, SceneError, settle
 from ...pywrap.settling.settle import settle_bed
 from ..executors import Processes
 from ..packing_tools import Start
@@ -32,6 +32,10 @@ from .user_function import UserFunctionError
 
 TRIES = 3
 """Deaths of workers, without a point that ends in between, after which a point and not an accident is to blame."""
+
+FINAL = (NoEquilibriumError, SceneError)
+"""Errors that the same scene has again, to the bit: it has no equilibrium, or it is refused. Others may have passed, as
+a lack of memory or a full disk does, and a sweep that goes on tries such scenes again."""
 
 FAILURES = (FaultgougeError, ValueError, ArithmeticError, ArpackError, MemoryError)
 """Errors of a single scene: those of the package, of LAPACK, of ARPACK, and of a packing that is too large."""
@@ -117,7 +121,7 @@ class _Shared:
 def compute_point(task: str, point: SweepPoint, bed: Packing | None, keep: bool) -> tuple[Row, Packing | None]:
     """One point: its row, and if it is to be kept the packing as it settled.
 
-    What goes wrong with a point is in its row under "says".
+    What goes wrong with a point is in its row under "says"; "final" says whether that is an answer to the scene.
     """
     begin = time.perf_counter(), time.process_time()
     beds = [] if bed is None else [bed]
@@ -127,16 +131,17 @@ def compute_point(task: str, point: SweepPoint, bed: Packing | None, keep: bool)
         "values": point.values,
         "result": {},
         "says": point.says,
+        "final": True,
     }
     if point.scene is not None:
         with threadpool_limits(1):
             try:
                 row["result"] = task_of(task).run(point.scene, _starter(point.scene, beds))
                 row["says"] = row["result"].pop("says", None)
-            except UserFunctionError as error:
-                row["says"] = f"scene {point.number}: {error}"
             except FAILURES as error:
-                row["says"] = str(error) or type(error).__name__
+                says = str(error) or type(error).__name__
+                row["says"] = f"scene {point.number}: {says}" if isinstance(error, UserFunctionError) else says
+                row["final"] = isinstance(error, FINAL)
     row["seconds"] = round(time.perf_counter() - begin[0], 3)
     row["cpu_seconds"] = round(time.process_time() - begin[1], 3)
     return row, (beds[0] if keep and beds else bed if keep else None)

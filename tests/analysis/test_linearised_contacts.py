@@ -6,13 +6,17 @@ from packing_snapshot import snapshot_of
 from scipy.linalg import expm
 
 from faultgouge.analysis import (
+    BadInputError,
     Configuration,
     LinearisedContacts,
     damping_matrix,
     eigenvalues,
     find_onset,
+    largest_damping_rate,
+    layer_force,
     linear_response,
     normal_modes,
+    solid_fraction,
     spectrum,
     stable_timestep,
     stiffness_matrix,
@@ -249,6 +253,24 @@ def test_the_analysis_takes_a_snapshot_as_a_packing(bed):
     assert stable_timestep(bed, 4 * stiffness_matrix(bed), 2 * damping_matrix(bed)) == pytest.approx(step / 2, rel=1e-7)
 
 
+def test_numbers_of_a_layer_are_right_of_a_configuration_or_refused(bed):
+    """The largest rate of dashpots and the volume fraction of a periodic box; no force on a layer that is not there."""
+    rates = np.linalg.eigvals(damping_matrix(bed).toarray() / bed.coordinate_mass[:, None])
+    assert largest_damping_rate(bed) == pytest.approx(rates.real.max(), rel=1e-9)
+    none = derive_frozen(bed.contacts, normal_dashpot=np.zeros(15 + 2), tangential_dashpot=np.zeros(15 + 2))
+    assert largest_damping_rate(derive_frozen(bed, contacts=none)) == 0
+    d = bed.dimension
+    box = np.diag([9.0, 8.0, 7.0])
+    box[1, 0] = 2.0  # sheared
+    closed = derive_frozen(bed, box=box, periodic=np.ones(3, dtype=bool))
+    volume = np.pi * np.sum(bed.radius**2) / 72 if d == 2 else 4 / 3 * np.pi * np.sum(bed.radius**3) / 504
+    assert solid_fraction(closed) == pytest.approx(volume, rel=1e-14)
+    with pytest.raises(BadInputError, match="this one is open along y"):
+        solid_fraction(derive_frozen(closed, periodic=np.array([True, False, True])))
+    with pytest.raises(BadInputError, match="acts on an upper layer, and this packing has none"):
+        layer_force(bed, 1.0)
+
+
 def test_rescaling_is_half_of_the_difference_of_both_derivatives(bed):
     """dF = -K dq + B |N dq|: with K of the mean, B N is what K while all contacts close lacks, and N is d delta."""
     c = bed.contacts
@@ -313,3 +335,54 @@ def test_contacts_that_are_none(change):
     values = {name: getattr(make(3).contacts, name) for name in PER_CONTACT}
     with pytest.raises(ValueError, match=r"shape|finite|integers"):
         LinearisedContacts(**values | change)
+
+
+def one_contact(**change):
+    """A configuration of two disks, or spheres, with one contact, but for some values."""
+    contacts = {
+        "i": [0], "j": [1], "normal": [[0, 1, 0]], "distance": [0.99], "overlap": [0.01], "slip_arm": [[0.5, 0.5]],
+        "lever_arm": [[0.5, 0.5]], "lever_slope": [0], "normal_force": [1], "tangential_force": [[0.1, 0, 0]],
+        "normal_stiffness": [100], "tangential_stiffness": [30], "closing": [[0, 0, 0]], "parting": [[0, 0, 0]],
+        "friction": [0.5], "sliding": [False], "normal_dashpot": [0], "tangential_dashpot": [0],
+    }  # fmt: skip
+    d = change.get("dimension", 2)
+    particles = {
+        "dimension": d, "position": np.zeros((2, d)), "radius": [0.5, 0.5], "mass": [1, 1], "inertia": [0.1, 0.1],
+        "box": np.eye(3), "origin": np.zeros(3), "periodic": [False] * 3, "load": np.zeros((2, 2, 3)),
+    }  # fmt: skip
+    made = LinearisedContacts(**contacts | {name: value for name, value in change.items() if name in contacts})
+    return Configuration(contacts=made, **particles | {n: each for n, each in change.items() if n not in contacts})
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"normal": [[0, 2, 0]]}, r"Contact 0: the normal .* is no unit vector"),
+        ({"normal": [[0, 0, 0]]}, r"no unit vector"),
+        ({"normal": [[0, 0.8, 0.6]]}, r"normal .* of disks is not in the plane"),
+        ({"tangential_force": [[0.1, 0, 0.1]]}, r"tangential force .* on a disk is not in the plane"),
+        ({"tangential_force": [[0, 0.1, 0]]}, r"has a part along the normal"),
+        ({"distance": [-1]}, r"the distance -1.0 is not positive"),
+        ({"slip_arm": [[0.5, -0.5]]}, r"slip_arm = .* is negative"),
+        ({"lever_arm": [[-0.5, 0.5]]}, r"lever_arm = .* is negative"),
+        ({"friction": [-0.5]}, r"friction = -0.5 is negative"),
+        ({"friction": [0.5 + 1j]}, r"friction holds complex values"),
+        ({"i": [-3]}, r"i = -3 is no particle"),
+        ({"j": [-2]}, r"j = -2 is no particle; -1 is a wall"),
+        ({"mass": [1 + 1j, 1]}, r"mass holds complex values"),
+        ({"mass": np.ma.masked_array([1.0, 1.0], [True, False])}, r"mass holds masked values"),
+        ({"ids": [7, 7]}, r"Two particles have the ID 7"),
+        ({"kind": [1]}, r"ids and kind must be lists of 2 integers"),
+    ],
+)
+def test_values_that_no_packing_has(change, says):
+    with pytest.raises(ValueError, match=says) as refusal:
+        one_contact(**change)
+    assert "\n" not in str(refusal.value)
+
+
+def test_values_that_packings_have():
+    """A tilted normal of spheres, a masked array without masks, and infinite bounds and distances."""
+    assert len(one_contact().contacts) == 1
+    one_contact(dimension=3, normal=[[0, 0.8, 0.6]], distance=[np.inf], friction=[np.inf])
+    one_contact(mass=np.ma.masked_array([1.0, 1.0], [False, False]), j=[-1])

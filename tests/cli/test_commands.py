@@ -297,6 +297,25 @@ def test_a_bed_is_settled_once_for_all_friction_coefficients(faultgouge_here, tm
     assert len(list(tmp_path.glob("True.*.disks"))) == 5
 
 
+@pytest.mark.parametrize(
+    ("disks", "more", "says", "damping"),
+    [
+        (301, (), "--all finds all windows of up to 300 disks, and the packing has 301: leave --all out", {}),
+        (301, (), "--all finds all windows of up to 300 disks, and", {"damping": {"cn": 1.0}}),
+        (30, ("--modes", "0:20"), "--all goes without --modes", {}),
+    ],
+)
+def test_all_windows_are_refused_where_the_first_alone_would_come(
+    faultgouge_here, tmp_path, disks, more, says, damping
+):
+    """Before any work: no file, and no packing that settles."""
+    scene = SMALL | {"packing": {"disks": disks, "width": 8.0}} | damping
+    (tmp_path / "scene.toml").write_text(toml(scene))
+    done = faultgouge_here("onset", "scene.toml", "--all", *more, "-o", "onset.json", code=2)
+    assert done.stderr.startswith(f"Error: {says}")  # not after what the work would take
+    assert not (tmp_path / "onset.json").exists()
+
+
 @pytest.mark.slow
 def test_onset_names_the_friction_coefficients_without_one(faultgouge_here, tmp_path):
     """Those that follow are searched, too; a scene of which none has an onset ends with the exit code 1."""
@@ -347,6 +366,17 @@ def test_onset_with_dissipation_as_json(faultgouge_here, tmp_path):
 
 
 @pytest.mark.slow
+def test_a_lack_of_memory_is_no_fault_of_the_program(capsys):
+    from faultgouge.exit_status import fail
+
+    with pytest.raises(MemoryError) as lack:
+        np.empty(1 << 55)
+    with pytest.raises(SystemExit) as end:
+        fail(lack.value)
+    assert end.value.code == 1
+    assert "Error: there is not enough memory (Unable to allocate 256. PiB for an array" in capsys.readouterr().err
+
+
 def test_every_command_has_help_with_an_example(faultgouge, faultgouge_here):
     commands = ["settle", "ramp", "perturb", "onset", "spectrum", "explain", "report", "stability", "reproduce"]
     commands += ["import", "export", "movie", "view", "sweep", "modes", "eruptions"]

@@ -1,11 +1,16 @@
 """faultgouge import DECK.in, and what takes the file that it leaves."""
 
 import json
+import os
 import re
+import subprocess
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from reference_layer import BIN
+
+from faultgouge.analysis.files.snapshot_file import read_snapshot
 
 DECK = """
 units lj
@@ -38,7 +43,6 @@ ROUND = {"d": 3, "z": "f", "box": "-2 2 0 4", "a": "0 0.5", "b": "0 1.3", "plane
 @pytest.mark.parametrize("shape", [FLAT, ROUND], ids=["disks", "spheres"])
 def test_deck(faultgouge_here, tmp_path, shape):
     from faultgouge.analysis import eigenvalues
-    from faultgouge.analysis.files.snapshot_file import read_snapshot
 
     folder = tmp_path / "own"
     folder.mkdir()
@@ -223,7 +227,7 @@ run 6000"""
 
 
 def test_deck_with_a_loop(faultgouge_here, tmp_path):
-    """LAMMPS goes through the loop without its runs."""
+    """What the loop sets up before its first run stays, unless a line of the loop says otherwise."""
     deck = DECK.format(**FLAT, word="contacts")
     fine = deck.replace("run 6000", LOOP).replace("boundary f f", "boundary p f")
     (tmp_path / "fine.in").write_text(fine)
@@ -255,9 +259,8 @@ def test_comments_with_variables(faultgouge_here, tmp_path):
 
 @pytest.mark.ranks
 def test_deck_without_commands_on_two_ranks(faultgouge, tmp_path):
-    """It is refused after its run: several ranks have no trial."""
     (tmp_path / "mute.in").write_text("log none\n" + DECK.format(**FLAT, word="contacts"))
-    assert "No pair_style is in the log" in faultgouge("import", "mute.in", ranks=2, code=1).stderr
+    assert "No pair_style is in the log" in faultgouge("import", "mute.in", ranks=2, code=2).stderr
 
 
 def test_deck_with_logs_of_its_own(faultgouge_here, tmp_path):
@@ -283,6 +286,139 @@ def test_decks_that_leave_no_commands(faultgouge_here, tmp_path, before, after, 
     assert says in faultgouge_here("import", "mute.in", code=2).stderr
 
 
+ONCE = """
+shell mkdir -p {out}
+shell echo begun >> {out}/begun
+variable before file count
+variable now equal ${{before}}+1
+print "${{now}}" file count screen no
+if "$(is_file({out}/state.restart)) == 1" then "jump SELF again"
+"""
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_each_command_is_carried_out_once(faultgouge_here, tmp_path, again):
+    """A file that counts, one outside of the folder, a restart that the deck reads if there is one, and a copy."""
+    folder, out = tmp_path / "own", tmp_path / "out"
+    folder.mkdir()
+    (folder / "count").write_text("7\n")
+    (folder / "precious.data").write_text("made by hand\n")
+    deck = DECK.format(**FLAT, word="contacts")
+    made, law = deck[: deck.index("variable kn")], deck[deck.index("variable kn") :]
+    keeps = f"shell cp precious.data old.data\nwrite_data precious.data\nrestart 6000 {out}/state.restart"
+    law = law.replace("run 6000", f"{keeps} {out}/state.restart\nrun 6000")
+    once = ONCE.format(out=out) if again else ONCE.format(out=out).rpartition("if")[0]
+    reads = f"jump SELF ready\nlabel again\nread_restart {out}/state.restart\nlabel ready\n" if again else ""
+    (folder / "pile.in").write_text(once + made + reads + law)
+    for time in range(1 + again):
+        done = faultgouge_here("import", "own/pile.in", "-o", f"pile{time}.h5")
+        assert "3 disks, 0 contacts between them and 3 with walls" in done.stdout
+        assert (folder / "count").read_text() == f"{8 + time}\n"
+        assert (out / "begun").read_text() == "begun\n" * (1 + time)
+        if time == 0:
+            assert (folder / "old.data").read_text() == "made by hand\n"
+
+
+EARLY = {
+    "if": 'if "1 > 0" then "quit 3"',
+    "include": "include end.inc",
+    "variable": "variable end string quit\n${end}",
+    "every": 'run 10 every 5 "quit 0"',
+    "error": "read_restart none.restart",
+    "jump": "jump SELF nowhere",
+}
+
+
+@pytest.mark.ranks
+@pytest.mark.parametrize("ranks", [None, 2])
+@pytest.mark.parametrize("way", EARLY)
+def test_decks_that_end_early(faultgouge, tmp_path, monkeypatch, way, ranks):
+    """One sentence, no file of results, no temporary file."""
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    (tmp_path / "end.inc").write_text("quit\n")
+    (tmp_path / "pile.in").write_text(DECK.format(**FLAT, word="contacts").replace("run 6000", f"run 60\n{EARLY[way]}"))
+    done = faultgouge("import", "pile.in", "-o", "pile.h5", ranks=ranks, code=1)
+    says = [line for line in done.stderr.splitlines() if line.startswith("Error: ")]
+    assert len(says) == 1
+    assert ("LAMMPS stopped: " if way in ("error", "jump") else "as LAMMPS does at quit, which a deck") in says[0]
+    assert not (tmp_path / "pile.h5").exists()
+    assert not any(temporary.iterdir())
+
+
+@pytest.mark.ranks
+@pytest.mark.parametrize("ranks", [None, 2])
+def test_empty_deck(faultgouge, tmp_path, ranks):
+    (tmp_path / "empty.in").write_text("")
+    assert "No pair_style is in the log" in faultgouge("import", "empty.in", ranks=ranks, code=2).stderr
+
+
+def test_packing_in_which_nothing_touches(faultgouge_here, tmp_path):
+    far = DECK.format(**FLAT, word="contacts").replace("0.5 0 units", "0.7 0 units").replace("-0.45", "-0.8")
+    far = far.replace("single 0.45", "single 0.8").replace("1.3", "2.5").replace("run 6000", "run 0")
+    (tmp_path / "far.in").write_text(far)
+    assert "3 disks, 0 contacts" in faultgouge_here("import", "far.in", "-o", "far.h5").stdout
+    for words in (("draw", "-o", "far.png"), ("export", "-o", "far.vtp")):
+        command, *output = words
+        for mode in ("pair", "0"):
+            says = faultgouge_here(command, "far.h5", "--mode", mode, *output, code=None).stderr
+            assert f"--mode {mode}: the packing has 0 modes" in says
+    assert "no frame 3: leave --frame out" in faultgouge_here("draw", "far.h5", "--frame", "3", code=2).stderr
+
+
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_closed_streams(tmp_path, closed):
+    """No file of results is taken for a stream that was closed."""
+    (tmp_path / "pile.in").write_text(DECK.format(**FLAT, word="contacts"))
+    done = subprocess.run(f"{BIN}/faultgouge import pile.in -o pile.h5 {closed}", shell=True, cwd=tmp_path, check=False)
+    assert done.returncode == 0
+    assert read_snapshot(tmp_path / "pile.h5").residual < 1e-6
+
+
+def test_deleted_folder(tmp_path):
+    """Of the shell in which the command is called."""
+    (tmp_path / "pile.in").write_text(DECK.format(**FLAT, word="contacts"))
+    (tmp_path / "gone").mkdir()
+    words = f"cd gone && rmdir ../gone && {BIN}/faultgouge import {tmp_path}/pile.in"
+    done = subprocess.run(words, shell=True, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == ("Error: the folder in which this command was called has been deleted: go to another one\n")
+
+
+def test_names_that_the_locale_cannot_decode(tmp_path):
+    (tmp_path / "häufchen.in").write_text(DECK.format(**FLAT, word="contacts"))
+    words = [BIN / "faultgouge", "import", "häufchen.in", "-o", "häufchen.h5"]
+    plain = os.environ | {"LC_ALL": "C", "PYTHONUTF8": "0"}
+    done = subprocess.run(words, cwd=tmp_path, env=plain, capture_output=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.decode().endswith("written to häufchen.h5\n")
+    assert len(read_snapshot(tmp_path / "häufchen.h5")) == 3
+
+
+def two_on_three():
+    """A row of three in a periodic box, and two above."""
+    layers = [(-1.0, 0.5), (0.0, 0.5), (1.0, 0.5), (-0.5, 1.36), (0.5, 1.36)]
+    body = DECK.format(**FLAT, word="contacts").replace("boundary f", "boundary p")
+    body = body.replace("block -2 2", "block -1.51 1.51").replace("run 6000", "run 20000")
+    lines = [line for line in body.splitlines() if "create_atoms" not in line]
+    at = lines.index("create_box 1 box") + 1
+    lines[at:at] = [f"create_atoms 1 single {x} {y} 0 units box" for x, y in layers]
+    return "\n".join(lines) + "\n"
+
+
+def test_restart_after_the_last_run(faultgouge_here, tmp_path):
+    """LAMMPS forgets histories there, since the compute has asked for another list of neighbours."""
+    deck = two_on_three()
+    compute = "compute pairs all pair/local force\n"
+    (tmp_path / "fine.in").write_text(f"{deck}{compute}")
+    faultgouge_here("import", "fine.in", "-o", "fine.h5")
+    (tmp_path / "lost.in").write_text(f"{deck}{compute}write_restart pile.restart\n")
+    says = faultgouge_here("import", "lost.in", "-o", "lost.h5", code=1).stderr
+    assert "'write_restart pile.restart' stands after the last run" in says
+    assert "by `restart N FILE` before it" in says
+
+
 def test_deck_of_another_name(faultgouge_here, tmp_path):
     (tmp_path / "pile.lammps").write_text(DECK.format(**FLAT, word="contacts"))
     assert "LAMMPS decks (.in, in.NAME)" in faultgouge_here("import", "pile.lammps", code=2).stderr
@@ -290,16 +426,7 @@ def test_deck_of_another_name(faultgouge_here, tmp_path):
 
 def test_contacts_at_the_bound_stick_or_slide(faultgouge_here, tmp_path):
     """Friction a little below what the packing uses: LAMMPS cuts these contacts to the bound."""
-    from faultgouge.analysis.files.snapshot_file import read_snapshot
-
-    # a row of three in a periodic box, and two above
-    layers = [(-1.0, 0.5), (0.0, 0.5), (1.0, 0.5), (-0.5, 1.36), (0.5, 1.36)]
-    body = DECK.format(**FLAT, word="contacts").replace("boundary f", "boundary p")
-    body = body.replace("block -2 2", "block -1.51 1.51").replace("run 6000", "run 20000")
-    lines = [line for line in body.splitlines() if "create_atoms" not in line]
-    at = lines.index("create_box 1 box") + 1
-    lines[at:at] = [f"create_atoms 1 single {x} {y} 0 units box" for x, y in layers]
-    deck = "\n".join(lines) + "\n"
+    deck = two_on_three()
     (tmp_path / "rough.in").write_text(deck)
     faultgouge_here("import", "rough.in", "-o", "rough.h5")
     c = read_snapshot(tmp_path / "rough.h5").contacts
@@ -317,3 +444,23 @@ def test_contacts_at_the_bound_stick_or_slide(faultgouge_here, tmp_path):
         assert f"{count} of {len(c)} contacts are at Coulomb's bound; they {acts} here" in done.stdout + done.stderr
         found[acts] = json.loads(faultgouge_here("spectrum", f"{acts}.h5", "--json").stdout)["eigenvalues"]
     assert found["stick"] != found["slide"]
+
+
+def test_laws_that_are_others_than_their_lines_say(faultgouge_here, tmp_path):
+    """A wall of hooke/history has another tangential stiffness in LAMMPS of 22 Jul 2025, one of hertz/history not."""
+    from faultgouge.analysis.files.snapshot_file import read_snapshot
+
+    deck = DECK.format(**FLAT, word="contacts")
+    hooke = deck.replace("wall/gran hertz/history ${kn}", "wall/gran hooke/history 1e3")
+    for name, text in (("hertz", deck), ("hooke", hooke)):
+        (tmp_path / f"{name}.in").write_text(text)
+        said = faultgouge_here("import", f"{name}.in", "-o", f"{name}.h5").stdout
+        found = read_snapshot(tmp_path / f"{name}.h5")
+        c = found.contacts
+        measured = c.tangential_stiffness[c.wall].mean() / (2 / 7 * 1e3)
+        share = re.search(r"fix floor: LAMMPS has a tangential stiffness (\S+) times that of the line", said)
+        differs = name == "hooke" and abs(measured - 1) > 0.01
+        assert bool(share) == bool(found.remarks) == differs
+        if share:
+            assert float(share[1]) == pytest.approx(measured, rel=0.3)  # that of the contact of the median overlap
+        assert f"proof {found.proof:.1g}" in said

@@ -136,6 +136,36 @@ def test_what_is_kept_is_said(tmp_path, command, says):
     assert not any(line.startswith("Error") for line in ahead)
 
 
+POURED = """
+units lj
+atom_style sphere
+region box block -2 2 -2 2 0 4
+create_box 1 box
+create_atoms 1 single 0 0 0.5
+set group all diameter 1.0 density 1.0
+pair_style gran/hertz/history 1e3 NULL 10 NULL 0.9 1
+pair_coeff * *
+fix move all nve/sphere
+comm_modify vel yes
+shell touch begun
+run 2000000000
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_import_leaves_nothing(tmp_path, monkeypatch, number):
+    """LAMMPS runs for hours without an instruction of Python, and is ended in the midst of its run."""
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    (tmp_path / "pile.in").write_text(POURED)
+    running = start_command(CommandToKill("import pile.in -o pile.h5", ""), tmp_path)
+    errors = interrupted(running, number, (tmp_path / "begun").exists)
+    assert errors.strip().endswith(f"Error: {ENDS[number][1]}: nothing has been written to pile.h5 yet.")
+    assert not (tmp_path / "pile.h5").exists()
+    assert not any(temporary.iterdir())
+
+
 LARGE = SWEPT | {"packing": {"disks": 5000, "seed": 1, "width": 84.3}, "ramp": {"step": 4e-4, "until": 0.02}}
 
 

@@ -234,7 +234,11 @@ def test_a_scene_takes_the_same_files(tmp_path, reference, reference_packing):
 BAD = {
     "missing column": ("a.dump", lambda p: dump(p).replace("radius", "size"), "no column radius or diameter"),
     "other disks": ("a.dump", lambda p: dump(p) + dump(p, 7, count=50), "other disks at step 7 (50) than at step 0"),
-    "three dimensions": ("a.dump", lambda p: dump(p).replace(" 0 ", " 9 ", 1), "three dimensions: z goes from 0 to 9"),
+    "three dimensions": (
+        "a.dump",
+        lambda p: dump(p).replace(" 0 ", " 9 ", 1),
+        "three dimensions (z goes from 0 to 9), and what such a file has is read as disks in a plane",
+    ),
     "cut off": ("a.dump", lambda p: dump(p)[:-200], "not a complete LAMMPS text dump"),
     "same centre": ("a.csv", lambda p: "x,y,radius\n1,1,0.5\n3,1,0.5\n1.1,1,0.5\n", "disks 1 and 3 are 0.1 apart"),
     "below the floor": ("a.csv", lambda p: "x,y,radius\n1,-1,0.5\n3,1,0.5\n", "say with --floor"),

@@ -1,6 +1,7 @@
 """Films: magnification in steps of ten, frames, and files that play."""
 
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from PIL import Image
 
 from faultgouge.analysis import Packing
 from faultgouge.figures.film import LARGEST_SHOWN, RampFilm, RunFilm, RunMotion
-from faultgouge.figures.writers import UNSEEN, write_film
+from faultgouge.figures.writers import UNSEEN, usual_suffix, write_film
 
 
 @pytest.fixture(scope="module")
@@ -100,3 +101,19 @@ def test_mp4_plays(tmp_path, motion):
     frames, seconds = ffmpeg.count_frames_and_secs(str(tmp_path / "run.mp4"))
     assert frames == 5
     assert seconds == pytest.approx(0.5, abs=0.11)  # a frame more or less
+
+
+def test_without_dots_a_frame_has_1080_lines(motion):
+    """That of an .mp4, the usual film where imageio-ffmpeg is installed; an even number of dots, as its codec asks."""
+    width, height = RunFilm(motion, 2, dots=None).size
+    assert 1080 <= height < 1100
+    assert (width % 2, height % 2) == (0, 0)
+    assert usual_suffix() == (".mp4" if find_spec("imageio_ffmpeg") else ".gif")
+
+
+def test_the_disk_that_moves_farthest_is_red(motion):
+    """At every moment, whatever the magnification: the reddest dots of all frames are alike."""
+    film = RunFilm(motion, 4, dots=60)  # a third of a decade falls differently on each frame's power of ten
+    film._artist.moving[2].set_visible(False)  # the floor is red, too
+    redness = [(film.frame(k)[:, : film.size[0] // 2].astype(int) @ [1, -1, 0]).max() for k in (1, 2, 3)]
+    assert max(redness) - min(redness) <= 3  # edges of disks are mixed with what lies below

@@ -224,16 +224,42 @@ def test_the_second_moment_of_a_mode_is_magnified_and_says_so(pyramid):
 
 
 def test_the_pair_over_the_load_has_both_members_and_an_inset_about_its_onset():
-    """The normal form: eigenvalues 1 -+ sqrt(fx_c - fx)."""
-    fx, fx_c = np.linspace(0, 0.03, 61), 0.02
+    """The normal form: eigenvalues 1 -+ sqrt(fx_c - fx). Its discriminant is linear, so that curves between a few loads
+    are exact, and both branches meet at the onset."""
+    fx, fx_c = np.linspace(0, 0.03, 8), 0.02
     root = np.sqrt(fx_c - fx + 0j)
     curve = PairCurve(1.0, fx, np.column_stack([1 + root, 1 - root]), fx_c)
     real, imaginary = draw_pair([curve]).axes[:2]
-    drawn = {real: (1 - root.real, 1 + root.real), imaginary: (-root.imag, root.imag)}
-    for axes, members in drawn.items():
-        for line, member in zip(axes.lines[:2], members, strict=True):
-            np.testing.assert_array_equal(line.get_xydata(), np.column_stack([fx, member]))
+    for axes, part in ((real, np.real), (imaginary, np.imag)):
+        for sign, line, dots in zip((-1, 1), axes.lines[:2], axes.lines[2:4], strict=True):
+            for drawn in (line, dots):
+                at, value = drawn.get_xydata()[np.isfinite(drawn.get_ydata())].T
+                wanted = np.sort([part(1 + s * np.sqrt(fx_c - at + 0j)) for s in (-1, 1)], axis=0)[(sign + 1) // 2]
+                np.testing.assert_allclose(value, wanted, atol=1e-8)  # the root of what rounding leaves of D
+            np.testing.assert_array_equal(dots.get_xdata(), fx)
+            assert fx_c in line.get_xdata()
     upper = imaginary.child_axes[0].lines[1]
-    beyond = upper.get_xdata() > 1e-9
-    np.testing.assert_allclose(upper.get_ydata()[beyond], np.sqrt(1e-3 * upper.get_xdata()[beyond]), rtol=1e-9)
+    beyond = (upper.get_xdata() > 1e-9) & np.isfinite(upper.get_ydata())
+    np.testing.assert_allclose(upper.get_ydata()[beyond], np.sqrt(1e-2 * upper.get_xdata()[beyond]), rtol=1e-9)
     assert draw_pair([replace(curve, fx_c=None)]).axes[1].child_axes == []
+
+
+def test_a_pair_that_is_lost_has_no_imaginary_part():
+    """A complex nan has the imaginary part 0 in NumPy, which would be drawn as a stable pair."""
+    eigenvalues = np.array([[1, 2], [1.2, 1.8], [np.nan, np.nan], [1, 2], [1, 3]], dtype=complex)
+    curve = PairCurve(1.0, np.arange(5.0), eigenvalues, None)
+    assert np.isnan(curve.imaginary[2]).all()
+    fine = curve.smooth()
+    assert not np.any((fine.fx > 1) & (fine.fx < 3))
+    np.testing.assert_array_equal(np.isnan(fine.imaginary), np.isnan(fine.real))
+
+
+def test_most_arrows_of_a_mode_are_as_long_as_a_radius(pyramid):
+    """Whatever the farthest disk does, up to a bound."""
+    for far in (1.0, 0.1):
+        moved = np.zeros((3, 3), dtype=complex)
+        moved[0] = [far, far, 1.0]
+        (arrows,) = draw_modes(pyramid, [Mode(4, 10.0, moved, 0.3, 0.1)], "a mode").axes[0].findobj(Quiver)
+        lengths = np.hypot(arrows.U, arrows.V) / pyramid.radius.mean()
+        assert lengths.max() <= 4.0 + 1e-12
+        assert np.quantile(lengths, 0.75) > 1.0

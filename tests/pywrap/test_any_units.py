@@ -1,6 +1,7 @@
 """No hidden unit: lengths, forces and masses scaled by any factors give the same dimensionless results."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, perturb, 
 from faultgouge.pywrap.equilibria.rattlers import middle_of_cage
 from faultgouge.pywrap.onset.damped import damped_onset_run
 from faultgouge.pywrap.onset.undamped import onset_run
-from faultgouge.pywrap.settling.settle import own_units
+from faultgouge.pywrap.settling.settle import law_of, own_units
 
 UNITS = st.floats(-9, 9).map(lambda power: 10.0**power)
 
@@ -62,6 +63,30 @@ def test_scenes_that_differ_in_units_settle_the_same_numbers(length, force):
     mine, yours = settles(scene(length, force)), settles(scene())
     assert mine[1:] == yours[1:]
     assert (mine[0].radii, mine[0].width) == (yours[0].radii, yours[0].width) == ((0.5, 0.7), 4.1)
+
+
+def quartz(name):
+    return Scene.from_toml(Path(__file__).parents[2] / "scenes" / f"{name}.toml", command="onset")
+
+
+def test_quartz_in_other_units_settles_the_same_numbers():
+    """All digits count, since settling is chaotic: with F_y rounded to 0.119 N it was another packing."""
+    plain, si = ((each.packing, law_of(each, 0.6), each.load.fy) for each in map(quartz, ("quartz", "quartz_si")))
+    mine, yours = own_units(*plain), own_units(*si)
+    assert mine[1:] == yours[1:]
+    assert mine[0].model_dump(exclude={"mass"}) == yours[0].model_dump(exclude={"mass"})
+
+
+@pytest.mark.long
+def test_quartz_in_other_units_has_the_same_onset():
+    plain, si = map(quartz, ("quartz", "quartz_si"))
+    ratios = []
+    for scene in (plain, si):
+        window = onset_run(scene, 0.6, first=True).onset.windows[0]
+        ratios.append((window.fx_onset / scene.load.fy, window.error / scene.load.fy))
+    # the error states two digits; rounding, amplified by the root of a double eigenvalue, leaves nine digits the same
+    assert ratios[0][0] == pytest.approx(ratios[1][0], rel=1e-9)
+    assert ratios[0][0] == pytest.approx(0.015611, abs=ratios[0][1])
 
 
 @pytest.mark.parametrize(("exponent", "kn"), [(1.5, 2e5), (1.0, 7e3)])

@@ -116,11 +116,13 @@ def test_equilibria_are_the_same_to_the_bit_and_time_steps_stay_below_what_dashp
     for a, b in zip(plain, damped, strict=True):
         assert a.packing == replace(b.packing, law=a.packing.law, drag_time=None)
     packing = damped[0].packing
-    rate, limit = largest_damping_rate(packing), stable_timestep(largest_frequency(packing))
+    rate = largest_damping_rate(packing)
     dense = damping_matrix(packing).toarray() - np.eye(60) / packing.drag_time  # masses and I0 are 1
     assert rate == pytest.approx(np.linalg.eigvalsh(dense).max(), rel=1e-10)
     longest = 20 * time_step(packing)
-    assert rate * longest + (longest / limit) ** 2 == pytest.approx(1.0, rel=1e-12)
+    # the fastest vibration and the strongest dashpots bound the limit, and are no one motion
+    both = rate * longest + (longest / stable_timestep(largest_frequency(packing))) ** 2
+    assert 1.0 <= both < 1.2
     with pytest.raises(SceneError, match="over the limit"):
         time_step(packing, 1.01 * longest)
 

@@ -96,7 +96,7 @@ def test_velocity_scale_is_a_number_or_a_multiple_of_the_threshold(v_ss, scale):
 def test_shipped_scenes_are_scenes(path):
     scene = Scene.from_toml(path)
     if path.stem == "quartz_si":  # in other units
-        assert scene.load.fy / (scene.law.kn * 1e-4**1.5) == pytest.approx(74.7 / 2e5, rel=1e-3)
+        assert scene.load.fy / (scene.law.kn * 1e-4**1.5) == pytest.approx(74.7 / 2e5, rel=1e-14)
         return
     assert scene.law.kn == 2e5
     quartz = {"quartz": 74.7, "quartz_1MPa": 7.47, "quartz_10MPa": 74.7, "quartz_100MPa": 747}
@@ -139,6 +139,7 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ),
         # names
         ({"packing.dsks": 10}, "packing.dsks is no key of [packing]: the nearest is packing.disks."),
+        ({"law.friction": 0.5}, "law.friction is no key of [law]: the nearest is law.mu."),
         ({"packing.kn": 1.0}, "packing.kn is no key of [packing]: the nearest is law.kn."),
         ({"kn": 200000.0}, "kn stands outside of its section: move it below [law]."),
         ({"precison": "double"}, "precison is no key of a scene: the nearest is precision."),

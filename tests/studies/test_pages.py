@@ -5,12 +5,16 @@ import re
 from dataclasses import replace
 
 import pytest
+from reference_layer import SMALL
 from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import RunFile
 from faultgouge.figures.pages import WIDTH, fill_paragraphs
 from faultgouge.figures.style import report_failure
+from faultgouge.pywrap import Scene
 from faultgouge.studies.packing_tools import distance_of_bearing_disks
+from faultgouge.studies.reproduce.compute import growth_run, recorded_ramp, summary_of
+from faultgouge.studies.reproduce.page import report
 from faultgouge.studies.sweep.draw import draw_sweep
 
 
@@ -28,6 +32,20 @@ def messages():
 
 
 PROSE = "The exponent is 0.5 - 0.001 + 0.002 > 0, as in 1. and in # 2, over all of the many loads that are there. " * 3
+
+
+@pytest.mark.long
+def test_the_page_of_the_protocol_counts_no_windows_that_were_not_counted(tmp_path):
+    """As of a packing of more than 300 disks, of which the first window alone is sought."""
+    scene = Scene.from_mapping(SMALL | {"ramp": {"step": 5e-3, "until": 0.045}})
+    run = recorded_ramp(scene, 1.0, tmp_path / "run.h5")
+    growth = growth_run(scene, run, tmp_path / "run.h5")
+    first = replace(run, onset=replace(run.onset, windows=run.onset.windows[:1], complete=False))
+    for each, cell in ((run, f"| {len(run.onset.windows)} |"), (first, "| not counted, as the search ended with the")):
+        page = report(scene, [each], growth, None, None)
+        (row,) = (line for line in page.splitlines() if line.startswith("| 1 |"))
+        assert cell in row
+        assert summary_of(scene, [each], growth)["ramps"][0]["onset"]["complete"] is each.onset.complete
 
 
 def test_prose_and_items_are_folded_where_no_line_begins_a_list():

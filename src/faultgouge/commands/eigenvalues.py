@@ -23,6 +23,7 @@ from .terminal import (
     read_scene,
     report_fallback,
     say,
+    say_work,
     status,
     stored_configuration,
     stored_files,
@@ -229,7 +230,7 @@ def onset(
     slices: Slices = None,
     every: Annotated[
         bool,
-        typer.Option("--all", help="All windows up to ramp.until, for up to 300 disks; takes longer."),
+        typer.Option("--all", help="All windows up to ramp.until, of up to 300 disks; takes longer."),
     ] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -245,10 +246,13 @@ def onset(
     from faultgouge.analysis.progress import show_progress
     from faultgouge.pywrap.settling.settle import shared_bed
 
-    wanted = read_scene(scene, "onset", "onset --all" if every else "onset")
+    wanted = read_scene(scene, "onset")
     part = None if modes is None else _modes(modes)
     if part is not None and wanted.damping is not None:
         raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
+    if every:
+        _check_all_windows(wanted, part)
+    say_work(wanted, "onset --all" if every else "onset")
     if output:
         lock_output(context, output, scene, *stored_files(wanted))
     folder = _search_folder(slices, output)
@@ -274,6 +278,21 @@ def onset(
         shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
     if as_json:
         print_json(result)
+
+
+def _check_all_windows(scene: Scene, modes: tuple[int, int] | None) -> None:
+    """Refuse --all where the first window alone is sought."""
+    from faultgouge.analysis import BadInputError
+    from faultgouge.analysis.onset import LIMITS
+
+    if modes is not None:
+        raise BadInputError("--all goes without --modes: among some modes the first window is sought; leave one out")
+    disks = scene.packing.disks
+    if disks > LIMITS.all_windows:
+        raise BadInputError(
+            f"--all finds all windows of up to {LIMITS.all_windows} disks, and the packing has {disks}: leave --all "
+            "out for the first window, or take a smaller packing"
+        )
 
 
 def _write_result(output: Path | None, found: list[dict[str, Any]]) -> dict[str, Any]:

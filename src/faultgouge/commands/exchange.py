@@ -14,6 +14,7 @@ from .terminal import (
     NONE_GIVEN,
     Frame,
     PackingFile,
+    counted,
     lock_output,
     print_line,
     progress,
@@ -131,9 +132,9 @@ def import_(
         _store(output, packing, assumed)
     if assumed:
         say(f"{file} gives no tangential forces: they are taken as zero, and nothing can be said of the stability")
-    contacts_of = f"{len(packing.contacts)} contacts, {len(packing.rattlers)} rattlers"
+    contacts_of = f"{counted(len(packing.contacts), 'contact')}, {counted(len(packing.rattlers), 'rattler')}"
     print_line(
-        f"{len(packing)} disks, {int(packing.top.sum())} of them the upper layer, {contacts_of}; residual "
+        f"{counted(len(packing), 'disk')}, {int(packing.top.sum())} of them the upper layer, {contacts_of}; residual "
         f"{packing.residual:.2g}; written to {output}"
     )
 
@@ -149,6 +150,8 @@ def _import_deck(file: Path, output: Path, slides: bool, balance: float | None) 
         snapshot = run_deck(file, slides=slides, balance=BALANCE if balance is None else balance, keep=output)
     if is_root():
         write_snapshot(output, snapshot, {"deck": file.read_text(errors="replace")})
+    for remark in snapshot.remarks:
+        print_line(remark)
     print_line(f"{repr(snapshot).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
     print_line(_time_steps(snapshot))
 
@@ -203,7 +206,7 @@ def export(
             raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")
         _export_frames(file, frames, output)
         return
-    snapshot = stored_snapshot(file)
+    snapshot = stored_snapshot(file, frame)
     if snapshot is None:
         check_writer(output, mode is not None)
     else:
@@ -235,7 +238,7 @@ def _export_frames(file: Path, says: str, output: Path) -> None:
         numbers = choose_frames(run, says)
         write_frames(output, progress(frames_of(run, numbers), "frames", len(numbers)))
         what = "an undamped run" if "trajectory" in run.names_of_series else "equilibria"
-    print_line(f"{len(numbers)} frames of {what}; written to {output}")
+    print_line(f"{counted(len(numbers), 'frame')} of {what}; written to {output}")
 
 
 def _place_disks(file: Path, frame: int | None, floor: float, width: str | None, contacts: Path | None) -> Disks:

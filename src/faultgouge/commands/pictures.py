@@ -12,6 +12,7 @@ from ..mpi_rank import is_root
 from .terminal import (
     Frame,
     PackingFile,
+    counted,
     growth_in,
     lock_output,
     print_line,
@@ -83,7 +84,7 @@ def draw(
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
     lock_output(context, output, file)
-    snapshot, series, cycle = snapshot_of_disks(file), None, []
+    snapshot, series, cycle = stored_snapshot(file, -1 if frame is None else frame), None, []
     packing = snapshot or stored_packing(file, -1 if frame is None else frame)
     if snapshot is None and frame is None and mode is None:
         series, cycle = stored_series(file), _cycle(file)
@@ -127,10 +128,20 @@ def movie(
         tuple[float, float] | None,
         typer.Option(metavar="T0 T1", help="First and last time of the run to show; all by default."),
     ] = None,
-    dots: Annotated[int, typer.Option(min=30, max=400, help="Dots per inch; a film is some five inches wide.")] = 110,
+    dots: Annotated[
+        int | None,
+        typer.Option(min=30, max=800, help="Dots per inch: 110 for .gif, 1080 lines for .mp4.", show_default=False),
+    ] = None,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="The film: .gif or .mp4; of spheres .xyz or .pvd.")
-    ] = Path("film.gif"),
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            help="The film: .mp4 or .gif; of spheres .xyz or .pvd. By default film.mp4, or film.gif without "
+            "imageio-ffmpeg.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Make a film of an undamped run, of a mode, or of a ramp.
 
@@ -142,8 +153,12 @@ def movie(
     (.xyz) or ParaView (.pvd).
     """
     from faultgouge.analysis import PackingFileError
-    from faultgouge.figures.writers import check_name, write_film
+    from faultgouge.figures.film import DOTS
+    from faultgouge.figures.writers import check_name, usual_suffix, write_film
 
+    output = output or Path("film").with_suffix(usual_suffix())
+    if dots is None and output.suffix.lower() == ".gif":
+        dots = DOTS
     snapshot = stored_snapshot(file)
     if snapshot is not None and mode is None:
         raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
@@ -167,7 +182,7 @@ def movie(
         film = _film_of_file(file, count, color.value, span, dots)
     write_film(film, output, rate, lambda frames, total: progress(frames, "frames", total))
     width, height = film.size
-    print_line(f"{count} frames of {width} x {height} dots; written to {output}")
+    print_line(f"{counted(count, 'frame')} of {width} x {height} dots; written to {output}")
 
 
 @app.command(epilog="Example: faultgouge view run.h5 -o page.html")
@@ -240,7 +255,7 @@ def _frames_of_spheres(
             raise BadInputError("--mode pair: the packing has no complex pair; give the number of a mode, from 0")
         vectors = ModeVectors(f"mode_{mode.number}", mode.eigenvalue, mode.displacement)
         write_mode_frames(output, snapshot, vectors, count, periods)
-        print_line(f"{count} frames of {mode.plain}; written to {output}")
+        print_line(f"{counted(count, 'frame')} of {mode.plain}; written to {output}")
 
 
 def _cycle(file: Path) -> list[Packing]:
@@ -254,7 +269,7 @@ def _cycle(file: Path) -> list[Packing]:
         return [run.packing(k) for k in range(len(run))] if turning_points(run.fx) else []
 
 
-def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] | None, dots: int) -> Film:
+def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] | None, dots: int | None) -> Film:
     """The run if the file has its trajectory, else its ramp."""
     from faultgouge.analysis import PackingFileError, RunFile
     from faultgouge.figures.film import RampFilm, RunFilm, RunMotion
@@ -276,14 +291,8 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
 
 def modes_of(packing: Packing | Configuration, which: str) -> tuple[list[Mode], str]:
     """The modes that --mode asks for, and what they are."""
-    from faultgouge.analysis import normal_modes, spectrum
-    from faultgouge.figures.mode import Mode, ModeError, unstable_pair
+    from faultgouge.figures.mode import modes_of as find_modes
 
-    modes = normal_modes(packing)
-    if which == "pair":
-        return unstable_pair(packing, modes, [pair.eigenvalue for pair in spectrum(packing).pairs])
-    if not which.isdecimal():
+    if which != "pair" and not which.isdecimal():
         raise typer.BadParameter(f"--mode {which}: give pair, or the number of a mode, from 0")
-    if int(which) >= len(modes.values):
-        raise ModeError(f"--mode {which}: the packing has {len(modes.values)} modes, counted from 0")
-    return [Mode.of(packing, modes, int(which))], f"mode {which} of {len(modes.values)}"
+    return find_modes(packing, None if which == "pair" else int(which))

@@ -17,6 +17,7 @@ from .terminal import (
     Out,
     ScenePath,
     check_output,
+    counted,
     growth_in,
     lock_output,
     print_json,
@@ -67,7 +68,8 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
             record.finish()
     packing = last.packing
     print_line(
-        f"{len(packing)} disks, {len(packing.contacts)} contacts, {len(packing.rattlers)} rattlers; "
+        f"{counted(len(packing), 'disk')}, {counted(len(packing.contacts), 'contact')}, "
+        f"{counted(len(packing.rattlers), 'rattler')}; "
         f"residual {last.residual:.2g} (rounding floor {last.floor:.2g}); written to {output}"
     )
 
@@ -117,12 +119,15 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
 def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson = False) -> None:
     """Run the undamped dynamics from the equilibrium at perturb.fx, and record D(t).
 
+    Without perturb.fx the load is just beyond the onset, which is found first; with
+    [friction] it is between the onsets of the weakened and of the static friction.
     The run may have a perturbation. The command prints whether D grew, the growth
     rate, the rate that the spectrum of the equilibrium predicts, and whether the run
     was long enough. With several friction coefficients, the run uses the first.
     """
     from faultgouge.analysis import RunFile
     from faultgouge.pywrap import Record, reach
+    from faultgouge.pywrap.onset.load_at_onset import load_at_onset
     from faultgouge.pywrap.runs.equilibrium_path import step_of
     from faultgouge.pywrap.scenes.validation import require_section
 
@@ -134,8 +139,12 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         say(f"the run uses mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene")
     with Record(output, wanted, task="perturb", saved=keeps) as record:
         if record.last is None:
-            total = ceil(settings.fx / step_of(wanted) * (1 - 1e-9)) + 1
-            for start in progress(reach(wanted, settings.fx), "equilibria", total):
+            fx = settings.fx
+            if fx is None:
+                fx = load_at_onset(wanted)
+                say(f"the scene has no perturb.fx: the run starts at F_x = {fx:.10g}, by the onset")
+            total = ceil(fx / step_of(wanted) * (1 - 1e-9)) + 1
+            for start in progress(reach(wanted, fx), "equilibria", total):
                 report_fallback(start)
             _lines(wanted, start)  # refuses what the packing does not allow, before anything is written
             record.append(start)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
-from .terminal import Folder, Workers, print_line, progress, say, table_of
+from .terminal import Folder, Workers, counted, print_line, progress, say, table_of
+
+if TYPE_CHECKING:
+    from faultgouge.studies.sweep.sweep_plan import Sweep
 
 app = typer.Typer()
 
@@ -34,20 +37,23 @@ def sweep(
     of a scene, as in "packing.seed" = "1:200". Sections [scene.SECTION] have the
     keys that all scenes share. Each result is written as soon as it is known, and
     the same command continues an interrupted sweep. A scene that fails is a row with
-    its error sentence. With several ranks, possibly on several machines, one rank
-    distributes the work: mpiexec -n 5 keeps 4 cores busy.
+    its error sentence, and is tried again, unless it is refused or has no
+    equilibrium. If every scene has failed, the exit code is 1. With several ranks,
+    possibly on several machines, one rank distributes the work: mpiexec -n 5 keeps 4
+    cores busy.
     """
     from faultgouge.studies.sweep.draw import draw_sweep
-    from faultgouge.studies.sweep.run_sweep import LINES, read_results, run_sweep
+    from faultgouge.studies.sweep.run_sweep import LINES, missing_points, read_results, require_result, run_sweep
     from faultgouge.studies.sweep.sweep_plan import Sweep
     from faultgouge.studies.sweep.sweep_plan import shard as part_of
     from faultgouge.studies.sweep.tasks import TASKS, estimate
 
     wanted, part = Sweep.from_toml(file, TASKS), _shard(shard)
+    _warn_of_seeds(wanted)
     if dry_run:
         if is_root():
             known = read_results(output / LINES)
-            missing = [point for point in part_of(wanted.points, part) if point.key not in known]
+            missing = missing_points(part_of(wanted.points, part), known)
             for line in estimate(wanted.task, missing, known.values()):
                 print_line(line)
         return
@@ -56,9 +62,11 @@ def sweep(
     if is_root():
         failed = sum(row["says"] is not None for row in rows)
         print_line(
-            f"{len(rows)} scenes, {failed} of them failed; written: {output}/results.csv{draw_sweep(rows, output, say)}"
+            f"{counted(len(rows), 'scene')}, {failed} of them failed; "
+            f"written: {output}/results.csv{draw_sweep(rows, output, say)}"
         )
         _summarise(wanted.task, rows, output)
+        require_result(rows)
 
 
 @app.command(epilog="Example: faultgouge merge shard1 shard2 shard3 -o whole")
@@ -66,7 +74,12 @@ def merge(
     parts: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Folders of `sweep --shard`.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The folder to write.")] = Path("merged"),
 ) -> None:
-    """Join the shards of a sweep; the table is that of an undivided sweep."""
+    """Join the shards of a sweep; the table is that of an undivided sweep.
+
+    The shards are only read, and may still be running. Rows that the folder DIR of -o
+    has are kept. A row with a result goes before one with an error; two different
+    results of one scene are an error.
+    """
     from faultgouge.studies.sweep.draw import draw_sweep
     from faultgouge.studies.sweep.run_sweep import merge as merge_parts
 
@@ -87,6 +100,14 @@ def _summarise(task: str, rows: list[dict[str, Any]], output: Path) -> None:
     write_json(output / "summary.json", numbers)
     for line in in_words(numbers):
         print_line(line)
+
+
+def _warn_of_seeds(sweep: Sweep) -> None:
+    """Say where a seed stands for several packings."""
+    from faultgouge.studies.sweep.seeds import other_packings
+
+    if is_root() and (sentence := other_packings(sweep)):
+        say(sentence)
 
 
 def _shard(text: str) -> tuple[int, int]:
@@ -117,11 +138,12 @@ def modes(
     """
     from faultgouge.studies.modes.study import modes as count_modes
     from faultgouge.studies.modes.study import read_modes_sweep
-    from faultgouge.studies.sweep.run_sweep import LINES
+    from faultgouge.studies.sweep.run_sweep import LINES, require_result
     from faultgouge.studies.sweep.sweep_plan import shard as part_of
     from faultgouge.studies.sweep.tasks import estimate
 
     wanted, part = read_modes_sweep(file), _shard(shard)
+    _warn_of_seeds(wanted)
     if is_root():
         for line in estimate(wanted.task, part_of(wanted.points, part)):
             (print_line if dry_run else say)(line)
@@ -129,7 +151,9 @@ def modes(
         return
     keeps(f"{output}/{LINES} has the scenes that have ended; the same command continues from there", output)
     result = count_modes(wanted, output, part, say, lambda rows, count: progress(rows, "scenes", count), workers)
-    if is_root():
+    if is_root() and not result:
+        print_line("this part of the sweep has no scenes")
+    elif is_root():
         _show_modes(result["rows"])
         failed = [each["says"] for each in result["packings"] if each["says"] is not None]
         print_line(f"packings: {len(result['packings'])}, failed: {len(failed)}; written: {output}/modes.json")
@@ -142,6 +166,7 @@ def modes(
                 f"packings whose branch ends before the last load, so that loads are left out: {len(short)}; the first "
                 f"of them goes to F_x = {each['reach']:g}, and {why} at the next load"
             )
+        require_result(result["packings"])
 
 
 def _show_modes(rows: list[dict[str, Any]]) -> None:

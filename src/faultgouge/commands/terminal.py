@@ -48,32 +48,45 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON."
 
 def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
     """What a command reads of a scene, a TOML file; if its task is long, what is to be done and how long is said."""
-    from faultgouge.pywrap.scenes.estimate import describe_work
     from faultgouge.pywrap.scenes.scene import Scene
 
     scene = Scene.from_toml(path, command=command)
-    ahead = describe_work(scene, task) if task is not None else ""
-    if ahead:
-        say(ahead)
+    if task is not None:
+        say_work(scene, task)
     return scene
 
 
-def stored_snapshot(file: Path) -> Configuration | None:
-    """The snapshot of a run.h5 that holds one; None of all other files."""
+def say_work(scene: Scene, task: Task) -> None:
+    """Say what a long task has to do with a scene, and how long that takes; it is refused if it is too much."""
+    from faultgouge.pywrap.scenes.estimate import describe_work
+
+    ahead = describe_work(scene, task)
+    if ahead:
+        say(ahead)
+
+
+def stored_snapshot(file: Path, frame: int = -1) -> Configuration | None:
+    """The snapshot of a run.h5 that holds one; None of all other files. It is the file's only frame."""
+    from faultgouge.analysis import BadInputError
     from faultgouge.analysis.files.snapshot_file import holds_snapshot, read_snapshot
 
-    return read_snapshot(file) if holds_snapshot(file) else None
+    if not holds_snapshot(file):
+        return None
+    if frame not in (-1, 0):
+        raise BadInputError(f"{file} has one packing, and no frame {frame}: leave --frame out.")
+    return read_snapshot(file)
 
 
-def snapshot_of_disks(file: Path) -> Configuration | None:
+def snapshot_of_disks(file: Path, frame: int = -1) -> Configuration | None:
     """The snapshot of a run.h5 that holds one of disks; None of all other files; spheres are refused."""
     from faultgouge.analysis import BadInputError
 
-    snapshot = stored_snapshot(file)
+    snapshot = stored_snapshot(file, frame)
     if snapshot is not None and snapshot.dimension == 3:
         raise BadInputError(
-            f"{file} holds spheres: `faultgouge export {file} --mode 0 -o packing.vtp` shows them in ParaView, and "
-            f"-o packing.xyz in OVITO; `faultgouge movie {file} --mode 0 -o mode.xyz` moves a mode."
+            f"{file} holds spheres: `faultgouge draw {file}` draws them; `faultgouge export {file} -o packing.vtp` "
+            f"shows them in ParaView, and -o packing.xyz in OVITO; `faultgouge movie {file} --mode 0 -o mode.xyz` "
+            "moves a mode."
         )
     return snapshot
 
@@ -84,6 +97,13 @@ def stored_files(scene: Scene) -> list[Path]:
     return [Path(each) for each in (file, signal) if each is not None]
 
 
+def counted(number: int, noun: str, plural: str | None = None) -> str:
+    """A number with its noun, see `faultgouge.analysis.counted`, which is imported with all of the analysis."""
+    from faultgouge.analysis import counted
+
+    return counted.counted(number, noun, plural)
+
+
 def stored_packing(file: Path, frame: int = -1) -> Packing:
     """A packing of a run.h5, or of the dumps that decks write."""
     from faultgouge.analysis import RunFile, read_dump
@@ -92,7 +112,8 @@ def stored_packing(file: Path, frame: int = -1) -> Packing:
         return read_dump(file, frame=frame)
     with RunFile(file) as run:
         if not run.complete:
-            say(f"{file} is of a run that is not finished: {len(run)} equilibria, up to F_x = {run.fx[-1]:g}")
+            stored = counted(len(run), "equilibrium", "equilibria")
+            say(f"{file} is of a run that is not finished: {stored}, up to F_x = {run.fx[-1]:g}")
         return run.packing(frame)
 
 

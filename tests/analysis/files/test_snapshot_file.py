@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from test_linearised_contacts import make
 
-from faultgouge.analysis import PackingFileError
+from faultgouge.analysis import PackingFileError, RunFile
 from faultgouge.analysis.files.checksummed_file import new_file, write
 from faultgouge.analysis.files.snapshot_file import holds_snapshot, read_snapshot, write_snapshot
 
@@ -33,11 +33,32 @@ def test_damage_is_refused(tmp_path):
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
-    with pytest.raises(PackingFileError, match="damaged"):
-        read_snapshot(path)
+    for reads in (read_snapshot, holds_snapshot):
+        with pytest.raises(PackingFileError, match=r"damaged: its .* bytes do not have the checksum"):
+            reads(path)
     with pytest.raises(PackingFileError, match="does not exist"):
         read_snapshot(tmp_path / "none.h5")
     assert not holds_snapshot(tmp_path / "none.h5")
+
+
+def test_damage_anywhere_is_refused_by_the_checksum(tmp_path):
+    """HDF5 is not asked before: it has errors of its own for what it meets."""
+    path, rng = tmp_path / "run.h5", np.random.default_rng(0)
+    write_snapshot(path, make(3))
+    content = path.read_bytes()
+    for _ in range(200):
+        changed = bytearray(content)
+        for at in rng.integers(512, len(content), 12):
+            changed[at] ^= 1 << int(rng.integers(8))
+        path.write_bytes(changed)
+        with pytest.raises(PackingFileError, match="damaged"):
+            holds_snapshot(path)
+
+
+def test_a_snapshot_is_no_run(tmp_path):
+    write_snapshot(tmp_path / "run.h5", make(2))
+    with pytest.raises(PackingFileError, match=r"as LAMMPS left it, and no run .* spectrum, draw"):
+        RunFile(tmp_path / "run.h5")
 
 
 def elsewhere(file):

@@ -9,7 +9,7 @@ import pytest
 from granular_packings import ALMOST_NONE, LAWS, RESCALED, command, instance, start, with_law
 from packing_snapshot import snapshot_of
 
-from faultgouge.analysis import damping_matrix, spectrum, stiffness_matrix
+from faultgouge.analysis import damping_matrix, largest_frequency, spectrum, stable_timestep, stiffness_matrix
 
 
 @pytest.fixture(scope="module")
@@ -417,6 +417,45 @@ def test_our_own_style():
 
 
 @pytest.mark.slow
+def test_a_comparison_that_proves_nothing_is_refused(beds):
+    """And a comparison says over how many periods it went."""
+    from faultgouge.analysis import BadInputError
+    from faultgouge.pywrap import compare_motion, from_lammps
+
+    lmp = beds("gran/hertz/history", 3, True)
+    bed = from_lammps(lmp)
+    good = {"time": 0.2, "amplitude": 1e-5, "timestep": 1e-4}
+    wrong = {"time": (-1.0, 0.0, np.nan, np.inf), "timestep": (-1e-4, 0.0, np.nan), "amplitude": (0.0, np.nan, np.inf)}
+    for name, values in wrong.items():
+        for value in values:
+            with pytest.raises(BadInputError, match=f"^{name} = {value:g} is refused"):
+                compare_motion(lmp, bed, **(good | {name: value}))
+    with pytest.raises(BadInputError, match="balance = nan is refused"):
+        from_lammps(lmp, balance=np.nan)
+    found = compare_motion(lmp, bed, **good)
+    assert found.periods == pytest.approx(0.2 * largest_frequency(bed) / (2 * np.pi), rel=1e-9)
+    assert "after t = 0.2, 1." in str(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["gran/hertz/history", "mindlin"])
+def test_lammps_rests_below_the_largest_stable_time_step_and_blows_up_above(beds, law):
+    """Within half a per cent, by dashpots that take a tenth of the step."""
+    from faultgouge.pywrap import compare_motion, from_lammps
+
+    lmp = beds(law, 3, True)
+    bed = from_lammps(lmp)
+    limit = stable_timestep(bed)
+    assert limit < 0.95 * stable_timestep(largest_frequency(bed))
+    size = {}
+    for share in (0.995, 1.005):
+        motion = compare_motion(lmp, bed, 120 * share * limit, 1e-9, timestep=share * limit)
+        size[share] = np.linalg.norm(motion.velocity) / (1e-9 * len(motion.velocity) ** 0.5)
+    assert size[0.995] < 0.3
+    assert size[1.005] > 10
+
+
+@pytest.mark.slow
 def test_pairs_at_rest_on_a_slope(beds):
     """mindlin/force has no complex pair, and gran/hertz/history has some (research/laws)."""
     from faultgouge.pywrap import from_lammps
@@ -459,3 +498,71 @@ def test_analysis_of_packings_of_lammps(beds, tmp_path, d):
     assert gain.gain == pytest.approx(most, rel=1e-6)
     times = np.linspace(0, 3 * gain.time, 61)[1:]
     assert max(np.linalg.norm(expm(t * system)[:n, :n], 2) ** 2 for t in times) <= gain.gain * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("width", [0.95, 1.2, 1.49])
+def test_a_narrow_slot(width):
+    """The law of a wall of two planes is that of one of them, however near the other one is."""
+    from faultgouge.pywrap import from_lammps
+
+    wall = f"fix w all wall/gran hertz/history 1e5 3e4 1 1 0.5 1 zplane {{}} {width} contacts"
+    found = []
+    for lower in ("0", "NULL"):
+        lmp, told = two(HERTZ, "* *", wall.format(lower) + MOVES)
+        lmp.numpy.extract_atom("x")[:2] = [[0, 0, width - 0.45], [0, 3, width - 0.452]]
+        lmp.command("run 0")
+        found.append(from_lammps(lmp, told, balance=np.inf).contacts)
+        lmp.close()
+    one, other = found
+    assert len(one) == 2
+    assert one.tangential_stiffness == pytest.approx(3e4 * np.sqrt(0.5 * one.overlap), rel=1e-9)
+    for name in ("overlap", "normal_stiffness", "tangential_stiffness", "normal_dashpot", "friction"):
+        assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-9)
+
+
+def test_a_log_that_two_instances_write(tmp_path):
+    """The commands in it may be those of the other one."""
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    lmp, told = two(HERTZ, "* *", MOVES.strip())
+    lmp.command(f'log "{tmp_path}/log.lammps"')
+    command(lmp, "\n".join(told))
+    other = instance(tmp_path / "log.lammps")
+    with pytest.raises(SnapshotError, match=r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
+        from_lammps(lmp, balance=np.inf)
+    for each in (lmp, other):
+        each.close()
+
+
+INTERRUPTED = """
+import os, signal, sys, threading
+sys.path.insert(0, {tests!r})
+import time
+from granular_packings import command, instance, start, with_law
+from faultgouge.pywrap import compare_motion, from_lammps
+
+lmp = instance(None)
+start(lmp, 3, 18)
+with_law(lmp, "gran/hertz/history", 3, "100", "100", ("", ""))
+command(lmp, "fix load all gravity 1.0 vector 0.1 0 -1\\nfix move all nve/sphere\\ntimestep 0.002\\nrun 3000")
+given = ["pair_style gran/hertz/history 3e3 NULL 100 100 3.0 1", "fix move all nve/sphere",
+         "fix floor all wall/gran hertz/history 3e3 9e2 100 100 3.0 1 zplane 0 NULL contacts"]
+found = from_lammps(lmp, given, balance=1e9)
+threading.Timer(1.0, os.killpg, (os.getpgid(0), signal.SIGINT)).start()
+try:
+    compare_motion(lmp, found, 1e6, 1e-5, timestep=1e-3)
+except KeyboardInterrupt:
+    try:
+        os.waitpid(-1, 0)
+    except ChildProcessError:
+        print("no copy is left")
+"""
+
+
+def test_ctrl_c_ends_the_copy(tmp_path):
+    """A copy that would run for days; Ctrl-C of a terminal goes to the program and to its copies."""
+    from pathlib import Path
+
+    words = [sys.executable, "-c", INTERRUPTED.format(tests=str(Path(__file__).parent))]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=300, start_new_session=True)
+    assert done.stdout.split("\n")[-2:] == ["no copy is left", ""], done.stderr

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from granular_packings import instance
 
+from docs.run_page import files
 from faultgouge.analysis import NoEquilibriumError, find_onset, spectrum, stiffness_matrix
 
 LAW = "hertz/history 1e5 3e4 40 20 0.5 1"
@@ -62,6 +63,8 @@ def test_tilt_of_a_slope(tmp_path):
             assert each.load[:, 0].sum(axis=0) == pytest.approx(
                 [weight * value / np.hypot(value, 1), -weight / np.hypot(value, 1), 0], abs=1e-9
             )
+        assert found[0.0].proof < 1e-5  # the first, from which the others come
+        assert found[0.1].proof is None
         assert path(0.02) is found[0.02]
         assert path(0.05) == found[0.05]  # from 0.02 both times, to the bit
         with pytest.raises(NoEquilibriumError, match=r"flows at 0\.9"):
@@ -165,38 +168,117 @@ def test_force_on_a_layer(tmp_path):
 
 
 @pytest.mark.slow
-def test_strain_of_a_periodic_box(tmp_path):
-    """By change_box, which moves the particles along; the shear stress of the contacts rises with the strain."""
-    from faultgouge.pywrap import lammps_path
+def test_what_is_wrong_with_a_path_is_said(tmp_path):
+    """An error of the user's function with its line in the user's file, and a path that is closed."""
+    from faultgouge.analysis import BadInputError
+    from faultgouge.pywrap import SnapshotError, lammps_path
 
+    lmp = layer(tmp_path)
+    (tmp_path / "load.py").write_text(
+        "import numpy as np\n"
+        "def divides(lmp, value):\n    return 1 / 0\n"
+        "def library(lmp, value):\n    np.linalg.inv(np.zeros((2, 2)))\n"
+        "def ends(lmp, value):\n    raise SystemExit(3)\n"
+        "def lammps(lmp, value):\n\n    lmp.command('fix pull nobody addforce 1 0 0')\n"
+    )
+    own: dict = {}
+    exec(compile((tmp_path / "load.py").read_text(), str(tmp_path / "load.py"), "exec"), own)
+    for name, says in {
+        "divides": r"^At 0\.1: apply failed with ZeroDivisionError: division by zero \(load\.py, line 3\)\.$",
+        "library": r"^At 0\.1: apply failed with LinAlgError: Singular matrix \(load\.py, line 5\)\.$",
+        "ends": r"^At 0\.1: apply failed with SystemExit: 3 \(load\.py, line 7\)\.$",
+        "lammps": r"^At 0\.1: LAMMPS stopped: .*nobody.* \(load\.py, line 10\)\.$",
+    }.items():
+        with lammps_path(lmp, own[name]) as path, pytest.raises(SnapshotError, match=says):
+            path(0.1)
+    with pytest.raises(SnapshotError, match=r"The path is closed: ask it inside of its `with` block"):
+        path(0.1)
+    path.close()  # a second time does no harm
+    for balance in (np.nan, -1.0):
+        with pytest.raises(BadInputError, match="balance = "):
+            lammps_path(lmp, "slope", balance=balance)
+    lmp.close()
+
+
+def periodic(tmp_path):
+    """Disks under pressure in a periodic box, at rest, with a log."""
     lmp, rng = instance(tmp_path / "log.lammps"), np.random.default_rng(3)
     places = np.array([(k % 6 + k // 6 % 2 / 2, 0.1 + 0.9 * (k // 6)) for k in range(36)]) + rng.uniform(
         0, 0.1, (36, 2)
     )
+    law = LAW.replace(" 0.5 1", " 2.0 1")  # no contact comes to rest at the bound
     for line in [
         "units lj", "dimension 2", "atom_style sphere", "boundary p p p", "newton off", "comm_modify vel yes",
-        "region box prism 0 6 0 5.5 -0.5 0.5 0 0 0", "create_box 2 box",
+        "region box block 0 6 0 5.5 -0.5 0.5", "create_box 2 box",
         *(f"create_atoms {1 + k % 2} single {x:.17g} {y:.17g} 0" for k, (x, y) in enumerate(places)),
         "set type 1 diameter 0.8", "set type 2 diameter 1.0", "set group all density/disc 1.0",
-        f"pair_style gran/{LAW}", "pair_coeff * *", "fix move all nve/sphere disc", "fix drag all viscous 1.0",
-        "timestep 1e-3", "change_box all x final 0 5.35 y final 0 4.9 remap", "run 20000 post no",
+        f"pair_style gran/{law}", "pair_coeff * *", "fix move all nve/sphere disc", "fix drag all viscous 1.0",
+        "timestep 1e-3", "change_box all x final 0 5.35 y final 0 4.9 remap", "run 40000 post no",
     ]:  # fmt: skip
         lmp.command(line)
+    return lmp
 
-    def shear(lmp, strain: float) -> None:
-        lmp.command(f"change_box all xy final {4.9 * strain:.17g} remap")
 
-    stress = []
-    with lammps_path(lmp, shear) as path:
-        for strain in (0.0, 0.001, 0.002):
-            found = path(strain)
-            c = found.contacts
-            assert found.box[1, 0] == pytest.approx(4.9 * strain, abs=1e-15)
-            assert found.residual <= 1e-8 * c.normal_force.mean()
-            force = c.normal_force * c.normal[:, 0] + c.tangential_force[:, 0]
-            stress.append(-float(np.sum(force * c.distance * c.normal[:, 1])))
+def stress(found) -> np.ndarray:
+    """Of the contacts, xx and yy, force / length."""
+    c = found.contacts
+    force = c.normal_force[:, None] * c.normal + c.tangential_force
+    return -np.sum(force * c.distance[:, None] * c.normal, axis=0)[:2] / (found.box[0, 0] * found.box[1, 1])
+
+
+@pytest.mark.slow
+def test_histories_that_a_restart_file_has_lost_are_named(tmp_path):
+    """Another granular instance was there in the process, and LAMMPS reads no history at all."""
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    lmp = periodic(tmp_path)
+    count = len(from_lammps(lmp).contacts)
+    lmp.command(f"write_restart {tmp_path / 'state.restart'}")
     lmp.close()
-    assert stress[0] < stress[1] < stress[2]
+    again = instance(tmp_path / "log.again")
+    for line in (
+        "newton off", "comm_modify vel yes", f"read_restart {tmp_path / 'state.restart'}",
+        f"pair_style gran/{LAW.replace(' 0.5 1', ' 2.0 1')}", "pair_coeff * *", "fix move all nve/sphere disc",
+    ):  # fmt: skip
+        again.command(line)
+    with pytest.raises(
+        SnapshotError, match=f"{count} of {count} contacts have no tangential force, as where histories"
+    ):
+        from_lammps(again)
+    again.close()
+
+
+@pytest.mark.slow
+def test_moduli_along_a_path_of_strain_are_those_of_a_run(tmp_path):
+    """By the function of the how-to: as LAMMPS's own slow run with fix deform. By change_box they are others."""
+    from faultgouge.pywrap import from_lammps, lammps_path
+
+    own: dict = {}
+    exec(files(Path(__file__).parents[3] / "docs" / "howto_own_lammps.md")["strain.py"], own)
+    lmp, strain, length = periodic(tmp_path), 1e-5, own["LENGTH"]
+
+    def change_box(lmp, value: float) -> None:
+        lmp.command(f"change_box all x final 0 {length * (1 + value):.17g} remap")
+
+    moduli = {}
+    for name, apply in (("strain", own["strain"]), ("change_box", change_box)):
+        with lammps_path(lmp, apply) as path:
+            first, last = path(0.0), path(strain)
+        assert last.box[0, 0] == pytest.approx(length * (1 + strain), rel=1e-14)
+        assert not last.contacts.at_bound.any()
+        moduli[name] = (stress(last) - stress(first)) / strain
+    before, steps = stress(from_lammps(lmp)), 20000
+    for line in (
+        f"velocity all ramp vx 0 {length * strain / (steps * 1e-3):.17g} x 0 {length}",
+        f"fix strain all deform 1 x final 0 {length * (1 + strain):.17g} remap v", f"run {steps} post no",
+        "unfix strain", "velocity all set 0 0 0", "run 40000 post no",
+    ):  # fmt: skip
+        lmp.command(line)
+    run = (stress(from_lammps(lmp)) - before) / strain
+    lmp.close()
+    # 2e-7 measured; the strain adds 1e-3 to the forces of contacts, and the run ends with a residual of 1e-9 of them
+    assert moduli["strain"] == pytest.approx(run, rel=2e-6)
+    assert np.all(np.abs(moduli["change_box"] / run - 1) > 0.05)
 
 
 @pytest.mark.slow

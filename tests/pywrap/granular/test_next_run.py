@@ -1,6 +1,8 @@
 """The next run of a LAMMPS instance after looks at its packing: the same to the bit as without them."""
 
+import gzip
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -43,10 +45,39 @@ run 1950
     assert one == other
 
 
-def run_script(folder: Path, law: str, ranks: int = 1, threads: int = 1) -> None:
-    """Run next_run.py, whose threads sleep while they wait, since other processes want the cores."""
+@pytest.mark.parametrize("style", ["custom/gz", "atom/gz", "xyz/gz"])
+def test_a_look_leaves_compressed_dumps_whole(tmp_path, style):
+    """zlib writes the rest of a file when it is closed, as a copy of the process would at the place that both share."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = instance(tmp_path / "log.lammps")
+    start(lmp, 3, 18)
+    with_law(lmp, "gran/hertz/history", 3, "100", "100", ("", ""))
+    columns = " id x y z vx vy vz fx fy fz" if style == "custom/gz" else ""
+    command(lmp, f"""
+fix load all gravity 1.0 vector 0.2 0 -1
+fix move all nve/sphere
+timestep 0.002
+dump 1 all {style} 10 {tmp_path}/dump.gz{columns}
+run 1995
+""")  # fmt: skip
+    own = (tmp_path / "own.txt").open("w")
+    own.write("what a user's script has written")
+    for _ in range(2):
+        from_lammps(lmp, balance=np.inf)
+        lmp.command("run 1000")
+    lmp.close()
+    own.close()
+    text = gzip.decompress((tmp_path / "dump.gz").read_bytes()).decode()
+    assert len(re.findall(r"(?m)^(ITEM: TIMESTEP$| ?Atoms\. Timestep)", text)) == 400
+    assert text.count("\n") == 400 * (18 + (2 if style == "xyz/gz" else 9))
+    assert (tmp_path / "own.txt").read_text() == "what a user's script has written"
+
+
+def run_script(folder: Path, *arguments: object, script: str = "next_run.py", ranks: int = 1) -> None:
+    """Run a script, whose threads sleep while they wait, since other processes want the cores."""
     launcher = [BIN / "mpiexec", "-n", str(ranks)] if ranks > 1 else []
-    words = [*launcher, sys.executable, Path(__file__).with_name("next_run.py"), law, str(threads)]
+    words = [*launcher, sys.executable, Path(__file__).with_name(script), *map(str, arguments)]
     passive = os.environ | {"OMP_WAIT_POLICY": "passive"}
     done = subprocess.run(words, cwd=folder, env=passive, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
@@ -64,11 +95,18 @@ def run_script(folder: Path, law: str, ranks: int = 1, threads: int = 1) -> None
 )
 def test_on_several_ranks(tmp_path, law, ranks):
     """All contacts are in the snapshot, whichever rank has them, and the next run is the same to the bit."""
-    run_script(tmp_path, law, ranks=ranks)
+    run_script(tmp_path, law, 1, ranks=ranks)
 
 
 @pytest.mark.ranks
 @pytest.mark.slow
 def test_with_two_threads(tmp_path):
     """With the styles of LAMMPS's package OPENMP, for which a process with threads cannot be copied."""
-    run_script(tmp_path, "gran/hertz/history", threads=2)
+    run_script(tmp_path, "gran/hertz/history", 2)
+
+
+@pytest.mark.ranks
+@pytest.mark.parametrize(("ranks", "threads"), [(2, 1), (1, 2), (1, 1)])
+def test_runs_that_end_early_and_restarts(tmp_path, ranks, threads):
+    """LAMMPS skips the runs that follow, and the look has its zero steps all the same; no restart loses histories."""
+    run_script(tmp_path, threads, script="after_a_look.py", ranks=ranks)

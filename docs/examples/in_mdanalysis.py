@@ -1,0 +1,27 @@
+"""A ramp in MDAnalysis: the upper layer selected by its type, and how far the layer goes."""
+
+from pathlib import Path
+
+import MDAnalysis
+
+from faultgouge.pywrap import Record, Scene, ramp
+from faultgouge.pywrap.exchange.mdanalysis import MeanSquareDisplacement
+
+scene = Scene.from_mapping(
+    {
+        "packing": {"seed": 4, "disks": 40, "width": 7.5},
+        "law": {"kn": 2e5},
+        "load": {"fy": 3.0},
+        "ramp": {"step": 1e-2, "until": 0.05},
+    }
+)
+with Record(Path("run.h5"), scene) as record:
+    for state in ramp(scene):
+        record.append(state)
+    record.finish()
+
+universe = MDAnalysis.Universe("run.h5")
+layer = universe.select_atoms("type top")
+motion = MeanSquareDisplacement(layer).run()
+print(f"{len(universe.atoms)} disks, {len(layer)} of them in the upper layer, {len(universe.trajectory)} equilibria")
+print("sqrt(D) of the layer:", *(f"{each**0.5:.3e}" for each in motion.results.msd))

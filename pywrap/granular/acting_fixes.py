@@ -1,0 +1,56 @@
+"""Fixes that may act on particles as contacts do not tell: by their positions, or on their velocities.
+
+Whether they do in a given packing is shown by its motion (:mod:`~faultgouge.pywrap.granular.motion_proof`). These lists
+only explain.
+"""
+
+from .granular_commands import INTEGRATORS, WALLS, NotLinearisedError, without_suffix
+from .look_in_a_copy import DRAG, PER_STEP
+
+PASSIVE = (
+    *WALLS, *INTEGRATORS, *PER_STEP, *DRAG, "freeze", "gravity", "enforce2d", "NEIGH_HISTORY", "slip/history",
+    "low/parts", "dashpot/velocities", "keep/histories", "store", "STORE", "DUMMY", "property/atom",
+)  # fmt: skip
+"""Fixes, by the beginnings of their styles, whose action is in K, or constant, or none."""
+
+HOLDING = {
+    "setforce": "holds some coordinates: use fix freeze, or leave the particles out of fix nve/sphere",
+    "lineforce": "holds some coordinates: leave it out",
+    "planeforce": "holds some coordinates: leave it out",
+    "aveforce": "shares forces among particles: leave it out",
+    "spring": "pulls at particles as contacts do not tell: leave it out",
+    "indent": "pushes particles as contacts do not tell: leave it out",
+}
+"""Fixes that are refused where no motion is compared, and what is said of them."""
+
+ACTING = HOLDING | {
+    "smd": "pulls at particles as contacts do not tell: leave it out",
+    "drag": "pulls at particles as contacts do not tell: leave it out",
+    "addforce": "has a force that depends on the position or on velocities: make the force a constant",
+    "accelerate/cos": "has a force that depends on the position: use fix gravity",
+    "momentum": "changes velocities: unfix it",
+    "temp/": "changes velocities: unfix it",
+    "oneway": "changes velocities: unfix it",
+    "recenter": "moves particles: unfix it",
+    "damping/cundall": "damps as the forces on particles tell, which is not linearised here: use fix viscous",
+}
+"""What is said of fixes, by the beginnings of their styles, without which LAMMPS moves as K says."""
+
+
+def acting_fixes(styles: dict[str, str]) -> dict[str, str]:
+    """Fixes that may act as contacts do not tell, by ID, with a clause on each."""
+    found = {}
+    for name, style in styles.items():
+        plain = without_suffix(style)
+        if plain.startswith(PASSIVE):
+            continue
+        says = [text for begin, text in ACTING.items() if plain.startswith(begin)]
+        found[name] = f"fix {name} {style} {(says or ['acts on particles as contacts do not tell: unfix it'])[0]}"
+    return found
+
+
+def check_holding(styles: dict[str, str]) -> None:
+    """Refuse fixes that hold, push or pull particles, where no motion shows whether they do."""
+    held = {name: style for name, style in styles.items() if style.startswith(tuple(HOLDING))}
+    for says in acting_fixes(held).values():
+        raise NotLinearisedError(f"{says}.")

@@ -1,0 +1,300 @@
+r"""The proof of a Configuration: a few steps of LAMMPS beside the same steps of the linearised packing.
+
+LAMMPS starts from small random velocities, in a copy of the process. The linearised packing, its contacts at Coulomb's
+bound sliding on ahead and sticking on the way back (:mod:`~faultgouge.analysis.motion.one_sided`), starts from the same
+velocities and with the forces that are left at rest, and takes LAMMPS's own steps of velocity Verlet. So no error of
+the step is left, and the step may be as long as a stable one. Dashpots feel the velocities of half steps in LAMMPS's
+styles, and extrapolated ones in mindlin/smooth (fix dashpot/velocities).
+
+K by differences of forces has no contacts at the bound. Where its forces are one-sided, K is the mean of both sides,
+and no linear motion is LAMMPS's: the difference is said, and refuses nothing.
+
+The proof is :math:`|\Delta v - \Delta u| / |\Delta u|` with the changes of the velocities v of LAMMPS and u of the
+linearised packing, and with the root of the masses. One motion is compared first. If its difference is not small, half
+of the difference of the motions of both signs is, which has no terms of second order in the amplitude. With contacts at
+the bound the motions of both signs are no opposites; each is compared by itself, without the motion from rest.
+
+A force that no contact has, and that depends on the position, may be weak beside those of the contacts, and strong
+beside the lowest eigenvalues of K. Therefore all particles are displaced alike, too. Then no contact between particles
+changes, and only particles at walls may feel other forces. K by differences has such forces, to its own error.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from ...analysis import Configuration
+from ...analysis.arrays import Floats
+from ...analysis.motion.one_sided import OneSidedSystem
+from .acting_fixes import acting_fixes
+from .granular_commands import GIVE_LINES, NotLinearisedError, SnapshotError
+from .lammps_steps import steps_in_a_copy
+
+BOUND = 1e-3
+"""Difference from which on a packing is refused. Packings at rest have 1e-9 to 1e-5, by curvatures and roundings of
+forces; what is out of balance by the share e of the mean contact force adds some e, for K is that of other overlaps. A
+wrong stiffness of one contact in a hundred gives 1e-2 or more. An eigenvalue of K far below the largest may still be
+wrong by this share of the largest."""
+
+OTHER = 1e-6
+"""Stiffness that is none of contacts, as a share of K's mean diagonal, from which on a packing is refused: far below
+the smallest eigenvalues, some 1e-4 of the largest, and far above rounding, 1e-11 and less."""
+
+STEPS = 10
+"""Steps of LAMMPS and of the linearised packing."""
+
+PHASE = 0.5
+"""A step times a bound of the fastest rate, twice the fastest rate or so: ten steps are half an oscillation of it."""
+
+COMMON = 1.0
+"""Velocity that all particles share, in units of their random ones: what acts on the momentum is seen by this one."""
+
+DISPLACED = 1e-3
+"""Common displacement in units of the mean radius."""
+
+ROUNDING = 1e-14
+"""Rounding of a displacement, as a share of the largest coordinate: some units in the last place."""
+
+SMALL = 1e-2
+"""Share of the median overlap: smaller overlaps do not decide how small the velocities are."""
+
+GOOD = 1e-5
+"""Difference from which on no other amplitude is tried."""
+
+AMPLITUDES = 1.0, 0.03, 30.0
+"""Amplitudes that are tried, in units of the first."""
+
+OVERLAP = 1e-4
+"""Overlap as a share of the mean radius where no contact is known."""
+
+
+class NotProvedError(NotLinearisedError):
+    """Something acts on particles as the laws of contacts do not tell, and LAMMPS's motion shows it."""
+
+
+def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extrapolates: bool) -> float | None:
+    """Relative difference of LAMMPS's motion from that of the linearised packing; None if no contact moves.
+
+    Parameters
+    ----------
+    lmp : lammps.lammps
+        The instance, whose process can be copied.
+    configuration : Configuration
+        Its packing at rest.
+    fixes : dict
+        Styles of its fixes, by ID.
+    extrapolates : bool
+        Whether dashpots feel velocities of whole steps.
+
+    Raises
+    ------
+    NotProvedError
+        If LAMMPS's forces do not change as K says, with the likeliest cause: something acts beside contacts.
+    SnapshotError
+        If nothing is known to act beside contacts: the commands are others.
+    """
+    comparison = _Comparison.of(configuration, extrapolates=extrapolates)
+    if comparison is None:
+        return None
+    others = acting_fixes(fixes)
+    difference, other_stiffness = comparison.least_difference(lmp)
+    if other_stiffness > OTHER:
+        causes = [says for name, says in others.items() if comparison.least_difference(lmp, (name,))[1] < OTHER]
+        causes = causes or list(others.values()) or ["something acts on particles by their positions"]
+        raise NotProvedError(
+            "LAMMPS's forces do not change as K says: where all particles are displaced alike, forces change that no "
+            f"contact has; {' and '.join(causes)}."
+        )
+    if len(configuration.one_sided_particles):
+        return difference
+    causes = [
+        says
+        for name, says in others.items()
+        if difference > GOOD and comparison.least_difference(lmp, (name,))[0] < 0.1 * difference
+    ]
+    if difference <= BOUND and not causes:
+        return difference
+    causes = causes or list(others.values())
+    says = (
+        f"LAMMPS's forces do not change as K says: in {STEPS} steps from small velocities the change differs by "
+        f"{difference:.2g} of itself"
+    )
+    if causes:
+        raise NotProvedError(f"{says}; {' and '.join(causes)}.")
+    if configuration.operators == "differences":
+        raise SnapshotError(f"{says}, though K and C are differences of these forces: do they depend on the time?")
+    raise SnapshotError(
+        f"{says}; the commands are those of another run or instance, or some are not in the log (echo none, a full "
+        f"disk), or a restart has lost histories of contacts: {GIVE_LINES}, as they hold now."
+    )
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """LAMMPS's steps beside linear ones.
+
+    Attributes
+    ----------
+    system : OneSidedSystem
+        The equations of the linearised packing.
+    extrapolates : bool
+        Whether dashpots feel velocities of whole steps.
+    start : ndarray, shape (coordinates,)
+        Velocities that make the largest displacement of a contact about as large as its overlap.
+    timestep : float
+        Of both, stable for certain.
+    """
+
+    system: OneSidedSystem
+    extrapolates: bool
+    start: Floats
+    timestep: float
+
+    @classmethod
+    def of(cls, configuration: Configuration, *, extrapolates: bool) -> "_Comparison | None":
+        """None if nothing that moves has a contact."""
+        system = OneSidedSystem.of(configuration)
+        if not len(system.motion.active):
+            return None
+        k, c = (_largest_row(matrix) for matrix in (system.motion.stiffness, system.motion.damping))
+        timestep, start = PHASE / (0.5 * (c + np.sqrt(c * c + 4 * k))), _start(configuration)
+        return cls(system, extrapolates, start / _deformation(configuration, STEPS * timestep * start), timestep)
+
+    @property
+    def configuration(self) -> Configuration:
+        """The linearised packing."""
+        return self.system.motion.configuration
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether contacts are at Coulomb's bound."""
+        return bool(self.configuration.contacts.one_sided.any())
+
+    def least_difference(self, lmp: Any, without: tuple[str, ...] = ()) -> tuple[float, float]:
+        """Relative difference of LAMMPS's steps from the linear ones, at the amplitude where it is least, and the
+        stiffness that no contact has.
+
+        A K that is not LAMMPS's disagrees at every amplitude: contacts open or begin to slide with large ones, and
+        `granular` does not turn a history that has left its plane by less than 1e-10 of Coulomb's bound.
+
+        Parameters
+        ----------
+        lmp : lammps.lammps
+            The instance, whose process can be copied.
+        without : tuple of str
+            IDs of fixes that are left out.
+        """
+        overlap = float(np.median(_overlaps(self.configuration)))
+        rounding = ROUNDING * float(np.abs(self.configuration.position).max()) / overlap
+        # roundings over the amplitude are as large as terms of second order, or of third order
+        alone, both = rounding ** (1 / 2), rounding ** (1 / 2 if self.one_sided else 1 / 3)
+        best, other = self.difference(lmp, alone, (1.0,), without)
+        for factor in AMPLITUDES:
+            if best < GOOD or other > OTHER:
+                break
+            signs = (1.0, -1.0, 0.0) if self.one_sided else (1.0, -1.0)
+            best = min(best, self.difference(lmp, factor * both, signs, without)[0])
+        return best, other
+
+    def difference(
+        self, lmp: Any, amplitude: float, signs: tuple[float, ...], without: tuple[str, ...]
+    ) -> tuple[float, float]:
+        """Relative difference of the changes of velocities, and the stiffness that no contact has.
+
+        Parameters
+        ----------
+        lmp, without
+            As above.
+        amplitude : float
+            Of the velocities, in units of `start`.
+        signs : tuple of float
+            (1,) compares one motion; (1, -1) half of the difference of two, without terms of second order and without
+            what is out of balance; (1, -1, 0) each of two without what is out of balance.
+        """
+        c, sizes = self.configuration, amplitude * np.array(signs)
+        way = DISPLACED * float(c.radius.mean()) * np.where(np.arange(3) < c.dimension, [0.48, 0.6, 0.64], 0.0)
+        displaces = c.operators == "laws"
+        ends = [
+            steps_in_a_copy(
+                lmp,
+                c,
+                size * self.start,
+                self.timestep,
+                STEPS,
+                displacement=way if displaces and k == 0 else None,
+                without=without,
+            )
+            for k, size in enumerate(sizes)
+        ]
+        mix = {1: [[1.0]], 2: [[0.5], [-0.5]], 3: [[1.0, 0.0], [0.0, -1.0], [-1.0, 1.0]]}[len(signs)]
+        moves = c.coordinate_free | ~np.tile(c.free, c.axes)  # particles that do not move are compared, too
+        weight = np.sqrt(c.coordinate_mass) * (moves & ~np.tile(self._rattle & c.free, c.axes))
+        seen, expected = (
+            weight[:, None] * (each @ mix - amplitude * self.start[:, None])
+            for each in (np.column_stack([end.velocity for end in ends]), self._velocities(sizes))
+        )
+        difference = float((np.linalg.norm(seen - expected, axis=0) / np.linalg.norm(expected, axis=0)).max())
+        change = ends[0].force_change
+        return difference, 0.0 if change is None else self._other_stiffness(change) / float(np.linalg.norm(way))
+
+    @property
+    def _rattle(self) -> NDArray[np.bool_]:
+        return np.isin(np.arange(len(self.configuration)), self.configuration.rattlers)
+
+    def _other_stiffness(self, change: Floats) -> float:
+        """Largest change of a force on particles that touch no wall, over the mean of K's diagonal."""
+        c, motion = self.configuration, self.system.motion
+        inside = c.free & ~self._rattle
+        inside[c.contacts.i[c.contacts.wall]] = False
+        largest = np.abs(change[np.tile(inside, c.axes)]).max(initial=0.0)
+        return float(largest / np.mean(motion.stiffness.diagonal() * motion.root_mass**2))
+
+    def _velocities(self, sizes: Floats) -> Floats:
+        """Velocities of all coordinates after the linear steps, shape (coordinates, P), from P sizes of the start.
+
+        Forces that are left at rest act, and contacts slide that are a little below Coulomb's bound.
+        """
+        motion, c, velocity = self.system.motion, self.configuration.contacts, self.start[:, None] * sizes
+        state = self.system.start(velocity)
+        constant = (self.configuration.coordinate_force[motion.active] / motion.root_mass)[:, None]
+        # p begins with what is missing to the bound, which the force does not lack
+        slack = (c.friction - np.linalg.norm(c.tangential_force, axis=1))[c.one_sided, None]
+        state.p += slack
+        constant = constant + self.system.sliders[0] @ slack
+        self.system.take_steps(state, self.timestep, STEPS, constant=constant, extrapolates=self.extrapolates)
+        velocity[motion.active] = state.v / motion.root_mass[:, None]
+        return velocity
+
+
+def _largest_row(matrix: csr_array) -> float:
+    """Largest sum of a row in absolute values."""
+    return float(abs(matrix).sum(axis=1).max(initial=0.0))
+
+
+def _start(configuration: Configuration) -> Floats:
+    """Random velocities of size one of all that moves and touches something, and a common one."""
+    random = np.random.Generator(np.random.PCG64(0))
+    touches = np.ones(len(configuration), bool)
+    touches[configuration.rattlers] = False
+    translation, rotation = configuration.vectors(random.standard_normal(configuration.coordinates))
+    common = random.standard_normal(3)
+    translation += COMMON * np.sqrt(3) * common / np.linalg.norm(common)
+    start = configuration.join_vectors(translation, rotation)
+    return start * (configuration.coordinate_free & np.tile(touches, configuration.axes))
+
+
+def _deformation(configuration: Configuration, displacement: Floats) -> float:
+    """Largest displacement of a contact over its overlap."""
+    c, (u, _) = configuration.contacts, configuration.vectors(displacement)
+    overlap = _overlaps(configuration)
+    between = u[c.i] - np.where(c.wall[:, None], 0.0, u[c.j]) if len(c) else u
+    return float((np.linalg.norm(between, axis=1) / np.maximum(overlap, SMALL * np.median(overlap))).max())
+
+
+def _overlaps(configuration: Configuration) -> Floats:
+    """Sizes of overlaps, of which those of cohesive contacts may be gaps; a small one where no contact is known."""
+    overlap = np.abs(configuration.contacts.overlap)
+    return overlap if len(overlap) else np.array([OVERLAP * configuration.radius.mean()])

@@ -1,0 +1,112 @@
+"""Each script of docs/examples runs in an empty folder, and its numbers are right."""
+
+import re
+import shutil
+import subprocess
+import sys
+from math import sqrt
+from pathlib import Path
+
+import pytest
+from reference_layer import BIN
+
+FOLDER = Path(__file__).parents[2] / "docs" / "examples"
+PAGE = FOLDER.parent / "examples.md"
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def printed(tmp_path):
+    """What a script prints."""
+
+    def run(name, *before):
+        shutil.copy(FOLDER / f"{name}.py", tmp_path)
+        command = [*map(str, before), sys.executable, f"{name}.py"]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return run
+
+
+def number(text, before):
+    return float(re.search(re.escape(before) + r" *(-?\d[-+.\de]*)", text)[1])
+
+
+def test_three_disks(printed):
+    text = printed("three_disks")
+    assert text.splitlines()[0].count(",") == 8
+    # other increments of the ramp, and other processors, move the onset by 1e-10
+    assert number(text, "merge at F_x =") == pytest.approx(1.935965487, abs=2e-8)
+
+
+def test_own_law(printed):
+    """The vertical modes of a column of two equal springs and masses are known."""
+    text = printed("own_law")
+    found = [float(each) for each in re.search(r"\[(.*)\]", text)[1].split(",")]
+    stiffness = 1e4 + 2.0 / 0.01  # k exp(overlap/a) = k + f_n/a
+    for sign in (-1, 1):
+        wanted = stiffness * (3 + sign * sqrt(5)) / 2
+        assert min(abs(each - wanted) for each in found) < 0.01  # printed with two decimals
+    assert min(found) < 0  # the column falls over
+
+
+def test_sweep_with_interval(printed):
+    text = printed("sweep_interval")
+    onsets = [float(each) for each in re.search(r"onsets:(.*)", text)[1].split()]
+    assert 0.0342 in onsets  # seed 4, as docs/api.md has it
+    share, low, high = map(float, re.search(r"of ([\d.]+) \(([\d.]+) to ([\d.]+)\)", text).groups())
+    assert share == len(onsets) / 10
+    assert low < share < high
+    assert high - low == pytest.approx(2 * 1.96 * sqrt(share * (1 - share) / 10), rel=0.2)  # Wilson's is narrower
+
+
+def test_deck(printed):
+    text = printed("dem_deck")
+    assert number(text, "<Configuration:") == 40
+    largest, step = number(text, "eigenvalues up to"), number(text, "largest stable time step")
+    assert 0.5 < step / (2 / sqrt(largest)) <= 1  # dashpots shorten the step of the undamped packing
+
+
+def test_table_of_another_code(printed):
+    text = printed("other_code")
+    assert number(text, "the largest force on a disk was") > 100
+    assert number(text, "residual") < 1e-9
+    assert 0 < number(text, "lowest eigenvalue") < 2000
+
+
+def test_wave(printed):
+    """The response to a small pulse is in proportion to the pulse; the tolerance leaves room for the nonlinear part."""
+    assert number(printed("wave"), "moves the layer") == pytest.approx(10, abs=0.01)
+
+
+def test_spheres(printed):
+    text = printed("spheres")
+    assert number(text, "K has") == 6 * 12
+    assert number(text, "differs from that of K and C by") < 2e-3  # in proportion to the time step, with dashpots
+
+
+@pytest.mark.ranks
+def test_two_ranks(printed):
+    """The same bits on one rank and on two."""
+    one, two = printed("on_two_ranks"), printed("on_two_ranks", BIN / "mpiexec", "-n", 2)
+    assert (number(one, ""), number(two, "")) == (1, 2)
+    assert one.split(":")[1] == two.split(":")[1]
+    assert number(one, "growth rate") > 0
+
+
+def test_mdanalysis(printed):
+    text = printed("in_mdanalysis")
+    assert "6 equilibria" in text
+    first, *others = map(float, re.search(r"of the layer:(.*)", text)[1].split())
+    assert first == 0
+    assert others == sorted(others)
+    assert others[-1] / others[0] == pytest.approx(5, rel=0.05)  # the layer gives way in proportion to the load
+
+
+def test_the_page_shows_every_script():
+    scripts = sorted(path.name for path in FOLDER.glob("*.py"))
+    assert sorted(re.findall(r"examples/(\w+\.py)$", PAGE.read_text(), re.MULTILINE)) == scripts
+    lengths = {path.name: len(path.read_text().splitlines()) for path in FOLDER.glob("*.py")}
+    assert {name: length for name, length in lengths.items() if not 20 <= length <= 60} == {}

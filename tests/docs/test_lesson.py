@@ -1,0 +1,71 @@
+"""The lesson about three disks: its cells run, and its text is right about what they compute."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from faultgouge.pywrap import Scene
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "lesson.md"
+SCENE = ROOT / "scenes" / "three_disks.toml"
+
+
+def cells():
+    return re.findall(r"^```\{code-cell\} ipython3\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.slow
+def test_cells_compute_what_the_answers_say(faultgouge_here, tmp_path):
+    facts = """
+import json
+from faultgouge.analysis import normal_modes
+x, y, turn = normal_modes(rest).right[:, 0].real.reshape(3, 3)
+merging = np.argsort(abs(before[0] - window.eigenvalue))[:2]
+print(json.dumps({
+    "contacts": len(rest.contacts),
+    "slip": abs(rest.contacts.slip).max(),
+    "sideways": float(abs(x).min() / abs(y).max()),
+    "merging": sorted(np.argsort(np.argsort(before[0].real))[merging].tolist()),
+    "first complex load": float(loads[(spectra.imag != 0).any(axis=1)][0]),
+    "largest D": float(msd.max()),
+    "last decade": float(np.log10(msd[-1] / msd[len(msd) * 9 // 10])),
+}))
+"""
+    (tmp_path / "lesson.py").write_text("\n".join(cells()) + facts)
+    done = subprocess.run([sys.executable, "lesson.py"], cwd=tmp_path, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    *printed, last = done.stdout.splitlines()
+    found = json.loads(last)
+    text = "\n".join(printed)
+    values = [float(each) for each in re.search(r"at F_x = 0: (.*)", text)[1].split()]
+    assert len(values) == 9
+    assert min(values) > 0
+    assert "K^T over the largest of K: 0e+00" in text
+    # questions 1, 2, 4 and 6: contacts, no slip, the slowest motion is sideways, the second and the third merge
+    assert (found["contacts"], found["slip"], found["merging"]) == (5, 0.0, [1, 2])
+    assert found["sideways"] > 5
+    # question 8: the scan in steps of 0.025 has two digits
+    assert found["first complex load"] == pytest.approx(1.95)
+    # the onset of the command, in the same scene; its error is that of the rounding and of the increments
+    fx_c = float(re.search(r"F_x\^c = ([\d.]+)", text)[1])
+    faultgouge_here("onset", str(SCENE), "-o", "onset.json")
+    command = json.loads((tmp_path / "onset.json").read_text())
+    assert fx_c == pytest.approx(command["fx_c"], abs=command["error"] + 5e-10)  # printed with ten digits
+    assert fx_c == pytest.approx(1.935965487, abs=1e-8)  # another processor settles the disks within 1e-10
+    assert float(re.search(r"\^(0\.\d+)", text)[1]) == pytest.approx(0.5, abs=0.005)
+    predicted, measured = map(float, re.findall(r"exp\(([\d.]+) t\)", text))
+    assert measured == pytest.approx(predicted, rel=0.01)  # one beat in ten growth times is left in the fit
+    # question 10: the growth ends
+    assert found["largest D"] > 1e-9
+    assert found["last decade"] < 1
+
+
+def test_the_scene_is_that_of_the_page():
+    [block] = re.findall(r"sections = (\{.*?^\})", cells()[0], re.MULTILINE | re.DOTALL)
+    mine, shipped = Scene.from_mapping(eval(block)), Scene.from_toml(SCENE)
+    assert mine == shipped

@@ -1,0 +1,271 @@
+"""The proof of a look by LAMMPS's own motion: what it refuses with which sentence, and what it takes."""
+
+import shutil
+
+import numpy as np
+import pytest
+from granular_packings import command, instance, start, with_law
+
+TRAPS = """
+variable trap atom -0.2*(x-1.5)
+region everywhere block INF INF INF INF INF INF
+"""
+HERTZ = "gran/hertz/history 3e3 NULL 40 40 0.5 1"
+
+
+def at_rest(log, d: int, mu: str):
+    """Particles at rest on a slope, with their log."""
+    lmp = instance(log)
+    start(lmp, d, 20 if d == 3 else 18)
+    with_law(lmp, "gran/hertz/history", d, "40", "40", ("", ""), mu)
+    command(lmp, TRAPS)
+    command(lmp, f"""
+fix load all gravity 1.0 vector {"0.1 0 -1" if d == 3 else "0.05 -1 0"}
+fix move all nve/sphere
+fix drag all viscous 1.5
+timestep 0.002
+thermo 100000
+run 60000
+""")  # fmt: skip
+    return lmp
+
+
+@pytest.fixture(scope="module")
+def bed(tmp_path_factory):
+    """Spheres."""
+    log = tmp_path_factory.mktemp("log") / "log.lammps"
+    lmp = at_rest(log, 3, "0.5")
+    yield lmp, log
+    lmp.close()
+
+
+@pytest.fixture(scope="module")
+def sliding(tmp_path_factory):
+    """Disks, some of their contacts at Coulomb's bound."""
+    lmp = at_rest(tmp_path_factory.mktemp("log") / "log.lammps", 2, "0.3")
+    yield lmp
+    lmp.close()
+
+
+def look(lmp, log, lines: str = "", run: int = 0, *, prove: bool = True):
+    """A look in a copy of the process, which has a log of its own, some lines more, and has run before."""
+    from faultgouge.pywrap import from_lammps
+    from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
+
+    def work():
+        shutil.copyfile(log, f"{log}.copy")
+        lmp.command(f'log "{log}.copy" append')
+        command(lmp, lines)
+        lmp.command(f"run {run} post no")
+        return from_lammps(lmp, prove=prove)
+
+    return in_a_copy(work)
+
+
+@pytest.mark.parametrize(
+    ("fix", "says"),
+    [
+        ("smd cvel 2.0 1e-9 tether 1.5 1.5 NULL 0.0", "fix trap smd pulls at particles"),
+        ("rhok 1 0 0 20.0 0.2", "fix trap rhok acts on particles as contacts do not tell"),
+        ("flow/gauss 1 1 0", "fix trap flow/gauss acts on particles as contacts do not tell"),
+        ("momentum 1000 linear 1 1 0", "fix trap momentum changes velocities"),
+        ("temp/rescale 1000 1e-20 1e-20 0.0 1.0", "fix trap temp/rescale changes velocities"),
+        ("temp/berendsen 1e-20 1e-20 1.0", "fix trap temp/berendsen changes velocities"),
+        ("damping/cundall 0.3 0.3", "fix trap damping/cundall damps as the forces"),
+    ],
+)
+def test_fixes_that_act_as_contacts_do_not_tell(bed, fix, says):
+    from faultgouge.pywrap import SnapshotError
+
+    with pytest.raises(SnapshotError, match=f"^LAMMPS's forces do not change as K says: .*{says}") as refusal:
+        look(*bed, f"fix trap all {fix}", 60000)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    "fix",
+    ["addforce v_trap 0 0", "accelerate/cos 0.02", "drag 1.5 1.5 NULL 0.05 0.1", "spring/self 0.1",
+     "aveforce NULL 0 NULL"],
+)  # fmt: skip
+def test_forces_of_places_are_taken_by_differences(bed, fix):
+    """The laws of contacts do not have them, which the proof shows; K by differences does, and has a proof."""
+    found = look(*bed, f"fix trap all {fix}", 60000)
+    assert found.operators == "differences"
+    assert found.proof < 1e-5
+    assert found.operator_error < 1e-5
+
+
+def test_a_force_of_places_is_in_the_operator(bed):
+    """F = -0.2 (x - 1.5) adds 0.2 to each x of K."""
+    from faultgouge.analysis import stiffness_matrix
+
+    found, laws = (look(*bed, "fix trap all addforce v_trap 0 0", 60000, prove=prove) for prove in (True, False))
+    assert (found.operators, laws.operators) == ("differences", "laws")
+    added = (stiffness_matrix(found) - stiffness_matrix(laws)).toarray()
+    expected = np.diag(np.repeat([0.2, 0.0], [len(found), 5 * len(found)]))
+    assert added == pytest.approx(expected, abs=1e-5 * laws.contacts.normal_stiffness.max())
+    assert added.diagonal()[: len(found)] == pytest.approx(0.2, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("fix", "says"),
+    [
+        # at rest they do nothing
+        ("oneway 1000 everywhere x", "LAMMPS's forces do not change as K says: .*fix trap oneway changes velocities"),
+        ("propel/self velocity 0.01", "fix trap propel/self pushes particles along their velocities"),
+    ],
+)
+def test_fixes_that_act_on_what_moves(bed, fix, says):
+    from faultgouge.pywrap import SnapshotError
+
+    with pytest.raises(SnapshotError, match=says):
+        look(*bed, f"fix trap all {fix}")
+
+
+@pytest.mark.parametrize(
+    "fix",
+    ["addforce 0.01 0 0", "indent 1.0 sphere 0 0 100 1", "setforce NULL NULL NULL", "ave/time 1 1 1 c_thermo_temp"],
+)
+def test_fixes_without_effect_on_small_motion(bed, fix):
+    """Some of them were refused by their names before there was a proof."""
+    found = look(*bed, f"fix trap all {fix}", 60000)
+    assert found.operators == "laws"
+    assert found.proof < 1e-5
+
+
+def test_proof_is_kept(sliding, tmp_path):
+    """The proof is in the file and in what is printed, and no part of the comparison of two packings."""
+    from faultgouge.analysis.files.snapshot_file import read_snapshot, write_snapshot
+    from faultgouge.pywrap import from_lammps
+
+    found, other = from_lammps(sliding), from_lammps(sliding, prove=False)
+    assert found.contacts.at_bound.any()
+    assert found.proof < 1e-5
+    assert f"proof {found.proof:.1g}>" in repr(found)
+    assert other.proof is None
+    assert "not proved>" in repr(other)
+    assert found == other
+    for each in (found, other):
+        write_snapshot(tmp_path / "run.h5", each)
+        assert read_snapshot(tmp_path / "run.h5").proof == each.proof
+        (tmp_path / "run.h5").unlink()
+
+
+def test_commands_of_another_run(sliding):
+    """The same normal forces, but other tangential stiffnesses, dashpots or friction."""
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    style = HERTZ.replace("0.5", "0.3")
+    rest = ["pair_coeff * *", "fix floor all wall/gran hertz/history 3e3 9e2 40 40 0.3 1 yplane 0 NULL contacts",
+            "fix move all nve/sphere"]  # fmt: skip
+    assert from_lammps(sliding, [f"pair_style {style}", *rest]) == from_lammps(sliding)
+    for before, after in (("NULL", "1e3"), ("40 40", "20 40"), ("40 40", "40 10"), ("40 0.3", "40 0.9")):
+        with pytest.raises(SnapshotError, match=r"as K says: .*the commands are those of another run or instance"):
+            from_lammps(sliding, [f"pair_style {style.replace(before, after)}", *rest])
+    with pytest.raises(SnapshotError, match=r"contacts carry more than Coulomb's bound .* with mu = 0.1"):
+        from_lammps(sliding, [f"pair_style {style.replace('40 0.3', '40 0.1')}", *rest])
+
+
+@pytest.mark.parametrize(
+    "around",
+    [
+        pytest.param(("echo none", "echo both"), id="echo none"),
+        pytest.param(("log none", 'log "{log}" append'), id="log none"),
+        pytest.param(("", 'print "pair_style gran/hertz/history 3e3 2e3 40 40 0.5 1"'), id="print"),
+    ],
+)
+def test_logs_that_lack_commands_or_have_others(tmp_path, around):
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    log = tmp_path / "log.lammps"
+    lmp = instance(log)
+    start(lmp, 3, 20)
+    before, after = (each.format(log=log) for each in around)
+    command(lmp, f"""
+pair_style gran/hertz/history 3e3 2e3 40 40 0.5 1
+pair_coeff * *
+{before}
+pair_style {HERTZ}
+{after}
+fix floor all wall/gran hertz/history 3e3 NULL 40 40 0.5 1 zplane 0 NULL contacts
+fix load all gravity 1.0 vector 0.1 0 -1
+fix move all nve/sphere
+fix drag all viscous 1.5
+timestep 0.002
+run 60000
+""")  # fmt: skip
+    with pytest.raises(SnapshotError, match=r"as K says: .*some are not in the log"):
+        from_lammps(lmp)
+    lmp.close()
+
+
+def test_log_of_another_instance(tmp_path):
+    """Two instances of one process with one log: the commands of the second are found for the first."""
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    made = []
+    for kt in ("NULL", "2e3"):
+        lmp = instance(tmp_path / "log.lammps")
+        start(lmp, 3, 20)
+        command(lmp, f"""
+pair_style gran/hertz/history 3e3 {kt} 40 40 0.5 1
+pair_coeff * *
+fix floor all wall/gran hertz/history 3e3 {kt} 40 40 0.5 1 zplane 0 NULL contacts
+fix load all gravity 1.0 vector 0.1 0 -1
+fix move all nve/sphere
+fix drag all viscous 1.5
+timestep 0.002
+run 60000
+""")  # fmt: skip
+        made.append(lmp)
+    with pytest.raises(SnapshotError, match=r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
+        from_lammps(made[0])
+    assert from_lammps(made[1]).proof < 1e-5
+    for lmp in made:
+        lmp.close()
+
+
+def test_bonds(tmp_path):
+    """The laws have none: four spheres on a floor, two of them bonded, and no force in the bond but a small one."""
+    from faultgouge.analysis import stiffness_matrix
+    from faultgouge.pywrap import from_lammps
+
+    lmp = instance(tmp_path / "log.lammps")
+    command(lmp, f"""
+units lj
+atom_style hybrid sphere bond
+atom_modify map array
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -4 4 -4 4 0 8 units box
+create_box 1 box bond/types 1 extra/bond/per/atom 2 extra/special/per/atom 4
+create_atoms 1 single 0 0 0.5 units box
+create_atoms 1 single 0.99 0 0.5 units box
+create_atoms 1 single 0.5 0.86 0.5 units box
+create_atoms 1 single 0.5 0.29 1.3 units box
+set group all diameter 1.0 density 1.0
+pair_style {HERTZ}
+pair_coeff * *
+bond_style harmonic
+bond_coeff 1 50.0 0.99
+special_bonds lj/coul 1.0 1.0 1.0
+fix floor all wall/gran hertz/history 3e3 NULL 40 40 0.5 1 zplane 0 NULL contacts
+fix load all gravity 1.0 vector 0 0 -1
+fix move all nve/sphere
+fix drag all viscous 1.5
+timestep 0.002
+run 0
+create_bonds single/bond 1 1 2
+run 60000
+""")  # fmt: skip
+    found = from_lammps(lmp)
+    assert found.operators == "differences"
+    assert found.proof < 1e-5
+    # E = 50 (r - 0.99)^2 along x
+    with_bond = stiffness_matrix(found)
+    lmp.command("delete_bonds all bond 1 remove")
+    without = from_lammps(lmp, differences=True, prove=False)
+    added = (with_bond - stiffness_matrix(without)).toarray()[:2, :2]
+    assert added == pytest.approx(np.array([[100.0, -100.0], [-100.0, 100.0]]), abs=0.2)
+    lmp.close()

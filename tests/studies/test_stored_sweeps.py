@@ -1,0 +1,270 @@
+"""Stored rows of sweeps: for which scene, code and version they stand, what is tried again, and that none is lost."""
+
+import json
+
+import pytest
+from reference_layer import REFERENCE, SMALL, toml
+
+from faultgouge.pywrap import SceneError
+from faultgouge.studies.sweep import run_sweep as stored
+from faultgouge.studies.sweep import sweep_plan
+from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
+from faultgouge.studies.sweep.seeds import other_packings
+from faultgouge.studies.sweep.sweep_plan import Sweep
+from faultgouge.studies.sweep.tasks import TASKS
+from faultgouge.studies.sweep.user_function import user_function
+
+TASK = """
+import sys
+from pathlib import Path
+
+from faultgouge.analysis import NoEquilibriumError
+
+CALLS = Path(__file__).with_name("calls")
+
+def passing(scene):
+    with CALLS.open("a") as file:
+        file.write(f"{scene.packing.seed} ")
+    if scene.packing.seed == 1:
+        raise NoEquilibriumError("it flows")
+    if scene.packing.seed == 2 and len(CALLS.read_text().split()) < 4:
+        raise OSError("the disk is full")
+    return {"seed": scene.packing.seed}
+
+def ends(scene):
+    if scene.packing.seed == 1:
+        sys.exit()
+    return {"seed": scene.packing.seed}
+
+def imports(scene):
+    from tools.numbers import number
+    return {"number": number}
+
+def nothing(scene):
+    return {"number": float("nan")}
+
+def fails(scene):
+    return {"number": 1 / 0}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with the file of a task, and the modules that it imports."""
+    (tmp_path / "ask.py").write_text(TASK)
+    (tmp_path / "tools").mkdir()
+    (tmp_path / "tools" / "numbers.py").write_text("from .deeper import number\n")
+    (tmp_path / "tools" / "deeper.py").write_text("number = 1  # of nothing\n")
+    user_function.cache_clear()
+    return tmp_path
+
+
+def sweep_of(folder, function, seeds="1:3"):
+    mapping = {"task": f"ask.py:{function}", "sweep": {"packing.seed": seeds}, "scene": SMALL}
+    return Sweep.from_mapping(mapping, TASKS, folder)
+
+
+def keys(sweep):
+    return [point.key for point in sweep.points]
+
+
+def shards(folder, function, number=2, seeds="1:3"):
+    """The folders of the shards of a sweep."""
+    parts = [folder / f"part{k}" for k in range(1, number + 1)]
+    for k, part in enumerate(parts, 1):
+        run_sweep(sweep_of(folder, function, seeds), part, (k, number), say=id)
+    return parts
+
+
+def change(folder, says=None, result=None):
+    """Make the first row of a folder another one."""
+    lines = (folder / "results.jsonl").read_text().splitlines()
+    first = json.loads(lines[0]) | {"says": says, "result": result or {}}
+    (folder / "results.jsonl").write_text("\n".join([json.dumps(first), *lines[1:]]) + "\n")
+    return first["key"]
+
+
+def test_a_row_is_known_by_what_the_task_imports_of_its_own(folder):
+    before = keys(sweep_of(folder, "imports"))
+    for text, same in (("number = 1  # of another", True), ("number = 2", False)):
+        (folder / "tools" / "deeper.py").write_text(text)
+        user_function.cache_clear()
+        assert (keys(sweep_of(folder, "imports")) == before) is same
+
+
+def test_a_row_of_a_function_of_a_package_is_known_by_the_modules_of_the_package(tmp_path, monkeypatch):
+    package = tmp_path / "grains_of_mine"
+    package.mkdir()
+    monkeypatch.syspath_prepend(tmp_path)
+    (package / "__init__.py").write_text("")
+    (package / "tasks.py").write_text("import beside\nfrom . import numbers\ndef task(scene):\n    return {}\n")
+    (package / "numbers.py").write_text("one = 1")
+    (tmp_path / "beside.py").write_text("two = 2")
+    found = []
+    for name, text in ((None, ""), ("beside.py", "two = 3"), ("grains_of_mine/numbers.py", "one = 2")):
+        if name:
+            (tmp_path / name).write_text(text)
+        user_function.cache_clear()
+        found += keys(Sweep.from_mapping({"task": "grains_of_mine.tasks:task", "scene": SMALL}, TASKS))
+    assert found[0] == found[1] != found[2]
+
+
+def test_a_row_is_known_by_the_version_of_the_program(folder, monkeypatch):
+    before = keys(sweep_of(folder, "ends"))
+    monkeypatch.setattr(sweep_plan, "version", lambda _: "0.9")
+    assert not set(before) & set(keys(sweep_of(folder, "ends")))
+
+
+def test_a_row_is_known_by_the_content_of_the_files_of_its_scene(tmp_path):
+    """And not by their names: the same packing elsewhere has the same rows."""
+    found = []
+    for name in ("one.json", "same.json", "other.json"):
+        text = REFERENCE.read_text()
+        (tmp_path / name).write_text(text.replace("{", "{ ", 1) if name == "other.json" else text)
+        scene = {"packing": {"file": name}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": SMALL["ramp"]}
+        found += keys(Sweep.from_mapping({"task": "onset", "scene": scene}, TASKS, tmp_path))
+    assert found[0] == found[1] != found[2]
+
+
+def test_a_signal_is_found_beside_the_sweep_and_counts_by_its_content(tmp_path):
+    found = []
+    for value in (1e-3, 2e-3):
+        (tmp_path / "signal.txt").write_text(f"0 0\n0.5 {value}\n1 0\n")
+        scene = SMALL | {
+            "perturb": {"fx": 0.0, "time": 1.0, "signal": "signal.txt"},
+            "friction": {"v0": 1e-6, "v_ss": "10 v0"},
+        }
+        found += keys(Sweep.from_mapping({"task": "triggering", "scene": scene}, TASKS, tmp_path))
+    assert found[0] != found[1]
+
+
+def test_failures_are_tried_again_but_for_scenes_without_equilibrium(folder):
+    sweep = sweep_of(folder, "passing")
+    rows = run_sweep(sweep, folder / "out", say=id)
+    assert rows[0]["says"] == "it flows"
+    assert rows[1]["says"] == "scene 1: passing failed with OSError: the disk is full (ask.py, line 15)"
+    again = run_sweep(sweep, folder / "out", say=id)
+    assert (folder / "calls").read_text().split() == ["1", "2", "3", "2"]
+    assert [row["result"].get("seed") for row in again] == [None, 2, 3]
+    assert read_results(folder / "out" / "results.jsonl")[again[1]["key"]] == again[1]
+    run_sweep(sweep, folder / "out", say=id)
+    assert len((folder / "calls").read_text().split()) == 4
+
+
+def test_the_end_of_python_in_a_task_is_a_row(folder):
+    rows = run_sweep(sweep_of(folder, "ends"), folder / "out", say=id)
+    assert rows[0]["says"].startswith("scene 0: ends failed with SystemExit:  (ask.py, line 20)")
+    assert [row["says"] for row in rows[1:]] == [None, None]
+
+
+def test_a_module_that_ends_python_when_it_is_imported_is_refused(folder):
+    (folder / "ask.py").write_text("raise SystemExit(0)")
+    with pytest.raises(SceneError, match=r"cannot be imported .SystemExit: 0"):
+        sweep_of(folder, "ends")
+
+
+def test_merge_keeps_the_rows_of_its_target(folder):
+    """A target that has more than the parts, as a row that was computed since, loses none; another sweep is refused."""
+    one, two = shards(folder, "ends")
+    whole = folder / "whole"
+    merge([one, two], whole, id)
+    before = (whole / "results.jsonl").read_text()
+    merge([one], whole, id)
+    assert (whole / "results.jsonl").read_text() == before
+    assert len((whole / "results.csv").read_text().splitlines()) == 4
+    run_sweep(sweep_of(folder, "ends", "7:9"), folder / "precious", say=id)
+    files = {path: path.read_bytes() for path in (folder / "precious").iterdir()}
+    with pytest.raises(SceneError, match=r"precious is of another sweep than .*part1"):
+        merge([one, two], folder / "precious", id)
+    assert {path: path.read_bytes() for path in (folder / "precious").iterdir()} == files
+
+
+def test_a_result_that_is_no_number_is_the_same_result_again(folder):
+    parts, whole = shards(folder, "nothing"), folder / "whole"
+    merge(parts, whole, id)
+    before = (whole / "results.jsonl").read_text()
+    merge([*parts, whole], whole, id)
+    assert (whole / "results.jsonl").read_text() == before
+
+
+def test_merge_reads_a_part_that_is_being_written(folder):
+    one, two = shards(folder, "ends")
+    half = (one / "results.jsonl").read_text() + '{"key": "0123'
+    (one / "results.jsonl").write_text(half)
+    assert len(merge([one, two], folder / "whole", id)[1]) == 3
+    assert (one / "results.jsonl").read_text() == half
+
+
+@pytest.mark.parametrize("first", ["good", "bad"])
+def test_a_good_row_goes_before_an_error(folder, first):
+    for name in ("good", "bad"):
+        run_sweep(sweep_of(folder, "ends", "2:3"), folder / name, say=id)
+    change(folder / "bad", says="out of memory")
+    second = {"good": "bad", "bad": "good"}[first]
+    rows = merge([folder / first, folder / second], folder / "whole", id)[1]
+    assert [row["result"] for row in rows] == [{"seed": 2}, {"seed": 3}]
+
+
+def test_two_results_of_one_scene_are_named(folder):
+    one, two = folder / "one", folder / "two"
+    for part in (one, two):
+        run_sweep(sweep_of(folder, "ends", "2:3"), part, say=id)
+    merge([one, two], folder / "same", id)  # but for their times
+    key = change(two, result={"seed": 5})
+    with pytest.raises(SceneError, match=rf"one/results.jsonl and .*two/results.jsonl have .*seed = 2; key {key}"):
+        merge([one, two], folder / "whole", id)
+    assert not (folder / "whole" / "results.csv").exists()
+
+
+def test_merge_takes_the_keys_that_the_sweep_had_and_names_versions(folder, monkeypatch):
+    one, two = shards(folder, "ends")
+    (folder / "ask.py").unlink()
+    assert len(merge([one, two], folder / "whole", id)[1]) == 3
+    (folder / "ask.py").write_text(TASK)
+    monkeypatch.setattr(stored, "version", lambda _: "0.9")
+    run_sweep(sweep_of(folder, "ends"), two, (2, 2), say=id)
+    with pytest.raises(SceneError, match=r"part2 is of version 0.9, and .*part1 of "):
+        merge([one, two], folder / "whole", id)
+    (one / "sweep.json").write_text('{"task": "onset", "sweep": {}, "scene": {}, "shard": [1, 2]}')
+    with pytest.raises(SceneError, match=r"part1 is of version 1\.0\.0 or before"):
+        merge([one, two], folder / "whole", id)
+
+
+def test_rows_of_other_code_stay_and_are_told(folder):
+    run_sweep(sweep_of(folder, "ends"), folder / "out", say=id)
+    before, said = (folder / "out" / "results.jsonl").read_text(), []
+    (folder / "ask.py").write_text(TASK.replace('{"seed": scene.packing.seed}', '{"seed": 2 * scene.packing.seed}'))
+    user_function.cache_clear()
+    rows = run_sweep(sweep_of(folder, "ends"), folder / "out", say=said.append)
+    assert [row["result"].get("seed") for row in rows] == [None, 4, 6]
+    assert said == ["3 rows there are of other scenes, code or versions, and are not in the table"]
+    assert (folder / "out" / "results.jsonl").read_text().startswith(before)
+
+
+@pytest.mark.slow
+def test_a_sweep_of_which_all_failed_ends_with_1(folder, faultgouge_here):
+    text = 'task = "ask.py:fails"\n' + toml({"sweep": {'"packing.seed"': [1, 2]}}) + toml(SMALL, "scene.")
+    (folder / "fails.toml").write_text(text)
+    done = faultgouge_here("sweep", "fails.toml", "-o", "out", "--workers", "1", code=1)
+    assert "none of the 2 scenes has a result; the first says: scene 0: fails failed with ZeroDivision" in done.stderr
+    assert len((folder / "out" / "results.csv").read_text().splitlines()) == 3
+    (folder / "fails.toml").write_text(text.replace("fails", "ends"))
+    faultgouge_here("sweep", "fails.toml", "-o", "some", "--workers", "1")  # one has failed, and one has not
+
+
+@pytest.mark.parametrize(
+    ("axes", "changes", "named"),
+    [
+        ({"load.fy": [3.0, 3.001], "packing.seed": "1:2"}, {}, "load.fy"),
+        ({"law.kn": [1e5, 2e5]}, {}, "law.kn"),
+        ({"law.mu": [0.5, 1.0]}, {}, None),
+        ({"law.mu": [0.5, 1.0]}, {"packing": {"settle_friction": True}}, "law.mu"),
+        ({"load.fy, packing.seed": [[3.0, 1], [4.0, 2]]}, {}, None),  # no seed has two loads
+        ({"law.kn, load.fy": [[2e5, 3.0], [4e5, 6.0]]}, {}, None),  # one packing in two units of force
+        ({"packing.seed": "1:3"}, {}, None),
+    ],
+)
+def test_a_sweep_says_where_a_seed_is_several_packings(axes, changes, named):
+    scene = {section: values | changes.get(section, {}) for section, values in SMALL.items()}
+    says = other_packings(Sweep.from_mapping({"task": "onset", "sweep": axes, "scene": scene}, TASKS))
+    assert says is None if named is None else says.startswith(f"{named}: settling is chaotic")
