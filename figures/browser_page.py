@@ -1,7 +1,7 @@
 """A page that shows a ramp or an undamped run in a browser, without a network: `faultgouge view`.
 
 Bokeh draws and its JavaScript is part of the page. Arrays are for drawing: float32, in base64. `view.js` passes them to
-Bokeh as the slider moves. `browser_pair` finds the pair of eigenvalues that the page follows.
+Bokeh as the slider moves. `followed_pairs` finds the pair of eigenvalues that the page follows, and the verdicts.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.analysis.motion.hysteresis import layer_displacement
 
-from .browser_pair import LARGE, NEAREST, Progress, RampEigenvalues, follow_eigenvalues
+from .followed_pairs import SECONDS_OF_1000, FollowedPair, Progress, RampEigenvalues, follow_eigenvalues
 from .packing import LEAST_SHARE, PackingArtist, View
 from .style import EDGE, FLOOR, INK, MOBILIZATION
 
@@ -57,8 +57,8 @@ def equally_spaced(count: int, most: int) -> list[int]:
 
 
 def loads_shown(disks: int) -> int:
-    """How many loads a page of so many disks has by default: 60, or so many that the page stays below 6 MB."""
-    return max(min(60, 60 * LARGE // disks), 6)
+    """How many loads a page of so many disks has by default: 60, or as many as take a minute, but six at least."""
+    return max(min(60, round(60 / SECONDS_OF_1000 * (1000 / disks) ** 3)), 6)
 
 
 def write_view(
@@ -96,16 +96,19 @@ def write_view(
     from bokeh.resources import INLINE
 
     course = follow_eigenvalues(packings, progress)
+    if not course.pairs:
+        raise ViewError("the packing has fewer than two modes, so that no two can meet")
+    pair = course.pairs[0]
     ramp = [each for each in packings if isinstance(each, Packing)]
     moved = layer_displacement(ramp)[:, 0] if ramp else np.zeros(len(packings))
-    frames = [_frame(packing, course, k) | {"moved": moved[k]} for k, packing in enumerate(packings)]
+    frames = [_frame(packing, course, pair, k) | {"moved": moved[k]} for k, packing in enumerate(packings)]
     sources = {
         name: ColumnDataSource({column: [] for column in columns.split()}, name=name)
         for name, columns in SOURCE_COLUMNS.items()
     }
-    plots = [_packing_plot(packings, sources), _plane(course, sources)]
+    plots = [_packing_plot(packings, sources), _plane(pair, sources)]
     if len(packings) > 1:
-        plots += _curves(packings, course, sources)
+        plots += _curves(packings, pair, sources)
         plots.append(_cycle(packings, moved, sources))
     if series is not None:
         plots.append(_growth(series))
@@ -113,7 +116,6 @@ def write_view(
     for plot in plots:
         document.add_root(plot)
     folder = files(__package__ or "")
-    others = f"the {NEAREST} closest others" if len(packings[0]) > LARGE else "all others"
     script = CustomJS(args={"frames": frames, "plots": plots, **sources}, code=(folder / "view.js").read_text())
     document.js_on_event(DocumentReady, script)
     page = file_html(
@@ -124,18 +126,17 @@ def write_view(
         template_variables={
             "count": len(packings),
             "colours": (FIRST, SECOND),
-            "others": others,
             "yellow": "Yellow: upper layer." if ramp else "Red: walls, and disks that are held.",
         },
     )
     write_text(path, page)
 
 
-def _frame(packing: Packing | Configuration, course: RampEigenvalues, k: int) -> dict[str, Any]:
+def _frame(packing: Packing | Configuration, course: RampEigenvalues, pair: FollowedPair, k: int) -> dict[str, Any]:
     """The arrays of one load, in float32."""
     view, contacts = View.of(packing, margin=0.5 * packing.radius.max()), packing.contacts
     force = packing.normal_force
-    modes = course.modes[k]
+    modes = pair.modes[k]
     arrays = {
         "x": view.place[:, 0],
         "y": view.place[:, 1],
@@ -152,14 +153,15 @@ def _frame(packing: Packing | Configuration, course: RampEigenvalues, k: int) ->
         "share": np.maximum(packing.mobilised, LEAST_SHARE)[view.contact],
         "re": course.values[k].real,
         "im": course.values[k].imag,
-        "pair": np.concatenate([course.pair[k].real, course.pair[k].imag]),
+        "pair": np.concatenate([pair.eigenvalues[k].real, pair.eigenvalues[k].imag]),
         "modes": np.stack([modes.real, modes.imag], axis=1).ravel(),
     }
     faces = PackingArtist.faces(packing)[view.disk]
     return {
         "fx": packing.fx,
         "face": [{"white": None}.get(str(face), str(face)) for face in faces],
-        "known": bool(np.isfinite(course.pair[k]).all()),
+        "known": bool(np.isfinite(pair.eigenvalues[k]).all()),
+        "verdict": " ".join(course.verdicts[k].sentences),
         **{name: np.asarray(array, dtype=np.float32) for name, array in arrays.items()},
     }
 
@@ -207,28 +209,26 @@ def _packing_plot(packings: Sequence[Packing | Configuration], sources: dict[str
     return plot
 
 
-def _plane(course: RampEigenvalues, sources: dict[str, Any]) -> "figure":
+def _plane(pair: FollowedPair, sources: dict[str, Any]) -> "figure":
     """The plane of eigenvalues about the pair, with the way of the pair."""
-    known = course.pair[np.isfinite(course.pair).all(axis=1)]
+    known = pair.eigenvalues[np.isfinite(pair.eigenvalues).all(axis=1)]
     low, high = float(known.real.min()), float(known.real.max())
     margin = 0.15 * (high - low) or 0.05 * abs(high)
     most = 1.3 * float(known.imag.max()) or margin
     plot = _plot("plane", "Re λ", "Im λ", x_range=(low - margin, high + margin), y_range=(-most, most))
     for member, colour in enumerate((FIRST, SECOND)):
-        way = course.pair[:, member].astype(np.complex64)
+        way = pair.eigenvalues[:, member].astype(np.complex64)
         plot.line(way.real, way.imag, line_color=colour, line_alpha=0.5, line_width=1.5)
     plot.scatter("re", "im", source=sources["others"], size=6, fill_color=OTHERS, line_color=None)
     plot.scatter("re", "im", source=sources["members"], size=13, fill_color="colour", line_color=None)
     return plot
 
 
-def _curves(
-    packings: Sequence[Packing | Configuration], course: RampEigenvalues, sources: dict[str, Any]
-) -> list["figure"]:
+def _curves(packings: Sequence[Packing | Configuration], pair: FollowedPair, sources: dict[str, Any]) -> list["figure"]:
     """Real and imaginary parts of the pair over the load."""
     fx = np.array([packing.fx for packing in packings])
     plots: list[figure] = []
-    for name, label, part in (("real", "Re λ", course.pair.real), ("imaginary", "Im λ", course.pair.imag)):
+    for name, label, part in (("real", "Re λ", pair.eigenvalues.real), ("imaginary", "Im λ", pair.eigenvalues.imag)):
         more = {"x_range": plots[0].x_range} if plots else {}
         plot = _plot(name, "Fₓ", label, **more)
         for member, colour in enumerate((FIRST, SECOND)):

@@ -34,9 +34,10 @@ function show() {
   here.data = {moved: [frame.moved], fx: [frame.fx]}
   const digits = (x) => Number(x.toPrecision(5))
   at("fx").textContent = digits(frame.fx)
-  at("says").textContent = !frame.known ? "The pair is not recognised at this load."
-    : im[0] > 0 ? `λ = ${digits(re[0])} ± ${digits(im[0])} i: complex. The layer amplifies the faintest motion.`
-    : `λ = ${digits(re[0])} and ${digits(re[1])}: two real eigenvalues. Each mode oscillates.`
+  at("says").textContent = frame.verdict + " " + (
+    !frame.known ? "No two modes of this load have the shapes of the pair that is drawn at others."
+    : im[0] > 0 ? `The pair drawn here is complex: λ = ${digits(re[0])} ± ${digits(im[0])} i.`
+    : `The pair drawn here is real: λ = ${digits(re[0])} and ${digits(re[1])}.`)
   const names = im[0] > 0 ? ["growing mode", "decaying mode"] : ["mode of the lower λ", "mode of the higher λ"]
   names.forEach((name, k) => choice.querySelector(`[value="${k}"]`).textContent = name)
   place()

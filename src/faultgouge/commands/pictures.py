@@ -193,7 +193,7 @@ def view(
         int | None,
         typer.Option(
             min=1,
-            help="Number of equilibria on the page, equally spaced; 60 by default, and fewer for more than 300 disks.",
+            help="Number of equilibria on the page, equally spaced; 60 by default, and fewer for more than 380 disks.",
             show_default=False,
         ),
     ] = None,
@@ -210,7 +210,7 @@ def view(
     from faultgouge.analysis import RunFile
     from faultgouge.analysis.motion.hysteresis import turning_points
     from faultgouge.figures.browser_page import check_library, equally_spaced, loads_shown, write_view
-    from faultgouge.figures.browser_pair import seconds
+    from faultgouge.figures.followed_pairs import seconds
 
     check_library()
     snapshot = snapshot_of_disks(file)
