@@ -11,12 +11,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from faultgouge.analysis import Configuration, Eigenpairs, Packing, closest_to_meeting
-from faultgouge.analysis.onset import Modes, Pair, full_operator
+from faultgouge.analysis import (
+    ComplexPair,
+    Configuration,
+    Eigenpairs,
+    Packing,
+    Spectrum,
+    Stability,
+    closest_to_meeting,
+    stability,
+)
+from faultgouge.analysis.motion.eigenvalues import is_negative, unit_rounding, zero_uncertainty
+from faultgouge.analysis.onset import Modes, Pair, force_bearing, full_operator
 from faultgouge.analysis.onset.eigenvalue_pair import continue_pair
 
 from .mode import Complexes, displacement
-from .verdict import Verdict
 
 Progress = Callable[[Sequence[Packing | Configuration]], Iterable[Packing | Configuration]]
 
@@ -57,20 +66,24 @@ class RampEigenvalues:
     ----------
     values : list of ndarray of complex, shape (E,)
         All eigenvalues at each load, 1 / time^2. A complex pair that is rounding noise has lost its imaginary parts.
-    verdicts : list of Verdict
-        What they mean, for each load.
+    verdicts : list of Stability
+        Whether the packing moves, for each load.
     pairs : list of FollowedPair
         The pairs that are complex at some load, fastest growing first; without any, the two real modes closest to
         merging; none if a packing has fewer than two modes.
     """
 
     values: list[Complexes]
-    verdicts: list[Verdict]
+    verdicts: list[Stability]
     pairs: list[FollowedPair]
 
 
-def follow_eigenvalues(packings: Sequence[Packing | Configuration], progress: Progress = iter) -> RampEigenvalues:
+def follow_eigenvalues(
+    packings: Sequence[Packing | Configuration], progress: Progress = iter, reasons: Sequence[str] = ()
+) -> RampEigenvalues:
     """Eigenvalues of equilibria in the order of their path.
+
+    The motion of contacts at Coulomb's bound, which takes seconds to minutes, is followed in a single packing alone.
 
     Parameters
     ----------
@@ -78,13 +91,15 @@ def follow_eigenvalues(packings: Sequence[Packing | Configuration], progress: Pr
         The equilibria, all with the same particles.
     progress : callable
         Wraps the packings while their eigenvalues are computed.
+    reasons : sequence of str
+        Why the stability of the packings cannot be known, if it cannot.
     """
     followed = _Followed(packings)
     values, verdicts = [], []
     for k, packing in enumerate(progress(packings)):
         modes = Modes.of(packing.fx, full_operator(packing))
         values.append(modes.values)
-        verdicts.append(Verdict.of(packing, modes))
+        verdicts.append(_verdict_on(force_bearing(packing), modes, reasons, alone=len(packings) == 1))
         followed.add(k, modes)
     followed.close()
     pairs = [_along(packings, each) for each in followed.pairs]
@@ -93,8 +108,7 @@ def follow_eigenvalues(packings: Sequence[Packing | Configuration], progress: Pr
 
 def seconds(packings: Sequence[Packing | Configuration]) -> float:
     """Seconds of `follow_eigenvalues` on one core."""
-    dissipation = 8 if packings[0].damped else 0  # twice the size
-    return (1 + dissipation) * SECONDS_OF_1000 * (packings[0].coordinates / 3000) ** 3 * len(packings)
+    return (4 if packings[0].damped else 1) * SECONDS_OF_1000 * (packings[0].coordinates / 3000) ** 3 * len(packings)
 
 
 class _Followed:
@@ -145,6 +159,35 @@ class _Followed:
         else:
             image = continue_pair(pair, self.packings[k].fx, full_operator(self.packings[k]))
         return image if image is not None and image.same_planes(pair) else None
+
+
+def _verdict_on(packing: Packing | Configuration, modes: Modes, reasons: Sequence[str], alone: bool) -> Stability:
+    """Whether a packing moves; of one among many the motion of contacts at Coulomb's bound is not followed."""
+    slide = int(packing.configuration.contacts.one_sided.sum())
+    if slide and not alone:
+        contacts = "1 contact" if slide == 1 else f"{slide} contacts"
+        how = "this page does not follow, and `faultgouge spectrum --frame` does"
+        reasons = [*reasons, f"{contacts} at Coulomb's bound may slide on, which {how}"]
+    return stability(packing, spectrum_of_stiffness=_spectrum_of(packing, modes), reasons=reasons)
+
+
+def _spectrum_of(packing: Packing | Configuration, modes: Modes) -> Spectrum:
+    """The spectrum of a packing whose modes are known, fastest growing pair first."""
+    found = Eigenpairs(modes.values, modes.right, modes.left, 0, packing.axes)
+    rounding = unit_rounding(modes.matrix.data)
+    zero = zero_uncertainty(packing, rounding)
+    numbers = zip(modes.values, found.overlap, found.participation, found.rotation, strict=True)
+    pairs = [ComplexPair(complex(value), *map(float, rest)) for value, *rest in numbers if value.imag > 0]
+    return Spectrum(
+        eigenvalues=modes.values,
+        pairs=tuple(sorted(pairs, key=lambda pair: -pair.growth_rate)),
+        negative=np.sort(modes.values[is_negative(modes.values, found.overlap, zero)].real),
+        noise_pairs=0,  # they have lost their imaginary parts
+        rattlers=packing.rattlers,
+        rounding=rounding,
+        uncertainty=zero,
+        packing=packing,
+    )
 
 
 def _about_to_meet(modes: Modes) -> list[Pair]:

@@ -4,26 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reference_layer import SMALL
 from scipy.linalg import eigvals
 
 from faultgouge.analysis import damping_matrix, spectrum, stiffness_matrix
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.figures.followed_pairs import follow_eigenvalues
-from faultgouge.pywrap import Scene, ramp
 
 pytestmark = pytest.mark.slow
 
 TURN = 8
 """The equilibrium at which the ramp turns for the first time, with two complex pairs."""
-
-
-@pytest.fixture(scope="module")
-def there_and_back():
-    """Equilibria of a small layer up through its onset, down to zero, and up again."""
-    changed = {"packing": SMALL["packing"] | {"seed": 2}, "ramp": {"step": 0.02, "until": [0.16, 0.0, 0.16]}}
-    scene = Scene.from_mapping(SMALL | changed)
-    return [each.packing for each in ramp(scene)]
 
 
 @pytest.fixture(scope="module")
@@ -35,12 +25,12 @@ def test_every_complex_pair_is_counted_at_every_load(there_and_back, followed):
     counts = [len(spectrum(packing).pairs) for packing in there_and_back]
     assert 0 in counts
     assert max(counts) > 0
-    assert [verdict.pairs for verdict in followed.verdicts] == counts
+    assert [verdict.undamped.pairs for verdict in followed.verdicts] == counts
     drawn = np.array([pair.eigenvalues[:, 0].imag > 0 for pair in followed.pairs])
     assert list(drawn.sum(axis=0)) == counts
     for verdict, packing in zip(followed.verdicts, there_and_back, strict=True):
-        assert verdict.rate == pytest.approx(spectrum(packing).growth_rate(), rel=1e-6)
-        assert verdict.grows == bool(verdict.pairs)
+        assert verdict.growth_rate == pytest.approx(spectrum(packing).growth_rate(), rel=1e-6)
+        assert verdict.stable is not bool(verdict.undamped.pairs)
 
 
 def test_a_pair_is_followed_up_down_and_up(followed):
@@ -69,7 +59,7 @@ def test_nothing_is_known_of_a_pair_in_a_packing_with_other_modes(there_and_back
     )
     followed = follow_eigenvalues([*there_and_back[: TURN + 1], renumbered])
     before, other = followed.verdicts[-2:]
-    assert before.pairs == other.pairs > 0
+    assert before.undamped.pairs == other.undamped.pairs > 0
     pairs = [pair.eigenvalues for pair in followed.pairs if np.isfinite(pair.eigenvalues[0]).all()]
     assert pairs
     for pair in pairs:
@@ -88,10 +78,21 @@ def test_dashpots_decide_whether_a_layer_with_complex_pairs_grows(there_and_back
     ])  # fmt: skip
     # disks that touch nothing have s = 0
     moving = [s for s in eigvals(system) if abs(s) > 1e-6]
-    assert verdict.pairs == len(spectrum(packing).pairs) > 0
-    assert verdict.rate == pytest.approx(2 * max(s.real for s in moving), rel=1e-5)
-    assert verdict.grows is grows
-    says = "Unstable with its dashpots and drag: D" if grows else "Stable with its dashpots and drag: no motion grows;"
-    assert verdict.sentences[0].startswith(says)
-    assert f"{verdict.pairs} pair" in verdict.sentences[1]
-    assert verdict.sentences[1].startswith("Without dissipation ")
+    assert verdict.undamped.pairs == len(spectrum(packing).pairs) > 0
+    assert verdict.growth_rate == pytest.approx(2 * max(s.real for s in moving), rel=1e-5)
+    assert verdict.stable is not grows
+
+
+def test_a_path_of_loads_does_not_judge_contacts_that_may_slide_on(there_and_back):
+    """Coulomb's slider, at whose bound a contact slides on one side: many packings say so, and one is followed."""
+    before = there_and_back[TURN]
+    law = replace(before.law, coulomb=True)
+    slip = before.contacts.slip.copy()
+    largest = int(np.argmax(before.mobilised))
+    slip[largest] = np.sign(slip[largest]) * law.slip_limit(before.geometry.overlap)[largest]
+    packing = derive_frozen(before, law=law, contacts=replace(before.contacts, slip=slip))
+    assert packing.configuration.contacts.one_sided.sum() == 1
+    for verdict in follow_eigenvalues([packing, packing]).verdicts:
+        assert verdict.stable is None
+        assert verdict.one_sided is None
+        assert "1 contact at Coulomb's bound may slide on" in verdict.sentences[0]
