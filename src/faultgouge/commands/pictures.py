@@ -18,7 +18,7 @@ from .terminal import (
     print_line,
     progress,
     say,
-    snapshot_of_disks,
+    stored_configuration,
     stored_packing,
     stored_series,
     stored_snapshot,
@@ -188,52 +188,66 @@ def movie(
 @app.command(epilog="Example: faultgouge view run.h5 -o page.html")
 def view(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5 of a ramp, or perturb.h5.", show_default=False)],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="run.h5, perturb.h5, or NAME.disks from the dumps of a deck.", show_default=False
+        ),
+    ],
     loads: Annotated[
         int | None,
         typer.Option(
             min=1,
-            help="Number of equilibria on the page, equally spaced; 60 by default, and fewer for more than 300 disks.",
+            help="Number of equilibria on the page, equally spaced; 60 by default, and fewer for more than 380 disks.",
             show_default=False,
         ),
     ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="The page: .html.")] = Path("page.html"),
 ) -> None:
-    """Make one page that any browser opens offline: a ramp with its pair, under a slider.
+    """Make one page that any browser opens offline: is a packing stable, from load to load?
 
-    The page shows the packing with its force chains, the eigenvalues in the complex
-    plane, the pair that merges over F_x, and D(t) if the file contains it. The modes
-    of the pair move. The command needs pip install 'faultgouge[view]'.
+    The page says at each load whether the packing is stable, and shows how many pairs
+    are complex and how fast D grows. A click chooses a pair, whose modes move. It shows
+    D(t) if the file contains it. Spheres of a LAMMPS deck can be turned.
     """
     if output.suffix.lower() != ".html":
         raise typer.BadParameter(f"-o {output}: a page is an .html")
-    from faultgouge.analysis import RunFile
+    from faultgouge.analysis import Configuration, RunFile
     from faultgouge.analysis.motion.hysteresis import turning_points
-    from faultgouge.figures.browser_page import check_library, equally_spaced, loads_shown, write_view
-    from faultgouge.figures.browser_pair import seconds
+    from faultgouge.figures.browser_page import Axis, equally_spaced, loads_shown, write_view
+    from faultgouge.figures.followed_pairs import seconds
 
-    check_library()
-    snapshot = snapshot_of_disks(file)
+    last, assumed = stored_configuration(file)
     lock_output(context, output, file)
     if not is_root():
         return
     packings: list[Packing] | list[Configuration]
-    if snapshot is not None:
-        packings, series = [snapshot], None
-        title = f"{file.name}: {len(snapshot)} disks as LAMMPS left them"
+    axis: Axis | None = None
+    if isinstance(last, Configuration):
+        packings, series = [last], None
+        particles = "disks" if last.dimension == 2 else "spheres"
+        title = f"{file.name}: {len(last)} {particles} as LAMMPS left them"
+    elif file.suffix == ".disks":
+        packings, series = [last], None
+        title = f"{file.name}: {len(last)} disks, Fₓ = {last.fx:g}"
     else:
         with RunFile(file) as run:
-            most = loads_shown(len(run.packing(0))) if loads is None else loads
-            chosen = {*equally_spaced(len(run), most), *turning_points(run.fx)}
-            packings = [run.packing(k) for k in sorted(chosen)]
+            most = loads_shown(len(last)) if loads is None else loads
+            driven = "time" in run.observables
+            turns = [] if driven else turning_points(run.fx)
+            chosen = sorted({*equally_spaced(len(run), most), *turns})
+            packings = [run.packing(k) for k in chosen]
+            axis = Axis("t", "time of the run", run.observable("time")[chosen]) if driven else None
             series = run.series("undamped") if "undamped" in run.names_of_series else None
-        span = " to ".join(f"{fx:g}" for fx in dict.fromkeys((packings[0].fx, packings[-1].fx)))
-        what = "undamped run" if series is not None else "equilibria"
-        title = f"{file.name}: {what} of {len(packings[0])} disks, Fₓ = {span}"
+            ends = [run.fx[k] for k in sorted({0, *turns, len(run) - 1})]
+        span = f", Fₓ = {' to '.join(f'{fx:g}' for fx in ends)}" if not driven else ""
+        what = "states of a driven run" if driven else "undamped run" if series is not None else "equilibria"
+        title = f"{file.name}: {what} of {len(packings[0])} disks{span}"
     if seconds(packings) > 5:
         say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
-    write_view(packings, output, title, series, lambda them: progress(them, "loads"))
-    print_line(f"{len(packings)} loads, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
+    write_view(packings, output, title, series, lambda them: progress(them, "loads"), axis, assumed)
+    count = "1 packing" if len(packings) == 1 else f"{len(packings)} packings"
+    print_line(f"{count}, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
 
 
 def _frames_of_spheres(

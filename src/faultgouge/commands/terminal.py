@@ -84,7 +84,8 @@ def snapshot_of_disks(file: Path, frame: int = -1) -> Configuration | None:
     snapshot = stored_snapshot(file, frame)
     if snapshot is not None and snapshot.dimension == 3:
         raise BadInputError(
-            f"{file} holds spheres: `faultgouge draw {file}` draws them; `faultgouge export {file} -o packing.vtp` "
+            f"{file} holds spheres: `faultgouge draw {file}` draws them; `faultgouge view {file}` shows them in "
+            f"a browser; `faultgouge export {file} -o packing.vtp` "
             f"shows them in ParaView, and -o packing.xyz in OVITO; `faultgouge movie {file} --mode 0 -o mode.xyz` "
             "moves a mode."
         )
