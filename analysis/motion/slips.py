@@ -27,9 +27,9 @@ from scipy.integrate import trapezoid
 
 from ..arrays import Floats
 
-FAST = 10.0
+FAST = 6.0
 """Velocity of the layer from which on it slips, in units of the fastest velocity of the far end. After a slip the layer
-of 100 disks rings with 2 to 5 of these units; the slip has 30 to 60."""
+of 100 disks rings with 2 to 5 of these units; its slips have 8 to 40."""
 
 WINDOW = 0.25
 """Periods of the layer on the spring over which its velocity is a mean: faster vibrations are no slips."""
@@ -61,6 +61,11 @@ class Slip:
     force_after: float
     slip: float
     kinetic_energy: float
+
+    @property
+    def force_drop(self) -> float:
+        """Force before less force after."""
+        return self.force_before - self.force_after
 
 
 @dataclass(frozen=True)
@@ -109,7 +114,8 @@ class SlipDetector:
         """Take the next row of a series, and give the slip that it ends, if any."""
         row, found = _Row(time, force, displacement), None
         if self._past:
-            before = next((old for old in reversed(self._past) if old.time <= time - self._window), self._past[0])
+            early = (old for old in reversed(self._past) if old.time <= time - self._window)
+            before = next(early, row)  # no motion where the rows do not fill the window
             # a slip that overshoots goes on in its direction while the spring pushes back
             moved = np.sign((self._begin or before).force) * (displacement - before.displacement)
             fast = moved > self._threshold * (time - before.time)

@@ -264,10 +264,16 @@ def drive(
         If the layer leaves the bed.
     """
     settings = require_section(scene.drive, "drive")
+    signal = settings.forcing()
     with (
         Engine(start, communicator) as engine,
-        engine.driven(settings.spring, settings.stages, settings.forcing(), settings.on) as dynamics,
+        engine.driven(settings.spring, settings.stages, signal, settings.on) as dynamics,
     ):
+        if signal is not None and settings.signal != "pulse" and signal.shortest < dynamics.time_step:
+            raise SceneError(
+                f"drive.signal has rows that are {signal.shortest:.3g} apart, and the time step is "
+                f"{dynamics.time_step:.3g}: the run would not follow it, so give a slower signal"
+            )
         plan = Plan.of(settings, start, time_step(start, dynamics.time_step))
         detector = slip_detector(settings, start)
         slips = sum(detector.add(*_of_detector(row)) is not None for row in known) if detector else 0

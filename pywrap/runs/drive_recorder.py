@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -10,14 +11,17 @@ from mpi4py import MPI
 from ...analysis import RunFile
 from ...analysis.motion.slips import Slip, find_slips
 from ..equilibria.quasistatic import Equilibrium
+from ..scenes.drive_section import Drive
 from ..scenes.scene import Scene
-from ..scenes.validation import require_section
 from .drive import DriveSample, DriveState, DriveStep, drive, layer_period
 from .run_recorder import Record, raise_on_all_ranks
 from .undamped import Checkpoint
 
 SERIES = "drive"
 """Name of the series in the file."""
+
+COMPARABLE = 0.5
+"""Least force drop of a slip with a signal that is compared with one without, in units of the drop of the latter."""
 
 
 class DriveRecord(Record):
@@ -38,6 +42,9 @@ class DriveRecord(Record):
 
     def _stored_equilibrium(self, file: RunFile) -> Equilibrium:
         return Equilibrium.of(file.packing(0))
+
+    def _contents(self, file: RunFile) -> str:
+        return f"{len(file)} state{'s' * (len(file) != 1)}, the last at t = {file.observable('time')[-1]:g}"
 
     def append(self, equilibrium: Equilibrium) -> None:
         """Write the packing from which the run starts."""
@@ -86,9 +93,18 @@ class DriveRecord(Record):
             self._file.append(state.packing, time=state.time, displacement=state.displacement)
 
 
-def slips_in(file: RunFile, scene: Scene) -> list[Slip]:
-    """The slips in the series of a drive.h5 of a scene."""
-    settings = require_section(scene.drive, "drive")
+def drive_of(file: RunFile) -> Drive | None:
+    """The section [drive] of the scene of a drive.h5; None of another file."""
+    if file.attributes.get("task") != "drive":
+        return None
+    return Drive.model_validate(json.loads(file.attributes["scene"])["drive"])
+
+
+def slips_in(file: RunFile) -> list[Slip]:
+    """The slips in the series of a drive.h5."""
+    settings = drive_of(file)
+    if settings is None:
+        return []
     period = layer_period(settings, file.packing(0))
     if period is None or SERIES not in file.names_of_series:
         return []
@@ -101,3 +117,33 @@ def slips_in(file: RunFile, scene: Scene) -> list[Slip]:
         settings.fastest,
         period,
     )
+
+
+def clock_advance(path: Path, other: Path) -> float | None:
+    """How much earlier the next slip after a signal begins than in another run without the signal, time.
+
+    Slips whose force drop is below `COMPARABLE` of that of the next slip without the signal are left out: a strong
+    signal makes small slips at once, which leave the next large one where it was.
+
+    Parameters
+    ----------
+    path : Path
+        A drive.h5 with a signal.
+    other : Path
+        The drive.h5 of the same scene without the signal.
+
+    Returns
+    -------
+    float or None
+        None if one of the two has no slip after the signal has begun.
+    """
+    with RunFile(path) as with_signal, RunFile(other) as without:
+        settings = drive_of(with_signal)
+        assert settings is not None
+        after = [[slip for slip in slips_in(run) if slip.ends > (settings.at or 0.0)] for run in (with_signal, without)]
+    if not after[1]:
+        return None
+    due = after[1][0]
+    begins = (slip.begins for slip in after[0] if abs(slip.force_drop) >= COMPARABLE * abs(due.force_drop))
+    first = next(begins, None)
+    return None if first is None else due.begins - first

@@ -229,8 +229,11 @@ class Record:
         if file is None or not file.is_complete or len(file) == 0:
             return
         goes_on = "is complete" if file.complete else "the same command continues from there"
-        count = f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}{more}"
-        self._said(f"{self.path} holds {count}; {goes_on}", self.path)
+        self._said(f"{self.path} holds {self._contents(file)}{more}; {goes_on}", self.path)
+
+    def _contents(self, file: RunFile) -> str:
+        """What the file holds, in words."""
+        return f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}"
 
     def _attributes(self) -> dict[str, str | int | float]:
         return {

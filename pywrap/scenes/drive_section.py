@@ -17,6 +17,10 @@ LOADINGS = 2.0
 """Time for each slip of a run that ends after a number of slips, in units of the time in which the spring loads a layer
 at rest to mu F_y: the run ends then, whether it has slipped or not."""
 
+NOISE = 1e-12
+"""Scale of a signal that shows by how much any small disturbance moves the next slip: far above the rounding of forces,
+and far below every force."""
+
 
 class Drive(Section):
     """[drive] a spring whose far end moves along x draws the upper layer.
@@ -119,6 +123,11 @@ class Drive(Section):
                     return key, 'stands without signal: give signal = "pulse" or a file'
         elif self.at is None:
             return "at", "is missing: give the time at which the signal begins"
+        elif self.until is not None and self.at >= self.until:
+            return (
+                "at",
+                f"= {self.at:g} is after the end of the run, until = {self.until:g}: let the signal begin before",
+            )
         elif (self.signal == "pulse") != (self.omega is not None):
             return "omega", 'is the frequency of signal = "pulse": give both or neither'
         return None
@@ -142,6 +151,14 @@ class Drive(Section):
         assert self.slips is not None
         assert self.spring != "rigid"
         return LOADINGS * self.slips * strength / (self.spring * self.fastest)
+
+    def without_signal(self) -> Drive:
+        """The same drive without its signal."""
+        return self.model_copy(update={"signal": None, "at": None, "omega": None, "scale": 1.0, "on": "layer"})
+
+    def with_noise(self) -> Drive:
+        """The same drive with its signal as small as noise."""
+        return self.model_copy(update={"scale": NOISE})
 
     def forcing(self) -> Signal | None:
         """The signal as LAMMPS takes it, the force on a disk or the acceleration of the floor, by time of the run."""

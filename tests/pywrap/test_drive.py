@@ -12,7 +12,7 @@ from faultgouge.pywrap import Equilibrium, Scene, SceneError
 from faultgouge.pywrap.lammps.data_file import data_file
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
-from faultgouge.pywrap.runs.drive_recorder import DriveRecord, slips_in
+from faultgouge.pywrap.runs.drive_recorder import DriveRecord, clock_advance, slips_in
 from faultgouge.pywrap.runs.run_recorder import Record
 
 BASE = {
@@ -123,7 +123,7 @@ def test_rigid_layer_has_force_and_no_slips(scene, tmp_path):
     wanted = scene(spring="rigid", protocol=[[1e-2, 1.0], [0.0, 0.5]])
     run_to_end(wanted, tmp_path / "drive.h5")
     with RunFile(tmp_path / "drive.h5") as file:
-        series, slips = file.series("drive"), slips_in(file, wanted)
+        series, slips = file.series("drive"), slips_in(file)
     assert series["displacement"][-1] == pytest.approx(1e-2, rel=1e-3)  # a step more or less
     assert series["force"].max() > 0.3
     assert slips == []
@@ -142,7 +142,8 @@ def test_rigid_layer_has_force_and_no_slips(scene, tmp_path):
         ({"spring": "rigid", "velocity": 1e-3, "slips": 3, "until": 1.0}, "drive.slips needs a spring"),
         ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "at": 3.0}, "drive.at stands without signal"),
         ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "signal": "pulse", "omega": 1.0}, "drive.at is missing"),
-        ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "signal": "pulse", "at": 1.0}, "drive.omega is the freq"),
+        ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "signal": "pulse", "at": 0.5}, "drive.omega is the freq"),
+        ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "signal": "pulse", "omega": 1.0, "at": 1.0}, "after the end"),
         ({"spring": 10.0, "velocity": 1e-3, "untill": 1.0}, "until"),
     ],
 )
@@ -214,3 +215,48 @@ states = 0.5
     one, two = datasets(tmp_path / "1.h5"), datasets(tmp_path / "2.h5")
     assert all(np.array_equal(one[name], two[name], equal_nan=True) for name in one | two)
     assert (tmp_path / "1.csv").read_text().startswith("begins,ends,")
+
+
+SIGNAL = {"signal": "pulse", "at": 0.06, "omega": 200.0, "scale": 5.0}
+
+
+def test_signal_changes_nothing_until_it_comes(scene, tmp_path):
+    """The same run with and without, and with noise: equal to the bit up to the beginning of the signal."""
+    wanted = scene(**THROWN, **SIGNAL)
+    drives = {"with": wanted.drive, "without": wanted.drive.without_signal(), "noise": wanted.drive.with_noise()}
+    series = {}
+    for name, drive in drives.items():
+        run_to_end(wanted.model_copy(update={"drive": drive}), tmp_path / f"{name}.h5")
+        with RunFile(tmp_path / f"{name}.h5") as file:
+            series[name] = file.series("drive")
+    time = series["with"]["time"]
+    for name in ("with", "noise"):
+        same = series[name]["displacement"] == series["without"]["displacement"]
+        assert same[time < 0.06].all()
+        assert not same[-1]
+    apart = np.abs(series["with"]["displacement"] - series["without"]["displacement"]).max()
+    assert apart > 1e-4
+
+
+def test_clock_advance_is_the_time_between_comparable_slips(scene, tmp_path):
+    """Of series that are made: a small slip with the signal does not count."""
+    wanted = scene(spring=10.0, velocity=1e-3, until=200.0, signal="pulse", at=60.0, omega=2.0, scale=0.1)
+    start = settle_for_drive(wanted)
+
+    def store(name, drive, slips):
+        time = np.arange(0.0, 200.0, 0.1)
+        moved = sum(size * np.clip((time - begin) / 3.0, 0.0, 1.0) for begin, size in slips)
+        with DriveRecord(tmp_path / name, wanted.model_copy(update={"drive": drive})) as record:
+            record.append(Equilibrium.of(start))
+            file = RunFile(tmp_path / name, "a")
+            force = 10.0 * (1e-3 * time - moved)
+            columns = {"time": time, "force": force, "displacement": moved, "kinetic_energy": 0 * time}
+            file.append_series("drive", **columns)
+            file.close()
+
+    store("with.h5", wanted.drive, [(30.0, 0.05), (66.0, 0.045), (100.0, 0.06)])
+    store("without.h5", wanted.drive.without_signal(), [(30.0, 0.05), (120.0, 0.1)])
+    advance = clock_advance(tmp_path / "with.h5", tmp_path / "without.h5")
+    assert advance == pytest.approx(20.0, abs=0.2)
+    store("none.h5", wanted.drive.without_signal(), [(30.0, 0.05)])
+    assert clock_advance(tmp_path / "with.h5", tmp_path / "none.h5") is None

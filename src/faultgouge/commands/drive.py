@@ -25,6 +25,7 @@ from .terminal import (
 )
 
 if TYPE_CHECKING:
+    from faultgouge.analysis import Packing
     from faultgouge.pywrap import Scene
 
 app = typer.Typer()
@@ -40,9 +41,6 @@ def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = Fa
     intervals and before and after each slip, which spectrum and draw take by --frame.
     The slips are also written as a table beside the file, with the suffix .csv.
     """
-    from faultgouge.pywrap import Equilibrium
-    from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
-    from faultgouge.pywrap.runs.drive_recorder import DriveRecord
     from faultgouge.pywrap.scenes.validation import require_section
 
     wanted = read_scene(scene, "drive", "settle")
@@ -50,24 +48,14 @@ def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = Fa
     check_output(output, scene, *stored_files(wanted))
     check_output(table, scene, output)
     settings = require_section(wanted.drive, "drive")
-    with DriveRecord(output, wanted, saved=keeps) as record:
-        if record.last is None:
-            with status("settling") as show:
-                start = settle_for_drive(wanted, watch=lambda what: show(f"settling: {what}"))
-            for warning in check_drive(wanted, start):
-                say(f"warning: {warning}")
-            record.append(Equilibrium.of(start))
-        assert record.last is not None
-        with status("driving") as show:
-            slips = 0
-            for step in record.drive():
-                slips += step.slip is not None
-                sample = step.sample
-                show(f"driving: t = {sample.time:.4g}, F = {sample.force:.3g}, {slips} slips")
-        record.finish()
+    start = _run(output, wanted, "driving")
+    others = _others(output, wanted)
+    for name, (path, scene_of_other) in others.items():
+        check_output(path, scene, output)
+        _run(path, scene_of_other, f"driving {name}", start)
     if not is_root():
         return
-    result = _result(output, wanted)
+    result = _result(output, wanted) | _advances(output, {name: path for name, (path, _) in others.items()})
     _write_table(table, result["slips"])
     if as_json:
         print_json(result)
@@ -78,7 +66,70 @@ def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = Fa
             f"squeezed out of the bed, above the layer, where no force acts: disks "
             f"{', '.join(map(str, result['strays']))}; they were stopped there"
         )
-    print_line(f"written to {output} and {table}")
+    if others:
+        print_line(_advance_in_words(result))
+    print_line(f"written to {', '.join(map(str, [output, *(path for path, _ in others.values())]))} and {table}")
+
+
+def _run(output: Path, scene: Scene, what: str, start: Packing | None = None) -> Packing:
+    """Run a drive to its end, from a packing or from the one that the scene settles to, which is returned."""
+    from faultgouge.pywrap import Equilibrium
+    from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
+    from faultgouge.pywrap.runs.drive_recorder import DriveRecord
+
+    with DriveRecord(output, scene, saved=keeps) as record:
+        if record.last is None:
+            if start is None:
+                with status("settling") as show:
+                    start = settle_for_drive(scene, watch=lambda words: show(f"settling: {words}"))
+                for warning in check_drive(scene, start):
+                    say(f"warning: {warning}")
+            record.append(Equilibrium.of(start))
+        assert record.last is not None
+        with status(what) as show:
+            slips = 0
+            for step in record.drive():
+                slips += step.slip is not None
+                sample = step.sample
+                show(f"{what}: t = {sample.time:.4g}, F = {sample.force:.3g}, {slips} slips")
+        record.finish()
+        return record.last.packing
+
+
+def _others(output: Path, scene: Scene) -> dict[str, tuple[Path, Scene]]:
+    """Of a drive with a signal: the runs without the signal, and with one as small as noise."""
+    settings = scene.drive
+    assert settings is not None
+    if settings.signal is None:
+        return {}
+    changed = {"without": settings.without_signal(), "noise": settings.with_noise()}
+    return {
+        name: (output.with_suffix(f".{name}{output.suffix}"), scene.model_copy(update={"drive": drive}))
+        for name, drive in changed.items()
+    }
+
+
+def _advances(output: Path, others: dict[str, Path]) -> dict[str, float | None]:
+    """How much earlier the next slip is, with the signal and with noise; nothing without a signal."""
+    from faultgouge.pywrap.runs.drive_recorder import clock_advance
+
+    if not others:
+        return {}
+    return {
+        "clock_advance": clock_advance(output, others["without"]),
+        "clock_advance_of_noise": clock_advance(others["noise"], others["without"]),
+    }
+
+
+def _advance_in_words(result: dict[str, Any]) -> str:
+    advance, noise = result["clock_advance"], result["clock_advance_of_noise"]
+    if advance is None:
+        return "clock advance: not known, since no slip follows the signal, with or without it; let the run be longer"
+    side = "earlier" if advance >= 0 else "later"
+    earlier = f"the next slip of comparable size is {abs(advance):.4g} {side} than without the signal"
+    if noise is None:
+        return f"{earlier}; with noise none follows in the run"
+    return f"{earlier}; noise of 1e-12 moves it by {abs(noise):.2g}"
 
 
 def _result(path: Path, scene: Scene) -> dict[str, Any]:
@@ -91,7 +142,7 @@ def _result(path: Path, scene: Scene) -> dict[str, Any]:
     from faultgouge.pywrap.runs.drive_recorder import SERIES, slips_in
 
     with RunFile(path) as file:
-        slips, series, times = slips_in(file, scene), file.series(SERIES), file.observable("time")
+        slips, series, times = slips_in(file), file.series(SERIES), file.observable("time")
         out = np.flatnonzero(strays(file.packing(-1), file.packing(0)))
     frames = [
         {

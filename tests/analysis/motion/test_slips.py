@@ -23,7 +23,7 @@ def series(noise=0.0, sign=1.0):
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("noise", [0.0, 5e-4])
 def test_slips_are_those_of_the_series(noise, sign):
-    """Vibration with a velocity of 8 V, faster than the window, moves beginnings by its own period alone."""
+    """Vibration with a velocity of 8 V, faster than the window, moves beginnings and ends by its own period alone."""
     time, force, moved, energy = series(noise, sign)
     found = find_slips(time, force, moved, energy, VELOCITY, PERIOD)
     assert len(found) == len(SLIPS)
