@@ -24,13 +24,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ...analysis import Contacts, FaultgougeError, Packing, layer_force
+from ...analysis import Contacts, FaultgougeError, Packing, dynamical_matrix, eigenpairs, layer_force
 from ...analysis.arrays import Floats
 from ...analysis.factors.sparse_lu import general_lu
 from ...analysis.motion.slips import Slip, SlipDetector
 from ...analysis.progress import Watch
-from ...analysis.spectrum.eigenpairs import eigenpairs
-from ...analysis.spectrum.spectrum import dynamical_matrix
 from ..lammps.dynamics import Dynamics
 from ..lammps.engine import Engine
 from ..scenes.drive_section import Drive
