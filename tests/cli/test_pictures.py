@@ -1,12 +1,13 @@
 """draw, movie, view, init and --version, as a user types them."""
 
+import json
 import re
 import subprocess
 import sys
 
 import pytest
 from PIL import Image
-from reference_layer import BIN
+from reference_layer import BIN, LAYER, toml
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene
@@ -40,6 +41,45 @@ def test_films_of_a_run_a_ramp_and_a_mode(beyond, faultgouge_here_in):
             assert gif.n_frames == 5
 
 
+DRIVE = {
+    "damping": {"cn": 60.0, "ct": 17.0},
+    "drive": {"spring": 10.0, "velocity": 2e-3, "until": 200.0, "states": 2.0, "slips": 1},
+}
+"""A layer that a fast spring draws until it slips."""
+
+
+@pytest.mark.slow
+def test_drive_is_a_table_of_slips_pictures_a_film_and_spectra(faultgouge_here, tmp_path):
+    (tmp_path / "scene.toml").write_text(LAYER + toml(DRIVE))
+    done = faultgouge_here("drive", "scene.toml", "-o", "drive.h5", "--json")
+    result = json.loads(done.stdout)
+    (slip,) = result["slips"]
+    assert slip["force_before"] > slip["force_after"]
+    assert slip["slip"] > 0.005
+    assert slip["kinetic_energy"] > 0
+    assert result["time"] < 200.0
+    row = (tmp_path / "drive.csv").read_text().splitlines()[1].split(",")
+    assert [float(number) for number in row[:6]] == list(slip.values())[:6]
+    with RunFile(tmp_path / "drive.h5") as file:
+        times = file.observable("time")
+        assert times[slip["frame_before"]] <= slip["begins"]
+        assert times[slip["frame_after"]] >= slip["ends"]
+        assert file.packing(slip["frame_before"]).fx == pytest.approx(slip["force_before"], rel=0.05)
+    again = faultgouge_here("drive", "scene.toml", "-o", "drive.h5")
+    assert "1 slip up to t = " in again.stdout
+    drawn = faultgouge_here("draw", "drive.h5", "-o", "force.png")
+    assert drawn.stdout == "written to force.png\n"
+    by_time = faultgouge_here("draw", "drive.h5", "--time", str(slip["begins"]), "-o", "packing.png").stdout
+    by_frame = faultgouge_here("draw", "drive.h5", "--frame", slip["frame_before"], "-o", "packing.png").stdout
+    assert by_time == by_frame
+    film = ("movie", "drive.h5", "--span", "1", "9", "--seconds", "1", "--rate", "5", "--dots", "50", "-o", "film.gif")
+    faultgouge_here(*film)
+    with Image.open(tmp_path / "film.gif") as gif:
+        assert gif.n_frames == 5
+    assert "eigenvalues" in faultgouge_here("spectrum", "drive.h5", "--frame", slip["frame_before"]).stdout
+    assert "floor" in faultgouge_here("explain", "scene.toml").stdout
+
+
 @pytest.mark.slow
 def test_init_writes_a_scene_that_holds_every_key(faultgouge_here, tmp_path):
     faultgouge_here("init")
@@ -48,7 +88,7 @@ def test_init_writes_a_scene_that_holds_every_key(faultgouge_here, tmp_path):
     # without the signs of comments every key is there, and the scene is still one
     path.write_text(re.sub(r"^# (?=\[|[A-Za-z_0-9]+ = )", "", path.read_text(), flags=re.MULTILINE))
     keys = read_toml(path, "scene")
-    for name in ("relax", "ramp", "perturb", "friction", "output", "law", "load"):
+    for name in ("relax", "ramp", "perturb", "friction", "drive", "output", "law", "load"):
         section = Scene.model_fields[name].annotation
         models = [each for each in (section, *getattr(section, "__args__", ())) if hasattr(each, "model_fields")]
         missing = set(models[0].model_fields) - set(keys[name])

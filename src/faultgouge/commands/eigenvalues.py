@@ -17,6 +17,8 @@ from .terminal import (
     Frame,
     PackingFile,
     ScenePath,
+    Time,
+    frame_at,
     lock_output,
     print_json,
     print_line,
@@ -57,6 +59,7 @@ Slices = Annotated[
 def spectrum(
     file: PackingFile,
     frame: Frame = -1,
+    time: Time = None,
     values: Annotated[
         bool, typer.Option("--values", help="Only the eigenvalues: for a thousand disks in a third of the time.")
     ] = False,
@@ -82,7 +85,7 @@ def spectrum(
     from faultgouge.analysis import spectrum as eigenvalues_of
     from faultgouge.analysis.progress import show_progress
 
-    packing, assumed = stored_configuration(file, frame)
+    packing, assumed = stored_configuration(file, frame_at(file, frame, time))
     size = packing.configuration.coordinates
     if size > LARGE:
         # four matrices of doubles; 18000 coordinates took 10.2 GB

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,13 +13,16 @@ from ..mpi_rank import is_root
 from .terminal import (
     Frame,
     PackingFile,
+    Time,
     counted,
+    frame_at,
     growth_in,
     lock_output,
     print_line,
     progress,
     say,
     stored_configuration,
+    stored_drive,
     stored_packing,
     stored_series,
     stored_snapshot,
@@ -66,38 +70,45 @@ def draw(
             show_default=False,
         ),
     ] = None,
+    time: Time = None,
     mode: WhichMode = None,
     color: WhichColour = Colour.MOBILISED,
     output: Annotated[
         Path, typer.Option("-o", "--output", help="The picture: .png, .svg or .pdf.", show_default=True)
     ] = Path("picture.png"),
 ) -> None:
-    """Draw a stored packing with its force chains or a mode, a cycle of loads, or the D(t) of perturb.h5.
+    """Draw a stored packing with its force chains or a mode, a cycle of loads, D(t) of perturb.h5, F(t) of drive.h5.
 
     Disks are to scale: the upper layer is yellow, rattlers are hollow. Bars are
     contacts, with a width proportional to the normal force. For a mode, arrows are
     displacements and colours rotations; the participation ratio and the share of
     rotation stand above. A ramp with turning points is drawn as F_x over the
-    displacement of the upper layer, and perturb.h5 as D(t) with the predicted slope.
-    With --frame or --mode, the packing of these files is drawn instead.
+    displacement of the upper layer, perturb.h5 as D(t) with the predicted slope, and
+    drive.h5 as the force over time with its slips. With --frame, --time or --mode, the
+    packing of these files is drawn instead.
     """
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
     lock_output(context, output, file)
-    snapshot, series, cycle = stored_snapshot(file, -1 if frame is None else frame), None, []
-    packing = snapshot or stored_packing(file, -1 if frame is None else frame)
-    if snapshot is None and frame is None and mode is None:
-        series, cycle = stored_series(file), _cycle(file)
+    number, series, cycle, driven = frame_at(file, -1 if frame is None else frame, time), None, [], None
+    snapshot = stored_snapshot(file, number)
+    packing = snapshot or stored_packing(file, number)
+    if snapshot is None and frame is None and time is None and mode is None:
+        driven = stored_drive(file)
+        series, cycle = stored_series(file), [] if driven else _cycle(file)
     if not is_root():
         return
     from faultgouge.analysis import Packing
     from faultgouge.figures import draw_cycle, draw_packing
+    from faultgouge.figures.drive import draw_drive
     from faultgouge.figures.mode import draw_modes
     from faultgouge.figures.packing import in_words
     from faultgouge.figures.series import draw_growth
     from faultgouge.figures.style import save_as
 
-    if cycle:
+    if driven is not None:
+        figure = draw_drive(*driven)
+    elif cycle:
         figure = draw_cycle(cycle)
     elif series is not None:
         growth = growth_in(file, series)
@@ -148,7 +159,8 @@ def movie(
     From perturb.h5 with its trajectory ([output] trajectory = true): the run and
     D(t). Displacements are magnified by a power of ten, which is printed on the film
     and falls in steps. With --mode: the motion of a mode without its growth. From
-    run.h5: the ramp, and F_x over the displacement of the upper layer. An .mp4 needs
+    run.h5: the ramp, and F_x over the displacement of the upper layer. From drive.h5:
+    its states, to scale, and the force over time. An .mp4 needs
     pip install 'faultgouge[movie]'. A mode of spheres is written as frames for OVITO
     (.xyz) or ParaView (.pvd).
     """
@@ -284,15 +296,23 @@ def _cycle(file: Path) -> list[Packing]:
 
 
 def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] | None, dots: int | None) -> Film:
-    """The run if the file has its trajectory, else its ramp."""
+    """The run if the file has its trajectory, else its drive or its ramp."""
     from faultgouge.analysis import PackingFileError, RunFile
+    from faultgouge.figures.drive import course_of
     from faultgouge.figures.film import RampFilm, RunFilm, RunMotion
 
     if file.suffix == ".disks":
         raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
+    driven, course, times = stored_drive(file), None, list[float]()
     with RunFile(file) as run:
         motion = RunMotion.read(run)
         packings = [] if motion is not None else [run.packing(k) for k in range(len(run))]
+        times = run.observable("time").tolist() if driven else times
+    if driven:
+        first, last = span or (-inf, inf)
+        shown = [k for k, time in enumerate(times) if first <= time <= last]
+        packings = [packings[k] for k in shown]
+        course = course_of(*driven, [times[k] for k in shown], first, last)
     if motion is not None:
         return RunFilm(motion if span is None else motion.between(*span), count, dots=dots)
     if len(packings) < 2:
@@ -300,7 +320,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
             f"{file} has one equilibrium and no trajectory: ask for a mode with --mode, or run `faultgouge perturb` "
             "with trajectory = true under [output]"
         )
-    return RampFilm(packings, count, color, dots=dots)
+    return RampFilm(packings, count, color, dots=dots, course=course)
 
 
 def modes_of(packing: Packing | Configuration, which: str) -> tuple[list[Mode], str]:
