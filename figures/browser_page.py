@@ -19,8 +19,9 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike
 
-from faultgouge.analysis import Configuration, Packing, Stability
+from faultgouge.analysis import Packing, Stability
 from faultgouge.analysis.arrays import Floats
+from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.analysis.motion.hysteresis import layer_displacement, turning_points
 
@@ -59,7 +60,7 @@ class Axis:
     values: Floats
 
     @classmethod
-    def of_loads(cls, packings: Sequence[Packing | Configuration]) -> "Axis":
+    def of_loads(cls, packings: Sequence[HasConfiguration]) -> "Axis":
         """The shear force of a ramp; a load parameter of other codes."""
         values = np.array([packing.fx for packing in packings])
         layer = isinstance(packings[0], Packing)
@@ -77,7 +78,7 @@ def loads_shown(disks: int) -> int:
 
 
 def write_view(
-    packings: Sequence[Packing | Configuration],
+    packings: Sequence[HasConfiguration],
     path: Path,
     title: str,
     series: dict[str, Any] | None = None,
@@ -171,11 +172,9 @@ def _encode(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else _array(value, "f4")
 
 
-def _frame(
-    packing: Packing | Configuration, axis: Axis, images: Images, followed: RampEigenvalues, k: int
-) -> dict[str, Any]:
+def _frame(packing: HasConfiguration, axis: Axis, images: Images, followed: RampEigenvalues, k: int) -> dict[str, Any]:
     """What the page shows of one packing."""
-    verdict, contacts, force = followed.verdicts[k], packing.contacts, packing.normal_force
+    verdict, contacts, force = followed.verdicts[k], packing.configuration.contacts, packing.normal_force
     share = np.log(np.maximum(packing.mobilised, LEAST_SHARE)) / np.log(LEAST_SHARE)
     faces = PackingArtist.faces(packing)
     return {
@@ -262,19 +261,20 @@ def _colours(count: int) -> list[str]:
     return [to_hex(MOBILIZATION(k / (count - 1))) for k in range(count)]
 
 
-def _legend(packing: Packing | Configuration) -> str:
+def _legend(packing: HasConfiguration) -> str:
     """What the colours of the particles are."""
     kinds = ["White: rattlers, which touch nothing."] if len(packing.rattlers) else []
+    configuration = packing.configuration
     if isinstance(packing, Packing):
         kinds.insert(0, "Yellow: upper layer.")
-    elif (len(packing.contacts) and packing.contacts.wall.any()) or not packing.free.all():
+    elif configuration.contacts.wall.any() or not configuration.free.all():
         kinds.insert(0, "Red: walls, and particles that are held.")
     if packing.configuration.dimension == 3:
         kinds.append("Drag to turn.")
     return " ".join([*kinds, "Width of a bar: normal force."])
 
 
-def _scene(packings: Sequence[Packing | Configuration], images: Sequence[Images]) -> dict[str, Any]:
+def _scene(packings: Sequence[HasConfiguration], images: Sequence[Images]) -> dict[str, Any]:
     """What all packings of a page share: the particles, the colours and the frame of the picture."""
     return {
         "dimension": images[0].dimension,

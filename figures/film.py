@@ -21,8 +21,9 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from faultgouge.analysis import Configuration, Packing, PackingFileError, RunFile, nearest_image
+from faultgouge.analysis import Packing, PackingFileError, RunFile, nearest_image
 from faultgouge.analysis.arrays import Floats
+from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.motion.hysteresis import layer_displacement
 
 from .cycle import in_powers_of_ten
@@ -238,7 +239,7 @@ class ModeFilm(Film):
     @styled
     def __init__(
         self,
-        packing: Packing | Configuration,
+        packing: HasConfiguration,
         modes: Sequence[Mode],
         words: str,
         frames: int,

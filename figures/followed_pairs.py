@@ -13,21 +13,20 @@ import numpy as np
 
 from faultgouge.analysis import (
     ComplexPair,
-    Configuration,
     Eigenpairs,
-    Packing,
     Spectrum,
     Stability,
     closest_to_meeting,
     stability,
 )
+from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.motion.eigenvalues import is_negative, unit_rounding, zero_uncertainty
 from faultgouge.analysis.onset import Modes, Pair, force_bearing, full_operator
 from faultgouge.analysis.onset.eigenvalue_pair import continue_pair
 
 from .mode import Complexes, displacement
 
-Progress = Callable[[Sequence[Packing | Configuration]], Iterable[Packing | Configuration]]
+Progress = Callable[[Sequence[HasConfiguration]], Iterable[HasConfiguration]]
 
 MEMORY = 1e9
 """Bytes of modes that are kept until all pairs are followed; at other loads a pair is found by inverse iteration."""
@@ -79,7 +78,7 @@ class RampEigenvalues:
 
 
 def follow_eigenvalues(
-    packings: Sequence[Packing | Configuration], progress: Progress = iter, reasons: Sequence[str] = ()
+    packings: Sequence[HasConfiguration], progress: Progress = iter, reasons: Sequence[str] = ()
 ) -> RampEigenvalues:
     """Eigenvalues of equilibria in the order of their path.
 
@@ -106,7 +105,7 @@ def follow_eigenvalues(
     return RampEigenvalues(values, verdicts, sorted(pairs, key=lambda pair: -np.nanmax(pair.growth)))
 
 
-def seconds(packings: Sequence[Packing | Configuration]) -> float:
+def seconds(packings: Sequence[HasConfiguration]) -> float:
     """Seconds of `follow_eigenvalues` on one core."""
     return (4 if packings[0].damped else 1) * SECONDS_OF_1000 * (packings[0].coordinates / 3000) ** 3 * len(packings)
 
@@ -114,7 +113,7 @@ def seconds(packings: Sequence[Packing | Configuration]) -> float:
 class _Followed:
     """Pairs that are followed while the loads of a ramp come one after the other, and then back to where they began."""
 
-    def __init__(self, packings: Sequence[Packing | Configuration]) -> None:
+    def __init__(self, packings: Sequence[HasConfiguration]) -> None:
         self.packings = packings
         self.pairs: list[dict[int, Pair]] = []
         self._modes: dict[int, Modes] = {}
@@ -161,7 +160,7 @@ class _Followed:
         return image if image is not None and image.same_planes(pair) else None
 
 
-def _verdict_on(packing: Packing | Configuration, modes: Modes, reasons: Sequence[str], alone: bool) -> Stability:
+def _verdict_on(packing: HasConfiguration, modes: Modes, reasons: Sequence[str], alone: bool) -> Stability:
     """Whether a packing moves; of one among many the motion of contacts at Coulomb's bound is not followed."""
     slide = int(packing.configuration.contacts.one_sided.sum())
     if slide and not alone:
@@ -171,7 +170,7 @@ def _verdict_on(packing: Packing | Configuration, modes: Modes, reasons: Sequenc
     return stability(packing, spectrum_of_stiffness=_spectrum_of(packing, modes), reasons=reasons)
 
 
-def _spectrum_of(packing: Packing | Configuration, modes: Modes) -> Spectrum:
+def _spectrum_of(packing: HasConfiguration, modes: Modes) -> Spectrum:
     """The spectrum of a packing whose modes are known, fastest growing pair first."""
     found = Eigenpairs(modes.values, modes.right, modes.left, 0, packing.axes)
     rounding = unit_rounding(modes.matrix.data)
@@ -199,7 +198,7 @@ def _about_to_meet(modes: Modes) -> list[Pair]:
     return [modes.pair((first, second))]
 
 
-def _along(packings: Sequence[Packing | Configuration], known: dict[int, Pair]) -> FollowedPair:
+def _along(packings: Sequence[HasConfiguration], known: dict[int, Pair]) -> FollowedPair:
     """Eigenvalues and displacements of a pair."""
     found = np.full((len(packings), 2), complex(np.nan, np.nan))
     modes = np.zeros((len(packings), 2, packings[0].axes, len(packings[0])), dtype=np.complex128)

@@ -8,6 +8,7 @@ import numpy as np
 
 from faultgouge.analysis import Configuration, Packing
 from faultgouge.analysis.arrays import Floats, Indices
+from faultgouge.analysis.configuration import HasConfiguration
 
 from .packing import View
 
@@ -53,10 +54,10 @@ class Images:
     periodic: bool
 
     @classmethod
-    def of(cls, packing: Packing | Configuration) -> "Images":
+    def of(cls, packing: HasConfiguration) -> "Images":
         """Those of a packing."""
-        if isinstance(packing, Configuration) and packing.dimension == 3:
-            return cls._of_spheres(packing)
+        if packing.dimension == 3:
+            return cls._of_spheres(packing.configuration)
         view = View.of(packing, margin=MARGIN * packing.radius.max())
         top = float((packing.position[:, 1] + packing.radius).max())
         room = 1.1 if isinstance(packing, Packing) else 0.3  # for the arrow of the load

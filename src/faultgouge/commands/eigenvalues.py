@@ -33,7 +33,8 @@ from .terminal import (
 )
 
 if TYPE_CHECKING:
-    from ..analysis import Configuration, DampedWindow, Packing, Spectrum, Stability, Window
+    from ..analysis import DampedWindow, Packing, Spectrum, Stability, Window
+    from ..analysis.configuration import HasConfiguration
     from ..pywrap import Equilibrium, Scene
     from ..pywrap.onset.damped import DampedOnset
 
@@ -125,7 +126,7 @@ def spectrum(
     )
 
 
-def _values(packing: Packing | Configuration, as_json: bool) -> None:
+def _values(packing: HasConfiguration, as_json: bool) -> None:
     """Eigenvalues without vectors: as JSON, or a line each."""
     from faultgouge.analysis import eigenvalues
 
@@ -138,7 +139,7 @@ def _values(packing: Packing | Configuration, as_json: bool) -> None:
 
 
 def _print_spectrum(
-    packing: Packing | Configuration,
+    packing: HasConfiguration,
     result: Spectrum,
     verdict: Stability,
     gain: dict[str, Any] | None,
@@ -161,7 +162,7 @@ def _print_spectrum(
             print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
 
 
-def _print_size(packing: Packing | Configuration, result: Spectrum) -> None:
+def _print_size(packing: HasConfiguration, result: Spectrum) -> None:
     """The packing, and the range of its eigenvalues."""
     from faultgouge.analysis import Packing, solid_fraction
 
@@ -193,7 +194,7 @@ def _print_growing_motions(result: Spectrum, dissipative: bool, verbose: bool) -
         print(f"least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}")
 
 
-def _gain_of(packing: Packing | Configuration) -> dict[str, Any] | None:
+def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None if unstable, too large, or where it fails."""
     from faultgouge.analysis.motion.transient import MOST_DISKS, NoGainError, transient_gains
 

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from faultgouge.figures.film import Film
     from faultgouge.figures.mode import Mode
 
+    from ..analysis.configuration import HasConfiguration
+
 app = typer.Typer()
 
 
@@ -323,7 +325,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
     return RampFilm(packings, count, color, dots=dots, course=course)
 
 
-def modes_of(packing: Packing | Configuration, which: str) -> tuple[list[Mode], str]:
+def modes_of(packing: HasConfiguration, which: str) -> tuple[list[Mode], str]:
     """The modes that --mode asks for, and what they are."""
     from faultgouge.figures.mode import modes_of as find_modes
 
