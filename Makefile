@@ -7,7 +7,7 @@
 # make check       format, lint and types
 # make benchmark   measures all that docs/benchmarks.md shows, and writes that page anew (a quarter of an hour)
 # make pictures    the report and the stiff cases that the documentation shows, anew and with the version that made
-#                  them, in docs/report and docs/stability (a quarter of an hour); before a release
+#                  them, in docs/report and docs/extremes (a quarter of an hour); before a release
 # make wheel       sdist and wheel, to be given away, in dist/
 # make wheel-aarch64   the same wheel for 64-bit ARM, cross-compiled
 # make docs        the documentation, in docs/_build/html (Python >= 3.11)
@@ -69,7 +69,7 @@ benchmark: $(VENV)/.installed
 
 pictures: $(VENV)/.installed
 	$(BIN)/faultgouge report -o docs/report
-	$(BIN)/faultgouge stability -o docs/stability
+	$(BIN)/faultgouge extremes -o docs/extremes
 
 # the wheel is built from the sdist, for the LAMMPS of the environment, and says so
 wheel: $(VENV)/.plugin

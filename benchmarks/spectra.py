@@ -25,6 +25,7 @@ from scale import scene
 
 import faultgouge.analysis.motion.spectrum as spectrum_module
 from faultgouge.analysis import Configuration, Packing, Spectrum, dynamical_matrix, spectrum
+from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.pywrap import Engine, equilibrate, from_lammps, settle
 
 LOADS = 10
@@ -80,13 +81,13 @@ def spheres(count: int) -> Configuration:
     return found
 
 
-def measured(packing: Packing | Configuration, sliced: float) -> tuple[Spectrum, float, float]:
+def measured(packing: HasConfiguration, sliced: float) -> tuple[Spectrum, float, float]:
     """A spectrum, in slices from so many coordinates on, with its seconds and GB; in a process of its own."""
     with multiprocessing.get_context("fork").Pool(1) as pool:
         return pool.apply(_measure, (packing, sliced))
 
 
-def _measure(packing: Packing | Configuration, sliced: float) -> tuple[Spectrum, float, float]:
+def _measure(packing: HasConfiguration, sliced: float) -> tuple[Spectrum, float, float]:
     spectrum_module.SLICED = sliced  # type: ignore[assignment]
     begin = time.process_time()
     found = spectrum(packing)

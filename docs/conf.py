@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -110,20 +111,27 @@ def add_address(app, docname, source):
         source[0] = re.sub(r"<!-- git clone.*?-->", line, source[0])
 
 
-def make_live_page(app, exception):
-    """The page of `faultgouge view` that the first page shows, from a scene that ships with the package."""
+def make_live_pages(app, exception):
+    """The pages of `faultgouge view`: of a scene that ships with the package, and of three disks of the tutorial."""
     if exception is not None or app.builder.format != "html":
         return
-    scene = Path(__file__).parents[1] / "scenes" / "paper.toml"
+    here = Path(__file__).parent
+    sys.path.insert(0, str(here.parent))
+    from docs.run_page import files
+
+    paper = (here.parent / "scenes" / "paper.toml").read_text()
     with tempfile.TemporaryDirectory() as folder:
-        for words in (["ramp", str(scene), "-o", "paper.h5"], ["view", "paper.h5", "-o", f"{app.outdir}/live.html"]):
-            command = [sys.executable, "-m", "faultgouge", *words]
-            subprocess.run(command, cwd=folder, env=os.environ | {"OMP_NUM_THREADS": "1"}, check=True)
+        for page, scene in (("live", paper), ("three", files(here / "tutorial.md")["three.toml"])):
+            Path(folder, f"{page}.toml").write_text(scene)
+            for words in (["ramp", f"{page}.toml", "-o", f"{page}.h5"], ["view", f"{page}.h5", "-o", f"{page}.html"]):
+                command = [sys.executable, "-m", "faultgouge", *words]
+                subprocess.run(command, cwd=folder, env=os.environ | {"OMP_NUM_THREADS": "1"}, check=True)
+            shutil.copy(Path(folder, f"{page}.html"), app.outdir)
 
 
 def setup(app):
     app.connect("source-read", add_address)
-    app.connect("build-finished", make_live_page)
+    app.connect("build-finished", make_live_pages)
     app.connect("doctree-read", keep_numbers_whole)
     app.connect("autodoc-process-docstring", keep_first_line, priority=90)
     app.connect("autodoc-process-docstring", keep_bars, priority=100)

@@ -1,54 +1,70 @@
-"""A page that shows a ramp or an undamped run in a browser, without a network: `faultgouge view`.
+"""A page that shows a ramp, an undamped run or one packing in a browser, without a network: `faultgouge view`.
 
-Bokeh draws and its JavaScript is part of the page. Arrays are for drawing: float32, in base64. `view.js` passes them to
-Bokeh as the slider moves. `browser_pair` finds the pair of eigenvalues that the page follows.
+The page is one file: numbers as JSON, arrays in base64, and the scripts of the folder `view`, which draw them.
+:mod:`.followed_pairs` finds the pairs of eigenvalues. Arrays are for drawing: positions are float32, and the shape of a
+mode is 8 bits a coordinate.
 """
 
+import base64
+import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.resources import files
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from jinja2 import Environment, FunctionLoader, StrictUndefined
 from matplotlib.colors import to_hex
+from numpy.typing import ArrayLike
 
-from faultgouge.analysis import BadInputError, Configuration, Packing
+from faultgouge.analysis import Packing, Stability
 from faultgouge.analysis.arrays import Floats
+from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.files.atomic_write import write_text
-from faultgouge.analysis.motion.hysteresis import layer_displacement
+from faultgouge.analysis.motion.hysteresis import layer_displacement, turning_points
 
-from .browser_pair import LARGE, NEAREST, Progress, RampEigenvalues, follow_eigenvalues
-from .packing import LEAST_SHARE, PackingArtist, View
-from .style import EDGE, FLOOR, INK, MOBILIZATION
+from .followed_pairs import SECONDS_OF_1000, FollowedPair, Progress, RampEigenvalues, follow_eigenvalues
+from .images import Images
+from .packing import LEAST_SHARE, PackingArtist
+from .pair import curve_through
+from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER
 
-if TYPE_CHECKING:
-    from bokeh.plotting import figure
+BYTES_OF_MODES = 1.2e6
+"""Bytes for the shapes of modes: the page of 100 disks and 60 loads has room for 33 pairs, and less than 3 MB."""
 
-FIRST, SECOND, OTHERS = "#0072b2", "#d55e00", "#8a949c"
-"""The two of the pair, and all other eigenvalues: told apart by the colour-blind, on white and on black."""
+FACES = ["#ffffff", BULK, UPPER, FLOOR]
+"""Colours of disks: rattlers, others, the upper layer, those that are held."""
 
-SOURCE_COLUMNS = {
-    "disks": "x y radius face",
-    "marks": "x0 y0 x1 y1",
-    "chains": "x0 y0 x1 y1 px share",
-    "others": "re im",
-    "members": "re im colour",
-    "now": "fx real imaginary colour",
-    "here": "moved fx",
-}
-"""What `view.js` fills anew at each load: sources of data and their columns."""
+FEW, MANY = 4, 40
+"""Pairs of a page, at least and at most."""
 
 
-class ViewError(BadInputError):
-    """A page that cannot be made, in one sentence."""
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """What changes from one packing of a page to the next.
 
+    Attributes
+    ----------
+    name : str
+        Its symbol.
+    meaning : str
+        What it is, in words.
+    values : ndarray, shape (S,)
+        Its value for each packing.
+    """
 
-def check_library() -> None:
-    """Refuse before any work if Bokeh is not installed."""
-    try:
-        import bokeh  # noqa: F401 - only whether it is there
-    except ImportError as error:
-        raise ViewError("view needs Bokeh, which is not installed: pip install 'faultgouge[view]'") from error
+    name: str
+    meaning: str
+    values: Floats
+
+    @classmethod
+    def of_loads(cls, packings: Sequence[HasConfiguration]) -> "Axis":
+        """The shear force of a ramp; a load parameter of other codes."""
+        values = np.array([packing.fx for packing in packings])
+        layer = isinstance(packings[0], Packing)
+        return cls("Fₓ", "force on each disk of the upper layer" if layer else "the load", values)
 
 
 def equally_spaced(count: int, most: int) -> list[int]:
@@ -57,23 +73,25 @@ def equally_spaced(count: int, most: int) -> list[int]:
 
 
 def loads_shown(disks: int) -> int:
-    """How many loads a page of so many disks has by default: 60, or so many that the page stays below 6 MB."""
-    return max(min(60, 60 * LARGE // disks), 6)
+    """How many loads a page of so many disks has by default: 60, or as many as take a minute, but six at least."""
+    return max(min(60, round(60 / SECONDS_OF_1000 * (1000 / disks) ** 3)), 6)
 
 
 def write_view(
-    packings: Sequence[Packing | Configuration],
+    packings: Sequence[HasConfiguration],
     path: Path,
     title: str,
     series: dict[str, Any] | None = None,
     progress: Progress = iter,
+    axis: Axis | None = None,
+    reasons: Sequence[str] = (),
 ) -> None:
     """Write the page.
 
     Parameters
     ----------
     packings : sequence of Packing or Configuration
-        Equilibria in order of their load, all with the same disks.
+        Equilibria along their path, all with the same particles.
     path : Path
         The page to write.
     title : str
@@ -82,174 +100,189 @@ def write_view(
         Columns time and msd of an undamped run from the last equilibrium.
     progress : callable
         Wraps the packings while their eigenvalues are computed.
-
-    Raises
-    ------
-    ViewError
-        If Bokeh is not installed.
+    axis : Axis, optional
+        What changes from packing to packing; the load by default.
+    reasons : sequence of str
+        Why the stability of the packings cannot be known, if it cannot.
     """
-    check_library()
-    from bokeh.document import Document
-    from bokeh.embed import file_html
-    from bokeh.events import DocumentReady
-    from bokeh.models import ColumnDataSource, CustomJS
-    from bokeh.resources import INLINE
-
-    course = follow_eigenvalues(packings, progress)
-    ramp = [each for each in packings if isinstance(each, Packing)]
-    moved = layer_displacement(ramp)[:, 0] if ramp else np.zeros(len(packings))
-    frames = [_frame(packing, course, k) | {"moved": moved[k]} for k, packing in enumerate(packings)]
-    sources = {
-        name: ColumnDataSource({column: [] for column in columns.split()}, name=name)
-        for name, columns in SOURCE_COLUMNS.items()
+    axis = Axis.of_loads(packings) if axis is None else axis
+    followed = follow_eigenvalues(packings, progress, reasons)
+    opens = _best_frame(followed.verdicts)
+    room = BYTES_OF_MODES / (2 * packings[0].coordinates * len(packings))
+    pairs = followed.pairs[: int(np.clip(room, FEW, MANY))]
+    legs = _legs(axis.values) if len(packings) > 1 else []
+    cycle = _cycle([each for each in packings if isinstance(each, Packing)])
+    images = [Images.of(packing) for packing in packings]
+    data = {
+        "axis": {"name": axis.name} if legs else None,
+        "legs": [leg.tolist() for leg in legs],
+        "opens": opens,
+        "dissipative": any(verdict.dissipative for verdict in followed.verdicts),
+        "frames": [_frame(packing, axis, images[k], followed, k) for k, packing in enumerate(packings)],
+        "pairs": [_pair(pair, axis, legs) for pair in pairs],
+        "cycle": cycle,
+        "series": None if series is None else _series(series),
+        **_scene(packings, images),
     }
-    plots = [_packing_plot(packings, sources), _plane(course, sources)]
-    if len(packings) > 1:
-        plots += _curves(packings, course, sources)
-        plots.append(_cycle(packings, moved, sources))
-    if series is not None:
-        plots.append(_growth(series))
-    document = Document()
-    for plot in plots:
-        document.add_root(plot)
-    folder = files(__package__ or "")
-    others = f"the {NEAREST} closest others" if len(packings[0]) > LARGE else "all others"
-    script = CustomJS(args={"frames": frames, "plots": plots, **sources}, code=(folder / "view.js").read_text())
-    document.js_on_event(DocumentReady, script)
-    page = file_html(
-        document,
-        INLINE,
+    page = _template().render(
         title=title,
-        template=(folder / "view.html.j2").read_text(),
-        template_variables={
-            "count": len(packings),
-            "colours": (FIRST, SECOND),
-            "others": others,
-            "yellow": "Yellow: upper layer." if ramp else "Red: walls, and disks that are held.",
-        },
+        axis=axis if legs else None,
+        count=len(packings),
+        opens=opens,
+        dissipative=data["dissipative"],
+        grows=any(verdict.undamped.growth_rate for verdict in followed.verdicts),
+        cycle=cycle is not None,
+        series=series is not None,
+        gradient=", ".join(_colours(8)),
+        legend=_legend(packings[0]),
+        data=json.dumps(data, separators=(",", ":"), default=_encode, allow_nan=False).replace("<", "\\u003c"),
     )
     write_text(path, page)
 
 
-def _frame(packing: Packing | Configuration, course: RampEigenvalues, k: int) -> dict[str, Any]:
-    """The arrays of one load, in float32."""
-    view, contacts = View.of(packing, margin=0.5 * packing.radius.max()), packing.contacts
-    force = packing.normal_force
-    modes = course.modes[k]
-    arrays = {
-        "x": view.place[:, 0],
-        "y": view.place[:, 1],
-        "disk": view.disk,
-        "radius": packing.radius[view.disk],
-        "angle": np.zeros(len(view.disk)) if isinstance(packing, Configuration) else packing.angle[view.disk],
-        "x0": view.start[:, 0],
-        "y0": view.start[:, 1],
-        "x1": view.end[:, 0],
-        "y1": view.end[:, 1],
-        "i": contacts.i[view.contact],
-        "j": contacts.j[view.contact],
-        "width": 0.5 * packing.radius.min() * (force / force.max(initial=np.finfo(float).tiny))[view.contact],
-        "share": np.maximum(packing.mobilised, LEAST_SHARE)[view.contact],
-        "re": course.values[k].real,
-        "im": course.values[k].imag,
-        "pair": np.concatenate([course.pair[k].real, course.pair[k].imag]),
-        "modes": np.stack([modes.real, modes.imag], axis=1).ravel(),
-    }
-    faces = PackingArtist.faces(packing)[view.disk]
+def _template() -> Any:
+    folder = files(__package__ or "") / "view"
+    loader = FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8"))
+    environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True, trim_blocks=True)
+    return environment.get_template("page.html.j2")
+
+
+def _best_frame(verdicts: Sequence[Stability]) -> int:
+    """Where the page opens: the fastest growth with dissipation, or else without; the last packing if nothing grows."""
+    with_loss = np.array([0.0 if verdict.stable else verdict.growth_rate for verdict in verdicts])
+    without = np.array([verdict.undamped.growth_rate for verdict in verdicts])
+    for rates in (with_loss, without):
+        if rates.max() > 0:
+            return int(np.argmax(rates))
+    return len(verdicts) - 1
+
+
+def _legs(values: Floats) -> list[np.ndarray]:
+    """Numbers of the packings on each part of the path on which the axis rises, or falls."""
+    ends = [0, *turning_points(values), len(values) - 1]
+    return [np.arange(a, b + 1) for a, b in pairwise(ends)]
+
+
+def _array(values: ArrayLike, kind: str) -> dict[str, str]:
+    """An array as `page.js` decodes it."""
+    return {"type": kind, "base64": base64.b64encode(np.asarray(values, dtype=f"<{kind}").tobytes()).decode()}
+
+
+def _encode(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else _array(value, "f4")
+
+
+def _frame(packing: HasConfiguration, axis: Axis, images: Images, followed: RampEigenvalues, k: int) -> dict[str, Any]:
+    """What the page shows of one packing."""
+    verdict, contacts, force = followed.verdicts[k], packing.configuration.contacts, packing.normal_force
+    share = np.log(np.maximum(packing.mobilised, LEAST_SHARE)) / np.log(LEAST_SHARE)
+    faces = PackingArtist.faces(packing)
     return {
-        "fx": packing.fx,
-        "face": [{"white": None}.get(str(face), str(face)) for face in faces],
-        "known": bool(np.isfinite(course.pair[k]).all()),
-        **{name: np.asarray(array, dtype=np.float32) for name, array in arrays.items()},
+        "value": float(axis.values[k]),
+        "force": packing.fx if isinstance(packing, Packing) else None,
+        "stable": verdict.stable,
+        "sentences": _sentences(verdict),
+        "pairs": verdict.undamped.pairs,
+        "rate": verdict.growth_rate,
+        "undamped": verdict.undamped.growth_rate,
+        "place": _array(images.place, "f4"),
+        "disk": _array(images.particle, "u2"),
+        "face": _array([FACES.index(to_hex(face)) for face in faces], "u1"),
+        "angle": _array(getattr(packing, "angle", np.zeros(len(packing))), "f4"),
+        "bars": _array(images.bar, "f4"),
+        "i": _array(contacts.i[images.contact], "i2"),
+        "j": _array(contacts.j[images.contact], "i2"),
+        "width": _array((force / force.max(initial=np.finfo(float).tiny))[images.contact], "f4"),
+        "share": _array(np.clip(255 * (1 - share), 0, 255)[images.contact], "u1"),
+        "re": _array(followed.values[k].real, "f4"),
+        "im": _array(followed.values[k].imag, "f4"),
     }
 
 
-def _plot(name: str, x: str, y: str, **more: Any) -> "figure":
-    from bokeh.plotting import figure
-
-    tools: dict[str, Any] = {"tools": "pan,wheel_zoom,box_zoom,reset", "toolbar_location": "above"}
-    plot = figure(name=name, x_axis_label=x, y_axis_label=y, sizing_mode="stretch_both", **{**tools, **more})
-    plot.toolbar.logo = None
-    plot.toolbar.autohide = True
-    # from the start: of what is painted once, half a pixel stays at two edges
-    plot.background_fill_color = plot.border_fill_color = plot.outline_line_color = None
-    return plot
-
-
-def _packing_plot(packings: Sequence[Packing | Configuration], sources: dict[str, Any]) -> "figure":
-    """Disks and force chains; the floor."""
-    from bokeh.models import BoxAnnotation, ColorBar, LogColorMapper
-
-    views = [View.of(packing) for packing in packings]
-    left, right = min(view.left for view in views), max(view.right for view in views)
-    bottom = min(view.bottom for view in views)
-    top = max(float((packing.position[:, 1] + packing.radius).max()) for packing in packings)
-    top += 0.6 * float(packings[0].radius.min())
-    more = {"x_range": (left, right), "y_range": (bottom, top), "tools": "", "toolbar_location": None}
-    plot = _plot("packing", "", "", **more)
-    plot.axis.visible = False
-    plot.grid.visible = False
-    plot.min_border = 0
-    plot.aspect_ratio = (right - left) / (top - bottom)
-    plot.sizing_mode = "scale_width"
-    plot.circle("x", "y", radius="radius", source=sources["disks"], fill_color="face", line_color=EDGE, line_width=0.6)
-    colours = LogColorMapper([to_hex(MOBILIZATION(k / 255)) for k in range(256)], low=LEAST_SHARE, high=1)
-    plot.segment("x0", "y0", "x1", "y1", source=sources["marks"], line_color=INK, line_width=1.2)
-    chains = {"line_width": "px", "line_cap": "round", "line_color": {"field": "share", "transform": colours}}
-    plot.segment("x0", "y0", "x1", "y1", source=sources["chains"], **chains)
-    for wall in views[0].walls:
-        side = [["right", "left"], ["top", "bottom"]][wall.axis][wall.sign < 0]
-        beyond: dict[str, Any] = {side: wall.place}
-        plot.add_layout(BoxAnnotation(**beyond, fill_color=FLOOR, fill_alpha=1, line_color=None, level="overlay"))
-    bar = ColorBar(color_mapper=colours, height=8, title="mobilised friction |fₜ| / (μ fₙ)", title_standoff=4)
-    bar.background_fill_color = None
-    plot.add_layout(bar, "below")
-    return plot
+def _sentences(verdict: Stability) -> list[str]:
+    """The verdict, what the eigenvalues without dissipation say, and contacts at Coulomb's bound."""
+    undamped, contacts = verdict.undamped, verdict.at_bound
+    found = [
+        f"{count} {'' if kind == 'negative' else 'pairs of '}eigenvalues {'is' if count == 1 else 'are'} {kind}"
+        for count, kind in ((undamped.pairs, "complex"), (undamped.negative, "negative"))
+        if count
+    ]
+    says = " and ".join(found).replace("1 pairs", "1 pair").replace("1 eigenvalues", "1 eigenvalue")
+    others = (
+        [f"{says}, D would grow as exp({undamped.growth_rate:.3g} t)" if verdict.dissipative else says] if found else []
+    )
+    if verdict.dissipative and found:
+        others[0] = f"without dissipation {others[0]}"
+    if contacts:
+        others.append(f"{contacts} contact{' is' if contacts == 1 else 's are'} at Coulomb's bound")
+    return [f"{each[0].upper()}{each[1:]}." for each in (verdict.sentences[0], *others)]
 
 
-def _plane(course: RampEigenvalues, sources: dict[str, Any]) -> "figure":
-    """The plane of eigenvalues about the pair, with the way of the pair."""
-    known = course.pair[np.isfinite(course.pair).all(axis=1)]
-    low, high = float(known.real.min()), float(known.real.max())
-    margin = 0.15 * (high - low) or 0.05 * abs(high)
-    most = 1.3 * float(known.imag.max()) or margin
-    plot = _plot("plane", "Re λ", "Im λ", x_range=(low - margin, high + margin), y_range=(-most, most))
-    for member, colour in enumerate((FIRST, SECOND)):
-        way = course.pair[:, member].astype(np.complex64)
-        plot.line(way.real, way.imag, line_color=colour, line_alpha=0.5, line_width=1.5)
-    plot.scatter("re", "im", source=sources["others"], size=6, fill_color=OTHERS, line_color=None)
-    plot.scatter("re", "im", source=sources["members"], size=13, fill_color="colour", line_color=None)
-    return plot
+def _pair(pair: FollowedPair, axis: Axis, legs: Sequence[np.ndarray]) -> dict[str, Any]:
+    """The eigenvalues of a pair at the packings, the curves through them, and the shapes of its modes."""
+    mean, square = _mean_and_square(pair.eigenvalues)
+    curves = []
+    for leg in legs:
+        load, values = curve_through(axis.values[leg], pair.eigenvalues[leg])
+        along_mean, along_square = _mean_and_square(values)
+        curves.append({"load": load, "mean": along_mean, "square": along_square})
+    shapes = [_shape(pair, k) if np.isfinite(each) else None for k, each in enumerate(mean)]
+    return {"mean": _array(mean, "f4"), "square": _array(square, "f4"), "curves": curves, "shapes": shapes}
 
 
-def _curves(
-    packings: Sequence[Packing | Configuration], course: RampEigenvalues, sources: dict[str, Any]
-) -> list["figure"]:
-    """Real and imaginary parts of the pair over the load."""
-    fx = np.array([packing.fx for packing in packings])
-    plots: list[figure] = []
-    for name, label, part in (("real", "Re λ", course.pair.real), ("imaginary", "Im λ", course.pair.imag)):
-        more = {"x_range": plots[0].x_range} if plots else {}
-        plot = _plot(name, "Fₓ", label, **more)
-        for member, colour in enumerate((FIRST, SECOND)):
-            plot.line(fx, part[:, member].astype(np.float32), line_color=colour, line_width=2)
-        plot.scatter("fx", name, source=sources["now"], size=11, fill_color="colour", line_color=None)
-        plots.append(plot)
-    return plots
+def _mean_and_square(eigenvalues: np.ndarray) -> tuple[Floats, Floats]:
+    """Mean of both members, and the square of their difference."""
+    return eigenvalues.mean(axis=1).real, ((eigenvalues[:, 0] - eigenvalues[:, 1]) ** 2).real
 
 
-def _cycle(packings: Sequence[Packing | Configuration], moved: Floats, sources: dict[str, Any]) -> "figure":
-    """F_x over the displacement of the upper layer."""
-    plot = _plot("cycle", "displacement of the upper layer", "Fₓ")
-    plot.line(moved, [packing.fx for packing in packings], line_color=OTHERS, line_width=2)
-    plot.scatter("moved", "fx", source=sources["here"], size=11, fill_color=FIRST, line_color=None)
-    return plot
+def _shape(pair: FollowedPair, k: int) -> dict[str, Any]:
+    """Two rows of 8 bits, with their scales: real and imaginary part of a complex mode, or two real modes."""
+    first, second = pair.modes[k]
+    rows = np.stack([first.real, first.imag if pair.eigenvalues[k, 0].imag else second.real])
+    largest = np.abs(rows).max(axis=(1, 2)) / 127
+    whole = np.rint(np.divide(rows, largest[:, None, None], out=np.zeros_like(rows), where=largest[:, None, None] > 0))
+    return {"scale": largest.tolist(), "rows": _array(whole, "i1")}
 
 
-def _growth(series: dict[str, Any]) -> "figure":
-    """D(t) of an undamped run, on a logarithmic axis."""
+def _cycle(packings: Sequence[Packing]) -> dict[str, list[float]] | None:
+    """F_x and the displacement of the upper layer; None of a single packing."""
+    if len(packings) < 2:
+        return None
+    return {"moved": layer_displacement(packings)[:, 0].tolist(), "force": [packing.fx for packing in packings]}
+
+
+def _series(series: dict[str, Any]) -> dict[str, Any]:
+    """The positive D(t) of an undamped run."""
     seen = series["msd"] > 0
-    plot = _plot("growth", "t", "D(t)", y_axis_type="log")
-    time, msd = (np.asarray(series[name][seen], dtype=np.float32) for name in ("time", "msd"))
-    plot.line(time, msd, line_color=SECOND, line_width=1.5)
-    return plot
+    return {name: series[name][seen] for name in ("time", "msd")}
+
+
+def _colours(count: int) -> list[str]:
+    return [to_hex(MOBILIZATION(k / (count - 1))) for k in range(count)]
+
+
+def _legend(packing: HasConfiguration) -> str:
+    """What the colours of the particles are."""
+    kinds = ["White: rattlers, which touch nothing."] if len(packing.rattlers) else []
+    configuration = packing.configuration
+    if isinstance(packing, Packing):
+        kinds.insert(0, "Yellow: upper layer.")
+    elif configuration.contacts.wall.any() or not configuration.free.all():
+        kinds.insert(0, "Red: walls, and particles that are held.")
+    if packing.configuration.dimension == 3:
+        kinds.append("Drag to turn.")
+    return " ".join([*kinds, "Width of a bar: normal force."])
+
+
+def _scene(packings: Sequence[HasConfiguration], images: Sequence[Images]) -> dict[str, Any]:
+    """What all packings of a page share: the particles, the colours and the frame of the picture."""
+    return {
+        "dimension": images[0].dimension,
+        "radius": packings[0].radius,
+        "faces": FACES,
+        "colours": _colours(256),
+        "edge": EDGE,
+        "ink": INK,
+        "wall": FLOOR,
+        **Images.frame(images),
+    }

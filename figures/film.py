@@ -21,8 +21,9 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from faultgouge.analysis import Configuration, Packing, PackingFileError, RunFile, nearest_image
+from faultgouge.analysis import Packing, PackingFileError, RunFile, nearest_image
 from faultgouge.analysis.arrays import Floats
+from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.motion.hysteresis import layer_displacement
 
 from .cycle import in_powers_of_ten
@@ -238,7 +239,7 @@ class ModeFilm(Film):
     @styled
     def __init__(
         self,
-        packing: Packing | Configuration,
+        packing: HasConfiguration,
         modes: Sequence[Mode],
         words: str,
         frames: int,
@@ -262,6 +263,37 @@ class ModeFilm(Film):
             artist.show(self._phase * number)
 
 
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A curve, and the places of packings on it.
+
+    Attributes
+    ----------
+    x, y : ndarray, shape (P,)
+        The curve.
+    places : sequence of int
+        Point of the curve of each packing.
+    labels : (str, str)
+        Of the axes.
+    words : sequence of str
+        Above each packing.
+    """
+
+    x: Floats
+    y: Floats
+    places: Sequence[int]
+    labels: tuple[str, str]
+    words: Sequence[str]
+
+    @classmethod
+    def of_ramp(cls, packings: Sequence[Packing]) -> "Course":
+        """F_x over the displacement of the upper layer."""
+        moved, label = in_powers_of_ten(layer_displacement(packings)[:, 0])
+        forces = np.array([each.fx for each in packings])
+        words = [f"$F_x = {each.fx:.5g}$" for each in packings]
+        return cls(moved, forces, range(len(packings)), (label, "$F_x$"), words)
+
+
 class RampFilm(Film):
     """The equilibria of a ramp, and F_x over the displacement of the upper layer beside them.
 
@@ -273,11 +305,18 @@ class RampFilm(Film):
         How many frames; each equilibrium is shown for about as long as the others.
     color : str
         As of :func:`~faultgouge.figures.draw_packing`.
+    course : Course, optional
+        The curve beside the packings, and their places on it; F_x over the displacement by default.
     """
 
     @styled
     def __init__(
-        self, packings: Sequence[Packing], frames: int, color: str = "mobilised", dots: int | None = DOTS
+        self,
+        packings: Sequence[Packing],
+        frames: int,
+        color: str = "mobilised",
+        dots: int | None = DOTS,
+        course: Course | None = None,
     ) -> None:
         self._packings, self._color = packings, color
         self._which = np.linspace(0, len(packings) - 1, frames).round().astype(int)
@@ -300,12 +339,11 @@ class RampFilm(Film):
         factor = rf"$\times\,10^{{{round(np.log10(self._factor))}}}$" if self._factor > 1 else "to scale"
         self._words = f"displacements {factor}"
         self._says = axes.text(0.5, 1.01, "", transform=axes.transAxes, ha="center", va="bottom", fontsize=8)
-        self._moved, label = in_powers_of_ten(layer_displacement(packings)[:, 0])
-        self._fx = np.array([each.fx for each in packings])
-        beside.plot(self._moved, self._fx, color=BULK, linewidth=1.2)
+        self._course = course or Course.of_ramp(packings)
+        beside.plot(self._course.x, self._course.y, color=BULK, linewidth=1.2)
         (self._line,) = beside.plot([], [], color="C1", linewidth=1.0)
         (self._dot,) = beside.plot([], [], "o", color="C0", markersize=4)
-        beside.set(xlabel=label, ylabel="$F_x$")
+        beside.set(xlabel=self._course.labels[0], ylabel=self._course.labels[1])
         moving = [*self._artist.moving, self._says, self._line, self._dot]
         super().__init__(figure, moving, frames, dots)
 
@@ -318,14 +356,16 @@ class RampFilm(Film):
         contact, disk = artist.view.contact, artist.view.disk
         artist.disks.set_widths(2 * packing.radius[disk])
         artist.disks.set_heights(2 * packing.radius[disk])
+        artist.disks.set_angles(np.zeros(len(disk)))  # as many as images, which disks gain and lose at the edges
         artist.disks.set_facecolor([str(face) for face in artist.faces(packing)[disk]])
         artist.chains.set_linewidth(artist.widest * packing.normal_force[contact] / self._widest)
         if artist.chains.get_array() is not None:
             artist.chains.set_array(COLOURS[self._color][1](packing)[contact])
         artist.move((self._factor - 1) * self._displacement[k])
-        self._says.set_text(f"$F_x = {packing.fx:.5g}$, {self._words}")
-        self._line.set_data(self._moved[: k + 1], self._fx[: k + 1])
-        self._dot.set_data([self._moved[k]], [self._fx[k]])
+        course, here = self._course, self._course.places[k]
+        self._says.set_text(f"{course.words[k]}, {self._words}")
+        self._line.set_data(course.x[: here + 1], course.y[: here + 1])
+        self._dot.set_data([course.x[here]], [course.y[here]])
 
 
 def _two_panels(packing: Packing, scale: bool = False) -> tuple[Figure, Axes, Axes, float]:

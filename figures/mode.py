@@ -25,6 +25,7 @@ from faultgouge.analysis import (
     spectrum,
 )
 from faultgouge.analysis.arrays import Floats
+from faultgouge.analysis.configuration import HasConfiguration
 
 from .packing import WIDTH, PackingArtist, View
 from .spheres import add_scale_of_turns, draw_turns, new_figure
@@ -78,7 +79,7 @@ class Mode:
     rotation: float
 
     @classmethod
-    def of(cls, packing: Packing | Configuration, modes: Eigenpairs, number: int) -> "Mode":
+    def of(cls, packing: HasConfiguration, modes: Eigenpairs, number: int) -> "Mode":
         """One of the modes of a packing."""
         moved = displacement(packing, modes.right[:, number])
         return cls(
@@ -118,7 +119,7 @@ class Mode:
         )
 
 
-def displacement(packing: Packing | Configuration, vector: Complexes) -> Complexes:
+def displacement(packing: HasConfiguration, vector: Complexes) -> Complexes:
     """A mass-weighted vector, shape (axes N,), as of :class:`Mode`: the coordinates of every particle, (axes, N)."""
     vector = vector / np.sqrt(packing.coordinate_mass)
     vector = vector * np.exp(-0.5j * np.angle(np.sum(vector**2)))
@@ -128,9 +129,7 @@ def displacement(packing: Packing | Configuration, vector: Complexes) -> Complex
     return np.asarray(moved / (largest if largest > PURE_ROTATION * rotation else rotation))
 
 
-def unstable_pair(
-    packing: Packing | Configuration, modes: Eigenpairs, believed: Sequence[complex]
-) -> tuple[list[Mode], str]:
+def unstable_pair(packing: HasConfiguration, modes: Eigenpairs, believed: Sequence[complex]) -> tuple[list[Mode], str]:
     """The modes that make a packing unstable, or are about to.
 
     Parameters
@@ -191,7 +190,7 @@ class ModeArtist:
     """
 
     def __init__(
-        self, axes: Axes, packing: Packing | Configuration, mode: Mode, points: float | None = None, moves: bool = False
+        self, axes: Axes, packing: HasConfiguration, mode: Mode, points: float | None = None, moves: bool = False
     ) -> None:
         self.mode, self.moves = mode, moves
         self.reach = MOVING * packing.radius.max() if moves else _arrow_scale(packing, mode)
@@ -232,14 +231,14 @@ class ModeArtist:
             self.arrows.set_UVC(*(self.reach * moved[:2, disk]))
 
 
-def _arrow_scale(packing: Packing | Configuration, mode: Mode) -> float:
+def _arrow_scale(packing: HasConfiguration, mode: Mode) -> float:
     """Length of an arrow for a displacement of one, length."""
     largest = np.sqrt(np.sum(np.abs(mode.displacement[: packing.dimension]) ** 2, axis=0))
     typical, radius = np.quantile(np.delete(largest, packing.rattlers), 0.75), packing.radius.mean()
     return float(radius * min(TYPICAL / max(typical, PURE_ROTATION), LONGEST / max(largest.max(), PURE_ROTATION)))
 
 
-def modes_of(packing: Packing | Configuration, number: int | None = None) -> tuple[list[Mode], str]:
+def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list[Mode], str]:
     """A mode of a packing by its number, or those of `unstable_pair`; with what they are.
 
     Raises
@@ -257,7 +256,7 @@ def modes_of(packing: Packing | Configuration, number: int | None = None) -> tup
     return [Mode.of(packing, modes, number)], f"mode {number} of {len(modes.values)}"
 
 
-def draw_mode(packing: Packing | Configuration, number: int | None = None) -> Figure:
+def draw_mode(packing: HasConfiguration, number: int | None = None) -> Figure:
     """Draw a mode: arrows for displacements, colours for rotations.
 
     Parameters
@@ -282,7 +281,7 @@ def draw_mode(packing: Packing | Configuration, number: int | None = None) -> Fi
 
 
 @styled
-def draw_modes(packing: Packing | Configuration, modes: Sequence[Mode], words: str) -> Figure:
+def draw_modes(packing: HasConfiguration, modes: Sequence[Mode], words: str) -> Figure:
     """Modes side by side, with their numbers below.
 
     Parameters
@@ -299,8 +298,8 @@ def draw_modes(packing: Packing | Configuration, modes: Sequence[Mode], words: s
     Figure
         A complex mode also a quarter of a period later.
     """
-    if isinstance(packing, Configuration) and packing.dimension == 3:
-        return _draw_modes_of_spheres(packing, modes, words)
+    if packing.dimension == 3:
+        return _draw_modes_of_spheres(packing.configuration, modes, words)
     panels = [(mode, phase) for mode in modes for phase in ((0.0, np.pi / 2) if mode.is_complex else (0.0,))]
     figure, axes, points = side_by_side(packing, len(panels))
     for one, (mode, phase) in zip(axes, panels, strict=True):
@@ -329,7 +328,7 @@ def _draw_modes_of_spheres(packing: Configuration, modes: Sequence[Mode], words:
     return figure
 
 
-def side_by_side(packing: Packing | Configuration, count: int) -> tuple[Figure, list[Axes], float]:
+def side_by_side(packing: HasConfiguration, count: int) -> tuple[Figure, list[Axes], float]:
     """A figure with axes for the same packing, and points per unit of length in them."""
     view = View.of(packing)
     across = WIDTH - 0.1
@@ -339,7 +338,7 @@ def side_by_side(packing: Packing | Configuration, count: int) -> tuple[Figure, 
     return figure, list(axes), 72 * across / (view.right - view.left)
 
 
-def finish(figure: Figure, axes: Sequence[Axes], packing: Packing | Configuration, words: str) -> None:
+def finish(figure: Figure, axes: Sequence[Axes], packing: HasConfiguration, words: str) -> None:
     """The line above and the scale of rotation below."""
     load = f"$F_x = {packing.fx:.6g}$: " if isinstance(packing, Packing) else ""
     figure.suptitle(f"{load}{words}", fontsize=8)

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from faultgouge.analysis import BadInputError, Configuration, Packing
 from faultgouge.analysis.arrays import Floats, Indices
+from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.counted import counted
 
 from .spheres import SpheresArtist, new_figure
@@ -40,8 +41,8 @@ WIDTH = 3.4
 """Width of a figure that holds one packing, inch."""
 
 
-def _slip_share(packing: Packing | Configuration) -> Floats:
-    if isinstance(packing, Configuration):
+def _slip_share(packing: HasConfiguration) -> Floats:
+    if not isinstance(packing, Packing):
         raise BadInputError("A packing of LAMMPS has forces and no slips: let colours show mobilised, force or none.")
     limit = packing.law.slip_limit(packing.geometry.overlap)
     return np.divide(np.abs(packing.contacts.slip), limit, out=np.zeros(len(limit)), where=limit > 0)
@@ -55,9 +56,7 @@ def _force_scale(values: Floats) -> Normalize:
     return Normalize(0, values.max(initial=0.0) or 1.0)
 
 
-COLOURS: dict[
-    str, tuple[str, Callable[[Packing | Configuration], Floats], Callable[[Floats], Normalize], str | Colormap]
-] = {
+COLOURS: dict[str, tuple[str, Callable[[HasConfiguration], Floats], Callable[[Floats], Normalize], str | Colormap]] = {
     "mobilised": (r"mobilised friction $|f_t|/(\mu f_n)$", attrgetter("mobilised"), _share_scale, MOBILIZATION),
     "slip": ("slip / slip limit", _slip_share, _share_scale, MOBILIZATION),
     "force": ("normal force $f_n$", attrgetter("normal_force"), _force_scale, "viridis_r"),
@@ -100,10 +99,10 @@ class View:
     edges: Floats
 
     @classmethod
-    def of(cls, packing: Packing | Configuration, margin: float = 0.0) -> "View":
+    def of(cls, packing: HasConfiguration, margin: float = 0.0) -> "View":
         """Every image of every disk and contact that reaches to within a margin of the box; length."""
         cell, origin, periodic = _cell(packing)
-        position, radius, contacts = packing.position[:, :2], packing.radius, packing.contacts
+        position, radius, contacts = packing.position[:, :2], packing.radius, packing.configuration.contacts
         walls, branch = _walls(packing), branch_vectors(packing)
         share = (position - origin) @ np.linalg.inv(cell)
         position = origin + (share - np.where(periodic, np.floor(share), 0.0)) @ cell
@@ -145,29 +144,26 @@ class Wall:
         return np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
 
 
-def branch_vectors(packing: Packing | Configuration) -> Floats:
+def branch_vectors(packing: HasConfiguration) -> Floats:
     """From the second partner of each contact, or from the wall, to the first; length, shape (C, 2)."""
-    if isinstance(packing, Packing):
-        return np.asarray(packing.geometry.distance[:, None] * packing.geometry.normal)
-    c = packing.contacts
+    c = packing.configuration.contacts
     reach = np.where(c.wall, packing.radius[c.i] - c.overlap, c.distance)
     return np.asarray(reach[:, None] * c.normal[:, :2])
 
 
-def _cell(packing: Packing | Configuration) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+def _cell(packing: HasConfiguration) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Edges of the box in rows, its lower corner, and along which edges it is periodic."""
-    if isinstance(packing, Configuration):
-        cell = packing.box[:2, :2].copy()
-        cell[~cell.any(axis=1)] = np.eye(2)[~cell.any(axis=1)]  # an open side may have no length
-        return cell, packing.origin[:2], packing.periodic[:2]
-    return np.diag([packing.box_length or 1.0, 1.0]), np.zeros(2), np.array([packing.box_length is not None, False])
+    configuration = packing.configuration
+    cell = configuration.box[:2, :2].copy()
+    cell[~cell.any(axis=1)] = np.eye(2)[~cell.any(axis=1)]  # an open side may have no length
+    return cell, configuration.origin[:2], configuration.periodic[:2]
 
 
-def _walls(packing: Packing | Configuration) -> tuple[Wall, ...]:
+def _walls(packing: HasConfiguration) -> tuple[Wall, ...]:
     """The floor of a packing; the walls that disks of a snapshot touch."""
     if isinstance(packing, Packing):
         return (Wall(1, 1.0, 0.0),)
-    c = packing.contacts
+    c = packing.configuration.contacts
     at = np.flatnonzero(c.wall)
     normal, axis = c.normal[at, :2], np.argmax(np.abs(c.normal[at, :2]), axis=1)
     sign = np.sign(normal[np.arange(len(at)), axis])
@@ -177,7 +173,7 @@ def _walls(packing: Packing | Configuration) -> tuple[Wall, ...]:
 
 
 def _frame(
-    packing: Packing | Configuration,
+    packing: HasConfiguration,
     position: Floats,
     cell: Floats,
     origin: Floats,
@@ -240,7 +236,7 @@ class PackingArtist:
     def __init__(
         self,
         axes: Axes,
-        packing: Packing | Configuration,
+        packing: HasConfiguration,
         color: str = "none",
         view: View | None = None,
         points: float | None = None,
@@ -262,7 +258,7 @@ class PackingArtist:
 
     def move(self, displacement: Floats) -> None:
         """Draw disks and contacts displaced from where the packing has them; length, shape (N, 2)."""
-        view, contacts = self.view, self.packing.contacts
+        view, contacts = self.view, self.packing.configuration.contacts
         self.disks.set_offsets(view.place + displacement[view.disk])
         i, j = contacts.i[view.contact], contacts.j[view.contact]
         normal = (view.start - view.end) / np.linalg.norm(view.start - view.end, axis=1, keepdims=True)
@@ -271,11 +267,11 @@ class PackingArtist:
         self.chains.set_segments(list(np.stack([view.start + displacement[i], view.end + far], axis=1)))
 
     @staticmethod
-    def faces(packing: Packing | Configuration) -> NDArray[np.str_]:
+    def faces(packing: HasConfiguration) -> NDArray[np.str_]:
         """Colours of the disks, shape (N,)."""
         hollow = np.isin(np.arange(len(packing)), packing.rattlers)
         faces = np.where(hollow, "white", np.where(packing.top, UPPER, BULK))
-        return np.where(packing.free, faces, FLOOR) if isinstance(packing, Configuration) else faces
+        return np.where(packing.configuration.free, faces, FLOOR)
 
     def _disks(self, axes: Axes) -> EllipseCollection:
         packing, disk = self.packing, self.view.disk
@@ -318,7 +314,7 @@ class PackingArtist:
 
 @styled
 def draw_packing(
-    packing: Packing | Configuration, axes: Axes | None = None, color: str = "mobilised", caption: bool = False
+    packing: HasConfiguration, axes: Axes | None = None, color: str = "mobilised", caption: bool = False
 ) -> Figure:
     """Draw a packing with its force chains (the paper's figure 1).
 
@@ -340,8 +336,8 @@ def draw_packing(
     """
     if color != "none" and color not in COLOURS:
         raise ValueError(f"color = {color!r} is none of {', '.join(COLOURS)}, none.")
-    if isinstance(packing, Configuration) and packing.dimension == 3:
-        return _draw_spheres(packing, axes, color, caption)
+    if packing.dimension == 3:
+        return _draw_spheres(packing.configuration, axes, color, caption)
     if axes is not None:
         artist = PackingArtist(axes, packing, color)
         _draw_load(axes, artist)
@@ -385,7 +381,7 @@ def _add_colours(figure: Figure, axes: Axes, chains: LineCollection, color: str)
     bar.outline.set_linewidth(0.4)
 
 
-def _style_of_bars(packing: Packing | Configuration, color: str) -> dict[str, Any]:
+def _style_of_bars(packing: HasConfiguration, color: str) -> dict[str, Any]:
     """Colours of the bars of all contacts."""
     if color != "none":
         _, values_of, scale_of, colours = COLOURS[color]
@@ -395,22 +391,22 @@ def _style_of_bars(packing: Packing | Configuration, color: str) -> dict[str, An
     return {"colors": INK}
 
 
-def in_words(packing: Packing | Configuration) -> str:
+def in_words(packing: HasConfiguration) -> str:
     """Load, contacts, rattlers, and how many contacts slide."""
-    if isinstance(packing, Configuration):
-        c = packing.contacts
-        slide = ", which slide" if c.sliding.any() else ", which stick" if c.at_bound.any() else ""
-        noun = "disk" if packing.dimension == 2 else "sphere"
+    if isinstance(packing, Packing):
+        sliding = int(np.count_nonzero(_slip_share(packing) >= 1))
         return (
-            f"{counted(len(packing), noun)} as LAMMPS left them: {counted(len(c), 'contact')} "
-            f"({int(c.wall.sum())} with walls), {counted(len(packing.rattlers), 'rattler')}; "
-            f"{counted(int(c.at_bound.sum()), 'contact')} at Coulomb's bound{slide}"
+            f"F_x = {packing.fx:g}, F_y = {packing.fy:g}: {counted(len(packing), 'disk')}, "
+            f"{counted(len(packing.contacts), 'contact')} "
+            f"({sliding} slide), {counted(len(packing.rattlers), 'rattler')}"
         )
-    sliding = int(np.count_nonzero(_slip_share(packing) >= 1))
+    c = packing.configuration.contacts
+    slide = ", which slide" if c.sliding.any() else ", which stick" if c.at_bound.any() else ""
+    noun = "disk" if packing.dimension == 2 else "sphere"
     return (
-        f"F_x = {packing.fx:g}, F_y = {packing.fy:g}: {counted(len(packing), 'disk')}, "
-        f"{counted(len(packing.contacts), 'contact')} "
-        f"({sliding} slide), {counted(len(packing.rattlers), 'rattler')}"
+        f"{counted(len(packing), noun)} as LAMMPS left them: {counted(len(c), 'contact')} "
+        f"({int(c.wall.sum())} with walls), {counted(len(packing.rattlers), 'rattler')}; "
+        f"{counted(int(c.at_bound.sum()), 'contact')} at Coulomb's bound{slide}"
     )
 
 
@@ -421,7 +417,7 @@ def _add_key(figure: Figure, artist: PackingArtist) -> None:
         handles.append(Patch(facecolor=UPPER, edgecolor=EDGE, linewidth=0.6, label="upper layer"))
     if len(packing.rattlers):
         handles.append(Patch(facecolor="white", edgecolor=EDGE, linewidth=0.6, label="rattler (no contact)"))
-    if isinstance(packing, Configuration) and not packing.free.all():
+    if not packing.configuration.free.all():
         handles.append(Patch(facecolor=FLOOR, edgecolor=EDGE, linewidth=0.6, label="held"))
     if handles:
         below: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "ncols": 2}
@@ -438,7 +434,7 @@ def _add_key(figure: Figure, artist: PackingArtist) -> None:
 def _draw_load(axes: Axes, artist: PackingArtist) -> None:
     """Arrows down onto the upper layer, and one along x above it."""
     packing, view = artist.packing, artist.view
-    if isinstance(packing, Configuration) or not packing.top.any():
+    if not isinstance(packing, Packing) or not packing.top.any():
         return
     x, y = packing.position[packing.top].T
     x = x if packing.box_length is None else x % packing.box_length

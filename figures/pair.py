@@ -22,11 +22,77 @@ from .style import INK, styled
 INSET_POINTS = 8
 """Loads beyond the onset that the inset shows."""
 
-BETWEEN = 64
+BETWEEN = 10
 """Points of a curve between two loads: closer to each other at the ends, where a square root is steep."""
 
 FEW = 100
 """Loads up to which dots show the computed eigenvalues."""
+
+
+def curve_through(
+    load: Floats, eigenvalues: NDArray[np.complex128], coalescence: float | None = None
+) -> tuple[Floats, NDArray[np.complex128]]:
+    """The curve of a pair of eigenvalues through its stored loads.
+
+    The interpolation keeps to the shape of the numbers (Fritsch and Carlson, SIAM J. Numer. Anal. 17, 238 (1980)): D
+    does not change its sign between two loads with the same sign of D.
+
+    Parameters
+    ----------
+    load : ndarray, shape (n,)
+        Stored loads, strictly increasing or strictly decreasing.
+    eigenvalues : ndarray of complex, shape (n, 2)
+        Both members, two real numbers or two complex conjugates; nan where the pair is unknown.
+    coalescence : float, optional
+        A load at which the two are known to coalesce; it counts if D changes its sign between the loads around it.
+
+    Returns
+    -------
+    load : ndarray, shape (m,)
+        The stored loads at which the pair is known, the coalescences, and loads in between; nan between two stretches
+        of known loads.
+    eigenvalues : ndarray of complex, shape (m, 2)
+        Both members: the one with the positive imaginary part, or the lower one, first.
+    """
+    known = np.isfinite(eigenvalues).all(axis=1)
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
+    parts = [_curve(load[a:b], eigenvalues[a:b], coalescence) for a, b in ends.reshape(-1, 2)]
+    gap = np.full((1, 3), complex(np.nan, np.nan))
+    rows = [row for part in parts for row in (part, gap)][:-1]
+    joined = np.concatenate(rows) if rows else gap[:0]
+    return joined[:, 0].real, joined[:, 1:]
+
+
+def _curve(load: Floats, eigenvalues: NDArray[np.complex128], coalescence: float | None) -> NDArray[np.complex128]:
+    """Rows of a load and two eigenvalues along one stretch of known loads."""
+    falls = load[-1] < load[0]
+    if falls:
+        load, eigenvalues = load[::-1], eigenvalues[::-1]
+    mean, square = eigenvalues.mean(axis=1).real, ((eigenvalues[:, 0] - eigenvalues[:, 1]) ** 2).real
+    if len(load) > 1:
+        load, mean, square = _between(load, mean, square, coalescence)
+    root = 0.5 * np.sqrt(square.astype(np.complex128))
+    below = np.where(square > 0, -root, root)
+    rows = np.column_stack([load, mean + below, mean - below])
+    return rows[::-1] if falls else rows
+
+
+def _between(load: Floats, mean: Floats, square: Floats, coalescence: float | None) -> tuple[Floats, Floats, Floats]:
+    """Loads, mean and D of a stretch, with loads in between that crowd at the roots of D."""
+    mean_at = PchipInterpolator(load, mean)
+    if coalescence is not None and load[0] < coalescence < load[-1]:
+        k = int(np.searchsorted(load, coalescence))
+        if square[k - 1] * square[k] < 0:
+            load, square = np.insert(load, k, coalescence), np.insert(square, k, 0.0)
+    square_at = PchipInterpolator(load, square)
+    roots = np.array([root for root in square_at.roots(extrapolate=False) if np.isfinite(root)])
+    knots = np.union1d(load, roots)
+    # short steps at both ends, as an eigenvalue leaves a coalescence as a square root
+    share = np.sin(np.linspace(0, 0.5 * np.pi, BETWEEN + 1)[:-1]) ** 2
+    at = np.append((knots[:-1, None] + np.diff(knots)[:, None] * share).ravel(), knots[-1])
+    found = square_at(at)
+    found[np.isin(at, roots)] = 0.0  # to the last bit, so that the branches meet
+    return at, mean_at(at), found
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,28 +128,9 @@ class PairCurve:
         return np.sort(np.where(np.isnan(self.eigenvalues), np.nan, self.eigenvalues.imag), axis=1)
 
     def smooth(self) -> "PairCurve":
-        """The same pair with many points between its loads, from its mean and its discriminant."""
-        mean = 0.5 * self.eigenvalues.sum(axis=1).real
-        discriminant = (0.25 * (self.eigenvalues[:, 1] - self.eigenvalues[:, 0]) ** 2).real
-        known = np.flatnonzero(np.isfinite(mean))
-        fx, values = [], []
-        for run in np.split(known, np.flatnonzero(np.diff(known) > 1) + 1):
-            if len(run) < 2:
-                fx.append(self.fx[run])
-                values.append(self.eigenvalues[run])
-                continue
-            knots, height = self.fx[run], discriminant[run]
-            if self.fx_c is not None and knots[0] < self.fx_c < knots[-1]:
-                at = int(np.searchsorted(knots, self.fx_c))
-                if knots[at] != self.fx_c:
-                    knots, height = np.insert(knots, at, self.fx_c), np.insert(height, at, 0.0)
-            share = 0.5 - 0.5 * np.cos(np.linspace(0, np.pi, BETWEEN, endpoint=False))
-            dense = np.append((knots[:-1, None] + share * np.diff(knots)[:, None]).ravel(), knots[-1])
-            root = np.emath.sqrt(PchipInterpolator(knots, height)(dense).astype(complex))
-            middle = PchipInterpolator(self.fx[run], mean[run])(dense)
-            fx += [dense, dense[-1:]]
-            values += [np.stack([middle - root, middle + root], axis=1), np.full((1, 2), np.nan)]  # a gap behind it
-        return PairCurve(self.mu, np.concatenate(fx), np.concatenate(values), self.fx_c) if fx else self
+        """The same pair with many points between its loads, see :func:`curve_through`."""
+        load, eigenvalues = curve_through(self.fx, self.eigenvalues, self.fx_c)
+        return PairCurve(self.mu, load, eigenvalues, self.fx_c)
 
 
 @styled

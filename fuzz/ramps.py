@@ -1,6 +1,6 @@
 """Ramps at random: whether a packing flows, and where, must not depend on increments or on arithmetic.
 
-    python -m fuzz.ramps [-o docs/stability] [--ramps 200] [--workers 1]
+    python -m fuzz.ramps [-o docs/extremes] [--ramps 200] [--workers 1]
 
 Packings are drawn at random: seed, number of disks, friction, tangential stiffness, exponent of the law. Each is ramped
 to F_x/F_y = 0.1 with three increments in both arithmetics. The ramp with the smallest increments in compensated
@@ -11,7 +11,7 @@ last equilibrium but one is ramped on with the increments of the reference. If t
 difference is the path's. If it goes on, an equilibrium that exists was not found, and that is a fault.
 
 ramps.jsonl has a row for each packing, written as they come; the same command goes on where it was cut off. ramps.txt
-is what stability.md says of them, ramps.png draws where ramps end.
+is what extremes.md says of them, ramps.png draws where ramps end.
 """
 
 import argparse
@@ -186,7 +186,7 @@ def rows_of(path: Path, packings: int, workers: int) -> Iterator[Row]:
 
 
 def says(rows: Sequence[Row]) -> str:
-    """What stability.md says of the ramps."""
+    """What extremes.md says of the ramps."""
     ramps = [each for row in rows for each in row["ramps"]]
     flowing = sum(row["ramps"][TRIED]["ends"] is not None for row in rows)
     agree, path, missed = (
@@ -241,7 +241,7 @@ def main() -> int:
     """The command; its exit code is 1 if an equilibrium was missed."""
     parser = argparse.ArgumentParser(prog="python -m fuzz.ramps", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs/stability"), help="the folder")
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs/extremes"), help="the folder")
     parser.add_argument("--ramps", type=int, default=200, help="at least; each packing has six")
     parser.add_argument("--workers", type=int, default=1, help="processes")
     chosen = parser.parse_args()

@@ -11,6 +11,7 @@
 #ifndef FAULTGOUGE_EXACT_ACCUMULATOR_H
 #define FAULTGOUGE_EXACT_ACCUMULATOR_H
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -44,6 +45,12 @@ public:
     whole[limb + 2] += sign * static_cast<std::int64_t>(high >> 32);
   }
 
+  // a difference has the sum of what was added less what is subtracted, and no mean
+  void subtract(const ExactAccumulator &other)
+  {
+    for (int k = 0; k < SIZE; k++) whole[k] -= other.whole[k];
+  }
+
   std::int64_t *integers() { return whole.data(); }    // SIZE of them, for a reduction
 
   // of all that was added, to the last place; NaN if one was not finite, 0 without any
@@ -56,12 +63,16 @@ public:
 
   double sum() const
   {
+    int first = 0, last = LIMBS - 1;    // of what is not 0
+    while (first < last && whole[first] == 0) first++;
+    while (last > first && whole[last] == 0) last--;
+    const int end = std::min(last + 1, LIMBS - 1);
     std::array<std::int64_t, LIMBS> digits;
-    const bool negative = carry(1, digits) < 0;
-    if (negative) carry(-1, digits);
-    int top = LIMBS - 1;
-    while (top > 0 && digits[top] == 0) top--;
-    const auto digit = [&](int k) { return k >= 0 ? static_cast<double>(digits[k]) : 0.0; };
+    const bool negative = carry(1, first, end, digits) < 0;
+    if (negative) carry(-1, first, end, digits);
+    int top = end;
+    while (top > first && digits[top] == 0) top--;
+    const auto digit = [&](int k) { return k >= first ? static_cast<double>(digits[k]) : 0.0; };
     const double leading = digit(top) * 0x1p64 + (digit(top - 1) * 0x1p32 + digit(top - 2));
     const double size = std::ldexp(leading, 32 * (top - 2) - 1074);
     return negative ? -size : size;
@@ -72,16 +83,17 @@ private:
   enum { COUNT = LIMBS, NOT_FINITE };
   std::array<std::int64_t, SIZE> whole{};
 
-  // digits of sign times the sum, all below 2^32 and not negative but for the last one, which is returned
-  std::int64_t carry(std::int64_t sign, std::array<std::int64_t, LIMBS> &digits) const
+  // digits of sign times the sum from the first to the end, beside which all are 0: all below 2^32 and not negative but
+  // for the last one, which is returned
+  std::int64_t carry(std::int64_t sign, int first, int end, std::array<std::int64_t, LIMBS> &digits) const
   {
     std::int64_t over = 0;
-    for (int k = 0; k < LIMBS - 1; k++) {
+    for (int k = first; k < end; k++) {
       const std::int64_t number = sign * whole[k] + over;
       digits[k] = number & static_cast<std::int64_t>(MASK);
       over = (number - digits[k]) / (std::int64_t(1) << 32);
     }
-    return digits[LIMBS - 1] = sign * whole[LIMBS - 1] + over;
+    return digits[end] = sign * whole[end] + over;
   }
 };
 

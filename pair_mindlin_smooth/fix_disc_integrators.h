@@ -103,6 +103,8 @@ public:
 
   void reset_dt() override;
 
+  bool drags() const { return drag_time > 0.0; }
+
 private:
   double kept = 1.0;    // share of a velocity that drag leaves over half a step
 

@@ -10,6 +10,7 @@
 #include "fix_addforce_signal.h"
 #include "fix_dashpot_velocities.h"
 #include "fix_disc_integrators.h"
+#include "fix_drive_spring.h"
 #include "fix_keep_histories.h"
 #include "fix_low_parts.h"
 #include "fix_slip_history.h"
@@ -131,6 +132,7 @@ void add_styles(void *lmp, void *handle, lammpsplugin_regfunc add)
           &create_fix<FixDashpotVelocities>);
   add_fix("displace/disc", "moves disks by their velocities alone", &create_fix<FixDisplaceDisc>);
   add_fix("addforce/signal", "force of a signal of time on disks", &create_fix<FixAddForceSignal>);
+  add_fix("drive/spring", "spring that draws a layer, the same on any number of ranks", &create_fix<FixDriveSpring>);
   add_fix("weaken/friction", "friction that weakens with the velocity of a layer", &create_fix<FixWeakenFriction>);
   add_fix("keep/histories", "copy of what fixes keep for each atom", &create_fix<FixKeepHistories>);
   add_fix("overdamped/disc", "overdamped relaxation of disks in the plane", &create_fix<FixOverdampedDisc>);

@@ -51,7 +51,7 @@ FLOORS = {
     ),
     "faultgouge.assessment": (
         ("timing",),
-        ("explain", "stability", "work_precision"),
+        ("explain", "extremes", "work_precision"),
     ),
 }
 """Rooms from the ground up. A room knows those below its floor, and none beside it."""

@@ -44,7 +44,7 @@ STEADY = 0.3
 """A motion still grows if D gains this share of its mean rate, in each quarter of the second half of the time."""
 
 EXPONENTIAL = 0.85
-"""Ratio of the rates of growth in the last two quarters of the time from which growth is exponential: of any power of the
+"""Ratio of the growth in the last two quarters of the time from which growth is exponential: of any power of the
 time it is 0.71."""
 
 SETTLED = 1e-3

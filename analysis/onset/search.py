@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
-from ..configuration import Configuration, HasConfiguration
+from ..configuration import HasConfiguration
 from ..errors import FaultgougeError, NoEquilibriumError, TurningPointError
 from ..motion.buckling import negative_eigenvalues
 from ..motion.spectrum import Spectrum, spectrum
-from ..packing.packing import Floats
+from ..packing.packing import Floats, Packing
 from ..progress import Watch, show_progress
 from ..table_display import TableDisplay
 from ..uncertain_digits import with_uncertainty
@@ -291,7 +291,7 @@ def find_onset(
     doubtful: Increments = ()
     all_modes: Spectrum | None = None
     # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
-    if modes is None and (not takes_all or (first and isinstance(start, Configuration))):
+    if modes is None and (not takes_all or (first and not isinstance(start, Packing))):
         all_modes = _complex_at_start(start, limits)
     if all_modes is not None:
         windows: tuple[Window, ...] = (_fastest(start, all_modes),)

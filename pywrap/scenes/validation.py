@@ -43,6 +43,7 @@ KEYS = {
     "ramp": "step and until",
     "perturb": "fx and time",
     "damping": "cn, ct or tau",
+    "drive": "spring, velocity and until",
     "friction": "v0, the velocity at which friction weakens",
     "eruptions": "load, a list of F_x",
 }

@@ -17,8 +17,8 @@ if "IPython" in sys.modules:
 
 OFFERS = {
     "Scene": "pywrap", "settle": "pywrap", "ramp": "pywrap", "perturb": "pywrap", "from_lammps": "pywrap",
-    "relax": "pywrap",
-    "onset": "pywrap.onset.first_onset", "stability": "analysis", "spectrum": "analysis", "load": "stored_files",
+    "relax": "pywrap", "drive": "pywrap.runs.drive", "onset": "pywrap.onset.first_onset", "stability": "analysis",
+    "spectrum": "analysis", "load": "stored_files",
 }  # fmt: skip
 """Names of this package, and the modules that have them."""
 

@@ -1,5 +1,7 @@
 """K and C of linearised contacts: a force law in extended precision, symmetries, and the operators of disks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from packing_snapshot import snapshot_of
@@ -386,3 +388,15 @@ def test_values_that_packings_have():
     assert len(one_contact().contacts) == 1
     one_contact(dimension=3, normal=[[0, 0.8, 0.6]], distance=[np.inf], friction=[np.inf])
     one_contact(mass=np.ma.masked_array([1.0, 1.0], [False, False]), j=[-1])
+
+
+@pytest.mark.parametrize("coulomb", [False, True])
+def test_a_smoothed_law_has_no_one_sided_contacts(reference_packing, coulomb):
+    """Close to the bound its tangential stiffness has gone, on both sides; that of Coulomb's slider stays."""
+    packing = reference_packing(0.5)
+    law = replace(packing.law, coulomb=coulomb)
+    share = 1.0 if coulomb else 1 - 5e-4
+    slip = share * law.slip_limit(packing.geometry.overlap)
+    contacts = derive_frozen(packing, law=law, contacts=replace(packing.contacts, slip=slip)).configuration.contacts
+    assert contacts.at_bound.all()
+    assert contacts.one_sided.all() == contacts.one_sided.any() == coulomb

@@ -378,7 +378,7 @@ def test_a_lack_of_memory_is_no_fault_of_the_program(capsys):
 
 
 def test_every_command_has_help_with_an_example(faultgouge, faultgouge_here):
-    commands = ["settle", "ramp", "perturb", "onset", "spectrum", "explain", "report", "stability", "reproduce"]
+    commands = ["settle", "ramp", "perturb", "onset", "spectrum", "explain", "report", "extremes", "reproduce"]
     commands += ["import", "export", "movie", "view", "sweep", "modes", "eruptions"]
     overview = faultgouge("--help").stdout
     for command in commands:

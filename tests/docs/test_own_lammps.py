@@ -18,7 +18,7 @@ def test_script_of_the_page(tmp_path):
     assert blocks.keys() == {"slope.in", "look.py", "heap.in", "heap.py", "strain.py"}
     for name, block in blocks.items():
         (tmp_path / name).write_text(block)
-    first = re.search(r"^(?: {4}.*\n|\n)+", text[text.index("    from ") :])[0]
+    first = re.search(r"^(?: {4}.*\n|\n)+", text[text.index("    import ") :])[0]
     with (tmp_path / "look.py").open("a") as script:  # the three lines at the top of the page
         script.write(dedent(first))
     done = subprocess.run([sys.executable, "look.py"], cwd=tmp_path, capture_output=True, text=True, timeout=600)
@@ -26,6 +26,8 @@ def test_script_of_the_page(tmp_path):
     assert "40 spheres" in done.stdout
     assert "LAMMPS moves as K and C say: True True" in done.stdout
     assert "<Spectrum: every motion decays with the packing's dissipation, D as exp(-0.05" in done.stdout
+    assert "stable: every motion decays, the slowest with D as exp(-0.0523" in done.stdout
+    assert "without dissipation: 42 complex pairs, D as exp(0.318" in done.stdout
     assert "K alone has 42 complex pairs, D as exp(0.318" in done.stdout
 
 

@@ -1,9 +1,13 @@
 """The force of a signal and friction that weakens: fixes against the same formulas in LAMMPS's variables."""
 
+import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from faultgouge.pywrap import Engine
 from faultgouge.pywrap.lammps.instance import EngineError
@@ -53,6 +57,39 @@ def force_at(engine, step):
     engine.lammps.command(f"reset_timestep {step}")
     engine.lammps.command("run 0 post no")
     return engine.net_force
+
+
+@given(
+    numbers=st.lists(st.floats(allow_nan=False, allow_infinity=False, width=64), min_size=1, max_size=10),
+    cancels=st.booleans(),
+)
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_mean_of_a_layer_is_exact(layer, numbers, cancels):
+    """Sums of doubles of any size, those that cancel included, against the exact sum of Python."""
+    numbers = [number / 16 for number in numbers]  # so that the sum is a double
+    numbers = [*numbers[:5], *(-number for number in reversed(numbers[:5]))] if cancels else numbers
+    velocity = np.zeros(10)
+    velocity[: len(numbers)] = numbers
+    expected = math.fsum(velocity) / 10
+    assert layer(velocity) == pytest.approx(expected, rel=3e-16, abs=5e-324)
+
+
+@pytest.fixture(scope="module")
+def layer(reference_packing):
+    """Mean by compute layer/velocity of ten velocities."""
+    packing = reference_packing(1.0)
+    with Engine(packing) as engine:
+        lammps, step = engine.lammps, itertools.count(1)
+        lammps.command("compute mean top layer/velocity")
+
+        def mean(velocity):
+            v = lammps.numpy.extract_atom("v")
+            tag = lammps.numpy.extract_atom("id")[: len(packing)]
+            v[: len(packing)][packing.top[tag - 1], 0] = velocity
+            lammps.command(f"reset_timestep {next(step)}")  # LAMMPS computes once in a step
+            return lammps.extract_compute("mean", 0, 0)
+
+        yield mean
 
 
 VARIABLES = """

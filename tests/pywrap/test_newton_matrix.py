@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix, touching
 from faultgouge.analysis.factors.linear_solver import ACCURATE, SparseSolver, elimination_order
-from faultgouge.assessment.stability.cases.packings import crystal
+from faultgouge.assessment.extremes.cases.packings import crystal
 from faultgouge.pywrap import Engine
 from faultgouge.pywrap.equilibria.newton import iterate_newton
 from faultgouge.pywrap.equilibria.newton_matrix import AFLOAT, factor_stiffness

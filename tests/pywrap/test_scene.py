@@ -331,6 +331,7 @@ WRONG = {
     "ramp": {"step": 1.0, "until": 0.5},
     "perturb": {"fx": 7.0, "time": "long", "inertia_factor": 0.5},
     "friction": {"B": 0.3},
+    "drive": {"spring": -1.0},
     "trigger": {"distance": []},
     "eruptions": {"load": -1.0},
     "modes": {"fx_over_fy": "all"},
@@ -345,6 +346,7 @@ def test_what_a_command_does_not_read_is_checked_for_its_keys_alone(command):
     unread = {name: section for name, section in WRONG.items() if name not in reads}
     perturb = {"fx": 0.01, "time": 1.0, "inertia_factor": 0.5}
     enough = FULL | {"eruptions": {"load": [0.01]}, "ramp": {"until": 0.02}, "perturb": perturb}
+    enough |= {"drive": {"spring": 10.0, "velocity": 1e-3, "until": 1.0}, "damping": {"cn": 1.0}}
     read = {name: enough[name] for name in needs}
     scene = Scene.from_mapping(merge_changes(read | unread), command=command)
     assert all(getattr(scene, name) is None for name in unread.keys() - {"relax"})

@@ -17,6 +17,8 @@ from .terminal import (
     Frame,
     PackingFile,
     ScenePath,
+    Time,
+    frame_at,
     lock_output,
     print_json,
     print_line,
@@ -31,7 +33,8 @@ from .terminal import (
 )
 
 if TYPE_CHECKING:
-    from ..analysis import Configuration, DampedWindow, Packing, Spectrum, Stability, Window
+    from ..analysis import DampedWindow, Packing, Spectrum, Stability, Window
+    from ..analysis.configuration import HasConfiguration
     from ..pywrap import Equilibrium, Scene
     from ..pywrap.onset.damped import DampedOnset
 
@@ -57,6 +60,7 @@ Slices = Annotated[
 def spectrum(
     file: PackingFile,
     frame: Frame = -1,
+    time: Time = None,
     values: Annotated[
         bool, typer.Option("--values", help="Only the eigenvalues: for a thousand disks in a third of the time.")
     ] = False,
@@ -82,7 +86,7 @@ def spectrum(
     from faultgouge.analysis import spectrum as eigenvalues_of
     from faultgouge.analysis.progress import show_progress
 
-    packing, assumed = stored_configuration(file, frame)
+    packing, assumed = stored_configuration(file, frame_at(file, frame, time))
     size = packing.configuration.coordinates
     if size > LARGE:
         # four matrices of doubles; 18000 coordinates took 10.2 GB
@@ -122,7 +126,7 @@ def spectrum(
     )
 
 
-def _values(packing: Packing | Configuration, as_json: bool) -> None:
+def _values(packing: HasConfiguration, as_json: bool) -> None:
     """Eigenvalues without vectors: as JSON, or a line each."""
     from faultgouge.analysis import eigenvalues
 
@@ -135,7 +139,7 @@ def _values(packing: Packing | Configuration, as_json: bool) -> None:
 
 
 def _print_spectrum(
-    packing: Packing | Configuration,
+    packing: HasConfiguration,
     result: Spectrum,
     verdict: Stability,
     gain: dict[str, Any] | None,
@@ -158,7 +162,7 @@ def _print_spectrum(
             print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
 
 
-def _print_size(packing: Packing | Configuration, result: Spectrum) -> None:
+def _print_size(packing: HasConfiguration, result: Spectrum) -> None:
     """The packing, and the range of its eigenvalues."""
     from faultgouge.analysis import Packing, solid_fraction
 
@@ -190,7 +194,7 @@ def _print_growing_motions(result: Spectrum, dissipative: bool, verbose: bool) -
         print(f"least Q of a pair, |Re omega| / (2 |Im omega|): {result.least_q:.4g}")
 
 
-def _gain_of(packing: Packing | Configuration) -> dict[str, Any] | None:
+def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None if unstable, too large, or where it fails."""
     from faultgouge.analysis.motion.transient import MOST_DISKS, NoGainError, transient_gains
 

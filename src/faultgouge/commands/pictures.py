@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,13 +13,16 @@ from ..mpi_rank import is_root
 from .terminal import (
     Frame,
     PackingFile,
+    Time,
     counted,
+    frame_at,
     growth_in,
     lock_output,
     print_line,
     progress,
     say,
-    snapshot_of_disks,
+    stored_configuration,
+    stored_drive,
     stored_packing,
     stored_series,
     stored_snapshot,
@@ -28,6 +32,8 @@ if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
     from faultgouge.figures.film import Film
     from faultgouge.figures.mode import Mode
+
+    from ..analysis.configuration import HasConfiguration
 
 app = typer.Typer()
 
@@ -66,38 +72,45 @@ def draw(
             show_default=False,
         ),
     ] = None,
+    time: Time = None,
     mode: WhichMode = None,
     color: WhichColour = Colour.MOBILISED,
     output: Annotated[
         Path, typer.Option("-o", "--output", help="The picture: .png, .svg or .pdf.", show_default=True)
     ] = Path("picture.png"),
 ) -> None:
-    """Draw a stored packing with its force chains or a mode, a cycle of loads, or the D(t) of perturb.h5.
+    """Draw a stored packing with its force chains or a mode, a cycle of loads, D(t) of perturb.h5, F(t) of drive.h5.
 
     Disks are to scale: the upper layer is yellow, rattlers are hollow. Bars are
     contacts, with a width proportional to the normal force. For a mode, arrows are
     displacements and colours rotations; the participation ratio and the share of
     rotation stand above. A ramp with turning points is drawn as F_x over the
-    displacement of the upper layer, and perturb.h5 as D(t) with the predicted slope.
-    With --frame or --mode, the packing of these files is drawn instead.
+    displacement of the upper layer, perturb.h5 as D(t) with the predicted slope, and
+    drive.h5 as the force over time with its slips. With --frame, --time or --mode, the
+    packing of these files is drawn instead.
     """
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
     lock_output(context, output, file)
-    snapshot, series, cycle = stored_snapshot(file, -1 if frame is None else frame), None, []
-    packing = snapshot or stored_packing(file, -1 if frame is None else frame)
-    if snapshot is None and frame is None and mode is None:
-        series, cycle = stored_series(file), _cycle(file)
+    number, series, cycle, driven = frame_at(file, -1 if frame is None else frame, time), None, [], None
+    snapshot = stored_snapshot(file, number)
+    packing = snapshot or stored_packing(file, number)
+    if snapshot is None and frame is None and time is None and mode is None:
+        driven = stored_drive(file)
+        series, cycle = stored_series(file), [] if driven else _cycle(file)
     if not is_root():
         return
     from faultgouge.analysis import Packing
     from faultgouge.figures import draw_cycle, draw_packing
+    from faultgouge.figures.drive import draw_drive
     from faultgouge.figures.mode import draw_modes
     from faultgouge.figures.packing import in_words
     from faultgouge.figures.series import draw_growth
     from faultgouge.figures.style import save_as
 
-    if cycle:
+    if driven is not None:
+        figure = draw_drive(*driven)
+    elif cycle:
         figure = draw_cycle(cycle)
     elif series is not None:
         growth = growth_in(file, series)
@@ -148,7 +161,8 @@ def movie(
     From perturb.h5 with its trajectory ([output] trajectory = true): the run and
     D(t). Displacements are magnified by a power of ten, which is printed on the film
     and falls in steps. With --mode: the motion of a mode without its growth. From
-    run.h5: the ramp, and F_x over the displacement of the upper layer. An .mp4 needs
+    run.h5: the ramp, and F_x over the displacement of the upper layer. From drive.h5:
+    its states, to scale, and the force over time. An .mp4 needs
     pip install 'faultgouge[movie]'. A mode of spheres is written as frames for OVITO
     (.xyz) or ParaView (.pvd).
     """
@@ -188,52 +202,66 @@ def movie(
 @app.command(epilog="Example: faultgouge view run.h5 -o page.html")
 def view(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="run.h5 of a ramp, or perturb.h5.", show_default=False)],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="run.h5, perturb.h5, or NAME.disks from the dumps of a deck.", show_default=False
+        ),
+    ],
     loads: Annotated[
         int | None,
         typer.Option(
             min=1,
-            help="Number of equilibria on the page, equally spaced; 60 by default, and fewer for more than 300 disks.",
+            help="Number of equilibria on the page, equally spaced; 60 by default, and fewer for more than 380 disks.",
             show_default=False,
         ),
     ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="The page: .html.")] = Path("page.html"),
 ) -> None:
-    """Make one page that any browser opens offline: a ramp with its pair, under a slider.
+    """Make one page that any browser opens offline: is a packing stable, from load to load?
 
-    The page shows the packing with its force chains, the eigenvalues in the complex
-    plane, the pair that merges over F_x, and D(t) if the file contains it. The modes
-    of the pair move. The command needs pip install 'faultgouge[view]'.
+    The page says at each load whether the packing is stable, and shows how many pairs
+    are complex and how fast D grows. A click chooses a pair, whose modes move. It shows
+    D(t) if the file contains it. Spheres of a LAMMPS deck can be turned.
     """
     if output.suffix.lower() != ".html":
         raise typer.BadParameter(f"-o {output}: a page is an .html")
-    from faultgouge.analysis import RunFile
+    from faultgouge.analysis import Configuration, RunFile
     from faultgouge.analysis.motion.hysteresis import turning_points
-    from faultgouge.figures.browser_page import check_library, equally_spaced, loads_shown, write_view
-    from faultgouge.figures.browser_pair import seconds
+    from faultgouge.figures.browser_page import Axis, equally_spaced, loads_shown, write_view
+    from faultgouge.figures.followed_pairs import seconds
 
-    check_library()
-    snapshot = snapshot_of_disks(file)
+    last, assumed = stored_configuration(file)
     lock_output(context, output, file)
     if not is_root():
         return
     packings: list[Packing] | list[Configuration]
-    if snapshot is not None:
-        packings, series = [snapshot], None
-        title = f"{file.name}: {len(snapshot)} disks as LAMMPS left them"
+    axis: Axis | None = None
+    if isinstance(last, Configuration):
+        packings, series = [last], None
+        particles = "disks" if last.dimension == 2 else "spheres"
+        title = f"{file.name}: {len(last)} {particles} as LAMMPS left them"
+    elif file.suffix == ".disks":
+        packings, series = [last], None
+        title = f"{file.name}: {len(last)} disks, Fₓ = {last.fx:g}"
     else:
         with RunFile(file) as run:
-            most = loads_shown(len(run.packing(0))) if loads is None else loads
-            chosen = {*equally_spaced(len(run), most), *turning_points(run.fx)}
-            packings = [run.packing(k) for k in sorted(chosen)]
+            most = loads_shown(len(last)) if loads is None else loads
+            driven = "time" in run.observables
+            turns = [] if driven else turning_points(run.fx)
+            chosen = sorted({*equally_spaced(len(run), most), *turns})
+            packings = [run.packing(k) for k in chosen]
+            axis = Axis("t", "time of the run", run.observable("time")[chosen]) if driven else None
             series = run.series("undamped") if "undamped" in run.names_of_series else None
-        span = " to ".join(f"{fx:g}" for fx in dict.fromkeys((packings[0].fx, packings[-1].fx)))
-        what = "undamped run" if series is not None else "equilibria"
-        title = f"{file.name}: {what} of {len(packings[0])} disks, Fₓ = {span}"
+            ends = [run.fx[k] for k in sorted({0, *turns, len(run) - 1})]
+        span = f", Fₓ = {' to '.join(f'{fx:g}' for fx in ends)}" if not driven else ""
+        what = "states of a driven run" if driven else "undamped run" if series is not None else "equilibria"
+        title = f"{file.name}: {what} of {len(packings[0])} disks{span}"
     if seconds(packings) > 5:
         say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
-    write_view(packings, output, title, series, lambda them: progress(them, "loads"))
-    print_line(f"{len(packings)} loads, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
+    write_view(packings, output, title, series, lambda them: progress(them, "loads"), axis, assumed)
+    count = "1 packing" if len(packings) == 1 else f"{len(packings)} packings"
+    print_line(f"{count}, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
 
 
 def _frames_of_spheres(
@@ -270,15 +298,23 @@ def _cycle(file: Path) -> list[Packing]:
 
 
 def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] | None, dots: int | None) -> Film:
-    """The run if the file has its trajectory, else its ramp."""
+    """The run if the file has its trajectory, else its drive or its ramp."""
     from faultgouge.analysis import PackingFileError, RunFile
+    from faultgouge.figures.drive import course_of
     from faultgouge.figures.film import RampFilm, RunFilm, RunMotion
 
     if file.suffix == ".disks":
         raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
+    driven, course, times = stored_drive(file), None, list[float]()
     with RunFile(file) as run:
         motion = RunMotion.read(run)
         packings = [] if motion is not None else [run.packing(k) for k in range(len(run))]
+        times = run.observable("time").tolist() if driven else times
+    if driven:
+        first, last = span or (-inf, inf)
+        shown = [k for k, time in enumerate(times) if first <= time <= last]
+        packings = [packings[k] for k in shown]
+        course = course_of(*driven, [times[k] for k in shown], first, last)
     if motion is not None:
         return RunFilm(motion if span is None else motion.between(*span), count, dots=dots)
     if len(packings) < 2:
@@ -286,10 +322,10 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
             f"{file} has one equilibrium and no trajectory: ask for a mode with --mode, or run `faultgouge perturb` "
             "with trajectory = true under [output]"
         )
-    return RampFilm(packings, count, color, dots=dots)
+    return RampFilm(packings, count, color, dots=dots, course=course)
 
 
-def modes_of(packing: Packing | Configuration, which: str) -> tuple[list[Mode], str]:
+def modes_of(packing: HasConfiguration, which: str) -> tuple[list[Mode], str]:
     """The modes that --mode asks for, and what they are."""
     from faultgouge.figures.mode import modes_of as find_modes
 

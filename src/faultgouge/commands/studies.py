@@ -1,4 +1,4 @@
-"""Commands that write studies and reports: explain, reproduce, report, stability, trigger, eruptions."""
+"""Commands that write studies and reports: explain, reproduce, report, extremes, trigger, eruptions."""
 
 from __future__ import annotations
 
@@ -96,15 +96,14 @@ def report(
     print_line(f"written: {output}/report.md")
 
 
-@app.command(epilog="Example: mpiexec -n 2 faultgouge stability -o stability")
-def stability(
-    output: NewFolder = Path("stability"),
-    quick: Annotated[bool, typer.Option("--quick", help="About half of the cases, in a few seconds.")] = False,
-    as_json: AsJson = False,
-) -> None:
+Quick = Annotated[bool, typer.Option("--quick", help="About half of the cases, in a few seconds.")]
+
+
+@app.command(epilog="Example: mpiexec -n 2 faultgouge extremes -o extremes")
+def extremes(output: NewFolder = Path("extremes"), quick: Quick = False, as_json: AsJson = False) -> None:
     """Test stiff and extreme cases: each holds within a stated bound, or is refused in one sentence."""
-    from faultgouge.assessment.stability import check
-    from faultgouge.assessment.stability import stability as try_cases
+    from faultgouge.assessment.extremes import check
+    from faultgouge.assessment.extremes import extremes as try_cases
 
     keeps(
         f"{output} has the cases that were finished; the same command starts from the beginning and replaces them",
@@ -115,11 +114,22 @@ def stability(
     counts = Counter(case["status"] for case in result.get("cases", ()))
     (say if as_json else print_line)(
         f"{counts.total()} cases: {counts['holds']} hold, {counts['refused']} are refused in a sentence, "
-        f"{counts['fails']} fail; written: {output}/stability.md"
+        f"{counts['fails']} fail; written: {output}/extremes.md"
     )
     if as_json:
         print_json(result)
     check(result)
+
+
+@app.command(hidden=True)
+def stability(output: NewFolder = Path("stability"), quick: Quick = False, as_json: AsJson = False) -> None:
+    """The name of `extremes` until version 1, with the JSON under its old name, too."""
+    say("faultgouge stability is called faultgouge extremes now: stability is what spectrum tells of a packing")
+    try:
+        extremes(output, quick, as_json)
+    finally:
+        if is_root() and (output / "extremes.json").exists():
+            (output / "stability.json").write_bytes((output / "extremes.json").read_bytes())
 
 
 @app.command(epilog="Example: mpiexec -n 3 faultgouge trigger trigger.toml -o trigger")

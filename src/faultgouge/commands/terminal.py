@@ -23,6 +23,7 @@ from ..mpi_rank import is_root
 if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
     from faultgouge.analysis.motion.growth import GrowthOfRun
+    from faultgouge.analysis.motion.slips import Slip
     from faultgouge.pywrap import Equilibrium, Scene
     from faultgouge.pywrap.scenes.estimate import Task
 
@@ -42,6 +43,7 @@ Workers = Annotated[
 PackingFile = Annotated[
     Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks from the dumps of a deck.", show_default=False)
 ]
+Time = Annotated[float | None, typer.Option("--time", metavar="T", help="Of drive.h5: the state nearest to this time.")]
 Frame = Annotated[int, typer.Option(help="Number of the equilibrium; negative numbers count from the last.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
@@ -77,24 +79,10 @@ def stored_snapshot(file: Path, frame: int = -1) -> Configuration | None:
     return read_snapshot(file)
 
 
-def snapshot_of_disks(file: Path, frame: int = -1) -> Configuration | None:
-    """The snapshot of a run.h5 that holds one of disks; None of all other files; spheres are refused."""
-    from faultgouge.analysis import BadInputError
-
-    snapshot = stored_snapshot(file, frame)
-    if snapshot is not None and snapshot.dimension == 3:
-        raise BadInputError(
-            f"{file} holds spheres: `faultgouge draw {file}` draws them; `faultgouge export {file} -o packing.vtp` "
-            f"shows them in ParaView, and -o packing.xyz in OVITO; `faultgouge movie {file} --mode 0 -o mode.xyz` "
-            "moves a mode."
-        )
-    return snapshot
-
-
 def stored_files(scene: Scene) -> list[Path]:
     """The files that a scene names: of its packing, and of the signal that forces it."""
-    file, signal = getattr(scene.packing, "file", None), scene.perturb.signal if scene.perturb else None
-    return [Path(each) for each in (file, signal) if each is not None]
+    signals = [section.signal for section in (scene.perturb, scene.drive) if section is not None]
+    return [Path(each) for each in (getattr(scene.packing, "file", None), *signals) if each is not None]
 
 
 def counted(number: int, noun: str, plural: str | None = None) -> str:
@@ -112,7 +100,8 @@ def stored_packing(file: Path, frame: int = -1) -> Packing:
         return read_dump(file, frame=frame)
     with RunFile(file) as run:
         if not run.complete:
-            stored = counted(len(run), "equilibrium", "equilibria")
+            names = ("state",) if run.attributes.get("task") == "drive" else ("equilibrium", "equilibria")
+            stored = counted(len(run), *names)
             say(f"{file} is of a run that is not finished: {stored}, up to F_x = {run.fx[-1]:g}")
         return run.packing(frame)
 
@@ -147,6 +136,33 @@ def stored_series(file: Path) -> dict[str, Any] | None:
         series = run.series("undamped") if "undamped" in run.names_of_series else None
         is_run = run.attributes.get("task") == "perturb"
     return series if is_run and series is not None and len(series["time"]) > 1 else None
+
+
+def stored_drive(file: Path) -> tuple[dict[str, Any], list[Slip]] | None:
+    """The series of a drive.h5 and its slips; None of another file."""
+    from faultgouge.analysis import RunFile
+    from faultgouge.pywrap.runs.drive_recorder import SERIES, drive_of, slips_in
+
+    if file.suffix == ".disks":
+        return None
+    with RunFile(file) as run:
+        if drive_of(run) is None or SERIES not in run.names_of_series:
+            return None
+        return run.series(SERIES), slips_in(run)
+
+
+def frame_at(file: Path, frame: int, time: float | None) -> int:
+    """The number of the state of a drive.h5 nearest to a time; without a time, the frame."""
+    from faultgouge.analysis import BadInputError, RunFile
+    from faultgouge.pywrap.runs.drive_recorder import drive_of
+
+    if time is None:
+        return frame
+    if file.suffix != ".disks":
+        with RunFile(file) as run:
+            if drive_of(run) is not None:
+                return int(abs(run.observable("time") - time).argmin())
+    raise BadInputError(f"{file} has no states in time: --time chooses a state of a drive.h5; give --frame")
 
 
 def growth_in(file: Path, series: dict[str, Any]) -> GrowthOfRun:

@@ -7,10 +7,10 @@ from functools import partial
 import pytest
 
 from faultgouge.analysis import stiffness_matrix
-from faultgouge.assessment.stability import CASES, StabilityError, check, stability
-from faultgouge.assessment.stability.cases import checks
-from faultgouge.assessment.stability.cases.case import Case, measured_outcome, refusal, refused_outcome
-from faultgouge.assessment.stability.cases.packings import crystal, shear_packing
+from faultgouge.assessment.extremes import CASES, ExtremeCasesError, check, extremes
+from faultgouge.assessment.extremes.cases import checks
+from faultgouge.assessment.extremes.cases.case import Case, measured_outcome, refusal, refused_outcome
+from faultgouge.assessment.extremes.cases.packings import crystal, shear_packing
 from faultgouge.pywrap import Equilibrium
 from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 
@@ -54,25 +54,25 @@ def test_failures_are_told_and_the_others_go_on(tmp_path, monkeypatch):
     """And so is a picture that cannot be drawn."""
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", no_font)
     told = []
-    result = stability(tmp_path / "out", say=told.append, cases=TROUBLE)
+    result = extremes(tmp_path / "out", say=told.append, cases=TROUBLE)
     status = {case["name"]: case["status"] for case in result["cases"]}
     wrong = dict.fromkeys(("too large", "no number", "crash", "not refused", "two lines", "traceback"), "fails")
     assert status == {"good": "holds", "last": "holds", "refused": "refused"} | wrong
     assert told[2] == "b, crash: ZeroDivisionError: in the middle of it"
-    assert json.loads((tmp_path / "out" / "stability.json").read_text()) == result
-    page = (tmp_path / "out" / "stability.md").read_text()
+    assert json.loads((tmp_path / "out" / "extremes.json").read_text()) == result
+    page = (tmp_path / "out" / "extremes.md").read_text()
     assert "9 cases: 2 hold, 1 are refused" in page
     assert "| too large | fails | 2 | 1 | twice |" in page
-    assert "stability.png was not drawn (RuntimeError: no font at all)" in told[-1]
-    with pytest.raises(StabilityError, match=r"6 of 9 cases failed: too large; no number; crash"):
+    assert "extremes.png was not drawn (RuntimeError: no font at all)" in told[-1]
+    with pytest.raises(ExtremeCasesError, match=r"6 of 9 cases failed: too large; no number; crash"):
         check(result)
 
 
 def test_the_command_counts_what_holds_was_refused_and_failed(faultgouge_here, monkeypatch):
     cases = [case for case in TROUBLE if case.name != "traceback"]  # no command may print that word
-    monkeypatch.setattr("faultgouge.assessment.stability.stability", partial(stability, cases=cases))
-    done = faultgouge_here("stability", code=1)
-    assert "8 cases: 2 hold, 1 are refused in a sentence, 5 fail; written: stability/stability.md" in done.stdout
+    monkeypatch.setattr("faultgouge.assessment.extremes.extremes", partial(extremes, cases=cases))
+    done = faultgouge_here("extremes", code=1)
+    assert "8 cases: 2 hold, 1 are refused in a sentence, 5 fail; written: extremes/extremes.md" in done.stdout
     assert "5 of 8 cases failed" in done.stderr
 
 
@@ -81,8 +81,8 @@ def test_results_are_written_as_they_come(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        stability(tmp_path, cases=[TROUBLE[0], Case("a", "killed", interrupt)])
-    (case,) = json.loads((tmp_path / "stability.json").read_text())["cases"]
+        extremes(tmp_path, cases=[TROUBLE[0], Case("a", "killed", interrupt)])
+    (case,) = json.loads((tmp_path / "extremes.json").read_text())["cases"]
     assert (case["name"], case["status"], case["figure"], case["says"]) == ("good", "holds", 0.5, "half of it")
 
 
@@ -104,11 +104,11 @@ def test_checks_tell_a_wrong_operator_and_a_force(monkeypatch):
 @pytest.mark.long
 def test_quick_cases_hold_with_the_same_table_on_two_ranks(faultgouge, tmp_path):
     """The command fails where a case does."""
-    one = faultgouge("stability", "--quick", "-o", "one", "--json")
-    assert (tmp_path / "one" / "stability.png").stat().st_size > 10_000
-    faultgouge("stability", "--quick", "-o", "two", ranks=2)
-    assert (tmp_path / "one" / "stability.json").read_text() == (tmp_path / "two" / "stability.json").read_text()
-    assert json.loads(one.stdout) == json.loads((tmp_path / "one" / "stability.json").read_text())
+    one = faultgouge("extremes", "--quick", "-o", "one", "--json")
+    assert (tmp_path / "one" / "extremes.png").stat().st_size > 10_000
+    faultgouge("extremes", "--quick", "-o", "two", ranks=2)
+    assert (tmp_path / "one" / "extremes.json").read_text() == (tmp_path / "two" / "extremes.json").read_text()
+    assert json.loads(one.stdout) == json.loads((tmp_path / "one" / "extremes.json").read_text())
     assert len(json.loads(one.stdout)["cases"]) == sum(case.quick for case in CASES)
 
 

@@ -1,7 +1,7 @@
 """Stiff and extreme cases: each holds within a stated bound, or is refused in one sentence.
 
 No case may give a NaN, a hang, a crash or a wrong number without a message. The cases are in `cases`, one module for
-each kind of difficulty; this module runs them. stability.json and stability.md are written again after every case, so
+each kind of difficulty; this module runs them. extremes.json and extremes.md are written again after every case, so
 that a case that crashes the program is the missing case. Runs with LAMMPS use all ranks; their number changes no
 figure. Rank 0 writes.
 """
@@ -23,7 +23,7 @@ from ...figures.pages import render
 from ...figures.style import report_failure, save
 from .cases import dynamics, eigenvalues, geometry, loads, restarts
 from .cases.case import Case, Outcome
-from .draw import stability_figure
+from .draw import extremes_figure
 
 Say = Callable[[str], None]
 
@@ -32,18 +32,18 @@ CASES: tuple[Case, ...] = tuple(
 )
 
 
-class StabilityError(FaultgougeError):
+class ExtremeCasesError(FaultgougeError):
     """Cases that failed, in one sentence."""
 
 
-def stability(
+def extremes(
     output: Path,
     quick: bool = False,
     say: Say = print,
     progress: Callable[[Sequence[Case]], Iterable[Case]] = lambda cases: cases,
     cases: Sequence[Case] = CASES,
 ) -> dict[str, Any]:
-    """Try the cases and leave stability.json, stability.md and stability.png in a folder.
+    """Try the cases and leave extremes.json, extremes.md and extremes.png in a folder.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def stability(
     Returns
     -------
     dict
-        What stability.json holds: each case's name, group, status, figure, bound and what it says.
+        What extremes.json holds: each case's name, group, status, figure, bound and what it says.
     """
     root = MPI.COMM_WORLD.rank == 0
     if root:
@@ -76,27 +76,27 @@ def stability(
         if root:
             _write(done, output)
     if root:
-        with report_failure(f"{output}/stability.png", say):
-            save(stability_figure(done), output / "stability")
+        with report_failure(f"{output}/extremes.png", say):
+            save(extremes_figure(done), output / "extremes")
     return _as_dict(done)
 
 
 def check(result: dict[str, Any]) -> None:
-    """Raise StabilityError if a case of a result has failed."""
+    """Raise ExtremeCasesError if a case of a result has failed."""
     failed = [case["name"] for case in result["cases"] if case["status"] == "fails"]
     if failed:
-        raise StabilityError(f"{len(failed)} of {len(result['cases'])} cases failed: {'; '.join(failed)}")
+        raise ExtremeCasesError(f"{len(failed)} of {len(result['cases'])} cases failed: {'; '.join(failed)}")
 
 
 def _write(done: Sequence[tuple[Case, Outcome]], output: Path) -> None:
-    """stability.json and stability.md with what there is."""
-    write_text(output / "stability.json", json.dumps(_as_dict(done), indent=1, allow_nan=False) + "\n")
+    """extremes.json and extremes.md with what there is."""
+    write_text(output / "extremes.json", json.dumps(_as_dict(done), indent=1, allow_nan=False) + "\n")
     statuses = [outcome.status for _, outcome in done]
     groups = [(name, list(members)) for name, members in groupby(done, lambda each: each[0].group)]
     drawn = output / "ramps.txt"  # of `python -m fuzz.ramps`, beside its picture
     ramps = drawn.read_text() if drawn.exists() else ""
-    page = render(__package__ or "", "stability.md.j2", done=done, statuses=statuses, groups=groups, ramps=ramps)
-    write_text(output / "stability.md", page)
+    page = render(__package__ or "", "extremes.md.j2", done=done, statuses=statuses, groups=groups, ramps=ramps)
+    write_text(output / "extremes.md", page)
 
 
 def _as_dict(done: Sequence[tuple[Case, Outcome]]) -> dict[str, Any]:

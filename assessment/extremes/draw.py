@@ -24,7 +24,7 @@ LOWEST = 1e-6
 
 
 @styled
-def stability_figure(done: Sequence[tuple[Case, Outcome]]) -> Figure:
+def extremes_figure(done: Sequence[tuple[Case, Outcome]]) -> Figure:
     """Every case, and how far within its bound it is.
 
     Parameters

@@ -1,0 +1,211 @@
+"""The pairs of eigenvalues of a ramp, each followed through the loads, and the verdict at each load.
+
+A pair is followed from the load at which it is complex first. Its image at another load is the pair of modes that lies
+closest to its planes (:meth:`~faultgouge.analysis.onset.Modes.nearest`). If the planes of the image are not those of
+the pair, the pair is unknown at that load, and it may be found again at a later one. If no pair of the ramp is complex,
+the two real modes of the last load that are closest to merging are followed.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from faultgouge.analysis import (
+    ComplexPair,
+    Eigenpairs,
+    Spectrum,
+    Stability,
+    closest_to_meeting,
+    stability,
+)
+from faultgouge.analysis.configuration import HasConfiguration
+from faultgouge.analysis.motion.eigenvalues import is_negative, unit_rounding, zero_uncertainty
+from faultgouge.analysis.onset import Modes, Pair, force_bearing, full_operator
+from faultgouge.analysis.onset.eigenvalue_pair import continue_pair
+
+from .mode import Complexes, displacement
+
+Progress = Callable[[Sequence[HasConfiguration]], Iterable[HasConfiguration]]
+
+MEMORY = 1e9
+"""Bytes of modes that are kept until all pairs are followed; at other loads a pair is found by inverse iteration."""
+
+SECONDS_OF_1000 = 18.0
+"""Seconds that all modes of 1,000 disks take on one core; the time grows as the cube of the number of disks."""
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedPair:
+    """A pair of eigenvalues along a ramp of S loads.
+
+    Attributes
+    ----------
+    eigenvalues : ndarray of complex, shape (S, 2)
+        Both members, 1 / time^2: the one with the positive imaginary part, or the lower one, first; nan where the pair
+        is unknown.
+    modes : ndarray of complex, shape (S, 2, axes, N)
+        Their displacements, see :func:`~faultgouge.figures.mode.displacement`; zero where the pair is unknown.
+    """
+
+    eigenvalues: Complexes
+    modes: Complexes
+
+    @property
+    def growth(self) -> np.ndarray:
+        """Growth rate of D without dissipation, 1 / time, shape (S,); nan where the pair is unknown."""
+        return 2 * np.abs(np.sqrt(self.eigenvalues[:, 0]).imag)
+
+
+@dataclass(frozen=True, eq=False)
+class RampEigenvalues:
+    """Eigenvalues along a ramp.
+
+    Attributes
+    ----------
+    values : list of ndarray of complex, shape (E,)
+        All eigenvalues at each load, 1 / time^2. A complex pair that is rounding noise has lost its imaginary parts.
+    verdicts : list of Stability
+        Whether the packing moves, for each load.
+    pairs : list of FollowedPair
+        The pairs that are complex at some load, fastest growing first; without any, the two real modes closest to
+        merging; none if a packing has fewer than two modes.
+    """
+
+    values: list[Complexes]
+    verdicts: list[Stability]
+    pairs: list[FollowedPair]
+
+
+def follow_eigenvalues(
+    packings: Sequence[HasConfiguration], progress: Progress = iter, reasons: Sequence[str] = ()
+) -> RampEigenvalues:
+    """Eigenvalues of equilibria in the order of their path.
+
+    The motion of contacts at Coulomb's bound, which takes seconds to minutes, is followed in a single packing alone.
+
+    Parameters
+    ----------
+    packings : sequence of Packing or Configuration
+        The equilibria, all with the same particles.
+    progress : callable
+        Wraps the packings while their eigenvalues are computed.
+    reasons : sequence of str
+        Why the stability of the packings cannot be known, if it cannot.
+    """
+    followed = _Followed(packings)
+    values, verdicts = [], []
+    for k, packing in enumerate(progress(packings)):
+        modes = Modes.of(packing.fx, full_operator(packing))
+        values.append(modes.values)
+        verdicts.append(_verdict_on(force_bearing(packing), modes, reasons, alone=len(packings) == 1))
+        followed.add(k, modes)
+    followed.close()
+    pairs = [_along(packings, each) for each in followed.pairs]
+    return RampEigenvalues(values, verdicts, sorted(pairs, key=lambda pair: -np.nanmax(pair.growth)))
+
+
+def seconds(packings: Sequence[HasConfiguration]) -> float:
+    """Seconds of `follow_eigenvalues` on one core."""
+    return (4 if packings[0].damped else 1) * SECONDS_OF_1000 * (packings[0].coordinates / 3000) ** 3 * len(packings)
+
+
+class _Followed:
+    """Pairs that are followed while the loads of a ramp come one after the other, and then back to where they began."""
+
+    def __init__(self, packings: Sequence[HasConfiguration]) -> None:
+        self.packings = packings
+        self.pairs: list[dict[int, Pair]] = []
+        self._modes: dict[int, Modes] = {}
+        self._last: Modes | None = None
+
+    def add(self, k: int, modes: Modes) -> None:
+        """The next load, with all of its modes."""
+        size = 32.0 * modes.right.size  # right and left vectors
+        if size * (len(self._modes) + 1) <= MEMORY:
+            self._modes[k] = modes
+        self._last, taken = modes, set()
+        for known in self.pairs:
+            members = self._members(known, k, modes)
+            if members is not None and members not in taken:
+                known[k] = modes.pair(members)
+                if modes.conjugate(members):
+                    taken.add(members)
+        self.pairs += [{k: modes.pair(members)} for members in modes.complex_pairs if members not in taken]
+
+    def close(self) -> None:
+        """Follow all pairs back, to loads at which they are not yet known."""
+        if not self.pairs and self._last is not None:
+            self.pairs = [{len(self.packings) - 1: pair} for pair in _about_to_meet(self._last)]
+        for known in self.pairs:
+            for k in range(max(known) - 1, -1, -1):
+                if k not in known and (image := self._image(known[min(n for n in known if n > k)], k)) is not None:
+                    known[k] = image
+
+    def _members(self, known: dict[int, Pair], k: int, modes: Modes) -> tuple[int, int] | None:
+        """The members of a pair at this load, from its last load, or from the one with the closest load."""
+        closest = min(known, key=lambda n: abs(self.packings[n].fx - self.packings[k].fx))
+        for pair in (known[max(known)], known[closest]):
+            members = modes.nearest(pair)
+            if modes.pair(members).same_planes(pair):
+                return members
+        return None
+
+    def _image(self, pair: Pair, k: int) -> Pair | None:
+        if k in self._modes:
+            modes = self._modes[k]
+            image: Pair | None = modes.pair(modes.nearest(pair))
+        else:
+            image = continue_pair(pair, self.packings[k].fx, full_operator(self.packings[k]))
+        return image if image is not None and image.same_planes(pair) else None
+
+
+def _verdict_on(packing: HasConfiguration, modes: Modes, reasons: Sequence[str], alone: bool) -> Stability:
+    """Whether a packing moves; of one among many the motion of contacts at Coulomb's bound is not followed."""
+    slide = int(packing.configuration.contacts.one_sided.sum())
+    if slide and not alone:
+        contacts = "1 contact" if slide == 1 else f"{slide} contacts"
+        how = "this page does not follow, and `faultgouge spectrum --frame` does"
+        reasons = [*reasons, f"{contacts} at Coulomb's bound may slide on, which {how}"]
+    return stability(packing, spectrum_of_stiffness=_spectrum_of(packing, modes), reasons=reasons)
+
+
+def _spectrum_of(packing: HasConfiguration, modes: Modes) -> Spectrum:
+    """The spectrum of a packing whose modes are known, fastest growing pair first."""
+    found = Eigenpairs(modes.values, modes.right, modes.left, 0, packing.axes)
+    rounding = unit_rounding(modes.matrix.data)
+    zero = zero_uncertainty(packing, rounding)
+    numbers = zip(modes.values, found.overlap, found.participation, found.rotation, strict=True)
+    pairs = [ComplexPair(complex(value), *map(float, rest)) for value, *rest in numbers if value.imag > 0]
+    return Spectrum(
+        eigenvalues=modes.values,
+        pairs=tuple(sorted(pairs, key=lambda pair: -pair.growth_rate)),
+        negative=np.sort(modes.values[is_negative(modes.values, found.overlap, zero)].real),
+        noise_pairs=0,  # they have lost their imaginary parts
+        rattlers=packing.rattlers,
+        rounding=rounding,
+        uncertainty=zero,
+        packing=packing,
+    )
+
+
+def _about_to_meet(modes: Modes) -> list[Pair]:
+    """The two real modes that are closest to meeting; none of a packing with fewer than two."""
+    try:
+        first, second, _ = closest_to_meeting(Eigenpairs(modes.values, modes.right, modes.left, 0))
+    except ValueError:
+        return []
+    return [modes.pair((first, second))]
+
+
+def _along(packings: Sequence[HasConfiguration], known: dict[int, Pair]) -> FollowedPair:
+    """Eigenvalues and displacements of a pair."""
+    found = np.full((len(packings), 2), complex(np.nan, np.nan))
+    modes = np.zeros((len(packings), 2, packings[0].axes, len(packings[0])), dtype=np.complex128)
+    for k, pair in known.items():
+        own, vectors = np.linalg.eig(pair.entries)
+        order = np.lexsort((-own.imag, own.real))
+        found[k] = own[order]
+        for member, number in enumerate(order):
+            modes[k, member] = displacement(packings[k], pair.right @ vectors[:, number])
+    return FollowedPair(found, modes)

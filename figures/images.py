@@ -1,0 +1,142 @@
+"""What a page draws of a packing in two or three dimensions: images of particles and contacts, walls and the box."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from faultgouge.analysis import Configuration, Packing
+from faultgouge.analysis.arrays import Floats, Indices
+from faultgouge.analysis.configuration import HasConfiguration
+
+from .packing import View
+
+MARGIN = 0.5
+"""Images of disks beyond the sides of a periodic box that move into sight, in units of the largest radius."""
+
+
+@dataclass(frozen=True, eq=False)
+class Images:
+    """Every image of a particle and of a contact that the page draws.
+
+    Attributes
+    ----------
+    dimension : int
+        2 or 3.
+    place : ndarray, shape (n, 3)
+        Centres, length.
+    particle : ndarray of int, shape (n,)
+        Whose they are.
+    bar : ndarray, shape (c, 2, 3)
+        Ends of the bars of contacts, length.
+    contact : ndarray of int, shape (c,)
+        Whose they are.
+    low, high : ndarray, shape (dimension,)
+        The frame of the picture of disks; of spheres the box along its periodic edges, and else what lies in it.
+    walls : list of dict
+        axis, sign, place: all that lies beyond a place along an axis, seen along sign times the axis.
+    corners : ndarray, shape (8, 3)
+        Of the box of spheres; bit k of the number of a corner says on which side along edge k.
+    periodic : bool
+        Whether a picture of disks repeats along x.
+    """
+
+    dimension: int
+    place: Floats
+    particle: Indices
+    bar: Floats
+    contact: Indices
+    low: Floats
+    high: Floats
+    walls: list[dict[str, Any]]
+    corners: Floats
+    periodic: bool
+
+    @classmethod
+    def of(cls, packing: HasConfiguration) -> "Images":
+        """Those of a packing."""
+        if packing.dimension == 3:
+            return cls._of_spheres(packing.configuration)
+        view = View.of(packing, margin=MARGIN * packing.radius.max())
+        top = float((packing.position[:, 1] + packing.radius).max())
+        room = 1.1 if isinstance(packing, Packing) else 0.3  # for the arrow of the load
+        return cls(
+            2,
+            _flat(view.place),
+            view.disk,
+            np.stack([_flat(view.start), _flat(view.end)], axis=1),
+            view.contact,
+            np.array([view.left, view.bottom]),
+            np.array([view.right, top + room * float(packing.radius.min())]),
+            [{"axis": wall.axis, "sign": wall.sign, "place": wall.place} for wall in view.walls],
+            np.zeros((0, 3)),
+            bool(len(view.edges)),
+        )
+
+    @classmethod
+    def _of_spheres(cls, packing: Configuration) -> "Images":
+        """Spheres within the box; of a contact through a periodic side each partner has half."""
+        cell = packing.box.copy()
+        cell[~cell.any(axis=1)] = np.eye(3)[~cell.any(axis=1)]  # an open side may have no length
+        share = (packing.position - packing.origin) @ np.linalg.inv(cell)
+        share -= np.where(packing.periodic, np.floor(share), 0.0)
+        place, c = packing.origin + share @ cell, packing.contacts
+        reach = np.where(c.wall, packing.radius[c.i] - c.overlap, c.distance)
+        branch = reach[:, None] * c.normal
+        bars = np.stack([place[c.i], place[c.i] - branch], axis=1)
+        through = np.flatnonzero(
+            ~c.wall & (np.linalg.norm(bars[:, 1] - place[c.j], axis=1) > 1e-6 * packing.radius.max())
+        )
+        bars[through, 1] += 0.5 * branch[through]
+        again = np.stack([place[c.j[through]] + 0.5 * branch[through], place[c.j[through]]], axis=1)
+        low, high = (place - packing.radius[:, None]).min(axis=0), (place + packing.radius[:, None]).max(axis=0)
+        walls = _planes(packing, place)
+        for wall in walls:
+            (low if wall["sign"] > 0 else high)[wall["axis"]] = wall["place"]
+        sides = [
+            (np.zeros(3), cell[k]) if packing.periodic[k] else (np.eye(3)[k] * low[k], np.eye(3)[k] * (high - low)[k])
+            for k in range(3)
+        ]
+        begin = np.where(packing.periodic, packing.origin, 0.0) + sum(side[0] for side in sides)
+        corners = [begin + sum((number >> k & 1) * sides[k][1] for k in range(3)) for number in range(8)]
+        return cls(
+            3,
+            place,
+            np.arange(len(packing)),
+            np.concatenate([bars, again]),
+            np.concatenate([np.arange(len(c)), through]),
+            low,
+            high,
+            walls,
+            np.array(corners),
+            False,
+        )
+
+    @staticmethod
+    def frame(images: Sequence["Images"]) -> dict[str, Any]:
+        """The frame that holds all packings of a page, as lists."""
+        low = np.min([each.low for each in images], axis=0)
+        high = np.max([each.high for each in images], axis=0)
+        first = images[0]
+        return {
+            "extent": [low.tolist(), high.tolist()],
+            "periodic": first.periodic,
+            "walls": first.walls,
+            "corners": first.corners.tolist(),
+        }
+
+
+def _flat(points: Floats) -> Floats:
+    return np.column_stack([points, np.zeros(len(points))])
+
+
+def _planes(packing: Configuration, place: Floats) -> list[dict[str, Any]]:
+    """Planes along the axes that spheres touch."""
+    c = packing.contacts
+    at = np.flatnonzero(c.wall)
+    axis = np.argmax(np.abs(c.normal[at]), axis=1)
+    sign = np.sign(c.normal[at, axis])
+    where = place[c.i[at], axis] - sign * (packing.radius[c.i[at]] - c.overlap[at])
+    sides = sorted({*zip(axis.tolist(), sign.tolist(), strict=True)})
+    return [{"axis": a, "sign": s, "place": float(np.mean(where[(axis == a) & (sign == s)]))} for a, s in sides]

@@ -1,0 +1,149 @@
+"""Write the drive.h5 of a scene: the states of a driven run, its series and its slips."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from mpi4py import MPI
+
+from ...analysis import RunFile
+from ...analysis.motion.slips import Slip, find_slips
+from ..equilibria.quasistatic import Equilibrium
+from ..scenes.drive_section import Drive
+from ..scenes.scene import Scene
+from .drive import DriveSample, DriveState, DriveStep, drive, layer_period
+from .run_recorder import Record, raise_on_all_ranks
+from .undamped import Checkpoint
+
+SERIES = "drive"
+"""Name of the series in the file."""
+
+COMPARABLE = 0.5
+"""Least force drop of a slip with a signal that is compared with one without, in units of the drop of the latter."""
+
+
+class DriveRecord(Record):
+    """The drive.h5 of a scene, created or continued after an interruption; parameters as of `Record`.
+
+    Its frames are states of the run, with the observables `time` and `displacement`. F_x of a frame is the force of the
+    spring.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        scene: Scene,
+        communicator: MPI.Comm | None = None,
+        saved: Callable[[str, Path], object] = lambda words, path: None,
+    ) -> None:
+        super().__init__(path, scene, communicator, "drive", saved)
+
+    def _stored_equilibrium(self, file: RunFile) -> Equilibrium:
+        return Equilibrium.of(file.packing(0))
+
+    def _contents(self, file: RunFile) -> str:
+        return f"{len(file)} state{'s' * (len(file) != 1)}, the last at t = {file.observable('time')[-1]:g}"
+
+    def append(self, equilibrium: Equilibrium) -> None:
+        """Write the packing from which the run starts."""
+        if self.communicator.rank == 0:
+            self._file = RunFile.create(self.path, equilibrium.packing, self._attributes())
+            self._append_states([DriveState(0.0, 0.0, equilibrium.packing)])
+            self._file.save()
+        self.last = equilibrium
+
+    def drive(self) -> Iterator[DriveStep]:
+        """Run the scene's drive and write its rows and states; an interrupted run continues.
+
+        Yields
+        ------
+        DriveStep
+            Those that are not in the file yet.
+        """
+        assert self.last is not None
+        if self.complete:
+            return
+        known, checkpoint = raise_on_all_ranks(self.communicator, lambda: self._known(SERIES, DriveSample))
+        steps: list[DriveStep] = []
+        run = drive(
+            self.scene,
+            self.last.packing,
+            known,
+            checkpoint,
+            lambda reached: self._keep_steps(steps, reached),
+            self.communicator,
+        )
+        for step in run:
+            steps.append(step)
+            yield step
+        self._keep_steps(steps, None)
+
+    def _keep_steps(self, steps: list[DriveStep], reached: Checkpoint | None) -> None:
+        if self._file is not None:
+            with self._file.change():
+                self._append_states([state for step in steps for state in step.states])
+                self._keep(SERIES, [step.sample for step in steps], [], reached)
+        steps.clear()
+
+    def _append_states(self, states: list[DriveState]) -> None:
+        assert self._file is not None
+        for state in states:
+            self._file.append(state.packing, time=state.time, displacement=state.displacement)
+
+
+def drive_of(file: RunFile) -> Drive | None:
+    """The section [drive] of the scene of a drive.h5; None of another file."""
+    if file.attributes.get("task") != "drive":
+        return None
+    return Drive.model_validate(json.loads(file.attributes["scene"])["drive"])
+
+
+def slips_in(file: RunFile) -> list[Slip]:
+    """The slips in the series of a drive.h5."""
+    settings = drive_of(file)
+    if settings is None:
+        return []
+    period = layer_period(settings, file.packing(0))
+    if period is None or SERIES not in file.names_of_series:
+        return []
+    series = file.series(SERIES)
+    return find_slips(
+        series["time"],
+        series["force"],
+        series["displacement"],
+        series["kinetic_energy"],
+        settings.fastest,
+        period,
+    )
+
+
+def clock_advance(path: Path, other: Path) -> float | None:
+    """How much earlier the next slip after a signal begins than in another run without the signal, time.
+
+    Slips whose force drop is below `COMPARABLE` of that of the next slip without the signal are left out: a strong
+    signal makes small slips at once, which leave the next large one where it was.
+
+    Parameters
+    ----------
+    path : Path
+        A drive.h5 with a signal.
+    other : Path
+        The drive.h5 of the same scene without the signal.
+
+    Returns
+    -------
+    float or None
+        None if one of the two has no slip after the signal has begun.
+    """
+    with RunFile(path) as with_signal, RunFile(other) as without:
+        settings = drive_of(with_signal)
+        assert settings is not None
+        after = [[slip for slip in slips_in(run) if slip.ends > (settings.at or 0.0)] for run in (with_signal, without)]
+    if not after[1]:
+        return None
+    due = after[1][0]
+    begins = (slip.begins for slip in after[0] if abs(slip.force_drop) >= COMPARABLE * abs(due.force_drop))
+    first = next(begins, None)
+    return None if first is None else due.begins - first

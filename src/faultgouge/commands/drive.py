@@ -1,0 +1,189 @@
+"""A spring draws the upper layer, which sticks and slips: drive."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from ..mpi_rank import is_root
+from ..signal_guard import keeps
+from .terminal import (
+    AsJson,
+    Out,
+    ScenePath,
+    check_output,
+    print_json,
+    print_line,
+    read_scene,
+    say,
+    status,
+    stored_files,
+    table_of,
+)
+
+if TYPE_CHECKING:
+    from faultgouge.analysis import Packing
+    from faultgouge.pywrap import Scene
+
+app = typer.Typer()
+
+
+@app.command(epilog="Example: faultgouge drive drive.toml -o drive.h5")
+def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = False) -> None:
+    """Draw the upper layer with a spring whose far end moves: the layer sticks and slips.
+
+    The packing settles at F_x = 0; then the spring of [drive] draws, with the dashpots
+    of [damping]. The file contains the force on each disk of the layer, the displacement
+    and the mean height of the layer and the kinetic energy over time, and states at
+    intervals and before and after each slip, which spectrum and draw take by --frame.
+    The slips are also written as a table beside the file, with the suffix .csv.
+    """
+    from faultgouge.pywrap.scenes.validation import require_section
+
+    wanted = read_scene(scene, "drive", "settle")
+    table = output.with_suffix(".csv")
+    check_output(output, scene, *stored_files(wanted))
+    check_output(table, scene, output)
+    settings = require_section(wanted.drive, "drive")
+    start = _run(output, wanted, "driving")
+    others = _others(output, wanted)
+    for name, (path, scene_of_other) in others.items():
+        check_output(path, scene, output)
+        _run(path, scene_of_other, f"driving {name}", start)
+    if not is_root():
+        return
+    result = _result(output, wanted) | _advances(output, {name: path for name, (path, _) in others.items()})
+    _write_table(table, result["slips"])
+    if as_json:
+        print_json(result)
+        return
+    print_line(_in_words(result, settings.spring == "rigid"))
+    if result["strays"]:
+        say(
+            f"squeezed out of the bed, above the layer, where no force acts: disks "
+            f"{', '.join(map(str, result['strays']))}; they were stopped there"
+        )
+    if others:
+        print_line(_advance_in_words(result))
+    print_line(f"written to {', '.join(map(str, [output, *(path for path, _ in others.values())]))} and {table}")
+
+
+def _run(output: Path, scene: Scene, what: str, start: Packing | None = None) -> Packing:
+    """Run a drive to its end, from a packing or from the one that the scene settles to, which is returned."""
+    from faultgouge.pywrap import Equilibrium
+    from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
+    from faultgouge.pywrap.runs.drive_recorder import DriveRecord
+
+    with DriveRecord(output, scene, saved=keeps) as record:
+        if record.last is None:
+            if start is None:
+                with status("settling") as show:
+                    start = settle_for_drive(scene, watch=lambda words: show(f"settling: {words}"))
+                for warning in check_drive(scene, start):
+                    say(f"warning: {warning}")
+            record.append(Equilibrium.of(start))
+        assert record.last is not None
+        with status(what) as show:
+            slips = 0
+            for step in record.drive():
+                slips += step.slip is not None
+                sample = step.sample
+                show(f"{what}: t = {sample.time:.4g}, F = {sample.force:.3g}, {slips} slips")
+        record.finish()
+        return record.last.packing
+
+
+def _others(output: Path, scene: Scene) -> dict[str, tuple[Path, Scene]]:
+    """Of a drive with a signal: the runs without the signal, and with one as small as noise."""
+    settings = scene.drive
+    assert settings is not None
+    if settings.signal is None:
+        return {}
+    changed = {"without": settings.without_signal(), "noise": settings.with_noise()}
+    return {
+        name: (output.with_suffix(f".{name}{output.suffix}"), scene.model_copy(update={"drive": drive}))
+        for name, drive in changed.items()
+    }
+
+
+def _advances(output: Path, others: dict[str, Path]) -> dict[str, float | None]:
+    """How much earlier the next slip is, with the signal and with noise; nothing without a signal."""
+    from faultgouge.pywrap.runs.drive_recorder import clock_advance
+
+    if not others:
+        return {}
+    return {
+        "clock_advance": clock_advance(output, others["without"]),
+        "clock_advance_of_noise": clock_advance(others["noise"], others["without"]),
+    }
+
+
+def _advance_in_words(result: dict[str, Any]) -> str:
+    advance, noise = result["clock_advance"], result["clock_advance_of_noise"]
+    if advance is None:
+        return "clock advance: not known, since no slip follows the signal, with or without it; let the run be longer"
+    side = "earlier" if advance >= 0 else "later"
+    earlier = f"the next slip of comparable size is {abs(advance):.4g} {side} than without the signal"
+    if noise is None:
+        return f"{earlier}; with noise none follows in the run"
+    return f"{earlier}; noise of 1e-12 moves it by {abs(noise):.2g}"
+
+
+def _result(path: Path, scene: Scene) -> dict[str, Any]:
+    """What a drive.h5 says, for JSON."""
+    import numpy as np
+
+    from faultgouge.analysis import RunFile
+    from faultgouge.analysis.motion.slips import friction_of
+    from faultgouge.pywrap.runs.drive import strays
+    from faultgouge.pywrap.runs.drive_recorder import SERIES, slips_in
+
+    with RunFile(path) as file:
+        slips, series, times = slips_in(file), file.series(SERIES), file.observable("time")
+        out = np.flatnonzero(strays(file.packing(-1), file.packing(0)))
+    frames = [
+        {
+            "frame_before": int(np.searchsorted(times, slip.begins, side="right") - 1),
+            "frame_after": int(np.searchsorted(times, slip.ends)),
+        }
+        for slip in slips
+    ]
+    return {
+        "slips": [asdict(slip) | frame for slip, frame in zip(slips, frames, strict=True)],
+        "cycles": max(0, len(slips) - 1),
+        "friction": asdict(friction_of(series["time"], series["force"], slips, scene.load.fy)),
+        "time": float(series["time"][-1]),
+        "states": len(times),
+        "strays": out.tolist(),
+    }
+
+
+def _write_table(path: Path, slips: list[dict[str, Any]]) -> None:
+    """The slips as rows of numbers with all digits."""
+    from faultgouge.analysis.files.atomic_write import write_text
+
+    columns = ("begins", "ends", "force_before", "force_after", "slip", "kinetic_energy", "frame_before", "frame_after")
+    rows = [",".join(repr(slip[name]) for name in columns) for slip in slips]
+    write_text(path, "\n".join([",".join(columns), *rows]) + "\n")
+
+
+def _in_words(result: dict[str, Any], rigid: bool) -> str:
+    friction, slips = result["friction"], result["slips"]
+    mean = f"F/F_y is {friction['mean']:.3g} on average"
+    if not slips:
+        why = ", of a rigid drive, which counts no slips" if rigid else ": no slip"
+        return f"t = {result['time']:.4g}{why}; {mean}, at most {friction['largest']:.3g}"
+    columns = ("begins", "ends", "force_before", "force_after", "slip", "kinetic_energy", "frame_before", "frame_after")
+    headings = ("begins", "ends", "F before", "F after", "slip", "kinetic energy", "frame before", "frame after")
+    rows = [[f"{slip[name]:.4g}" for name in columns] for slip in slips]
+    recurrence = ""
+    if len(slips) > 1:
+        recurrence = f", one in {(slips[-1]['begins'] - slips[0]['begins']) / (len(slips) - 1):.4g} units of time"
+    return (
+        f"{table_of(headings, rows)}\n{len(slips)} slip{'s' * (len(slips) > 1)} up to t = {result['time']:.4g}"
+        f"{recurrence}; {mean} from the first slip on, {friction['before']:.3g} before slips, "
+        f"{friction['after']:.3g} after them"
+    )

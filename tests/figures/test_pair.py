@@ -1,0 +1,59 @@
+"""The curve of a pair of eigenvalues between stored loads."""
+
+import numpy as np
+import pytest
+from reference_layer import SMALL
+
+from faultgouge.figures import PairCurve, draw_pair
+from faultgouge.figures.followed_pairs import follow_eigenvalues
+from faultgouge.figures.pair import curve_through
+from faultgouge.pywrap import Scene
+from faultgouge.pywrap.onset.undamped import onset_run
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("known", [True, False])
+def test_the_drawn_branches_meet_at_the_onset(known):
+    """To a pixel of a picture, with a ramp of 17 loads; the onset itself is the root of the discriminant, solved for
+    with equilibria close to it."""
+    changed = {"packing": SMALL["packing"] | {"seed": 3}, "ramp": {"step": 0.01, "until": 0.16}}
+    run = onset_run(Scene.from_mapping(SMALL | changed), mu=1.0)
+    first = run.onset.windows[0]
+    packings = [each.packing for each in run.equilibria]
+    pairs = follow_eigenvalues(packings).pairs
+    pair = min(pairs, key=lambda each: np.nanmin(np.abs(each.eigenvalues.real - first.eigenvalue)))
+    fx = np.array([each.fx for each in packings])
+    curve = PairCurve(1.0, fx, pair.eigenvalues, first.fx_onset if known else None)
+    real, imaginary = draw_pair([curve]).axes[:2]
+    for axes in (real, imaginary):
+        figure = axes.figure
+        figure.draw_without_rendering()
+        lower, upper = (line.get_xydata() for line in axes.lines[:2])
+        apart = np.abs(lower - upper)[:, 1]
+        real_pair = curve.smooth().eigenvalues[:, 0].imag == 0
+        # the last real load and the first complex one are one point, where both branches are
+        meeting = np.flatnonzero(real_pair)[-1]
+        assert apart[meeting] <= (1e-12 if axes is real else 0.0) * np.abs(lower).max()
+        drawn = axes.transData.transform(lower[meeting])
+        there = axes.transData.transform((first.fx_onset, lower[meeting, 1]))
+        assert abs(drawn - there).max() < 1.0
+
+
+def test_nothing_is_drawn_between_two_loads_of_which_one_is_unknown():
+    fx = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
+    pair = np.column_stack([fx, fx + 1]).astype(complex)
+    pair[2] = complex(np.nan, np.nan)
+    load, eigenvalues = curve_through(fx, pair)
+    assert not np.any((load > 1) & (load < 3))
+    assert np.isnan(load).sum() == 1
+    np.testing.assert_allclose(np.diff(eigenvalues[np.isfinite(load)], axis=1), 1.0, atol=1e-12)
+    assert len(curve_through(fx, np.full((5, 2), np.nan + 0j))[0]) == 0
+
+
+def test_the_curve_of_a_falling_load_is_that_of_the_rising_one():
+    fx = np.linspace(0, 1, 6)
+    root = np.sqrt(0.37 - fx + 0.05 * fx**2 + 0j)
+    pair = np.column_stack([2 - root, 2 + root])
+    up, down = curve_through(fx, pair), curve_through(fx[::-1], pair[::-1])
+    for one, other in zip(up, down, strict=True):
+        np.testing.assert_array_equal(one, other[::-1])

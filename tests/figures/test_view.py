@@ -1,0 +1,191 @@
+"""The page of `faultgouge view` in a browser that has no network. Without Chromium these tests are skipped."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import Configuration, LinearisedContacts
+from faultgouge.analysis.arrays import derive_frozen
+from faultgouge.figures.browser_page import Axis, write_view
+
+pytestmark = pytest.mark.slow
+
+WIDE, NARROW = {"width": 1280, "height": 800}, {"width": 390, "height": 800}
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api")
+    with playwright.sync_playwright() as p:
+        chromium = shutil.which("chromium") or shutil.which("google-chrome") or p.chromium.executable_path
+        if not Path(chromium).exists():
+            pytest.skip("no Chromium is installed: python -m playwright install chromium")
+        yield p.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+
+
+@pytest.fixture
+def opened(browser, tmp_path):
+    """Opens a page of packings; at the end nothing went wrong in the browser, and nothing was fetched."""
+    wrong, asked, pages = [], [], []
+
+    def open_page(packings, viewport=WIDE, scheme="light", **more):
+        write_view(packings, tmp_path / "page.html", "some packings", **more)
+        page = browser.new_page(viewport=viewport, color_scheme=scheme)
+        pages.append(page)
+        page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto((tmp_path / "page.html").as_uri())
+        page.wait_for_function("document.querySelector('#plane circle')")
+        return page
+
+    yield open_page
+    for page in pages:
+        page.close()
+    assert wrong == []
+    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
+
+
+@pytest.fixture(scope="module")
+def column():
+    """Two spheres, one on the other on a floor, at rest under their weight of one each."""
+    up = np.tile([0.0, 0.0, 1.0], (2, 1))
+    contacts = LinearisedContacts(
+        i=[0, 1], j=[-1, 0], normal=up, distance=[np.inf, 0.98], overlap=[0.01, 0.02], slip_arm=np.full((2, 2), 0.5),
+        lever_arm=np.full((2, 2), 0.5), lever_slope=[0, 0], normal_force=[2, 1], tangential_force=np.zeros((2, 3)),
+        normal_stiffness=[300, 300], tangential_stiffness=[200, 200], closing=np.zeros((2, 3)),
+        parting=np.zeros((2, 3)), friction=[1, 0.5], sliding=[False, False], normal_dashpot=[0, 0],
+        tangential_dashpot=[0, 0],
+    )  # fmt: skip
+    weight = np.zeros((2, 2, 3))
+    weight[:, 0, 2] = -1
+    return Configuration(
+        dimension=3, position=[[0.5, 0.5, 0.49], [0.5, 0.5, 1.47]], radius=[0.5, 0.5], mass=[1, 1], inertia=[0.1, 0.1],
+        contacts=contacts, box=np.diag([1.0, 1.0, 3.0]), origin=np.zeros(3), periodic=[True, True, False], load=weight,
+    )  # fmt: skip
+
+
+PICTURE = "document.getElementById('packing').toDataURL()"
+
+
+def boxes(page, selector):
+    return [each.bounding_box() for each in page.query_selector_all(selector)]
+
+
+def mark(page, plot="growth"):
+    """Where the present load is marked in a plot over the load, pixels."""
+    return float(page.get_attribute(f"#{plot} .mark", "x1"))
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_all_plots_are_in_view_on_a_wide_screen(there_and_back, opened, scheme):
+    page = opened(there_and_back, scheme=scheme)
+    plots = boxes(page, ".plots .plot svg")
+    assert len(plots) == 6
+    for box in [*plots, *boxes(page, "#packing")]:
+        assert box["y"] + box["height"] <= WIDE["height"]
+        assert box["x"] + box["width"] <= WIDE["width"]
+        assert min(box["width"], box["height"]) > 80
+
+
+def test_a_narrow_screen_has_the_verdict_and_the_first_plot_at_once(there_and_back, opened):
+    page = opened(there_and_back, NARROW)
+    assert page.evaluate("document.documentElement.scrollWidth") <= NARROW["width"]
+    for box in (*boxes(page, "#verdict"), *boxes(page, "#load"), *boxes(page, "#growth")):
+        assert box["y"] + box["height"] <= NARROW["height"]
+    assert all(box["width"] > 300 for box in boxes(page, ".plot svg"))
+
+
+def test_the_page_opens_where_motion_grows_fastest_and_moves_along_the_load(there_and_back, opened):
+    page = opened(there_and_back)
+    assert "Unstable: small motion grows, D as exp(" in page.inner_text("#verdict")
+    assert "2 pairs of eigenvalues are complex." in page.inner_text("#verdict")
+    assert page.inner_text("#where") == "Fₓ = 0.16"
+    assert page.inner_text("#value") == "0.16"
+    assert page.get_attribute("#verdict", "class") == "unstable"
+    begin = mark(page)
+    page.focus("#load")
+    page.keyboard.press("Home")
+    assert page.inner_text("#where") == "Fₓ = 0"
+    assert "Stable: no motion grows" in page.inner_text("#verdict")
+    assert mark(page) < begin
+    page.keyboard.press("ArrowRight")
+    assert page.inner_text("#where") == "Fₓ = 0.02"
+    page.locator("h1").click()
+    page.keyboard.press("ArrowRight")
+    assert page.inner_text("#where") == "Fₓ = 0.04"
+    plot = boxes(page, "#growth svg")[0]
+    page.mouse.click(plot["x"] + begin, plot["y"] + 0.5 * plot["height"])
+    assert page.inner_text("#where") == "Fₓ = 0.16"
+    page.click("#play")
+    page.wait_for_function("document.getElementById('where').textContent != 'Fₓ = 0.16'")
+    page.click("#play")
+
+
+def test_a_mode_moves_and_rests(there_and_back, opened):
+    page = opened(there_and_back)
+    first = page.evaluate(PICTURE)
+    page.wait_for_timeout(300)
+    assert page.evaluate(PICTURE) != first
+    page.select_option("#motion", "still")
+    still = page.evaluate(PICTURE)
+    page.wait_for_timeout(300)
+    assert page.evaluate(PICTURE) == still
+
+
+def test_a_press_on_an_eigenvalue_chooses_its_pair(there_and_back, opened):
+    page = opened(there_and_back)
+    before, says = page.input_value("#pair"), page.inner_text("#members")
+    other = page.locator("#plane circle.choice").first
+    other.click()
+    assert page.input_value("#pair") != before
+    assert page.inner_text("#members") != says
+    assert "a complex pair" in page.inner_text("#members")
+
+
+def test_nothing_is_drawn_of_a_pair_that_is_unknown(there_and_back, opened):
+    """The same disks in another order have other modes."""
+    last = there_and_back[8]
+    order = np.random.default_rng(1).permutation(len(last))
+    contacts = replace(
+        last.contacts,
+        i=np.argsort(order)[last.contacts.i],
+        j=np.where(last.contacts.j < 0, last.contacts.j, np.argsort(order)[last.contacts.j]),
+    )
+    moved = {name: getattr(last, name)[order] for name in ("position", "radius", "mass", "angle", "top")}
+    page = opened([derive_frozen(last, fx=0.17, contacts=contacts, **moved), last])
+    at_first = page.input_value("#pair")
+    page.focus("#load")
+    page.keyboard.press("End")
+    assert page.input_value("#pair") != at_first  # nobody has asked for that one: another pair is shown
+    assert "a complex pair" in page.inner_text("#members")
+    page.keyboard.press("Home")
+    page.select_option("#pair", at_first)
+    page.focus("#load")
+    page.keyboard.press("End")
+    assert page.inner_text("#members") == "No two modes at Fₓ = 0.16 have the shapes of the chosen pair."
+    assert page.query_selector_all("#imaginary circle") == []
+    assert page.input_value("#motion") == "still"
+
+
+def test_spheres_can_be_turned(column, opened):
+    page = opened([column])
+    assert page.query_selector("#load") is None
+    page.select_option("#motion", "still")
+    before, box = page.evaluate(PICTURE), boxes(page, "#packing")[0]
+    page.mouse.move(box["x"] + 100, box["y"] + 100)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 160, box["y"] + 100, steps=3)
+    page.mouse.up()
+    assert page.evaluate(PICTURE) != before
+
+
+def test_time_may_stand_in_place_of_the_load(there_and_back, opened):
+    times = np.arange(5.0)
+    page = opened(there_and_back[4:9], axis=Axis("t", "time", times))
+    assert page.inner_text("#where") == "t = 4"
+    assert "t, time: 4" in page.inner_text("nav")
+    assert "t" in [each.text_content() for each in page.query_selector_all("#growth .name")]

@@ -1,0 +1,262 @@
+"""A layer that a spring draws: the command, the deck and an interrupted run are one run, to the bit."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from reference_layer import REFERENCE
+
+from faultgouge.analysis import RunFile, read_dump
+from faultgouge.pywrap import Equilibrium, Scene, SceneError
+from faultgouge.pywrap.lammps.data_file import data_file
+from faultgouge.pywrap.lammps.decks import DECKS
+from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
+from faultgouge.pywrap.runs.drive_recorder import DriveRecord, clock_advance, slips_in
+from faultgouge.pywrap.runs.run_recorder import Record
+
+BASE = {
+    "packing": {"file": str(REFERENCE)},
+    "law": {"kn": 2e5, "mu": 1.0},
+    "load": {"fy": 3.0},
+    "damping": {"cn": 60.0, "ct": 17.0},
+}
+THROWN = {"spring": 300.0, "velocity": 40.0, "until": 0.2, "states": 0.02}
+"""A layer that is thrown across the period in a moment."""
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """A scene of the reference packing with a drive."""
+    numbers = json.loads(REFERENCE.read_text())
+    path = tmp_path_factory.mktemp("packing") / "packing.json"
+    keys = ("x", "y", "radius", "top", "box_length")
+    path.write_text(json.dumps({key: numbers[key] for key in keys}))
+
+    def make(precision="double", **drive):
+        return Scene.from_mapping(BASE | {"packing": {"file": str(path)}, "precision": precision, "drive": drive})
+
+    return make
+
+
+def run_to_end(scene, path, parts=None):
+    """Run a drive, or so many parts of it."""
+    with DriveRecord(path, scene) as record:
+        if record.last is None:
+            record.append(Equilibrium.of(settle_for_drive(scene)))
+        for count, step in enumerate(record.drive()):
+            if parts is not None and count == parts:
+                return step
+        record.finish()
+        return step
+
+
+def datasets(path):
+    """All datasets of a file by name."""
+    found = {}
+    with h5py.File(path) as file:
+        file.visititems(lambda name, item: found.update({name: item[...]} if isinstance(item, h5py.Dataset) else {}))
+    return found
+
+
+@pytest.mark.parametrize("precision", ["double", pytest.param("compensated", marks=pytest.mark.slow)])
+def test_interrupted_run_goes_on_to_the_bit(scene, tmp_path, precision):
+    """Cut off twice, once after disks have gone round the period."""
+    wanted = scene(precision, **THROWN)
+    last = run_to_end(wanted, tmp_path / "whole.h5")
+    assert last.sample.displacement > 1.5
+    for rows in (30, 25):
+        run_to_end(wanted, tmp_path / "cut.h5", rows)
+        with RunFile(tmp_path / "cut.h5") as file:
+            assert not file.complete
+            assert file.checkpoint
+    run_to_end(wanted, tmp_path / "cut.h5")
+    whole, cut = datasets(tmp_path / "whole.h5"), datasets(tmp_path / "cut.h5")
+    assert whole.keys() == cut.keys()
+    for name, values in whole.items():
+        np.testing.assert_array_equal(values, cut[name], err_msg=name)
+    with pytest.raises(SceneError, match=r"drive.velocity is 40.0 there and 41.0 here"):
+        run_to_end(scene(precision, **THROWN | {"velocity": 41.0}), tmp_path / "cut.h5")
+    with pytest.raises(SceneError, match="is a file of the command drive"):
+        Record(tmp_path / "cut.h5", wanted, task="ramp")
+
+
+@pytest.mark.parametrize("precision", ["double", pytest.param("compensated", marks=pytest.mark.slow)])
+@pytest.mark.slow
+def test_deck_alone_is_the_same_to_the_bit(scene, lmp, tmp_path, precision):
+    wanted = scene(precision, **THROWN)
+    run_to_end(wanted, tmp_path / "drive.h5")
+    with RunFile(tmp_path / "drive.h5") as file:
+        (tmp_path / "start.data").write_text(data_file(file.packing(0)))
+        stored, last = file.packing(-1), file.series("drive")
+    given = {"spring": 300.0, "velocity": 40.0, "time": 0.2, "states": 0.02, "every": 1}
+    lmp(DECKS / "drive.in", decks=DECKS, data=tmp_path / "start.data", precision=precision, **given)
+    dumped, rows = read_dump(tmp_path / "drive.end.disks"), np.loadtxt(tmp_path / "drive.series")
+    assert dumped.fx == stored.fx
+    for name in ("position", "position_low", "angle"):
+        np.testing.assert_array_equal(getattr(dumped, name), getattr(stored, name))
+    np.testing.assert_array_equal(dumped.contacts.slip, stored.contacts.slip)
+    assert rows[-1, 2:4].tolist() == [last["force"][-1], last["displacement"][-1]]
+    # sums in another order, and without low parts
+    few = 1e-13 if precision == "double" else 1e-8
+    assert rows[-1, 4:] == pytest.approx([last["thickness"][-1], last["kinetic_energy"][-1]], rel=few)
+
+
+def test_states_are_packings_under_the_force_of_the_spring(scene, tmp_path):
+    """Slow driving: the force balances the contacts, but for vibrations, and the layer follows as it yields."""
+    run_to_end(scene(spring=10.0, velocity=2e-3, until=40.0, states=10.0), tmp_path / "drive.h5")
+    with RunFile(tmp_path / "drive.h5") as file:
+        times, series = file.observable("time"), file.series("drive")
+        for k in range(len(file)):
+            packing, row = file.packing(k), np.searchsorted(series["time"], times[k])
+            # what accelerates the layer; single disks shake more
+            assert abs(packing.net_force[: len(packing)][packing.top].mean()) < 0.02 * packing.fy
+            if k > 0:
+                assert packing.fx == series["force"][row]
+                assert series["at_bound"][row] == packing.sliding.sum()
+                assert series["thickness"][row] == packing.position[packing.top, 1].mean()
+        np.testing.assert_allclose(series["force"], 10.0 * (2e-3 * series["time"] - series["displacement"]), atol=1e-12)
+        assert 0.6 < packing.fx < 0.8
+
+
+def test_rigid_layer_has_force_and_no_slips(scene, tmp_path):
+    wanted = scene(spring="rigid", protocol=[[1e-2, 1.0], [0.0, 0.5]])
+    run_to_end(wanted, tmp_path / "drive.h5")
+    with RunFile(tmp_path / "drive.h5") as file:
+        series, slips = file.series("drive"), slips_in(file)
+    assert series["displacement"][-1] == pytest.approx(1e-2, rel=1e-3)  # a step more or less
+    assert series["force"].max() > 0.3
+    assert slips == []
+
+
+@pytest.mark.parametrize(
+    ("drive", "says"),
+    [
+        ({"spring": 10.0}, "drive.velocity or drive.protocol says how"),
+        ({"spring": 10.0, "velocity": 1e-3, "protocol": [[1, 1]]}, "give one of the two"),
+        ({"spring": "soft", "velocity": 1e-3}, 'give a stiffness above 0, or "rigid"'),
+        ({"spring": 10.0, "velocity": 0.0}, "moves nothing"),
+        ({"spring": 10.0, "velocity": 1e-3}, "drive.until is missing"),
+        ({"spring": 10.0, "protocol": [[1e-3, 0.0]]}, "give pairs of a velocity and a time above 0"),
+        ({"spring": "rigid", "velocity": 1e-3, "slips": 3}, "drive.until is missing"),
+        ({"spring": "rigid", "velocity": 1e-3, "slips": 3, "until": 1.0}, "drive.slips needs a spring"),
+        ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "at": 3.0}, "drive.at stands without signal"),
+        ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "signal": "pulse", "omega": 1.0}, "drive.at is missing"),
+        ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "signal": "pulse", "at": 0.5}, "drive.omega is the freq"),
+        ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "signal": "pulse", "omega": 1.0, "at": 1.0}, "after the end"),
+        ({"spring": 10.0, "velocity": 1e-3, "untill": 1.0}, "until"),
+    ],
+)
+def test_sections_that_make_no_sense_are_refused(scene, drive, says):
+    with pytest.raises(SceneError, match=says):
+        scene(**drive)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"law": {"kn": 2e5, "mu": 0.0}, "damping": {"cn": 60.0}}, "drive needs friction"),
+        ({"damping": {"tau": 10.0}, "drive": {"spring": "rigid", "velocity": 1.0, "until": 1.0}}, "damping.tau would"),
+    ],
+)
+def test_scenes_that_make_no_sense_are_refused(change, says):
+    drive = {"spring": 10.0, "velocity": 1e-3, "until": 1.0}
+    with pytest.raises(SceneError, match=says):
+        Scene.from_mapping({**BASE, "packing": {}, "drive": drive, **change})
+
+
+def test_drive_without_damping_is_refused_by_the_command():
+    mapping = {key: value for key, value in BASE.items() if key != "damping"}
+    with pytest.raises(SceneError, match=r"the scene has no section \[damping\]: add it"):
+        Scene.from_mapping(
+            {**mapping, "packing": {}, "drive": {"spring": 1.0, "velocity": 1, "until": 1}}, command="drive"
+        )
+
+
+def test_drive_that_is_fast_or_stiff_is_warned_or_refused(scene):
+    slow = scene(spring=10.0, velocity=1e-3, until=1.0)
+    start = settle_for_drive(slow)
+    assert check_drive(slow, start) == []
+    assert not start.contacts.slip.any()
+    with pytest.raises(SceneError, match=r"periods of its slowest vibration, and slow driving takes 100 or more"):
+        check_drive(scene(spring=10.0, velocity=0.1, until=1.0), start)
+    (fast,) = check_drive(scene(spring=10.0, velocity=5e-3, until=1.0), start)
+    assert "slow driving takes 100 or more" in fast
+    (stiff,) = check_drive(scene(spring=1e4, velocity=1e-6, until=1.0), start)
+    assert "is stiffer than the layer" in stiff
+
+
+@pytest.mark.ranks
+@pytest.mark.slow
+def test_command_on_two_ranks_is_the_same_to_the_bit(scene, faultgouge, tmp_path):
+    packing = scene(**THROWN).packing.file
+    text = f"""[packing]
+file = "{packing}"
+[law]
+kn = 2e5
+[load]
+fy = 3.0
+[damping]
+cn = 60.0
+[drive]
+spring = 10.0
+velocity = 5e-3
+until = 3.0
+states = 0.5
+"""
+    (tmp_path / "scene.toml").write_text(text)
+    results = []
+    for ranks in (1, 2):
+        done = faultgouge("drive", "scene.toml", "-o", f"{ranks}.h5", "--json", ranks=ranks)
+        results.append(json.loads(done.stdout))
+        assert "slow driving takes 100" in done.stderr
+    assert results[0] == results[1]
+    assert results[0]["slips"] == []
+    one, two = datasets(tmp_path / "1.h5"), datasets(tmp_path / "2.h5")
+    assert all(np.array_equal(one[name], two[name], equal_nan=True) for name in one | two)
+    assert (tmp_path / "1.csv").read_text().startswith("begins,ends,")
+
+
+SIGNAL = {"signal": "pulse", "at": 0.06, "omega": 200.0, "scale": 5.0}
+
+
+def test_signal_changes_nothing_until_it_comes(scene, tmp_path):
+    """The same run with and without, and with noise: equal to the bit up to the beginning of the signal."""
+    wanted = scene(**THROWN, **SIGNAL)
+    drives = {"with": wanted.drive, "without": wanted.drive.without_signal(), "noise": wanted.drive.with_noise()}
+    series = {}
+    for name, drive in drives.items():
+        run_to_end(wanted.model_copy(update={"drive": drive}), tmp_path / f"{name}.h5")
+        with RunFile(tmp_path / f"{name}.h5") as file:
+            series[name] = file.series("drive")
+    time = series["with"]["time"]
+    for name in ("with", "noise"):
+        same = series[name]["displacement"] == series["without"]["displacement"]
+        assert same[time < 0.06].all()
+        assert not same[-1]
+    apart = np.abs(series["with"]["displacement"] - series["without"]["displacement"]).max()
+    assert apart > 1e-4
+
+
+def test_clock_advance_is_the_time_between_comparable_slips(scene, tmp_path):
+    """Of series that are made: a small slip with the signal does not count."""
+    wanted = scene(spring=10.0, velocity=1e-3, until=200.0, signal="pulse", at=60.0, omega=2.0, scale=0.1)
+    start = settle_for_drive(wanted)
+
+    def store(name, drive, slips):
+        time = np.arange(0.0, 200.0, 0.1)
+        moved = sum(size * np.clip((time - begin) / 3.0, 0.0, 1.0) for begin, size in slips)
+        with DriveRecord(tmp_path / name, wanted.model_copy(update={"drive": drive})) as record:
+            record.append(Equilibrium.of(start))
+            file = RunFile(tmp_path / name, "a")
+            force = 10.0 * (1e-3 * time - moved)
+            columns = {"time": time, "force": force, "displacement": moved, "kinetic_energy": 0 * time}
+            file.append_series("drive", **columns)
+            file.close()
+
+    store("with.h5", wanted.drive, [(30.0, 0.05), (66.0, 0.045), (100.0, 0.06)])
+    store("without.h5", wanted.drive.without_signal(), [(30.0, 0.05), (120.0, 0.1)])
+    advance = clock_advance(tmp_path / "with.h5", tmp_path / "without.h5")
+    assert advance == pytest.approx(20.0, abs=0.2)
+    store("none.h5", wanted.drive.without_signal(), [(30.0, 0.05)])
+    assert clock_advance(tmp_path / "with.h5", tmp_path / "none.h5") is None
