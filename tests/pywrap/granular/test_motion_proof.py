@@ -262,10 +262,16 @@ run 60000
     found = from_lammps(lmp)
     assert found.operators == "differences"
     assert found.proof < 1e-5
-    # E = 50 (r - 0.99)^2 along x
     with_bond = stiffness_matrix(found)
     lmp.command("delete_bonds all bond 1 remove")
-    without = from_lammps(lmp, differences=True, prove=False)
-    added = (with_bond - stiffness_matrix(without)).toarray()[:2, :2]
-    assert added == pytest.approx(np.array([[100.0, -100.0], [-100.0, 100.0]]), abs=0.2)
+    without = from_lammps(lmp, balance=np.inf, differences=True)
+    # E = 50 (r - 0.99)^2
+    branch = found.position[1] - found.position[0]
+    r = np.linalg.norm(branch)
+    along = np.outer(branch, branch) / r**2
+    expected = 100 * along + 100 * (r - 0.99) / r * (np.eye(3) - along)
+    added = (with_bond - stiffness_matrix(without)).toarray()
+    first, second = len(found) * np.arange(3), len(found) * np.arange(3) + 1
+    for rows, columns, sign in ((first, first, 1), (first, second, -1), (second, second, 1)):
+        assert added[np.ix_(rows, columns)] == pytest.approx(sign * expected, abs=1e-2)
     lmp.close()
