@@ -239,7 +239,7 @@ def stability(
     if damped:
         own = Motion.of(configuration).rates
     sticking, grows = LinearNeighbour(own.growth_rate), bool(own.grows.any())
-    why = [*reasons, *_what_is_wrong(configuration, undamped)]
+    why = [*reasons, *_what_is_wrong(configuration)]
     sliding, one_sided, rising = sticking, None, None
     if contacts.one_sided.any():
         sliding = LinearNeighbour(Motion.of(configuration, sliding=True).rates.growth_rate)
@@ -263,10 +263,8 @@ def stability(
     )  # fmt: skip
 
 
-def _what_is_wrong(configuration: Configuration, undamped: WithoutDissipation) -> Iterator[str]:
+def _what_is_wrong(configuration: Configuration) -> Iterator[str]:
     """Why no verdict is possible."""
-    if not np.isfinite(undamped.growth_rate):
-        yield "numbers of the operator overflow"
     if not in_balance(configuration):
         yield (
             f"the packing moves: the residual force on a particle is {configuration.residual:.3g}, "
@@ -279,8 +277,6 @@ def _without_dissipation(configuration: Configuration, found: Spectrum | None) -
     if found is None:
         rates = Motion.of(configuration, dissipation=False).rates
         return WithoutDissipation(rates.growth_rate, None, None), rates
-    if not np.all(np.isfinite(found.eigenvalues)):
-        return WithoutDissipation(np.nan, 0, 0), Rates(np.zeros(0, complex), np.zeros(0, bool), 0)
     unstable = 1j * np.sqrt(found.unstable)
     grows = np.ones(len(unstable), bool)
     rates = Rates(np.where(unstable.real < 0, -unstable, unstable), grows, found.free)
