@@ -338,8 +338,8 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     -------
     Spectrum
     """
-    matrix, active = dynamical_matrix(packing, form)
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
+        matrix, active = dynamical_matrix(packing, form)
         rounding = unit_rounding(matrix.data)
     if not np.isfinite(rounding):
         raise BadInputError("Stiffnesses overflow, and nothing can be said: take units in which numbers are smaller.")
