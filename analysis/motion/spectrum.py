@@ -45,6 +45,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
 from ..configuration import HasConfiguration
+from ..errors import BadInputError
 from ..operators.stiffness import Form, stiffness_matrix
 from ..packing.packing import Floats, Indices
 from ..table_display import TableDisplay
@@ -192,7 +193,7 @@ class Spectrum(TableDisplay):
         None where contacts at Coulomb's bound slide on ahead and stick on the way back: no eigenvalue decides, and
         :func:`~faultgouge.analysis.stability` follows their motion.
         """
-        if not np.all(np.isfinite(self.eigenvalues)) or self.packing.configuration.contacts.one_sided.any():
+        if self.packing.configuration.contacts.one_sided.any():
             return None
         if self._damped is not None:
             return not self._damped.grows.any()
@@ -337,8 +338,11 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     -------
     Spectrum
     """
-    matrix, active = dynamical_matrix(packing, form)
-    rounding = operator_rounding(packing, matrix.data)
+    with np.errstate(over="ignore", invalid="ignore"):
+        matrix, active = dynamical_matrix(packing, form)
+        rounding = operator_rounding(packing, matrix.data)
+    if not np.isfinite(rounding):
+        raise BadInputError("Stiffnesses overflow, and nothing can be said: take units in which numbers are smaller.")
     uncertainty = zero_uncertainty(packing, rounding)
     values, marked = _values_and_vectors(matrix, uncertainty)
     overlap = marked.overlap

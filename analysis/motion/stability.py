@@ -239,7 +239,7 @@ def stability(
     if damped:
         own = Motion.of(configuration).rates
     sticking, grows = LinearNeighbour(own.growth_rate), bool(own.grows.any())
-    why = [*reasons, *_what_is_wrong(configuration, undamped)]
+    why = [*reasons, *_what_is_wrong(configuration)]
     sliding, one_sided, rising = sticking, None, None
     if contacts.one_sided.any():
         sliding = LinearNeighbour(Motion.of(configuration, sliding=True).rates.growth_rate)
@@ -266,10 +266,8 @@ def stability(
     )  # fmt: skip
 
 
-def _what_is_wrong(configuration: Configuration, undamped: WithoutDissipation) -> Iterator[str]:
+def _what_is_wrong(configuration: Configuration) -> Iterator[str]:
     """Why no verdict is possible."""
-    if not np.isfinite(undamped.growth_rate):
-        yield "numbers of the operator overflow"
     sided = configuration.one_sided_particles
     if len(sided):
         named = ", ".join(map(str, configuration.ids[sided[:5]])) + (", ..." if len(sided) > 5 else "")
@@ -289,8 +287,6 @@ def _without_dissipation(configuration: Configuration, found: Spectrum | None) -
     if found is None:
         rates = Motion.of(configuration, dissipation=False).rates
         return WithoutDissipation(rates.growth_rate, None, None), rates
-    if not np.all(np.isfinite(found.eigenvalues)):
-        return WithoutDissipation(np.nan, 0, 0), Rates(np.zeros(0, complex), np.zeros(0, bool), 0)
     unstable = 1j * np.sqrt(found.unstable)
     grows = np.ones(len(unstable), bool)
     rates = Rates(np.where(unstable.real < 0, -unstable, unstable), grows, found.free)

@@ -36,6 +36,7 @@ from ..arrays import (
 )
 from ..configuration import Configuration
 from ..counted import counted
+from ..errors import BadInputError
 from .compensated import Pair
 from .contacts import Contacts
 from .geometry import ContactGeometry, check_box, contact_geometry
@@ -212,7 +213,14 @@ class Packing:
 
     @cached_property
     def configuration(self) -> Configuration:
-        """The disks with their contacts to first order."""
+        """The disks with their contacts to first order; BadInputError where numbers overflow."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            if not np.isfinite(self.residual) or not np.all(
+                np.isfinite(self.law.normal_stiffness(self.geometry.overlap))
+            ):
+                raise BadInputError(
+                    f"Forces overflow with kn = {self.law.kn:g}: take units in which numbers are smaller."
+                )
         g, c, n = self.geometry, self.contacts, len(self)
         flat = np.zeros(len(c))
         arms = np.column_stack([self.radius[c.i], np.where(c.floor, 0.0, self.radius[c.j])])

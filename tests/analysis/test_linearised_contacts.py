@@ -400,3 +400,16 @@ def test_a_smoothed_law_has_no_one_sided_contacts(reference_packing, coulomb):
     contacts = derive_frozen(packing, law=law, contacts=replace(packing.contacts, slip=slip)).configuration.contacts
     assert contacts.at_bound.all()
     assert contacts.one_sided.all() == contacts.one_sided.any() == coulomb
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_dashpots_of_given_operators_count(d):
+    """In the time step and in the largest damping rate, though no contact of a given C has a dashpot."""
+    made = make(d, slides=False)
+    none = np.zeros(len(made.contacts))
+    bare = derive_frozen(made.contacts, normal_dashpot=none, tangential_dashpot=none)
+    given = derive_frozen(made, contacts=bare, stiffness=stiffness_matrix(made), damping=damping_matrix(made))
+    assert damping_matrix(made).nnz
+    assert float(stable_timestep(given)) == pytest.approx(float(stable_timestep(made)), rel=1e-9)
+    assert largest_damping_rate(given) == pytest.approx(largest_damping_rate(made), rel=1e-9)
+    assert largest_damping_rate(derive_frozen(made, contacts=bare)) == 0.0

@@ -10,6 +10,7 @@ from scipy.sparse import csr_array, diags_array
 from tiling import tile
 
 from faultgouge.analysis import (
+    BadInputError,
     Contacts,
     Eigenpairs,
     MindlinLaw,
@@ -23,6 +24,7 @@ from faultgouge.analysis import (
     negative_eigenvalues,
     normal_modes,
     spectrum,
+    stability,
     stable_timestep,
     touching,
 )
@@ -246,3 +248,14 @@ def test_modes_of_a_symmetric_operator_are_not_close_to_meeting(path):
     first, second, cosine = closest_to_meeting(normal_modes(path(0.0)))
     assert first < second
     assert cosine < 1e-9
+
+
+@pytest.mark.parametrize("kn", [1e300, 1.7e308])
+def test_overflow_is_no_verdict(kn):
+    law = MindlinLaw(kn, 0.2 * kn, 0.5)
+    packing = Packing(
+        position=[[0.0, 0.4999]], radius=[0.5], contacts=Contacts([0], [-1], [0.0]), law=law, fy=1.0, top=[True]
+    )
+    for tell in (spectrum, stability):
+        with pytest.raises(BadInputError, match="overflow"):
+            tell(packing)
