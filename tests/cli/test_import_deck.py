@@ -392,7 +392,7 @@ def test_names_that_the_locale_cannot_decode(tmp_path):
     plain = os.environ | {"LC_ALL": "C", "PYTHONUTF8": "0"}
     done = subprocess.run(words, cwd=tmp_path, env=plain, capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.decode().endswith("written to häufchen.h5\n")
+    assert "written to häufchen.h5\n" in done.stdout.decode()
     assert len(read_snapshot(tmp_path / "häufchen.h5")) == 3
 
 
