@@ -262,6 +262,9 @@ def test_a_sweep_of_which_all_failed_ends_with_1(folder, faultgouge_here):
         ({"load.fy, packing.seed": [[3.0, 1], [4.0, 2]]}, {}, None),  # no seed has two loads
         ({"law.kn, load.fy": [[2e5, 3.0], [4e5, 6.0]]}, {}, None),  # one packing in two units of force
         ({"packing.seed": "1:3"}, {}, None),
+        ({"load.fy": [3.0, 3.001]}, {"packing": {"settle_at": {"fy": 3.0}}}, None),
+        ({"law.kn": [1e5, 2e5]}, {"packing": {"settle_at": {"fy": 3.0, "kn": 2e5}}}, None),
+        ({"law.kn": [1e5, 2e5]}, {"packing": {"settle_at": {"fy": 3.0}}}, "law.kn"),  # settled at each stiffness
     ],
 )
 def test_a_sweep_says_where_a_seed_is_several_packings(axes, changes, named):
