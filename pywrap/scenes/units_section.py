@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import Annotated, Any
 
@@ -43,6 +44,30 @@ def to_si(text: str, unit: str) -> float:
     except (PintError, ValueError, TypeError, AttributeError, AssertionError, OverflowError) as error:
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else "it is no quantity"
         raise ValueError(f"does not convert to {unit} ({reason})") from None
+
+
+def quantity(place: str, text: str, unit: str) -> float:
+    """A quantity somewhere in a scene as a number of SI units; a frequency in hertz as an angular frequency.
+
+    Raises
+    ------
+    ValueError
+        If it is no quantity, or one of another dimension: a sentence without its full stop.
+    """
+    try:
+        number = to_si(text, unit)
+    except ValueError as error:
+        raise ValueError(f'{place} = "{text}" {error}: give a number with a unit of that kind') from None
+    return number * (2 * np.pi if re.search(r"[Hh]ertz|Hz", text) else 1.0)
+
+
+def is_stress(text: str) -> bool:
+    """Whether a text is a quantity such as "10 MPa"."""
+    try:
+        to_si(text, "Pa")
+    except ValueError:
+        return False
+    return True
 
 
 class Units(Section):
@@ -99,6 +124,14 @@ class Units(Section):
                 key, "is missing: the restitution of such contacts depends on the velocity, so give both"
             )
         return self
+
+    @property
+    def grain_mass(self) -> float:
+        """Mass of a smallest grain, a sphere, or a cylinder with a thickness, kg."""
+        diameter = self.si("grain_diameter")
+        sphere = np.pi * diameter**3 / 6
+        volume = sphere if self.thickness is None else np.pi * diameter**2 / 4 * self.si("thickness")
+        return float(self.si("density") * volume)
 
     def si(self, key: str) -> float:
         """A quantity as a number of SI units."""

@@ -20,7 +20,7 @@ from .sweep_plan import Sweep, digest
 
 def other_packings(sweep: Sweep) -> str | None:
     """A sentence that names the swept keys by which a seed is another packing at each value; None without any."""
-    keys = [name for name in sweep.names if name.split(".")[0] in ("load", "law")]
+    keys = [name for name in sweep.names if name.split(".")[0] in ("load", "law", "units")]
     if not keys or not _seeds_settle_otherwise(point.scene for point in sweep.points if point.scene is not None):
         return None
     return (

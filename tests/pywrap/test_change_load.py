@@ -36,7 +36,8 @@ def test_loads_lie_on_one_grid(first, here, there):
     if (near - first) * (far - first) <= 0:
         return
     nearer, farther = loads_between(first, near), loads_between(first, far)
-    assert nearer[-1] == near and farther[-1] == far
+    assert nearer[-1] == near
+    assert farther[-1] == far
     assert farther[: len(nearer) - 1] == nearer[:-1]
     steps = np.abs(np.diff(np.log([first, *farther])))
     assert steps.max() <= np.log(FACTOR) * (1 + 1e-6)
@@ -80,9 +81,7 @@ def test_a_stiffness_that_rises_is_a_load_that_falls():
 
 @pytest.mark.slow
 def test_a_packing_settled_with_friction_keeps_its_slips_on_the_way():
-    settled, carried = (
-        settle(scene(fy, settle_friction=True, settle_at={"fy": 3.0})).packing for fy in (3.0, 3.3)
-    )
+    settled, carried = (settle(scene(fy, settle_friction=True, settle_at={"fy": 3.0})).packing for fy in (3.0, 3.3))
     assert settled.contacts.slip.any()
     assert farthest(carried, settled) < 0.02 * 0.3
     shared = {(i, j): s for i, j, s in zip(settled.contacts.i, settled.contacts.j, settled.contacts.slip, strict=True)}

@@ -1,7 +1,10 @@
 """Stored rows of sweeps: for which scene, code and version they stand, what is tried again, and that none is lost."""
 
 import json
+from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 from reference_layer import REFERENCE, SMALL, toml
 
@@ -250,6 +253,17 @@ def test_a_sweep_of_which_all_failed_ends_with_1(folder, faultgouge_here):
     assert len((folder / "out" / "results.csv").read_text().splitlines()) == 3
     (folder / "fails.toml").write_text(text.replace("fails", "ends"))
     faultgouge_here("sweep", "fails.toml", "-o", "some", "--workers", "1")  # one has failed, and one has not
+
+
+def test_an_overburden_that_varies_is_a_load_that_does():
+    path = Path(__file__).parents[2] / "scenes" / "sweeps" / "depth.toml"
+    sweep = Sweep.from_toml(path, TASKS)
+    assert other_packings(sweep) is None
+    loads = [point.scene.load.fy for point in sweep.points[::20]]
+    assert np.array(loads) / loads[1] == pytest.approx([0.5, 1.0, 2.0], rel=1e-11)
+    settled = {key: value for key, value in sweep.scene["packing"].items() if key != "settle_at"}
+    plain = replace(sweep, scene=sweep.scene | {"packing": settled})
+    assert other_packings(plain).startswith("units.overburden: settling is chaotic")
 
 
 @pytest.mark.parametrize(
