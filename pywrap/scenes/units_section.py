@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from functools import cache
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from ..exchange.table_units import registry
 from .validation import Section, refusal_sentence
 
 DIMENSIONS = {
@@ -19,13 +19,6 @@ DIMENSIONS = {
     "overburden": "Pa",
     "impact_velocity": "m/s",
 }
-
-
-@cache
-def _registry() -> Any:
-    from pint import UnitRegistry
-
-    return UnitRegistry()
 
 
 def to_si(text: str, unit: str) -> float:
@@ -39,7 +32,7 @@ def to_si(text: str, unit: str) -> float:
     from pint import PintError
 
     try:
-        quantity = _registry().Quantity(text)
+        quantity = registry().Quantity(text)
         return float(quantity.to(unit).magnitude)
     except (PintError, ValueError, TypeError, AttributeError, AssertionError, OverflowError) as error:
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else "it is no quantity"
