@@ -37,8 +37,9 @@ STRESS: Powers = (1, -1, -2)
 STIFFNESS: Powers = (1, 1 - HERTZ, -2)
 DASHPOT: Powers = (1, 1 - HERTZ, -1)
 VISCOSITY: Powers = (1, 0, -1)
+SPRING: Powers = (1, 0, -2)
 
-DIMENSIONS: Mapping[str, Mapping[str, Powers]] = {
+DIMENSIONS: Mapping[str, Mapping[str, Powers | tuple[Powers, Powers]]] = {
     "packing": {"radii": LENGTH, "width": LENGTH, "mass": MASS},
     "packing.settle_at": {"fy": FORCE, "kn": STIFFNESS},
     "law": {"kn": STIFFNESS, "kt": STIFFNESS},
@@ -55,12 +56,25 @@ DIMENSIONS: Mapping[str, Mapping[str, Powers]] = {
         "omega_end": FREQUENCY,
     },
     "friction": {"v0": VELOCITY, "v_ss": VELOCITY},
+    "drive": {
+        "spring": SPRING,
+        "velocity": VELOCITY,
+        "protocol": (VELOCITY, TIME),
+        "until": TIME,
+        "states": TIME,
+        "at": TIME,
+        "omega": FREQUENCY,
+        "scale": FORCE,
+    },
     "trigger": {"omega": FREQUENCY, "time": TIME},
     "eruptions": {"load": FORCE, "time": TIME},
 }
-"""What each number of a scene is; all others have no dimension."""
+"""What each number of a scene is, or each pair of numbers; all others have no dimension."""
 
-OWN_WORDS = {"law.kt": "kn", "friction.v_ss": "v0", "friction.v0": "calibrated"}
+WAVES = {"perturb": "amplitude", "drive": "scale"}
+"""Sections with a wave, and their keys that are a velocity where the wave is on the floor."""
+
+OWN_WORDS = {"law.kt": "kn", "friction.v_ss": "v0", "friction.v0": "calibrated", "drive.spring": "rigid"}
 """Texts of a scene that are no quantities, by a word in them."""
 
 DIGITS = 12
@@ -130,8 +144,12 @@ def _section(scene: Scene, path: str) -> Mapping[str, Any]:
 def _texts(path: str, key: str, scene: Scene) -> bool:
     """Whether a key, or a number in its list, is a quantity with a unit."""
     value, own = _section(scene, path).get(key), OWN_WORDS.get(f"{path}.{key}")
-    each = value if isinstance(value, (list, tuple)) else [value]
-    return any(isinstance(one, str) and not (own and own in one) for one in each)
+    return any(isinstance(each, str) and not (own and own in each) for each in _flat(value))
+
+
+def _flat(value: Any) -> list[Any]:
+    """A value, or all values of a list of lists."""
+    return [each for one in value for each in _flat(one)] if isinstance(value, (list, tuple)) else [value]
 
 
 def _packing_in_numbers(units: Units, section: Mapping[str, Any]) -> dict[str, Any]:
@@ -194,10 +212,10 @@ def _convert(scene: Scene, units: Units, layer: Layer) -> Scene:
 
 
 def _section_in_numbers(
-    path: str, section: Mapping[str, Any], texts: Mapping[str, Powers], real: RealUnits
+    path: str, section: Mapping[str, Any], texts: Mapping[str, Powers | tuple[Powers, Powers]], real: RealUnits
 ) -> dict[str, Any]:
-    if path == "perturb" and section.get("on") == "floor":
-        texts = {key: VELOCITY if key == "amplitude" else powers for key, powers in texts.items()}
+    if section.get("on") == "floor":
+        texts = {key: VELOCITY if key == WAVES.get(path) else powers for key, powers in texts.items()}
     return {**section, **{key: _numbers(f"{path}.{key}", section[key], of, real) for key, of in texts.items()}}
 
 
@@ -220,8 +238,13 @@ def _stiffness(given: str | None, units: Units, layer: Layer) -> float:
     return _round(STIFFNESS_OF_ONE * layer.mass * layer.diameter ** (1 - HERTZ))
 
 
-def _numbers(place: str, value: Any, powers: Powers, real: RealUnits) -> Any:
-    """A quantity, or each of a list; what is a number already stays."""
+def _numbers(place: str, value: Any, powers: Powers | tuple[Powers, Powers], real: RealUnits) -> Any:
+    """A quantity, or each of a list, or both of each pair in a list; what is a number already stays."""
+    if len(powers) == 2:
+        pairs = [each for each in value if isinstance(each, (list, tuple)) and len(each) == 2]
+        if len(pairs) < len(value):
+            return value  # no list of pairs, and refused as such
+        return [[_numbers(place, each, of, real) for each, of in zip(pair, powers, strict=True)] for pair in pairs]
     if isinstance(value, (list, tuple)):
         return [_numbers(place, each, powers, real) for each in value]
     if not isinstance(value, str):

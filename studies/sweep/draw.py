@@ -180,10 +180,9 @@ def _draw_median(axes: Axes, place: float, sample: Sample, highest: float, colou
 
 def _symbols() -> list[Line2D]:
     """What the legend shows."""
-    grey = {"color": "0.4", "linestyle": "none"}
     return [
-        Line2D([], [], marker="o", mfc="none", ms=2.5, label="onset", **grey),
-        Line2D([], [], marker="^", mfc="none", ms=2.5, label="none up to here", **grey),
+        Line2D([], [], linestyle="none", marker="o", mfc="none", ms=2.5, color="0.4", label="onset"),
+        Line2D([], [], linestyle="none", marker="^", mfc="none", ms=2.5, color="0.4", label="none up to here"),
         Line2D([], [], marker="D", ms=4.5, color="0.4", linewidth=1.6, label="median, 95 %"),
     ]
 

@@ -147,10 +147,24 @@ def test_any_number_of_a_scene_may_have_its_unit():
     assert real_units(moved).velocity(moved.perturb.amplitude) == pytest.approx(2e-3)
 
 
+def test_a_drive_may_have_units():
+    protocol = [["1 mm/s", "1 ms"], [0.0, "2 ms"]]
+    drive = {"spring": "10 N/m", "protocol": protocol, "signal": "pulse", "at": "1 us", "omega": "1 MHz"}
+    found = sized(load={"fy": 3.0}, drive={**drive, "scale": "2 mm/s", "on": "floor", "states": "1 us"})
+    real, (first, second) = real_units(found), found.drive.protocol
+    assert found.drive.spring * real.force / real.length == pytest.approx(10)
+    assert [real.velocity(first[0]), first[1] * real.time] == pytest.approx([1e-3, 1e-3])
+    assert [second[0], second[1] * real.time] == pytest.approx([0.0, 2e-3])
+    assert real.velocity(found.drive.scale) == pytest.approx(2e-3)
+    assert (
+        sized(load={"fy": 3.0}, drive={"spring": "rigid", "velocity": "1 mm/s", "until": "1 s"}).drive.spring == "rigid"
+    )
+
+
 def test_every_number_of_a_scene_has_its_dimension_or_none():
     """A key that is added to a section is added to `DIMENSIONS`, too, or here."""
     plain = {"disks", "top", "seed", "frame", "mu", "exponent", "inertia_factor", "target", "scale", "stretch"}
-    plain |= {"B", "w", "mu_ss", "distance", "runs", "fx_over_fy"}
+    plain |= {"B", "w", "mu_ss", "distance", "runs", "fx_over_fy", "slips"}
     for section, models in SECTIONS.items():
         if section in ("units", "output"):
             continue
@@ -190,6 +204,10 @@ MASSES = [LEAST["packing"] | {"mass": mass} for mass in (1.0, 4.0)]
         ({"packing": {"radii": ["50 um"], "disks": -1}, "load": {"fy": 3.0}}, "packing.disks = -1 is refused"),
         ({"law": {"exponent": 1.0}, "load": {"fy": "3 N"}}, "units takes k_n from Hertz's contact"),
         ({"law": {"mu": 0.5}}, "load.fy is missing: add fy to [load]"),
+        (
+            {"drive": {"spring": "1 N/m", "protocol": ["1 s"]}, "load": {"fy": 3.0}},
+            "drive.protocol = ['1 s'] is refused",
+        ),
         ({"perturb": {"fx": 0.0, "time": "soon"}, "load": {"fy": 3.0}}, 'perturb.time = "soon" does not convert to s'),
     ],
 )
