@@ -63,7 +63,7 @@ def _dicts(value: Any) -> list[dict[str, Any]]:
 
 
 @dataclass(frozen=True)
-class Sample:
+class SeedSample:
     """Scenes that differ in their seeds alone.
 
     Attributes
@@ -86,14 +86,14 @@ class Sample:
         return ", ".join(f"{key} = {value}" for key, value in self.values.items())
 
 
-def samples_of(found: Sequence[tuple[Row, Reach]]) -> list[Sample]:
+def samples_of(found: Sequence[tuple[Row, Reach]]) -> list[SeedSample]:
     """The samples of a sweep, in the order of their first rows."""
     keys = _varied_keys([row for row, _ in found])
     groups: dict[str, list[tuple[Row, Reach]]] = {}
     for row, reach in found:
         groups.setdefault(str([row["values"][key] for key in keys]), []).append((row, reach))
     return [
-        Sample(
+        SeedSample(
             {key: rows[0][0]["values"][key] for key in keys},
             np.array([reach for _, (reach, _) in rows]),
             np.array([onset for _, (_, onset) in rows]),
@@ -131,7 +131,7 @@ def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
     return figure
 
 
-def _labels(samples: Sequence[Sample]) -> list[str]:
+def _labels(samples: Sequence[SeedSample]) -> list[str]:
     """What the colour of each sample stands for: the sample, or, of more than can be told apart, one key's value."""
     if len(samples) <= COLOURS:
         return [sample.label for sample in samples]
@@ -140,7 +140,7 @@ def _labels(samples: Sequence[Sample]) -> list[str]:
     return ["" if key is None else f"{key} = {sample.values[key]}" for sample in samples]
 
 
-def _draw_onsets(axes: Axes, key: str, samples: Sequence[Sample], colours: Sequence[str]) -> None:
+def _draw_onsets(axes: Axes, key: str, samples: Sequence[SeedSample], colours: Sequence[str]) -> None:
     """The onsets of each sample over a key, and its median with its interval; samples of one value side by side."""
     places = _places(axes, key, [sample.values[key] for sample in samples])
     highest = max(float(sample.reach.max()) for sample in samples)
@@ -166,7 +166,7 @@ def _side_by_side(axes: Axes, places: Floats) -> Floats:
     return np.exp(aside) if logarithmic else aside
 
 
-def _draw_median(axes: Axes, place: float, sample: Sample, highest: float, colour: str) -> None:
+def _draw_median(axes: Axes, place: float, sample: SeedSample, highest: float, colour: str) -> None:
     middle, low, high = median_interval(sample.reach, sample.onset)
     if low is None:
         return  # no draw has a median within the ramps
