@@ -230,6 +230,9 @@ class Configuration:
         The particles of a driven layer, on each of which fx acts; none by default.
     drag_rate : float
         1/tau of the drag -(m/tau) v and -(I/tau) omega on every particle, 1 / time; none by default.
+    spring : float
+        Stiffness k of a spring that draws the layer `top`, force / length: each of its particles feels the force
+        k (X_0 - X) along x, X their mean displacement. None by default. X_0 is part of the load.
     proof : float, optional
         Relative difference of a short motion of the other code from that of this configuration; None without such a
         motion. The proof is no property of the packing, and does not count when two configurations are compared.
@@ -260,6 +263,7 @@ class Configuration:
     load_error: float
     top: NDArray[np.bool_]
     drag_rate: float
+    spring: float
     proof: float | None = field(compare=False)
     remarks: tuple[str, ...] = field(compare=False)
 
@@ -283,6 +287,7 @@ class Configuration:
         load_error: float = 0.0,
         top: ArrayLike | None = None,
         drag_rate: float = 0.0,
+        spring: float = 0.0,
         proof: float | None = None,
         remarks: Iterable[str] = (),
     ) -> None:
@@ -307,6 +312,7 @@ class Configuration:
             load_error=number("load_error", load_error),
             top=booleans("top", np.zeros(n, bool) if top is None else top, n),
             drag_rate=number("drag_rate", drag_rate),
+            spring=number("spring", spring),
             proof=None if proof is None else number("proof", proof),
             remarks=tuple(remarks),
         )

@@ -22,9 +22,9 @@ from .plain_file import open_plain
 from .runfile_header import CHECKSUM, CREATOR, program_version
 from .runfile_validation import check_places, dataset
 
-SCALARS = ("dimension", "fx", "load_error", "drag_rate")
+SCALARS = ("dimension", "fx", "load_error", "drag_rate", "spring")
 ARRAYS = ("position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind", "top")
-LATER = ("slider", "viscous_slider", "top", "drag_rate")
+LATER = ("slider", "viscous_slider", "top", "drag_rate", "spring")
 """Fields that files of version 1 do not have."""
 
 
