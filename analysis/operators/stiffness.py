@@ -102,7 +102,11 @@ def stiffness_matrix(
         if form == "paper" or coupled is not None:
             raise ValueError("The operator of a Configuration is the consistent one, of all of its contacts.")
         stiffness = assembled_stiffness(packing.configuration, parting)
-        return csr_array(stiffness + spring_stiffness(packing.configuration)) if packing.configuration.spring else stiffness
+        return (
+            csr_array(stiffness + spring_stiffness(packing.configuration))
+            if packing.configuration.spring
+            else stiffness
+        )
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry

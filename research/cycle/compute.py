@@ -1,8 +1,9 @@
 """Driven runs with both laws, and the eigenvalues of some of their states.
 
-**The rule**, which was written down before the first run: `scene` has the numbers of scenes/drive.toml. Seeds 1, 2, 3, ...
-in this order, each with the smoothed law (history `total`) and then with the standard one (`coulomb`), as many as forty
-minutes of one core allow for runs and eigenvalues together; every run that was over counts. Of a run these states count:
+**The rule**, which was written down before the eigenvalues of the chosen states were computed: `scene` has the numbers
+of scenes/drive.toml. Seeds 1, 2, 3, ... in this order, each with the smoothed law (history `total`) and then with the
+standard one (`coulomb`), as many as a quarter of an hour allows; every run that was over counts, with its slips or
+without. Of a run these states count:
 
 - `before`: the state in which a slip begins;
 - `control`: the stored state nearest to a third of the time from the end of the last slip, or from the beginning;
@@ -11,7 +12,7 @@ minutes of one core allow for runs and eigenvalues together; every run that was 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -58,11 +59,11 @@ def run(path: Path, wanted: Scene) -> None:
         record.finish()
 
 
-def compute(table: Path, runs: Path, seeds: range) -> None:
+def compute(table: Path, runs: Path, seeds: range, laws: Sequence[str] = LAWS) -> None:
     """Rows of the table that are missing, one for each run; the files of the runs stay in a folder."""
     runs.mkdir(parents=True, exist_ok=True)
     known = {(row["seed"], row["law"]) for row in read_rows(table)} if table.exists() else set()
-    for seed, law in product(seeds, LAWS):
+    for seed, law in product(seeds, laws):
         if (seed, law) not in known:
             path = runs / f"{law}_{seed}.h5"
             run(path, scene(seed, law))

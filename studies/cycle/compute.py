@@ -11,10 +11,11 @@ slider). Contacts at the bound are neither all sliding nor all sticking
 (:mod:`~faultgouge.analysis.operators.sliders`): each number is given for both.
 
 **Loose disks.** A disk that is about to leave its last contact has an eigenvalue near zero, of either sign, that says
-nothing of the layer. Motions that only one disk takes part in are counted aside (`alone`), and do not count in the rates
-and in the lowest eigenvalue.
+nothing of the layer. Motions that only one disk takes part in are counted aside (`alone`). They do not count in the
+rates and in the lowest eigenvalue.
 
-**A state of a moving layer** is no equilibrium: its numbers are those of its positions and slips, with the flag `rests`.
+**A state of a moving layer** is no equilibrium: its numbers are those of its positions and slips. The flag `rests`
+says which states are equilibria.
 """
 
 from __future__ import annotations
@@ -81,7 +82,8 @@ def cycle_state(packing: Packing, spring: float) -> dict[str, Any]:
     -------
     dict
         rests (whether forces balance), residual (the largest on a disk over the largest normal force), at_bound
-        (contacts at Coulomb's bound), and of `LinearState` NAME_sticking and NAME_sliding. A smoothed law has one derivative at the bound, and the two are the same.
+        (contacts at Coulomb's bound), and of `LinearState` NAME_sticking and NAME_sliding. A smoothed law has one
+        derivative at the bound, and the two are the same.
     """
     configuration = drawn(packing, spring)
     sticking = linear_state(configuration, sliding=False)
