@@ -72,16 +72,19 @@ def counts(rows: Sequence[Row], law: str, kind: str) -> dict[str, dict[str, Any]
 
 
 def before_or_control(rows: Sequence[Row], law: str) -> dict[str, dict[str, Any]]:
-    """Of how many slips an instability is there before the slip and not in its control, and the reverse; sign test."""
+    """Of how many slips an instability is there before the slip and not in its control, and the reverse; sign test.
+
+    Also for how many the force is larger before the slip, and for how many in the control.
+    """
     found = {}
-    for name in ("sliding", "fold"):
+    for name in ("sliding", "fold", "force"):
         alone = [0, 0]
         for row in (each for each in rows if each["law"] == law):
-            state = {(each["kind"], each["slip"]): begins_with(each)[name] for each in row["states"]}
+            state = {(each["kind"], each["slip"]): (begins_with(each) | each)[name] for each in row["states"]}
             for number in range(len(row["slips"])):
                 before, control = state["before", number], state["control", number]
-                alone[0] += before and not control
-                alone[1] += control and not before
+                alone[0] += before > control
+                alone[1] += control > before
         found[name] = {"before": alone[0], "control": alone[1], "p": None}
         if sum(alone):
             found[name]["p"] = float(binomtest(alone[0], sum(alone)).pvalue)
@@ -171,10 +174,7 @@ def numbers(rows: Sequence[Row]) -> dict[str, Any]:
         "control": {law: counts(rows, law, "control") for law in laws},
         "paired": {law: before_or_control(rows, law) for law in laws},
         "concordance": better,
-        "sooner": {
-            law: [each["says"] for each in better[law] if each["name"] != "force" and each["over_force"][1] > 0]
-            for law in laws
-        },
+        "sooner": [each["says"] for law in laws for each in better[law] if each["over_force"][1] > 0],
         "resting": share(
             sum(state["rests"] for row in rows for state in row["states"]), sum(len(row["states"]) for row in rows)
         ),
