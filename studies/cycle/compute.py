@@ -27,6 +27,7 @@ import numpy as np
 
 from ...analysis import Configuration, Packing
 from ...analysis.arrays import Complexes, Floats, derive_frozen
+from ...analysis.configuration import HasConfiguration
 from ...analysis.motion.eigenvalues import all_modes, growing_undamped, in_balance, unit_rounding, zero_uncertainty
 from ...analysis.motion.motion import Motion
 from ...analysis.motion.spectrum import participation_ratio
@@ -63,7 +64,7 @@ class LinearState:
     alone: int
 
 
-def drawn(packing: Packing, spring: float) -> Configuration:
+def drawn(packing: HasConfiguration, spring: float) -> Configuration:
     """A state of a driven run with the stiffness of the spring, force / length on each disk of the layer."""
     return derive_frozen(packing.configuration, spring=spring)
 
