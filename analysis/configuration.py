@@ -249,6 +249,9 @@ class Configuration:
         share of the largest entry; zero by default.
     constraint : scipy.sparse.csr_array, shape (coordinates, coordinates), optional
         P of q = P Q; the identity by default, and only where `stiffness` is given.
+    spring : float
+        Stiffness k of a spring that draws the layer `top`, force / length: each of its particles feels the force
+        k (X_0 - X) along x, X their mean displacement. None by default. X_0 is part of the load.
     proof : float, optional
         Relative difference of a short motion of the other code from that of this configuration; None without such a
         motion. The proof is no property of the packing, and does not count when two configurations are compared.
@@ -284,6 +287,7 @@ class Configuration:
     operator_error: float
     jump: Floats
     constraint: csr_array | None
+    spring: float
     proof: float | None = field(compare=False)
     remarks: tuple[str, ...] = field(compare=False)
 
@@ -312,6 +316,7 @@ class Configuration:
         operator_error: float = 0.0,
         jump: ArrayLike | None = None,
         constraint: csr_array | None = None,
+        spring: float = 0.0,
         proof: float | None = None,
         remarks: Iterable[str] = (),
     ) -> None:
@@ -343,6 +348,7 @@ class Configuration:
             operator_error=number("operator_error", operator_error),
             jump=floats("jump", np.zeros(n) if jump is None else jump, (n,)),
             **{name: None if each is None else square(name, each, size) for name, each in matrices.items()},
+            spring=number("spring", spring),
             proof=None if proof is None else number("proof", proof),
             remarks=tuple(remarks),
         )

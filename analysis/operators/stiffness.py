@@ -46,7 +46,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array
 
-from ..configuration import HasConfiguration
+from ..configuration import Configuration, HasConfiguration
 from ..packing.law import Derivatives
 from ..packing.packing import Floats, Indices, Packing
 from .linearised_contacts import assembled_stiffness
@@ -101,15 +101,16 @@ def stiffness_matrix(
     if not isinstance(packing, Packing):  # the assembly below is for disks of one law alone, and three times faster
         if form == "paper" or coupled is not None:
             raise ValueError("The operator of a Configuration is the consistent one, of all of its contacts.")
-        given = packing.configuration.stiffness
-        if given is None:
-            return assembled_stiffness(packing.configuration, parting)
+        configuration = packing.configuration
+        if configuration.stiffness is None:
+            stiffness = assembled_stiffness(configuration, parting)
+            return csr_array(stiffness + spring_stiffness(configuration)) if configuration.spring else stiffness
         if np.any(np.asarray(parting) != 0.5) or np.any(sliding):
             raise ValueError(
                 "K of this configuration is a difference of forces, the mean of closing and parting, and of both "
                 "sides of Coulomb's bound: leave parting and sliding out."
             )
-        return given.copy()
+        return configuration.stiffness.copy()
     contacts = packing.contacts
     pairs = len(contacts) - np.count_nonzero(contacts.floor)
     normal, _, distance, overlap = packing.geometry
@@ -119,6 +120,17 @@ def stiffness_matrix(
     return assemble_stiffness(
         contact_terms(law, normal.T, distance, pairs, form), contacts.i, contacts.j[:pairs], len(packing)
     )
+
+
+def spring_stiffness(configuration: Configuration) -> csr_array:
+    """The part of K of the spring that draws the layer: k/n between all pairs of its n particles, along x.
+
+    Each particle feels -k X for the mean displacement X of the layer.
+    """
+    layer = np.flatnonzero(configuration.top)
+    rows, columns = np.repeat(layer, len(layer)), np.tile(layer, len(layer))
+    values = np.full(len(rows), configuration.spring / max(1, len(layer)))
+    return csr_array((values, (rows, columns)), shape=(configuration.coordinates,) * 2)
 
 
 def assemble_stiffness(terms: Floats, i: Indices, j: Indices, disks: int) -> csr_array:

@@ -26,6 +26,7 @@ from .terminal import (
     report_fallback,
     say,
     say_work,
+    spring_in,
     status,
     stored_configuration,
     stored_files,
@@ -84,9 +85,12 @@ def spectrum(
     """
     from faultgouge.analysis import Packing, solid_fraction, stability
     from faultgouge.analysis import spectrum as eigenvalues_of
+    from faultgouge.analysis.arrays import derive_frozen
     from faultgouge.analysis.progress import show_progress
 
-    packing, assumed = stored_configuration(file, frame_at(file, frame, time))
+    stored, assumed = stored_configuration(file, frame_at(file, frame, time))
+    spring = spring_in(file)
+    packing = derive_frozen(stored.configuration, spring=spring) if spring else stored
     size = packing.configuration.coordinates
     if size > LARGE:
         # four matrices of doubles; 18000 coordinates took 10.2 GB
@@ -99,7 +103,9 @@ def spectrum(
         verdict = stability(packing, "fx" if rise else None, spectrum_of_stiffness=result, reasons=assumed)
     gains = _gain_of(packing) if gain else None
     if not as_json:
-        _print_spectrum(packing, result, verdict, gains, verbose)
+        _print_spectrum(stored, result, verdict, gains, verbose)
+        if spring:
+            print(f"K has the stiffness of the spring that draws the layer, {spring:g} on each of its disks")
         return
     names = ("condition", "overlap", "growth_rate", "frequency", "quality", "participation", "rotation")
     print_json(
@@ -118,8 +124,9 @@ def spectrum(
             "largest_growth_rate": result.growth_rate(),
             "rattlers": result.rattlers.tolist(),
             "fx": packing.configuration.fx,
+            "spring": spring,
             "residual": packing.residual,
-            "solid_fraction": solid_fraction(packing) if isinstance(packing, Packing) else None,
+            "solid_fraction": solid_fraction(stored) if isinstance(stored, Packing) else None,
             "noise_pairs": result.noise_pairs,
             "transient_gain": gains,
         }

@@ -9,7 +9,7 @@ import typer
 
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
-from .terminal import Folder, Workers, counted, print_line, progress, say, table_of
+from .terminal import Folder, Workers, counted, lock_folder, print_line, progress, say, table_of
 
 if TYPE_CHECKING:
     from faultgouge.studies.sweep.sweep_plan import Sweep
@@ -121,7 +121,12 @@ def _shard(text: str) -> tuple[int, int]:
 @app.command(epilog="Example: faultgouge modes modes.toml -o modes")
 def modes(
     file: Annotated[
-        Path, typer.Argument(metavar="SCENE|SWEEP", help="A scene, or a sweep of the task modes.", show_default=False)
+        Path,
+        typer.Argument(
+            metavar="SCENE|SWEEP|drive.h5",
+            help="A scene, a sweep of the task modes, or a run of `drive`.",
+            show_default=False,
+        ),
     ],
     output: Folder = Path("modes"),
     shard: Shard = "1/1",
@@ -135,13 +140,22 @@ def modes(
     factor below which dissipation stops all growth. It writes modes.json, modes.csv,
     pictures over the load and of the plane of frequencies, and a film of this plane.
     For a sweep, the pictures show medians over packings.
+
+    Of a drive.h5 the command computes the eigenvalues of each stored state, with the
+    stiffness of the spring: complex pairs, growth with and without dissipation, and
+    the lowest eigenvalue, with the contacts at Coulomb's bound all sticking, and all
+    sliding. It writes cycle.json, cycle.csv and a picture.
     """
+    from faultgouge.studies.cycle.study import holds_drive
     from faultgouge.studies.modes.study import modes as count_modes
     from faultgouge.studies.modes.study import read_modes_sweep
     from faultgouge.studies.sweep.run_sweep import LINES, require_result
     from faultgouge.studies.sweep.sweep_plan import shard as part_of
     from faultgouge.studies.sweep.tasks import estimate
 
+    if holds_drive(file):
+        _along_cycles(file, output)
+        return
     wanted, part = read_modes_sweep(file), _shard(shard)
     _warn_of_seeds(wanted)
     if is_root():
@@ -167,6 +181,46 @@ def modes(
                 f"of them goes to F_x = {each['reach']:g}, and {why} at the next load"
             )
         require_result(result["packings"])
+
+
+def _along_cycles(file: Path, output: Path) -> None:
+    """The eigenvalues of the states of a driven run, and those before its slips as a table."""
+    from faultgouge.studies.cycle.study import cycle
+
+    if not is_root():
+        return
+    keeps(f"{output}/cycle.json has the states so far; the same command continues from there", output)
+    with lock_folder(output):
+        result = cycle(file, output, say, lambda frames, count: progress(frames, "states", count))
+    states, rows = result["states"], []
+    for number, slip in enumerate(result["slips"], 1):
+        before = [state for state in states if state["time"] <= slip["begins"]][-1]
+        rows.append([str(number), *(_cell(before[name]) for name in BEFORE)])
+    if rows:
+        print_line(table_of(("slip", *BEFORE.values()), rows))
+    moving = sum(not state["rests"] for state in states)
+    print_line(
+        f"{counted(len(states), 'state')}, {moving} of them not in equilibrium (the flag rests), "
+        f"{counted(len(rows), 'slip')}; written: {output}/cycle.json, cycle.csv, cycle.png"
+    )
+
+
+BEFORE = {
+    "time": "begins",
+    "force": "F",
+    "at_bound": "at the bound",
+    "pairs_sticking": "pairs",
+    "undamped_sticking": "undamped",
+    "damped_sticking": "damped, stick",
+    "damped_sliding": "damped, slide",
+    "lowest_sticking": "lowest, stick",
+    "lowest_sliding": "lowest, slide",
+}
+"""Columns of the table of states before slips, with their headings."""
+
+
+def _cell(value: float) -> str:
+    return f"{value:.4g}"
 
 
 def _show_modes(rows: list[dict[str, Any]]) -> None:

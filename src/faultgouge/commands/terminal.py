@@ -151,6 +151,18 @@ def stored_drive(file: Path) -> tuple[dict[str, Any], list[Slip]] | None:
         return run.series(SERIES), slips_in(run)
 
 
+def spring_in(file: Path) -> float:
+    """Stiffness of the spring of a drive.h5, force / length on each disk of the layer; 0 of all other files."""
+    from faultgouge.analysis import RunFile
+    from faultgouge.pywrap.runs.drive_recorder import drive_of
+
+    if file.suffix == ".disks" or stored_snapshot(file) is not None:
+        return 0.0
+    with RunFile(file) as run:
+        settings = drive_of(run)
+    return 0.0 if settings is None or settings.spring == "rigid" else float(settings.spring)
+
+
 def frame_at(file: Path, frame: int, time: float | None) -> int:
     """The number of the state of a drive.h5 nearest to a time; without a time, the frame."""
     from faultgouge.analysis import BadInputError, RunFile

@@ -1,0 +1,227 @@
+"""The table of the page on cycles computed, the page made from the table, or a run computed again and compared.
+
+python -m research.cycle.make compute RUNS SEEDS   the runs of the seeds 1 to SEEDS that the table lacks; their files
+                                                   go to the folder RUNS; half a minute a run
+python -m research.cycle.make page                 README.md from the table
+python -m research.cycle.make check                the first run computed again, and compared
+
+From the folder of the repository.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest
+
+from faultgouge.analysis.files.atomic_write import write_text
+from faultgouge.figures.pages import render
+from faultgouge.studies.result_rows import read_rows
+from faultgouge.studies.statistics import interval, share
+from research.cycle.compute import LAWS, UNTIL, compute
+
+HERE = Path(__file__).parent
+TABLE = "cycles.jsonl"
+
+Row = dict[str, Any]
+
+FORETELLERS = {
+    "force": "force",
+    "since": "time since the last slip",
+    "at_bound": "contacts at the bound",
+    "pairs_sticking": "complex pairs, sticking",
+    "pairs_sliding": "complex pairs, sliding",
+    "undamped_sliding": "growth without loss, sliding",
+    "damped_sticking": "growth with loss, sticking",
+    "damped_sliding": "growth with loss, sliding",
+    "lowest_sliding": "lowest eigenvalue, sliding (the lower, the sooner)",
+}
+"""What may foretell a slip, with its name on the page."""
+
+DRAWS = 2000
+"""Resampled sets of runs for an interval."""
+
+AGREES = 1e-6
+"""Relative difference of numbers that are computed again on the same machine."""
+
+
+def begins_with(state: Row) -> dict[str, bool]:
+    """Which instabilities a state has."""
+    grows, folds = state["damped_sliding"] > 0, state["lowest_sliding"] < 0
+    return {
+        "sticking": state["damped_sticking"] > 0,
+        "sliding": grows,
+        "fold": folds,
+        "growth alone": grows and not folds,
+        "neither": not grows and not folds,
+    }
+
+
+def counts(rows: Sequence[Row], law: str, kind: str) -> dict[str, dict[str, Any]]:
+    """Of how many states of a kind each instability is there, with intervals."""
+    states = [
+        begins_with(state) for row in rows if row["law"] == law for state in row["states"] if state["kind"] == kind
+    ]
+    names = ("sticking", "sliding", "fold", "growth alone", "neither")
+    return {name: share(sum(state[name] for state in states), len(states)) for name in names}
+
+
+def before_or_control(rows: Sequence[Row], law: str) -> dict[str, dict[str, Any]]:
+    """Of how many slips an instability is there before the slip and not in its control, and the reverse; sign test.
+
+    Also for how many the force is larger before the slip, and for how many in the control.
+    """
+    found = {}
+    for name in ("sliding", "fold", "force"):
+        alone = [0, 0]
+        for row in (each for each in rows if each["law"] == law):
+            state = {(each["kind"], each["slip"]): (begins_with(each) | each)[name] for each in row["states"]}
+            for number in range(len(row["slips"])):
+                before, control = state["before", number], state["control", number]
+                alone[0] += before > control
+                alone[1] += control > before
+        found[name] = {"before": alone[0], "control": alone[1], "p": None}
+        if sum(alone):
+            found[name]["p"] = float(binomtest(alone[0], sum(alone)).pvalue)
+    return found
+
+
+def ordered_pairs(row: Row, name: str) -> tuple[float, int]:
+    """Pairs of even states of a run that a number orders rightly, ties as a half, and how many pairs there are.
+
+    Both states are of different waits: in one wait the time since the last slip would be right by construction. The
+    state nearer to its slip shall have the larger number (of the lowest eigenvalue the smaller). A state after the last
+    slip waits at least until the end of the run.
+    """
+    sign = -1.0 if name.startswith("lowest") else 1.0
+    states = [state for state in row["states"] if state["kind"] == "even"]
+    right, of = 0.0, 0
+    for state in states:
+        if state["until"] is None:
+            continue
+        for other in states:
+            waits = UNTIL - other["time"] if other["until"] is None else other["until"]
+            if other["slip"] != state["slip"] and waits > state["until"]:
+                difference = sign * (state[name] - other[name])
+                right, of = right + (0.5 if difference == 0 else float(difference > 0)), of + 1
+    return right, of
+
+
+def concordance(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Share of pairs that each number orders rightly, and its excess over that of the force, with 95 % intervals.
+
+    The intervals are of resampled runs. One half is chance.
+    """
+    found = {name: np.array([ordered_pairs(row, name) for row in rows]) for name in FORETELLERS}
+    chosen = np.random.default_rng(0).integers(len(rows), size=(DRAWS, len(rows)))
+
+    def shares(name: str) -> tuple[float, np.ndarray]:
+        drawn = found[name][chosen].sum(axis=1)
+        total = found[name].sum(axis=0)
+        return total[0] / total[1], np.divide(
+            drawn[:, 0], drawn[:, 1], out=np.full(DRAWS, np.nan), where=drawn[:, 1] > 0
+        )
+
+    force, force_draws = shares("force")
+    rows_of_table = []
+    for name, says in FORETELLERS.items():
+        value, draws = shares(name)
+        rows_of_table.append(
+            {
+                "name": name,
+                "says": says,
+                "share": [value, *np.nanquantile(draws, [0.025, 0.975])],
+                "over_force": [value - force, *np.nanquantile(draws - force_draws, [0.025, 0.975])],
+                "pairs": int(found[name][:, 1].sum()),
+            }
+        )
+    return rows_of_table
+
+
+def sizes(row: Row) -> dict[str, Any]:
+    """Slips of a run: how many, medians of force drop and of slip, and the mean time between two."""
+    slips = row["slips"]
+    begins = [slip["begins"] for slip in slips]
+    drops = [slip["force_before"] - slip["force_after"] for slip in slips]
+    return {
+        "seed": row["seed"],
+        "law": row["law"],
+        "slips": len(slips),
+        "drop": [float(np.median(drops)), max(drops)] if slips else None,
+        "slip": [float(np.median([slip["slip"] for slip in slips])), max(slip["slip"] for slip in slips)]
+        if slips
+        else None,
+        "recurrence": (begins[-1] - begins[0]) / (len(begins) - 1) if len(begins) > 1 else None,
+    }
+
+
+def numbers(rows: Sequence[Row]) -> dict[str, Any]:
+    """All numbers of the page."""
+    laws = [law for law in LAWS if any(row["law"] == law for row in rows)]
+    every = {law: [row for row in rows if row["law"] == law] for law in laws}
+    better = {law: concordance(every[law]) for law in laws}
+    return {
+        "runs": [sizes(row) for row in rows],
+        "laws": laws,
+        "seeds": {law: [row["seed"] for row in every[law]] for law in laws},
+        "slips": {law: sum(len(row["slips"]) for row in every[law]) for law in laws},
+        "before": {law: counts(rows, law, "before") for law in laws},
+        "control": {law: counts(rows, law, "control") for law in laws},
+        "paired": {law: before_or_control(rows, law) for law in laws},
+        "concordance": better,
+        "sooner": [each["says"] for law in laws for each in better[law] if each["over_force"][1] > 0],
+        "resting": share(
+            sum(state["rests"] for row in rows for state in row["states"]), sum(len(row["states"]) for row in rows)
+        ),
+        "residual": float(np.median([state["residual"] for row in rows for state in row["states"]])),
+    }
+
+
+def percent(part: dict[str, Any]) -> str:
+    """A share with its interval."""
+    if part["share"] is None:
+        return "-"
+    return f"{part['count']} of {part['of']} ({100 * part['low']:.0f} to {100 * part['high']:.0f} %)"
+
+
+def write_page(folder: Path = HERE) -> Path:
+    """Write README.md of a folder from its table."""
+    found = numbers(read_rows(folder / "tables" / TABLE))
+    write_text(
+        folder / "README.md", render("research.cycle", "README.md.j2", **found, percent=percent, interval=interval)
+    )
+    return folder / "README.md"
+
+
+def check() -> list[str]:
+    """What differs from the table in the first run computed again."""
+    known = read_rows(HERE / "tables" / TABLE)[0]
+    with TemporaryDirectory() as folder:
+        again = Path(folder) / TABLE
+        compute(again, Path(folder), range(1, 2), LAWS[:1])
+        new = read_rows(again)[0]
+    names = ("time", "force", "damped_sliding", "lowest_sliding", "pairs_sliding")
+    pairs = zip(known["states"], new["states"], strict=True)
+    return [
+        f"t = {old['time']:g}: {name}"
+        for old, state in pairs
+        for name in names
+        if not np.isclose(old[name], state[name], rtol=AGREES)
+    ]
+
+
+if __name__ == "__main__":
+    match sys.argv[1:]:
+        case ["compute", runs, seeds]:
+            compute(HERE / "tables" / TABLE, Path(runs), range(1, int(seeds) + 1))
+        case ["page"]:
+            print(write_page())
+        case ["check"]:
+            print(check() or "the same")
+        case _:
+            sys.exit(__doc__)

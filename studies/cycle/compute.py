@@ -1,0 +1,138 @@
+r"""Eigenvalues of the states of a driven run: complex pairs, growth with and without dissipation, and folds.
+
+The spring k draws the n disks of the upper layer, and its far end stands still for a small motion:
+
+.. math:: K \to K + \frac{k}{n}\, \mathbf e \mathbf e^T, \qquad \mathbf e = 1 \text{ on x of the layer, 0 elsewhere.}
+
+Two instabilities may begin a slip. **Growth**: a complex pair without dissipation, or Re s > 0 with dissipation.
+**Fold**: a real eigenvalue of K, with contacts at Coulomb's bound that slide on, goes through zero, and the branch of
+equilibria ends there (J. R. Rice, A. L. Ruina, J. Appl. Mech. 50, 343, 1983, have the same two of a spring and a
+slider). Contacts at the bound are neither all sliding nor all sticking
+(:mod:`~faultgouge.analysis.operators.sliders`): each number is given for both.
+
+**Loose disks.** A disk that is about to leave its last contact has an eigenvalue near zero, of either sign, that says
+nothing of the layer. Motions that only one disk takes part in are counted aside (`alone`). They do not count in the
+rates and in the lowest eigenvalue.
+
+**A state of a moving layer** is no equilibrium: its numbers are those of its positions and slips. The flag `rests`
+says which states are equilibria.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ...analysis import Configuration, Packing
+from ...analysis.arrays import Complexes, Floats, derive_frozen
+from ...analysis.configuration import HasConfiguration
+from ...analysis.motion.eigenvalues import all_modes, growing_undamped, in_balance, unit_rounding, zero_uncertainty
+from ...analysis.motion.motion import Motion
+from ...analysis.motion.spectrum import participation_ratio
+
+ALONE = 1.5
+"""Disks that take part in a motion, below which the motion is that of one disk."""
+
+TRIED = 20
+"""Growing motions whose vectors are looked at for one that more than a disk takes part in."""
+
+
+@dataclass(frozen=True)
+class LinearState:
+    """What grows about a state, if all contacts at Coulomb's bound stick, or all slide.
+
+    Attributes
+    ----------
+    pairs : int
+        Complex pairs of K without dissipation.
+    undamped : float
+        Growth rate of D without dissipation, 1 / time: of complex pairs and of negative eigenvalues.
+    damped : float
+        Largest 2 Re s with dissipation, 1 / time.
+    lowest : float
+        Least real part of the eigenvalues of K, 1 / time^2.
+    alone : int
+        Motions of one disk that grow without dissipation.
+    """
+
+    pairs: int
+    undamped: float
+    damped: float
+    lowest: float
+    alone: int
+
+
+def drawn(packing: HasConfiguration, spring: float) -> Configuration:
+    """A state of a driven run with the stiffness of the spring, force / length on each disk of the layer."""
+    return derive_frozen(packing.configuration, spring=spring)
+
+
+def cycle_state(packing: Packing, spring: float) -> dict[str, Any]:
+    """Numbers of one state of a driven run.
+
+    Parameters
+    ----------
+    packing : Packing
+        The state.
+    spring : float
+        Stiffness of the spring, force / length on each disk of the layer.
+
+    Returns
+    -------
+    dict
+        rests (whether forces balance), residual (the largest on a disk over the largest normal force), at_bound
+        (contacts at Coulomb's bound), and of `LinearState` NAME_sticking and NAME_sliding. A smoothed law has one
+        derivative at the bound, and the two are the same.
+    """
+    configuration = drawn(packing, spring)
+    sticking = linear_state(configuration, sliding=False)
+    both = configuration.contacts.one_sided.any()
+    sliding = linear_state(configuration, sliding=True) if both else sticking
+    return {
+        "rests": bool(in_balance(configuration)),
+        "residual": float(configuration.residual / configuration.normal_force.max(initial=np.finfo(float).tiny)),
+        "at_bound": int(configuration.contacts.at_bound.sum()),
+        **{f"{name}_sticking": value for name, value in asdict(sticking).items()},
+        **{f"{name}_sliding": value for name, value in asdict(sliding).items()},
+    }
+
+
+def linear_state(configuration: Configuration, sliding: bool) -> LinearState:
+    """What grows about a configuration in linear motion."""
+    motion = Motion.of(configuration, sliding=sliding)
+    values, right, left = all_modes(motion.stiffness)
+    rounding = unit_rounding(motion.stiffness.data)
+    zero = zero_uncertainty(configuration, rounding)
+    overlap = np.abs(np.sum(left.conj() * right, axis=0))
+    complex_, negative = growing_undamped(values, overlap, rounding, zero)
+    shared = _disks(motion, right) >= ALONE
+    grows = (complex_ | negative) & shared
+    rates = 2 * np.abs(np.sqrt(values[grows].astype(complex)).imag)
+    return LinearState(
+        pairs=int(np.count_nonzero(complex_ & shared)) // 2,
+        undamped=float(rates.max(initial=0.0)),
+        damped=_damped_rate(motion),
+        lowest=float(values[shared & (np.abs(values) > zero)].real.min(initial=np.inf)),
+        alone=int(np.count_nonzero((complex_ | negative) & ~shared)),
+    )
+
+
+def _damped_rate(motion: Motion) -> float:
+    """Largest 2 Re s of the motions that more than one disk takes part in."""
+    stiffness, damping = motion.stiffness.toarray(), motion.damping.toarray()
+    values = motion.rates.values
+    for s in values[:TRIED]:
+        pencil = s * s * np.eye(len(stiffness)) + s * damping + stiffness
+        vector = np.linalg.svd(pencil)[2][-1].conj()
+        if _disks(motion, vector[:, None])[0] >= ALONE:
+            return float(2 * s.real)
+    return float(2 * values[min(TRIED, len(values)) - 1].real)
+
+
+def _disks(motion: Motion, right: Complexes | Floats) -> Floats:
+    """How many disks take part in each motion, from vectors of the active coordinates in columns."""
+    whole = np.zeros((motion.configuration.coordinates, right.shape[1]), dtype=np.complex128)
+    whole[motion.active] = right
+    return len(motion.configuration) * participation_ratio(whole, motion.configuration.axes)

@@ -1,0 +1,151 @@
+"""The spectrum along the cycles of a driven layer: the spring in K beside LAMMPS's motion, and the files."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from faultgouge.analysis import RunFile, stability, stiffness_matrix
+from faultgouge.analysis.files.snapshot_file import read_snapshot, write_snapshot
+from faultgouge.analysis.motion.motion import Motion
+from faultgouge.pywrap import Equilibrium, Scene, SceneError
+from faultgouge.pywrap.runs.drive import settle_for_drive
+from faultgouge.pywrap.runs.drive_recorder import SERIES, DriveRecord
+from faultgouge.studies.cycle.compute import cycle_state, drawn
+from faultgouge.studies.cycle.study import COLUMNS, cycle
+
+SPRING = 10.0
+
+
+def make_run(path, **drive):
+    """The file of a driven run of a hundred disks."""
+    scene = Scene.from_mapping(
+        {
+            "packing": {"seed": 1},
+            "law": {"kn": 2e5, "mu": 1.0},
+            "load": {"fy": 3.0},
+            "damping": {"cn": 60.0, "ct": 17.0},
+            "drive": {"spring": SPRING} | drive,
+        }
+    )
+    with DriveRecord(path, scene) as record:
+        record.append(Equilibrium.of(settle_for_drive(scene)))
+        for _ in record.drive():
+            pass
+        record.finish()
+    return path
+
+
+@pytest.fixture(scope="module")
+def slow(tmp_path_factory):
+    return make_run(tmp_path_factory.mktemp("slow") / "drive.h5", velocity=1e-3, until=20.0, states=5.0)
+
+
+def linear_displacement(packing, spring, rate, times):
+    """Mean displacement of the layer by linear motion from rest, under a force that rises at a rate on each disk."""
+    motion = Motion.of(drawn(packing, spring))
+    size = len(motion.active)
+    layer = np.zeros(packing.coordinates)
+    layer[: len(packing)] = packing.top
+    along = layer[motion.active] / motion.root_mass
+    system = np.zeros((2 * size + 2,) * 2)
+    system[:size, size : 2 * size] = np.eye(size)
+    system[size : 2 * size, :size] = -motion.stiffness.toarray()
+    system[size : 2 * size, size : 2 * size] = -motion.damping.toarray()
+    system[size : 2 * size, 2 * size] = rate * along
+    system[2 * size, 2 * size + 1] = 1.0
+    step = expm((times[1] - times[0]) * system)
+    state, found = np.zeros(2 * size + 2), []
+    state[-1] = 1.0
+    for _ in times:
+        found.append(along @ state[:size] / packing.top.sum())
+        state = step @ state
+    return np.array(found)
+
+
+def test_the_layer_moves_as_the_spring_in_the_stiffness_says(tmp_path):
+    """A strong spring, so that its stiffness decides: LAMMPS's displacement is that of K with the spring."""
+    spring, velocity = 2000.0, 1e-7
+    path = make_run(tmp_path / "drive.h5", spring=spring, velocity=velocity, until=0.6, states=0.06)
+    with RunFile(path) as file:
+        start, series = file.packing(0), file.series(SERIES)
+    even = np.linspace(0, series["time"][-1], 61)
+    linear = linear_displacement(start, spring, spring * velocity, even)
+    moved = np.interp(even, series["time"], series["displacement"])
+    size = np.abs(moved).max()
+    assert np.abs(moved - linear).max() < 0.01 * size
+    alone = linear_displacement(start, 0.0, spring * velocity, even)
+    assert np.abs(moved - alone).max() > 0.1 * size
+
+
+def test_the_spring_resists_the_mean_displacement_of_the_layer_alone(slow):
+    with RunFile(slow) as file:
+        packing = file.packing(0)
+    added = stiffness_matrix(drawn(packing, SPRING)) - stiffness_matrix(drawn(packing, 0.0))
+    q = np.random.default_rng(0).standard_normal(packing.coordinates)
+    expected = np.zeros_like(q)
+    expected[: len(packing)] = SPRING * q[: len(packing)][packing.top].mean() * packing.top
+    np.testing.assert_allclose(added @ q, expected, atol=1e-9)
+
+
+def test_a_stored_configuration_keeps_its_spring(slow, tmp_path):
+    with RunFile(slow) as file:
+        configuration = drawn(file.packing(-1), SPRING)
+    write_snapshot(tmp_path / "run.h5", configuration)
+    assert read_snapshot(tmp_path / "run.h5") == configuration != drawn(configuration, 0.0)
+
+
+def test_the_states_of_a_run_go_on_where_they_were_cut_off(slow, tmp_path):
+    whole = cycle(slow, tmp_path / "whole")
+
+    def cut(frames, count):
+        yield from list(frames)[:2]
+
+    part = tmp_path / "parts"
+    assert len(cycle(slow, part, progress=cut)["states"]) == 2
+    asked = []
+    again = cycle(slow, part, progress=lambda frames, count: asked.append(count) or frames)
+    assert again == whole == json.loads((part / "cycle.json").read_text())
+    assert asked == [len(whole["states"]) - 2]
+    with (part / "cycle.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert tuple(rows[0]) == COLUMNS
+    assert [float(row["damped_sticking"]) for row in rows] == [state["damped_sticking"] for state in whole["states"]]
+    assert (part / "cycle.png").stat().st_size > 10_000
+
+
+def test_a_state_at_rest_has_the_rates_of_stability(slow):
+    with RunFile(slow) as file:
+        packing, moving = file.packing(0), file.packing(-1)
+    found, verdict = cycle_state(packing, SPRING), stability(drawn(packing, SPRING))
+    assert found["rests"]
+    assert found["alone_sticking"] == 0
+    assert found["damped_sticking"] == pytest.approx(verdict.growth_rate, rel=1e-6)
+    assert found["pairs_sticking"] == verdict.undamped.pairs
+    assert found["lowest_sticking"] > cycle_state(packing, 0.0)["lowest_sticking"]
+    # the pairs that the force brings grow in spite of the dashpots
+    assert cycle_state(moving, SPRING)["pairs_sticking"] > found["pairs_sticking"]
+
+
+def test_a_drive_without_a_spring_and_other_files_are_refused(tmp_path, faultgouge_here):
+    make_run(tmp_path / "rigid.h5", spring="rigid", velocity=1e-3, until=0.2, states=0.1)
+    with pytest.raises(SceneError, match="rigid drive"):
+        cycle(tmp_path / "rigid.h5", tmp_path)
+    (tmp_path / "scene.toml").write_text("[packing]\nseed = 1\n[law]\nkn = 2e5\nmu = 1.0\n[load]\nfy = 3.0\n")
+    faultgouge_here("settle", "scene.toml", "-o", "run.h5")
+    said = faultgouge_here("modes", "run.h5", code=2).stderr
+    assert "run.h5 is not a file of `faultgouge drive`" in said
+
+
+def test_modes_and_spectrum_of_a_drive_have_the_spring(slow, tmp_path, faultgouge_here):
+    said = faultgouge_here("modes", slow, "-o", "cycle").stdout
+    count = len(json.loads((tmp_path / "cycle" / "cycle.json").read_text())["states"])
+    assert f"{count} states" in said
+    found = json.loads(faultgouge_here("spectrum", slow, "--frame", "0", "--json").stdout)
+    assert found["spring"] == SPRING
+    with RunFile(slow) as file:
+        expected = cycle_state(file.packing(0), SPRING)["lowest_sticking"]
+    assert found["eigenvalues"][0][0] == pytest.approx(expected, rel=1e-9)
+    assert "K has the stiffness of the spring" in faultgouge_here("spectrum", slow, "--frame", "0").stdout
