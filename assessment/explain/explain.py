@@ -31,6 +31,7 @@ from ...pywrap.lammps.plain_file_names import temporary_folder
 from ...pywrap.runs.equilibrium_path import next_equilibrium, step_of
 from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.sections import Ramp
+from ...pywrap.scenes.units import real_units
 from ...pywrap.settling.settle import settle
 from .cost_comparison import FEW, SHARE, TURNS, Cost, Part, same_motion
 from .processors import ranks, threads
@@ -61,6 +62,8 @@ class Explanation:
     parts : tuple of Part
     defaults : dict
         Keys that the scene leaves to their defaults, and those.
+    units : dict or None
+        What real units make of the scene: k_n, F_y and the overburden, and one unit of it in SI; None without [units].
     load_average : float
         Processes that wanted a core meanwhile, of the last minute.
     """
@@ -72,6 +75,7 @@ class Explanation:
     left_out: tuple[str, ...]
     parts: tuple[Part, ...]
     defaults: dict[str, Any]
+    units: dict[str, float] | None
     load_average: float
 
     def as_dict(self) -> dict[str, Any]:
@@ -97,7 +101,7 @@ def explain(scene: Scene) -> Explanation:
     SceneError, NoEquilibriumError, EngineError
         If the packing cannot be settled.
     """
-    defaults = _defaults(scene)
+    defaults, units = _defaults(scene), _units(scene)
     scene, remark = _affordable(scene)
     start = settle(scene, communicator=MPI.COMM_SELF)
     run = _run_of(scene, start.packing)
@@ -121,8 +125,14 @@ def explain(scene: Scene) -> Explanation:
         left_out=tuple(package for package in HEAVY if package not in imported),
         parts=tuple(parts),
         defaults=defaults,
+        units=units,
         load_average=os.getloadavg()[0],
     )
+
+
+def _units(scene: Scene) -> dict[str, float] | None:
+    real = real_units(scene)
+    return None if real is None else {"kn": scene.law.kn, "fy": scene.load.fy} | real.as_dict()
 
 
 def _run_feature(feature: Feature, scene: InstanceContents, steps: int, folder: Path) -> Part:

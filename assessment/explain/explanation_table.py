@@ -1,5 +1,7 @@
 """An explanation in two sentences, and as a table for a terminal."""
 
+from collections.abc import Mapping
+
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
@@ -27,6 +29,16 @@ def in_words(explanation: Explanation) -> str:
     dearest = sorted(saves, key=lambda name: -saves[name])
     each = _join_names([f"{saves[name]:.0f} % for {name}" for name in dearest])
     return f"{first}. A step would take longer by {each}, one at a time."
+
+
+def units_in_words(units: Mapping[str, float]) -> str:
+    """A sentence: stiffness and load of the scene, what they stand for, and one unit of the scene in SI."""
+    length, mass, time, force = (units[name] for name in ("length_m", "mass_kg", "time_s", "force_N"))
+    return (
+        f"law.kn = {units['kn']:.12g} (Hertz's contact of the grains) and load.fy = {units['fy']:.12g} "
+        f"({units['overburden_Pa']:.4g} Pa on the layer); one unit of the scene is {length:.4g} m, {mass:.4g} kg, "
+        f"{time:.4g} s and {force:.4g} N."
+    )
 
 
 def _join_names(names: list[str]) -> str:

@@ -4,6 +4,7 @@ contact. JSON: packing.json."""
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,11 @@ from ...analysis import MindlinLaw, PackingFileError, read_packing
 from ...analysis.arrays import Floats
 from ...analysis.files.dumps import CONTACT, dump_frames
 from .disks import Disks, Slips, of_columns
+from .table_units import decimal_point, in_one_unit, is_number, mass_unit, split_unit
 from .text_columns import columns_of, lines_of
+
+HEADS = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")
+"""Names of columns with blanks between them, each with its unit in brackets, if there is one."""
 
 PARTNERS = {"first": ("id1", "i", "first"), "second": ("id2", "j", "second"), "slip": ("slip",), "low": ("slip_low",)}
 """Columns of a table of contacts and the names that they may have."""
@@ -20,21 +25,41 @@ PARTNERS = {"first": ("id1", "i", "first"), "second": ("id2", "j", "second"), "s
 
 def read_table(path: Path) -> Disks:
     """Disks of a CSV file; commas, semicolons, tabs or blanks between the numbers. Open sides."""
-    return of_columns(str(path), _table(path))
+    columns, units = _table(path)
+    columns, length = in_one_unit(str(path), columns, units)
+    masses = f" and masses in {mass_unit(columns, units)}" if {"mass", "m", "density"} & units.keys() else ""
+    remark = f"lengths are in {length}{masses}: give law and load in these units" if length else ""
+    return of_columns(str(path), columns, remark=remark, length_unit=length)
 
 
-def _table(path: Path) -> dict[str, Floats]:
-    """The columns of a CSV file by name."""
-    rows = [(number, line) for number, line in enumerate(lines_of(path), 1) if line.strip()]
-    if len(rows) < 2:
+def _table(path: Path) -> tuple[dict[str, Floats], dict[str, str]]:
+    """The columns of a CSV file by name, and the units in their heads.
+
+    Comments (lines that begin with # or //) may stand anywhere. If numbers follow the first of them at once, the last
+    comment before them has the names.
+    """
+    lines = [(number, line.removeprefix("\ufeff")) for number, line in enumerate(lines_of(path), 1)]
+    rows = [(number, line) for number, line in lines if line.strip()]
+    first = next((k for k, (_, line) in enumerate(rows) if not _is_comment(line)), len(rows))
+    named_by_comment = first > 0 and first < len(rows) and is_number(re.split(r"[;\t\s]", rows[first][1].strip())[0])
+    head = rows.pop(first - 1 if named_by_comment else first)[1] if first < len(rows) else ""
+    rows = [(number, line) for number, line in rows if not _is_comment(line)]
+    if not rows:
         raise PackingFileError(
             f"{path} is no table: it needs a line of names, such as x,y,radius, and lines of numbers."
         )
-    head = rows[0][1].lstrip("#").strip()
+    head = head.strip().lstrip("#/").strip()
     mark = next((each for each in ";,\t" if each in head), None)
-    names = [name.strip().strip('"').lower() for name in (head.split(mark) if mark else head.split())]
-    words = [(number, next(csv.reader([line], delimiter=mark)) if mark else line.split()) for number, line in rows[1:]]
-    return columns_of(path, words, names, f"the first {len(names)}", more=False)
+    heads = [split_unit(each) for each in (head.split(mark) if mark else HEADS.findall(head))]
+    words = [(number, next(csv.reader([line], delimiter=mark)) if mark else line.split()) for number, line in rows]
+    if mark != ",":
+        words = [(number, decimal_point(each)) for number, each in words]
+    names = [name for name, _ in heads]
+    return columns_of(path, words, names, f"the first {len(names)}", more=False), {name: u for name, u in heads if u}
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip().startswith(("#", "//"))
 
 
 def read_json(path: Path) -> Disks:
@@ -51,15 +76,26 @@ def read_json(path: Path) -> Disks:
     )
 
 
-def read_slips(path: Path) -> Slips:
-    """Slips of a table of contacts, in CSV (id1, id2, slip; a second ID of 0 is the floor) or as a LAMMPS dump."""
+def read_slips(path: Path, length: str = "") -> Slips:
+    """Slips of a table of contacts, in CSV (id1, id2, slip; a second ID of 0 is the floor) or as a LAMMPS dump.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    length : str
+        The unit of the disks' lengths, where their table has one.
+    """
     names = PARTNERS
     if next(iter(lines_of(path)), "").startswith("ITEM:"):
         *_, frame = dump_frames(path)
         columns = dict(zip(frame.columns, frame.rows.T, strict=True))
         names = {key: (*PARTNERS[key], *CONTACT.get(key, ())) for key in PARTNERS}
     else:
-        columns = _table(path)
+        columns, units = _table(path)
+        columns, unit = in_one_unit(str(path), columns, units, length)
+        if unit and not length:
+            raise PackingFileError(f"{path}: slip is in {unit}, and the disks have no unit: leave the unit out.")
     found = {key: next((columns[each] for each in also if each in columns), None) for key, also in names.items()}
     first, second, slip = (found[key] for key in ("first", "second", "slip"))
     if first is None or second is None or slip is None:

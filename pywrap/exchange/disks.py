@@ -7,7 +7,7 @@ refused here, once for all formats: disks out of the plane, below the floor, or 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -83,7 +83,11 @@ class Disks:
     groups : mapping
         Groups of disks by name, as booleans.
     remark : str
-        Information that the format has lost; empty for none.
+        Information that the format has lost, or units that it has; empty for none.
+    length_unit : str
+        Unit of the lengths, as the file has it; empty if it names none.
+    types : mapping
+        Disks of each type by its name, as booleans, where types have names.
     """
 
     source: str
@@ -100,6 +104,8 @@ class Disks:
     given: Mapping[str, float] = field(default_factory=dict)
     groups: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     remark: str = ""
+    length_unit: str = ""
+    types: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.radius)
@@ -109,7 +115,7 @@ class Disks:
         return self if floor == 0 else replace(self, position=self.position - (0.0, floor))
 
 
-def of_columns(source: str, columns: Mapping[str, Floats], **more: Any) -> Disks:
+def of_columns(source: str, columns: Mapping[str, Floats], type_names: Sequence[str] = (), **more: Any) -> Disks:
     """Disks from columns of numbers.
 
     Parameters
@@ -118,6 +124,8 @@ def of_columns(source: str, columns: Mapping[str, Floats], **more: Any) -> Disks
         The file, and where in it, for messages.
     columns : mapping of ndarray, each of shape (N,)
         By the names of `NAMES`; diameter stands for radius, and density is that of a sphere, as in LAMMPS.
+    type_names : sequence of str
+        Names of the types of the disks, in the order of the columns; empty for types without names.
     **more
         Further fields of :class:`Disks`.
 
@@ -145,6 +153,7 @@ def of_columns(source: str, columns: Mapping[str, Floats], **more: Any) -> Disks
     if len(twice):
         raise PackingFileError(f"{source} has disk {twice[0]} twice: give each disk an ID of its own.")
     found = {name: column[order] for name, column in found.items()}
+    names = np.array(type_names)[order] if len(type_names) else np.array([])
     low = None
     if "x_low" in columns and "y_low" in columns:
         low = np.column_stack([columns["x_low"], columns["y_low"]])[order]
@@ -158,6 +167,7 @@ def of_columns(source: str, columns: Mapping[str, Floats], **more: Any) -> Disks
         _whole(source, "type", found["type"]) if "type" in found else None,
         found["top"] != 0 if "top" in found else None,
         low,
+        types={str(name): names == name for name in dict.fromkeys(names.tolist())},
         **more,
     )
 
@@ -227,8 +237,27 @@ def _contacts(disks: Disks, law: MindlinLaw) -> Contacts:
     if slips.complete:
         return listed
     known = {pair: k for k, pair in enumerate(zip(listed.i.tolist(), listed.j.tolist(), strict=True))}
-    where = [known.get(pair, -1) for pair in zip(near.i.tolist(), near.j.tolist(), strict=True)]
+    pairs = list(zip(near.i.tolist(), near.j.tolist(), strict=True))
+    _refuse_apart(disks, {pair for pair, k in known.items() if listed.slip[k] != 0} - set(pairs))
+    where = [known.get(pair, -1) for pair in pairs]
     return near.slipped(np.where(np.array(where) >= 0, np.append(listed.slip, 0.0)[where], 0.0))
+
+
+def _refuse_apart(disks: Disks, apart: set[tuple[int, int]]) -> None:
+    """Refuse slips of disks that do not touch: no contact could have them."""
+    if not apart:
+        return
+    i, j = min(apart)
+    if j == FLOOR:
+        gap, other = disks.position[i, 1] - disks.radius[i], "the floor"
+    else:
+        branch = nearest_image(disks.position[i] - disks.position[j], disks.box_length)
+        gap, other = np.hypot(*branch) - disks.radius[i] - disks.radius[j], str(disks.id[j])
+    many = "1 slip is" if len(apart) == 1 else f"{len(apart)} slips are"
+    raise PackingFileError(
+        f"{disks.source}: {many} of disks that do not touch: {disks.id[i]} and {other} are {gap:.3g} apart: leave such "
+        "rows out, or give positions and radii with which these disks touch."
+    )
 
 
 def _index(disks: Disks, ids: Indices) -> Indices:

@@ -50,6 +50,7 @@ def _disks(path: Path, frame: Any) -> Disks:
         return of_columns(
             str(path),
             columns,
+            _type_names(particles),
             box_length=None if period is None else float(period),
             given=export_quantities.pick_numbers(values),
             slips=None if rows is None else export_quantities.slips_of(rows[rows[:, 0] > 0], "x_low" in columns),
@@ -64,7 +65,14 @@ def _disks(path: Path, frame: Any) -> Disks:
         "type": 1.0 + np.asarray(particles.typeid, dtype=np.float64),
         "angle": 2 * np.arctan2(turn[:, 3], turn[:, 0]),
     }
-    return of_columns(str(path), columns, box_length=float(box[0]), remark=SINGLE)
+    return of_columns(str(path), columns, _type_names(particles), box_length=float(box[0]), remark=SINGLE)
+
+
+def _type_names(particles: Any) -> list[str]:
+    """The name of each particle's type; none where types have no names."""
+    names = list(particles.types or [])
+    known = len(names) > int(np.max(particles.typeid, initial=0))
+    return [names[number] for number in particles.typeid] if known else []
 
 
 def write_gsd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:

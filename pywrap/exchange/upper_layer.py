@@ -8,11 +8,20 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis import BadInputError
+from ...analysis import BadInputError, touching
 from ...analysis.files.plain_file import read_plain_text
 from .disks import Disks
 
-WAYS = '12 (the highest), type:2, ids:1,4,7-9, ids:@FILE, group:NAME (of a restart), or a region such as "y>10"'
+WAYS = (
+    "12 (the highest that touch something), type:2, type:NAME, ids:1,4,7-9, ids:@FILE, group:NAME (of a restart), or a "
+    'region such as "y>10"'
+)
+
+FEW_TOUCH = 0.5
+"""Share of disks that touch something below which a packing is not at rest yet, and contacts tell nothing."""
+
+LISTED = 10
+"""Disks that are named; more are counted."""
 
 OPERATORS = {"<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": operator.ge}
 CONDITION = re.compile(r"\s*(x|y|radius)\s*(<=|>=|<|>)\s*([-+.\deE]+)\s*")
@@ -26,8 +35,9 @@ def upper_layer(disks: Disks, says: str | int | None) -> NDArray[np.bool_]:
     disks : Disks
         From a reader.
     says : str or int, optional
-        A number of highest disks, ``type:K``, ``ids:1,4,7-9``, ``ids:@FILE`` (numbers in a file), ``group:NAME``, or
-        conditions on x, y and radius joined by "and". By default the upper layer of the file.
+        A number of highest disks that touch something, ``type:K`` or ``type:NAME``, ``ids:1,4,7-9``, ``ids:@FILE``
+        (numbers in a file), ``group:NAME``, or conditions on x, y and radius joined by "and". By default the upper
+        layer of the file.
 
     Returns
     -------
@@ -54,10 +64,8 @@ def _choose_disks(disks: Disks, says: str) -> NDArray[np.bool_]:
     key, _, value = says.partition(":")
     if says.isdecimal():
         return _highest(disks, int(says))
-    if key == "type" and value.isdecimal():
-        if disks.kind is None:
-            raise BadInputError(f"--top {says}: {disks.source} has no types; take another of {WAYS}.")
-        return disks.kind == int(value)
+    if key == "type" and value:
+        return _of_type(disks, says, value)
     if key == "ids" and value:
         return _read_list(disks, says, value)
     if key == "group" and value:
@@ -68,12 +76,61 @@ def _choose_disks(disks: Disks, says: str) -> NDArray[np.bool_]:
     return _region(disks, says)
 
 
+def _of_type(disks: Disks, says: str, value: str) -> NDArray[np.bool_]:
+    """Disks of a type by its name, or by its number where types have no such name."""
+    if value in disks.types:
+        return disks.types[value]
+    if value.isdecimal() and disks.kind is not None:
+        return disks.kind == int(value)
+    if disks.types:
+        has = ", ".join(disks.types)
+        raise BadInputError(f"--top {says}: {disks.source} has no type {value} (its types: {has}).")
+    if disks.kind is None:
+        raise BadInputError(f"--top {says}: {disks.source} has no types; take another of {WAYS}.")
+    raise BadInputError(f"--top {says}: the types of {disks.source} have no names: give a number, as in type:2.")
+
+
 def _highest(disks: Disks, count: int) -> NDArray[np.bool_]:
+    """The highest disks of those that touch something; of all, if too few do, as in a packing not yet at rest."""
     if count > len(disks):
         raise BadInputError(f"--top {count}: {disks.source} has {len(disks)} disks alone.")
+    order = np.argsort(-disks.position[:, 1], kind="stable")
+    held = ~touching_nothing(disks)[order]
+    if held.sum() >= max(count, FEW_TOUCH * len(disks)):
+        order = order[held]
     chosen = np.zeros(len(disks), dtype=np.bool_)
-    chosen[np.argsort(-disks.position[:, 1], kind="stable")[:count]] = True
+    chosen[order[:count]] = True
     return chosen
+
+
+def touching_nothing(disks: Disks) -> NDArray[np.bool_]:
+    """Disks that touch neither another disk nor the floor, shape (N,)."""
+    contacts = touching(disks.position, disks.radius, disks.box_length)
+    alone = np.ones(len(disks), dtype=np.bool_)
+    alone[contacts.i] = alone[contacts.j[~contacts.floor]] = False
+    return alone
+
+
+def layer_remark(disks: Disks, says: str | None, layer: NDArray[np.bool_]) -> str:
+    """What is to be said of disks that touch nothing, in the layer or above it; empty for none, or too many."""
+    alone = touching_nothing(disks)
+    if alone.mean() > 1 - FEW_TOUCH:
+        return ""
+    loose = disks.id[layer & alone].tolist()
+    if loose:
+        return f"{len(loose)} of the {layer.sum()} disks of the upper layer touch nothing: {_listed(loose)}"
+    if says is None or not says.strip().isdecimal():
+        return ""
+    above = disks.id[alone & (disks.position[:, 1] > disks.position[layer, 1].min())].tolist()
+    return (
+        f"--top {says} leaves out {len(above)} of the highest disks, which touch nothing: {_listed(above)}"
+        if above
+        else ""
+    )
+
+
+def _listed(ids: list[int]) -> str:
+    return ", ".join(map(str, ids[:LISTED])) + (", ..." if len(ids) > LISTED else "")
 
 
 def _read_list(disks: Disks, says: str, value: str) -> NDArray[np.bool_]:
@@ -111,5 +168,6 @@ def _region(disks: Disks, says: str) -> NDArray[np.bool_]:
 
 def _extent(disks: Disks) -> str:
     y = disks.position[:, 1]
-    kinds = "" if disks.kind is None else f", and their types are {', '.join(map(str, np.unique(disks.kind)))}"
+    types = list(disks.types) or ([] if disks.kind is None else np.unique(disks.kind).tolist())
+    kinds = f", and their types are {', '.join(map(str, types))}" if types else ""
     return f"its disks go from y = {y.min():g} to {y.max():g}{kinds}"

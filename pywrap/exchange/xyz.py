@@ -41,12 +41,16 @@ def read_xyz(path: Path, frame: int | None = None) -> Disks:
     names = _columns(values["Properties"])
     rows = [(number + 1, lines[number].split()) for number in range(begin + 2, begin + 2 + count)]
     columns = columns_of(path, rows, names, f"Properties {len(names)}", more=False)
+    place = _species_column(values["Properties"])
+    species = [] if place is None else [words[place] for _, words in rows]
     lattice = numbers_in(values.get("Lattice", ""), path)
     periodic = len(lattice) == 9 and values.get("pbc", "T T T").split()[0] in ("T", "1", "True")
     listed = values.get("contacts")
     slips = None if listed is None else export_quantities.slips_of(numbers_in(listed, path), "x_low" in columns)
     period = lattice[0] if periodic else None
-    return of_columns(str(path), columns, box_length=period, given=export_quantities.pick_numbers(values), slips=slips)
+    return of_columns(
+        str(path), columns, species, box_length=period, given=export_quantities.pick_numbers(values), slips=slips
+    )
 
 
 def _columns(properties: str) -> list[str | None]:
@@ -58,6 +62,16 @@ def _columns(properties: str) -> list[str | None]:
         own = VECTORS.get(name, tuple(f"{name}_{k}" for k in range(size))) if size > 1 else (name,)
         names += size * [None] if kind == "s" else own[:size]
     return names
+
+
+def _species_column(properties: str) -> int | None:
+    """Where the names of types stand in a row; None if there are none."""
+    words, place = properties.split(":"), 0
+    for name, kind, count in zip(words[::3], words[1::3], words[2::3], strict=False):
+        if name.lower() in ("species", "type", "element") and kind.lower() == "s":
+            return place
+        place += int(count) if count.isdecimal() else 1
+    return None
 
 
 def _write_columns(frame: Frame, modes: list[ModeVectors]) -> list[tuple[str, str, np.ndarray]]:

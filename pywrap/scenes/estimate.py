@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from ...analysis import MindlinLaw
-from .packing_section import GeneratedPacking
+from .packing_section import GeneratedPacking, SettlingLoad
 from .scene_keys import SceneKeys
 from .validation import SceneError
 
@@ -231,6 +231,10 @@ def refuse_impossible(scene: SceneKeys) -> tuple[str, str] | None:
     packing, law, fy = scene.packing, scene.law, scene.load.fy
     if not isinstance(packing, GeneratedPacking):
         return None
+    if packing.settle_at is not None:
+        cannot = refuse_impossible(_at_settling(scene, packing.settle_at))
+        if cannot is not None:
+            return "packing.settle_at", f"does not settle, since {' '.join(cannot)}"
     overlap = _law(scene).overlap_of_force(fy)
     smallest = min(packing.radii)
     if not overlap < smallest:
@@ -262,6 +266,14 @@ def refuse_impossible(scene: SceneKeys) -> tuple[str, str] | None:
                 f"raise it, or leave it out for {_overdamped_step(scene):.2g}"
             )
     return None
+
+
+def _at_settling(scene: SceneKeys, at: SettlingLoad) -> SceneKeys:
+    """The scene with the load and the stiffness under which its packing settles."""
+    law = scene.law.model_copy(update={"kn": at.kn or scene.law.kn})
+    load = scene.load.model_copy(update={"fy": at.fy or scene.load.fy})
+    packing = scene.packing.model_copy(update={"settle_at": None})
+    return scene.model_copy(update={"law": law, "load": load, "packing": packing, "ramp": None})
 
 
 def _search_seconds(scene: SceneKeys, increments: float, task: Task) -> float:

@@ -19,6 +19,29 @@ SPARSEST = 10.0
 """Width of the box, in lengths of all disks in one row, beyond which nothing would ever touch."""
 
 
+class SettlingLoad(Section):
+    """packing.settle_at: the load and the stiffness under which a packing settles, if these are not the scene's.
+
+    Only the ratio of k_n to F_y matters. What is left out is the scene's.
+
+    Attributes
+    ----------
+    fy : float or None
+        Force on each disk of the upper layer.
+    kn : float or None
+        Normal stiffness, force / length^exponent.
+    """
+
+    fy: Positive | None = None
+    kn: Positive | None = None
+
+    @model_validator(mode="after")
+    def _not_empty(self) -> "SettlingLoad":
+        if self.fy is None and self.kn is None:
+            raise refusal_sentence("", "has nothing in it: give fy, or kn, or both, as in {fy = 3.0, kn = 2e5}")
+        return self
+
+
 class GeneratedPacking(Section):
     """[packing] from a seed: a loose start of disks of several sizes in equal shares, settled under the load.
 
@@ -42,6 +65,9 @@ class GeneratedPacking(Section):
         False: settled without friction, which then starts with zero slips, so that K is symmetric at F_x = 0.
         True: settled with friction, so that the packing carries tangential load from the start. The paper
         does not say which.
+    settle_at : SettlingLoad or None
+        The load under which the packing settles, before it is carried to the scene's: scenes that differ in their load
+        or their stiffness then have one packing. None: it settles under the load of the scene.
     masses : {"equal", "spheres"}
         Equal masses, as in the paper; or those of spheres of one material, as the cube of the radius.
     mass : float or None
@@ -56,6 +82,7 @@ class GeneratedPacking(Section):
     seed: int = Field(7, ge=0, lt=2**63)
     periodic: bool = True
     settle_friction: bool = False
+    settle_at: SettlingLoad | None = None
     masses: Literal["equal", "spheres"] = "equal"
     mass: Positive | None = None
 

@@ -32,6 +32,7 @@ from pydantic_core import InitErrorDetails
 
 from .command_sections import COMMANDS, Command
 from .estimate import refuse_impossible
+from .quantities import as_numbers
 from .scene_keys import SceneKeys
 from .sections import Inertia
 from .units import real_units
@@ -136,6 +137,8 @@ class Scene(SceneKeys):
         wanted = COMMANDS.get(command or "", ALL)
         context: dict[str, Any] = {"folder": folder}
         try:
+            if isinstance(mapping, Mapping) and "units" in mapping:
+                mapping = as_numbers(mapping, folder, name)
             if wanted is not ALL and isinstance(mapping, Mapping):
                 _check_keys(mapping)
                 mapping = wanted.part(mapping)

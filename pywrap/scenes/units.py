@@ -33,12 +33,14 @@ grows (N. V. Brilliantov et al., Phys. Rev. E 53, 5382, 1996), so that a restitu
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ...analysis import MindlinLaw, PackingFileError
-from .packing_section import GeneratedPacking
+from .packing_section import GeneratedPacking, StoredPacking
 from .scene_keys import SceneKeys
+from .units_section import Units
 from .validation import refusal_sentence
 
 HERTZ = 1.5
@@ -128,6 +130,25 @@ class RealUnits:
         }
 
 
+class Layer(NamedTuple):
+    """What decides the units of a scene beside its grains, in units of the scene.
+
+    Attributes
+    ----------
+    diameter, mass : float
+        Of the smallest disks.
+    width : float
+        Of the box.
+    top : int
+        Disks of the upper layer.
+    """
+
+    diameter: float
+    mass: float
+    width: float
+    top: int
+
+
 def real_units(scene: SceneKeys) -> RealUnits | None:
     """The units of a scene; None if it does not say them.
 
@@ -140,40 +161,58 @@ def real_units(scene: SceneKeys) -> RealUnits | None:
     units = scene.units
     if units is None:
         return None
-    if scene.law.exponent != HERTZ:
-        raise refusal_sentence(
-            "units", f"takes k_n from Hertz's contact, and law.exponent = {scene.law.exponent:g}: leave one out"
-        )
-    smallest, its_mass, width, top = _layer(scene)
-    if width is None:
-        raise refusal_sentence("units", "has no stress without the width of the layer: take a periodic packing")
-    diameter, density, modulus = (units.si(key) for key in ("grain_diameter", "density", "youngs_modulus"))
-    length = diameter / smallest
-    volume = np.pi * diameter**3 / 6 if units.thickness is None else np.pi * diameter**2 / 4 * units.si("thickness")
-    mass = density * volume / its_mass
-    stiffness = modulus * np.sqrt(diameter) / (3 * (1 - units.poisson_ratio**2))
-    time = float(np.sqrt(scene.law.kn * mass / (stiffness * np.sqrt(length))))
-    depth = diameter if units.thickness is None else units.si("thickness")
-    area = width * length * depth / top
-    shear_modulus = modulus / (2 * (1 + units.poisson_ratio))
-    real = RealUnits(length, mass, time, area, shear_modulus, density, scene.load.fy)
+    check_exponent(scene.law.exponent)
+    real = units_of(units, layer_of(scene.packing), scene.law.kn, scene.load.fy)
     if units.overburden is not None:
         wanted = units.si("overburden")
         if abs(real.overburden / wanted - 1) > MISMATCH:
             raise refusal_sentence(
                 "units.overburden",
                 f"= {units.overburden} is not the load of the scene, which presses with "
-                f"{real.overburden:.4g} Pa: set load.fy = {scene.load.fy * wanted / real.overburden:.6g}, or leave "
-                "units.overburden out",
+                f"{real.overburden:.4g} Pa: leave load.fy out, or set load.fy = "
+                f"{scene.load.fy * wanted / real.overburden:.6g}, or leave units.overburden out",
             )
     return real
 
 
-def _layer(scene: SceneKeys) -> tuple[float, float, float | None, int]:
-    """What a scene says of its layer, in its own units: smallest diameter and its mass, width, disks on top."""
-    section = scene.packing
+def units_of(units: Units, layer: Layer, kn: float, fy: float) -> RealUnits:
+    """The units of a scene with this layer, stiffness and load."""
+    diameter, modulus = units.si("grain_diameter"), units.si("youngs_modulus")
+    length = diameter / layer.diameter
+    mass = units.grain_mass / layer.mass
+    time = float(np.sqrt(kn * mass / (hertz_stiffness(units) * np.sqrt(length))))
+    depth = diameter if units.thickness is None else units.si("thickness")
+    area = layer.width * length * depth / layer.top
+    shear_modulus = modulus / (2 * (1 + units.poisson_ratio))
+    return RealUnits(length, mass, time, area, shear_modulus, units.si("density"), fy)
+
+
+def hertz_stiffness(units: Units) -> float:
+    """k of two smallest grains, N/m^(3/2)."""
+    modulus, diameter = units.si("youngs_modulus"), units.si("grain_diameter")
+    return float(modulus * np.sqrt(diameter) / (3 * (1 - units.poisson_ratio**2)))
+
+
+def check_exponent(exponent: float) -> None:
+    """Refuse a law that is not Hertz's, which has no stiffness from the moduli of its grains."""
+    if exponent != HERTZ:
+        raise refusal_sentence("units", f"takes k_n from Hertz's contact, and law.exponent = {exponent}: leave one out")
+
+
+def layer_of(section: GeneratedPacking | StoredPacking) -> Layer:
+    """What a section [packing] says of the layer; refused if it has no width."""
     if isinstance(section, GeneratedPacking):
-        return 2 * min(section.radii), 1.0, section.width if section.periodic else None, section.top
+        diameter, mass = 2 * min(section.radii), section.mass or 1.0
+        width, top = section.width if section.periodic else None, section.top
+    else:
+        diameter, mass, width, top = _stored_layer(section)
+    if width is None:
+        raise refusal_sentence("units", "has no stress without the width of the layer: take a periodic packing")
+    return Layer(diameter, mass, width, top)
+
+
+def _stored_layer(section: StoredPacking) -> tuple[float, float, float | None, int]:
+    """Smallest diameter and its mass, width, disks on top."""
     try:
         packing = section.packing(MindlinLaw(kn=1.0, kt=0.0, mu=0.0))
     except PackingFileError as error:

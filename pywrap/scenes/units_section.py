@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cache
+import re
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from ..exchange.table_units import registry
 from .validation import Section, refusal_sentence
 
 DIMENSIONS = {
@@ -18,13 +19,6 @@ DIMENSIONS = {
     "overburden": "Pa",
     "impact_velocity": "m/s",
 }
-
-
-@cache
-def _registry() -> Any:
-    from pint import UnitRegistry
-
-    return UnitRegistry()
 
 
 def to_si(text: str, unit: str) -> float:
@@ -38,11 +32,35 @@ def to_si(text: str, unit: str) -> float:
     from pint import PintError
 
     try:
-        quantity = _registry().Quantity(text)
+        quantity = registry().Quantity(text)
         return float(quantity.to(unit).magnitude)
     except (PintError, ValueError, TypeError, AttributeError, AssertionError, OverflowError) as error:
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else "it is no quantity"
         raise ValueError(f"does not convert to {unit} ({reason})") from None
+
+
+def quantity(place: str, text: str, unit: str) -> float:
+    """A quantity somewhere in a scene as a number of SI units; a frequency in hertz as an angular frequency.
+
+    Raises
+    ------
+    ValueError
+        If it is no quantity, or one of another dimension: a sentence without its full stop.
+    """
+    try:
+        number = to_si(text, unit)
+    except ValueError as error:
+        raise ValueError(f'{place} = "{text}" {error}: give a number with a unit of that kind') from None
+    return number * (2 * np.pi if re.search(r"[Hh]ertz|Hz", text) else 1.0)
+
+
+def is_stress(text: str) -> bool:
+    """Whether a text is a quantity such as "10 MPa"."""
+    try:
+        to_si(text, "Pa")
+    except ValueError:
+        return False
+    return True
 
 
 class Units(Section):
@@ -99,6 +117,14 @@ class Units(Section):
                 key, "is missing: the restitution of such contacts depends on the velocity, so give both"
             )
         return self
+
+    @property
+    def grain_mass(self) -> float:
+        """Mass of a smallest grain, a sphere, or a cylinder with a thickness, kg."""
+        diameter = self.si("grain_diameter")
+        sphere = np.pi * diameter**3 / 6
+        volume = sphere if self.thickness is None else np.pi * diameter**2 / 4 * self.si("thickness")
+        return float(self.si("density") * volume)
 
     def si(self, key: str) -> float:
         """A quantity as a number of SI units."""

@@ -56,6 +56,9 @@ upper layer of `loose.layer_size` a stage takes 10,000 to 50,000, whatever the s
 ITERATIONS = 60
 """Iterations before dynamics takes over again; where no rearrangement is under way, 15 to 40 do."""
 
+FLOATING = 1e-8
+"""Stiffness, in units of that of a contact that carries F_y, that is added to what has none: to what nothing holds."""
+
 LONGEST = 0.1
 """Longest displacement in one iteration, in smallest radii: no disk jumps over another."""
 
@@ -159,6 +162,11 @@ def minimize_energy(packing: Packing, iterations: int = ITERATIONS) -> tuple[Pac
             best, least = here, residual
     found = least < 10 * rounding_floor(best)
     return best if found else here, found
+
+
+def is_minimum(packing: Packing) -> bool:
+    """Whether an equilibrium without friction is a minimum of the energy, but for parts that float."""
+    return _positive(packing, FLOATING * _stiffest(packing)) is not None
 
 
 def _downhill(packing: Packing, step: Floats) -> tuple[Packing, float]:

@@ -22,6 +22,7 @@ from ..lammps.engine import Engine
 from ..scenes.packing_section import GeneratedPacking
 from ..scenes.scene import Scene
 from ..scenes.validation import SceneError
+from .change_load import change_load
 from .minimize_energy import settle_loose
 
 OUT_OF_BALANCE = 1e-3
@@ -152,7 +153,7 @@ def load_of(scene: Scene) -> dict[str, Any]:
 def _settle_starts(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None) -> Packing:
     """The first of the seed's loose starts whose upper layer stays on top, settled in `own_units`."""
     assert isinstance(scene.packing, GeneratedPacking)
-    section, own, fy = own_units(scene.packing, law, scene.load.fy)
+    section, own, fy = settling_units(scene, law)
     settling_law = own if section.settle_friction else replace(own, mu=0.0)
     for draw in range(STARTS):
         if draw:
@@ -173,7 +174,28 @@ def _settle_starts(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None)
         )
     if not section.settle_friction:
         packing = replace(clear_rattlers(packing, idle_disks(packing)), angle=np.zeros(len(packing)))
+    if section.settle_at is not None:
+        packing = _carry(packing, own_units(scene.packing, law, scene.load.fy)[2], communicator)
     return _in_scene(packing, scene, law, scene.packing.start(draw).radius)
+
+
+def _carry(packing: Packing, fy: float, communicator: MPI.Comm | None) -> Packing:
+    """A packing that has settled, under another load."""
+    carried = change_load(packing, fy, communicator)
+    if fy == packing.fy or packing.law.frictional:
+        return carried
+    # those that touch nothing stay where they were put at the load of settling
+    return clear_rattlers(carried, np.intersect1d(idle_disks(carried), [*carried.contacts.i, *carried.contacts.j]))
+
+
+def settling_units(scene: Scene, law: MindlinLaw) -> tuple[GeneratedPacking, MindlinLaw, float]:
+    """What a scene settles, in `own_units`: under its own load, or under that of packing.settle_at."""
+    assert isinstance(scene.packing, GeneratedPacking)
+    at = scene.packing.settle_at
+    if at is None:
+        return own_units(scene.packing, law, scene.load.fy)
+    kn = at.kn or law.kn
+    return own_units(scene.packing, replace(law, kn=kn, kt=law.kt * (kn / law.kn)), at.fy or scene.load.fy)
 
 
 def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[GeneratedPacking, MindlinLaw, float]:

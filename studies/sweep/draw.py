@@ -1,23 +1,37 @@
-"""The picture of a sweep: onsets, or the sizes of eruptions, over the swept keys."""
+"""The picture of a sweep: onsets, or the sizes of eruptions, over the swept keys.
+
+Scenes with the same values of all swept keys but the seed are one sample. Each sample is a curve, its share with an
+onset up to F_x (Kaplan and Meier), and a median with its 95 % interval from resampled packings
+(:mod:`~faultgouge.studies.statistics`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
+from ...analysis.arrays import Floats
 from ...figures.style import report_failure, save, styled
-from ..statistics import course
+from ..statistics import Bools, course, median_interval
 from .table import Row
 
 SEED = "packing.seed"
 
 COLOURS = 6
 """Colours of the style: more scenes cannot be told apart."""
+
+ASIDE, EDGE = 0.035, 0.08
+"""Distance of samples at one value, and of the outermost from the edge, in units of the range of values."""
+
+FEWEST = 6
+"""Scenes of a sample from which a median has an interval of 95 %: with five, all lie on one side of it once in 16."""
 
 Reach = tuple[float, bool]
 """The largest F_x up to which there is no window, and whether that is the onset."""
@@ -48,30 +62,129 @@ def _dicts(value: Any) -> list[dict[str, Any]]:
     return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
 
 
+@dataclass(frozen=True)
+class SeedSample:
+    """Scenes that differ in their seeds alone.
+
+    Attributes
+    ----------
+    values : dict
+        Swept keys with more than one value, but for the seed, and the values of these scenes.
+    reach : ndarray, shape (M,)
+        The onset, or the largest F_x up to which there is none.
+    onset : ndarray of bool, shape (M,)
+        Which of the two.
+    """
+
+    values: dict[str, Any]
+    reach: Floats
+    onset: Bools
+
+    @property
+    def label(self) -> str:
+        """Its values, in words."""
+        return ", ".join(f"{key} = {value}" for key, value in self.values.items())
+
+
+def samples_of(found: Sequence[tuple[Row, Reach]]) -> list[SeedSample]:
+    """The samples of a sweep, in the order of their first rows."""
+    keys = _varied_keys([row for row, _ in found])
+    groups: dict[str, list[tuple[Row, Reach]]] = {}
+    for row, reach in found:
+        groups.setdefault(str([row["values"][key] for key in keys]), []).append((row, reach))
+    return [
+        SeedSample(
+            {key: rows[0][0]["values"][key] for key in keys},
+            np.array([reach for _, (reach, _) in rows]),
+            np.array([onset for _, (_, onset) in rows]),
+        )
+        for rows in groups.values()
+    ]
+
+
 @styled
 def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
-    """The share of scenes with an onset up to F_x, and the onsets over each swept key.
+    """The share of scenes with an onset up to F_x, a curve a sample, and the onsets over each swept key.
 
-    Forces are per disk of the upper layer; triangles stand where there is no onset up to there. Above stands how many
-    scenes have an onset, and how many have none.
+    Forces are per disk of the upper layer. Small symbols are scenes; triangles stand where there is no onset up to
+    there. A large symbol with a bar is the median of a sample with its 95 % interval; a bar with an arrow has no upper
+    end within what the ramps reached. Above stands how many scenes have an onset, and how many have none.
     """
-    keys = _varied_keys([row for row, _ in found])
-    figure = Figure(figsize=(3.4, 2.2 * (1 + len(keys))), layout="constrained")
+    samples = samples_of(found)
+    keys, labels = list(samples[0].values), _labels(samples)
+    names = list(dict.fromkeys(labels))
+    colours = [f"C{names.index(label)}" for label in labels]
+    figure = Figure(figsize=(3.4, 2.2 * (1 + len(keys)) + 0.15 * len(names)), layout="constrained")
     share, *panels = figure.subplots(1 + len(keys), 1, squeeze=False)[:, 0]
-    reach = np.array([each for _, (each, _) in found])
-    onset = np.array([each for _, (_, each) in found])
-    share.step(*course(reach, onset), where="post")
+    for sample, colour in zip(samples, colours, strict=True):
+        share.step(*course(sample.reach, sample.onset), where="post", color=colour)
     share.set(xlabel="$F_x$", ylabel="share with an onset", xlim=(0, None), ylim=(0, 1))
-    without = int(np.count_nonzero(~onset))
-    share.set_title(f"{len(onset)} scenes: {len(onset) - without} with an onset, {without} without", fontsize=8)
+    count = sum(int(np.count_nonzero(sample.onset)) for sample in samples)
+    share.set_title(f"{len(found)} scenes: {count} with an onset, {len(found) - count} without", fontsize=8)
+    if len(names) > 1:
+        shown = [Line2D([], [], color=f"C{number}", label=name) for number, name in enumerate(names)]
+        share.legend(handles=shown, loc="upper center", bbox_to_anchor=(0.5, -0.25))
     for axes, key in zip(panels, keys, strict=True):
-        place = _places(axes, key, [row for row, _ in found])
-        axes.plot(place[onset], reach[onset], "o", color="C0", markersize=3, label="onset")
-        axes.plot(place[~onset], reach[~onset], "^", color="C0", mfc="none", markersize=3, label="none up to here")
-        axes.set(ylabel="$F_x^c$", ylim=(0, None))
+        _draw_onsets(axes, key, samples, colours)
     if panels:
-        panels[0].legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+        panels[0].legend(handles=_symbols(), loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     return figure
+
+
+def _labels(samples: Sequence[SeedSample]) -> list[str]:
+    """What the colour of each sample stands for: the sample, or, of more than can be told apart, one key's value."""
+    if len(samples) <= COLOURS:
+        return [sample.label for sample in samples]
+    counts = {key: len({str(sample.values[key]) for sample in samples}) for key in samples[0].values}
+    key = max((key for key in counts if counts[key] <= COLOURS), key=lambda each: counts[each], default=None)
+    return ["" if key is None else f"{key} = {sample.values[key]}" for sample in samples]
+
+
+def _draw_onsets(axes: Axes, key: str, samples: Sequence[SeedSample], colours: Sequence[str]) -> None:
+    """The onsets of each sample over a key, and its median with its interval; samples of one value side by side."""
+    places = _places(axes, key, [sample.values[key] for sample in samples])
+    highest = max(float(sample.reach.max()) for sample in samples)
+    for place, sample, colour in zip(_side_by_side(axes, places), samples, colours, strict=True):
+        for shown, marker in ((sample.onset, "o"), (~sample.onset, "^")):
+            x, y = np.full(shown.sum(), place), sample.reach[shown]
+            axes.plot(x, y, marker, color=colour, mfc="none", ms=2.5, alpha=0.5)
+        if len(sample.onset) >= FEWEST:
+            _draw_median(axes, place, sample, highest, colour)
+    axes.set(ylabel="$F_x^c$", ylim=(0, 1.1 * highest))
+
+
+def _side_by_side(axes: Axes, places: Floats) -> Floats:
+    """Places on the axis of a key, those of equal values next to each other; the axis becomes wide enough for all."""
+    logarithmic = axes.get_xscale() == "log"
+    along = np.log(places) if logarithmic else places
+    span = float(np.ptp(along)) or 1.0
+    same = along[:, None] == along
+    rank = np.tril(same, -1).sum(axis=1) - 0.5 * (same.sum(axis=1) - 1)
+    aside = along + ASIDE * span * rank
+    ends = aside.min() - EDGE * span, aside.max() + EDGE * span
+    axes.set_xlim(*np.exp(ends) if logarithmic else ends)
+    return np.exp(aside) if logarithmic else aside
+
+
+def _draw_median(axes: Axes, place: float, sample: SeedSample, highest: float, colour: str) -> None:
+    middle, low, high = median_interval(sample.reach, sample.onset)
+    if low is None:
+        return  # no draw has a median within the ramps
+    end = highest if high is None else high
+    axes.plot([place, place], [low, end], "-", color=colour, linewidth=1.6, zorder=3)
+    if high is None:
+        axes.plot(place, 1.03 * end, marker=r"$\uparrow$", color=colour, markersize=6, zorder=3)
+    if middle is not None:
+        axes.plot(place, middle, "D", color=colour, markersize=4.5, zorder=4)
+
+
+def _symbols() -> list[Line2D]:
+    """What the legend shows."""
+    return [
+        Line2D([], [], linestyle="none", marker="o", mfc="none", ms=2.5, color="0.4", label="onset"),
+        Line2D([], [], linestyle="none", marker="^", mfc="none", ms=2.5, color="0.4", label="none up to here"),
+        Line2D([], [], marker="D", ms=4.5, color="0.4", linewidth=1.6, label="median, 95 %"),
+    ]
 
 
 @styled
@@ -99,13 +212,14 @@ def _varied_keys(rows: Sequence[Row]) -> list[str]:
     return [key for key in keys if len({str(row["values"][key]) for row in rows}) > 1]
 
 
-def _places(axes: Axes, key: str, rows: Sequence[Row]) -> np.ndarray:
-    """Where rows stand on the axis of a key: at its number, or at the number of a value that is none."""
+def _places(axes: Axes, key: str, values: Sequence[Any]) -> Floats:
+    """Where values stand on the axis of a key: at a number, or at the number of a value that is none."""
     axes.set_xlabel(key)
-    values = [row["values"][key] for row in rows]
     if all(isinstance(value, int | float) for value in values):
         if min(values) > 0 and max(values) > 20 * min(values):
             axes.set_xscale("log")
+        elif len(set(values)) <= COLOURS:
+            axes.set_xticks(sorted(set(values)))
         return np.array(values, float)
     names = list(dict.fromkeys(map(str, values)))
     axes.set_xticks(range(len(names)), names)

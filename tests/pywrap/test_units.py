@@ -8,6 +8,8 @@ import pytest
 from faultgouge.analysis import MindlinLaw, read_packing
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.exchange import write_packing
+from faultgouge.pywrap.scenes.quantities import DIMENSIONS
+from faultgouge.pywrap.scenes.scene import SECTIONS
 from faultgouge.pywrap.scenes.units import dashpot, quality_factor, real_units, restitution
 
 QUARTZ = {
@@ -88,3 +90,126 @@ def test_dashpot_of_a_restitution_gives_it(wanted):
 def test_quality_factor():
     assert quality_factor(-0.1 + 10j) == pytest.approx(50.0)
     assert quality_factor(3j) == float("inf")
+
+
+SIZED = {"packing": {"radii": ["50 um", "70 um"], "width": "1.19 mm", "top": 10}, "units": QUARTZ}
+
+
+def sized(**sections):
+    return Scene.from_mapping({**SIZED, **sections})
+
+
+def test_stiffness_and_load_follow_from_the_grains_and_the_overburden():
+    found = sized(units={**QUARTZ, "overburden": "10 MPa"})
+    assert (found.packing.radii, found.packing.width, found.law.kn) == ((0.5, 0.7), 11.9, 2e5)
+    # ten disks on 1.19 mm by 0.1 mm, and k of two spheres, 4/3 E* sqrt(R/2)
+    force, stiffness = 10e6 * 1.19e-3 * 1e-4 / 10, 4 / 3 * 95e9 / 2 / (1 - 0.08**2) * np.sqrt(0.25e-4)
+    assert found.law.kn / found.load.fy == pytest.approx(stiffness * 1e-6 / force, rel=1e-11)
+    assert real_units(found).overburden == pytest.approx(10e6, rel=1e-11)
+    assert Scene.from_mapping(found.resolved()) == found
+
+
+@pytest.mark.parametrize("fy", ["10 MPa", "100 bar", "0.119 N", "119 mN"])
+def test_a_load_is_a_force_on_a_disk_or_a_stress_on_the_layer(fy):
+    assert sized(load={"fy": fy}).load.fy == sized(units={**QUARTZ, "overburden": "10 MPa"}).load.fy
+
+
+def test_any_number_of_a_scene_may_have_its_unit():
+    sections = {
+        "law": {"kn": "3.187e8 N/m^1.5", "kt": "1e8 N/m^1.5"},
+        "load": {"fy": "10 MPa"},
+        "packing": {**SIZED["packing"], "mass": "1.39 ug", "settle_at": {"fy": "1 MPa"}},
+        "ramp": {"step": "1 kPa", "until": ["1 MPa", "0 Pa"]},
+        "perturb": {"fx": "0 N", "time": "1 ms", "amplitude": "1 nN", "omega": "1 kHz", "time_step": "1 ns"},
+        "damping": {"tau": "1 s", "cn": "1 N s / m^1.5"},
+        "friction": {"v0": "1 mm/s", "v_ss": "10 v0"},
+        "eruptions": {"load": ["1 MPa", "2 MPa"], "time": "10 ms"},
+        "trigger": {"omega": ["1 MHz", "1e6 rad/s"], "time": "1 ms"},
+        "relax": {"damping": "1 kg/s"},
+    }
+    found = sized(**sections)
+    real = real_units(found)
+    assert real.stress(found.packing.settle_at.fy) == pytest.approx(1e6)
+    assert [real.stress(each) for each in found.ramp.until] == pytest.approx([1e6, 0.0])
+    assert real.stress(found.ramp.step) == pytest.approx(1e3)
+    assert [real.stress(each) for each in found.eruptions.load] == pytest.approx([1e6, 2e6])
+    assert found.law.kt / found.law.kn == pytest.approx(1e8 / 3.187e8, rel=1e-3)  # as is kn, given to four digits
+    assert found.perturb.amplitude * real.force == pytest.approx(1e-9)
+    assert real.frequency(found.perturb.omega) == pytest.approx(1e3)
+    assert found.perturb.time * real.time == pytest.approx(1e-3)
+    assert np.array(found.trigger.omega) / real.time == pytest.approx([2e6 * np.pi, 1e6])
+    assert real.velocity(found.friction.v0) == pytest.approx(1e-3)
+    assert found.damping.tau * real.time == pytest.approx(1.0)
+    assert found.damping.cn * real.force * real.time / real.length**1.5 == pytest.approx(1.0)
+    assert found.relax.damping * real.mass / real.time == pytest.approx(1.0)
+    on_floor = {"fx": 0.0, "time": 1.0, "signal": "pulse", "on": "floor", "omega": 1.0, "amplitude": "2 mm/s"}
+    moved = sized(load={"fy": 3.0}, perturb=on_floor)
+    assert real_units(moved).velocity(moved.perturb.amplitude) == pytest.approx(2e-3)
+
+
+def test_a_drive_may_have_units():
+    protocol = [["1 mm/s", "1 ms"], [0.0, "2 ms"]]
+    drive = {"spring": "10 N/m", "protocol": protocol, "signal": "pulse", "at": "1 us", "omega": "1 MHz"}
+    found = sized(load={"fy": 3.0}, drive={**drive, "scale": "2 mm/s", "on": "floor", "states": "1 us"})
+    real, (first, second) = real_units(found), found.drive.protocol
+    assert found.drive.spring * real.force / real.length == pytest.approx(10)
+    assert [real.velocity(first[0]), first[1] * real.time] == pytest.approx([1e-3, 1e-3])
+    assert [second[0], second[1] * real.time] == pytest.approx([0.0, 2e-3])
+    assert real.velocity(found.drive.scale) == pytest.approx(2e-3)
+    assert (
+        sized(load={"fy": 3.0}, drive={"spring": "rigid", "velocity": "1 mm/s", "until": "1 s"}).drive.spring == "rigid"
+    )
+
+
+def test_every_number_of_a_scene_has_its_dimension_or_none():
+    """A key that is added to a section is added to `DIMENSIONS`, too, or here."""
+    plain = {"disks", "top", "seed", "frame", "mu", "exponent", "inertia_factor", "target", "scale", "stretch"}
+    plain |= {"B", "w", "mu_ss", "distance", "runs", "fx_over_fy", "slips"}
+    for section, models in SECTIONS.items():
+        if section in ("units", "output"):
+            continue
+        for name, field in ((name, field) for model in models for name, field in model.model_fields.items()):
+            if any(kind in str(field.annotation) for kind in ("float", "int")):
+                assert name in DIMENSIONS.get(section, ()) or name in plain, f"{section}.{name}"
+
+
+def test_the_mass_of_a_grain_is_that_of_the_scene():
+    light, heavy = (real_units(Scene.from_mapping({**LEAST, "packing": p, "units": QUARTZ})) for p in MASSES)
+    assert heavy.mass == pytest.approx(light.mass / 4, rel=1e-12)
+    assert heavy.time == pytest.approx(light.time / 2, rel=1e-12)
+
+
+MASSES = [LEAST["packing"] | {"mass": mass} for mass in (1.0, 4.0)]
+
+
+@pytest.mark.parametrize(
+    ("sections", "says"),
+    [
+        ({"load": {"fy": "3 kg"}}, 'load.fy = "3 kg" does not convert to kg'),
+        (
+            {"load": {"fy": "3 N"}, "units": {**QUARTZ, "overburden": "10 MPa"}},
+            "leave load.fy out, or set load.fy = 74.6",
+        ),
+        (
+            {"law": {"kn": "1e8 N/m^1.5"}, "load": {"fy": 3.0}},
+            "not the stiffness of Hertz's contact of these grains, 3.18",
+        ),
+        (
+            {"packing": {"radii": ["60 um"]}, "load": {"fy": 3.0}},
+            "smallest disks of 0.00012 m, and units.grain_diameter",
+        ),
+        ({"packing": {"radii": ["50 um", 0.7]}, "load": {"fy": 3.0}}, "numbers beside quantities"),
+        ({"packing": {"mass": "1 g"}, "load": {"fy": 3.0}}, "not the mass of a smallest grain of units.density, 1.38"),
+        ({"packing": {"width": "3 s"}, "load": {"fy": 3.0}}, 'packing.width = "3 s" does not convert to m'),
+        ({"packing": {"radii": ["50 um"], "disks": -1}, "load": {"fy": 3.0}}, "packing.disks = -1 is refused"),
+        ({"law": {"exponent": 1.0}, "load": {"fy": "3 N"}}, "units takes k_n from Hertz's contact"),
+        ({"law": {"mu": 0.5}}, "load.fy is missing: add fy to [load]"),
+        (
+            {"drive": {"spring": "1 N/m", "protocol": ["1 s"]}, "load": {"fy": 3.0}},
+            "drive.protocol = ['1 s'] is refused",
+        ),
+        ({"perturb": {"fx": 0.0, "time": "soon"}, "load": {"fy": 3.0}}, 'perturb.time = "soon" does not convert to s'),
+    ],
+)
+def test_quantities_that_do_not_fit_are_refused_in_one_sentence(refused_scene, sections, says):
+    assert says in refused_scene({**SIZED, **sections})

@@ -12,9 +12,10 @@ from reference_layer import SMALL
 
 from faultgouge.assessment.explain.cost_comparison import Cost, Part
 from faultgouge.assessment.explain.explain import _affordable, _run_feature, explain
-from faultgouge.assessment.explain.explanation_table import in_words
+from faultgouge.assessment.explain.explanation_table import in_words, units_in_words
 from faultgouge.assessment.explain.switches import Feature, InstanceContents, UndampedRun, features
 from faultgouge.pywrap import Scene, settle
+from faultgouge.pywrap.scenes.units import real_units
 
 SCENES = files("faultgouge") / "scenes"
 
@@ -159,3 +160,13 @@ def test_command_prints_a_table(faultgouge):
     assert "deck parts: system.in, friction.in, undamped.in\n" in done.stdout
     assert "not imported: matplotlib, MDAnalysis" in done.stdout
     assert "law.mu = 1.0" in done.stdout
+
+
+def test_what_real_units_make_of_a_scene_is_told():
+    scene = Scene.from_toml(SCENES / "quartz.toml", command="settle")
+    units = {"kn": scene.law.kn, "fy": scene.load.fy} | real_units(scene).as_dict()
+    said = units_in_words(units)
+    assert said.startswith(
+        "law.kn = 200000 (Hertz's contact of the grains) and load.fy = 74.7 (1e+07 Pa on the layer);"
+    )
+    assert "one unit of the scene is 0.0001 m, 1.388e-09 kg, 9.331e-06 s and 0.001594 N" in said

@@ -1,7 +1,10 @@
 """Stored rows of sweeps: for which scene, code and version they stand, what is tried again, and that none is lost."""
 
 import json
+from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
 import pytest
 from reference_layer import REFERENCE, SMALL, toml
 
@@ -252,6 +255,17 @@ def test_a_sweep_of_which_all_failed_ends_with_1(folder, faultgouge_here):
     faultgouge_here("sweep", "fails.toml", "-o", "some", "--workers", "1")  # one has failed, and one has not
 
 
+def test_an_overburden_that_varies_is_a_load_that_does():
+    path = Path(__file__).parents[2] / "scenes" / "sweeps" / "depth.toml"
+    sweep = Sweep.from_toml(path, TASKS)
+    assert other_packings(sweep) is None
+    loads = [point.scene.load.fy for point in sweep.points[::20]]
+    assert np.array(loads) / loads[1] == pytest.approx([0.5, 1.0, 2.0], rel=1e-11)
+    settled = {key: value for key, value in sweep.scene["packing"].items() if key != "settle_at"}
+    plain = replace(sweep, scene=sweep.scene | {"packing": settled})
+    assert other_packings(plain).startswith("units.overburden: settling is chaotic")
+
+
 @pytest.mark.parametrize(
     ("axes", "changes", "named"),
     [
@@ -262,6 +276,9 @@ def test_a_sweep_of_which_all_failed_ends_with_1(folder, faultgouge_here):
         ({"load.fy, packing.seed": [[3.0, 1], [4.0, 2]]}, {}, None),  # no seed has two loads
         ({"law.kn, load.fy": [[2e5, 3.0], [4e5, 6.0]]}, {}, None),  # one packing in two units of force
         ({"packing.seed": "1:3"}, {}, None),
+        ({"load.fy": [3.0, 3.001]}, {"packing": {"settle_at": {"fy": 3.0}}}, None),
+        ({"law.kn": [1e5, 2e5]}, {"packing": {"settle_at": {"fy": 3.0, "kn": 2e5}}}, None),
+        ({"law.kn": [1e5, 2e5]}, {"packing": {"settle_at": {"fy": 3.0}}}, "law.kn"),  # settled at each stiffness
     ],
 )
 def test_a_sweep_says_where_a_seed_is_several_packings(axes, changes, named):

@@ -4,11 +4,14 @@ import csv
 import json
 import multiprocessing
 import os
+import re
 import signal
 import subprocess
 import sys
 import threading
 import time
+from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +20,7 @@ from reference_layer import BIN, REFERENCE, SMALL, toml
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.studies.executors import Processes, open_executor
+from faultgouge.studies.statistics import median_interval
 from faultgouge.studies.sweep import workers
 from faultgouge.studies.sweep.draw import draw_sweep, onsets_figure, reach_of
 from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
@@ -224,6 +228,69 @@ def test_the_picture_counts_the_scenes_without_an_onset():
     rows.append({"values": {"law.mu": 0.2}, "result": {"reach": 0.03, "ends": "until"}})
     share = onsets_figure([(row, reach_of(row)) for row in rows]).axes[0]
     assert share.get_title() == "3 scenes: 2 with an onset, 1 without"
+
+
+def drawn(keys, scenes=20, end=0.03):
+    """The picture of samples of random onsets, and the random onsets by sample."""
+    random, rows, known = np.random.default_rng(1), [], {}
+    for values in product(*keys.values()):
+        known[values] = onsets = 0.02 * random.weibull(1.2, scenes)
+        for seed, fx in enumerate(onsets.tolist()):
+            result = {"ends": "onset", "fx_c": fx} if fx < end else {"ends": "until", "reach": end}
+            rows.append({"values": dict(zip(keys, values, strict=True)) | {"packing.seed": seed}, "result": result})
+    return onsets_figure([(row, reach_of(row)) for row in rows]), known
+
+
+def test_the_picture_has_a_curve_and_a_median_with_its_interval_for_each_value():
+    figure, known = drawn({"law.mu": [0.5, 0.8, 1.0]})
+    share, over = figure.axes
+    assert [text.get_text() for text in share.get_legend().get_texts()] == [
+        "law.mu = 0.5",
+        "law.mu = 0.8",
+        "law.mu = 1.0",
+    ]
+    assert [line.get_color() for line in share.lines] == ["C0", "C1", "C2"]
+    for line, onsets in zip(share.lines, known.values(), strict=True):
+        fx, level = line.get_data()
+        np.testing.assert_allclose(np.sort(onsets[onsets < 0.03]), fx[1:-1])
+        assert level[-1] == pytest.approx(np.mean(onsets < 0.03))
+    diamonds = [line for line in over.lines if line.get_marker() == "D"]
+    bars = [line for line in over.lines if line.get_linestyle() == "-" and len(line.get_xdata()) == 2]
+    assert [line.get_xdata()[0] for line in diamonds] == [0.5, 0.8, 1.0]
+    for diamond, bar, onsets in zip(diamonds, bars, known.values(), strict=True):
+        middle, low, high = median_interval(np.minimum(onsets, 0.03), onsets < 0.03)
+        assert diamond.get_ydata()[0] == middle
+        assert list(bar.get_ydata()) == [low, 0.03 if high is None else high]
+
+
+def test_in_the_picture_samples_of_one_value_stand_side_by_side():
+    figure, known = drawn({"law.mu": [0.5, 1.0], "units.overburden": ["1 MPa", "10 MPa"]})
+    share, mu, load = figure.axes
+    assert len(share.lines) == len(known) == 4
+    for axes in (mu, load):
+        places = [line.get_xdata()[0] for line in axes.lines if line.get_marker() == "D"]
+        assert len(set(places)) == 4
+    assert [text.get_text() for text in load.get_xticklabels()] == ["1 MPa", "10 MPa"]
+
+
+def test_of_many_samples_the_colour_is_one_key_and_of_few_scenes_there_is_no_median():
+    figure, _ = drawn({"law.mu": [0.2, 0.4, 0.6, 0.8, 1.0], "load.fy": [3.0, 300.0]}, scenes=5)
+    share, _, load = figure.axes
+    assert share.get_legend().get_texts()[0].get_text() == "law.mu = 0.2"
+    assert [line.get_color() for line in share.lines] == [f"C{number}" for number in (0, 0, 1, 1, 2, 2, 3, 3, 4, 4)]
+    assert load.get_xscale() == "log"
+    assert not [line for line in load.lines if line.get_marker() == "D"]
+
+
+@pytest.mark.slow
+def test_every_column_of_an_onset_is_explained(tmp_path):
+    """The page names each column, and no other."""
+    rows = run_sweep(sweep_of({"packing.seed": [2]}), tmp_path / "out", say=id)
+    assert rows[0]["result"]["ends"] == "onset"
+    page = (Path(__file__).parents[2] / "docs" / "howto_sweep.md").read_text()
+    lines = page.partition("The table of the task")[2].splitlines()
+    named = {name for line in lines if line.startswith("| `") for name in re.findall(r"`(\w+)`", line.split(" | ")[0])}
+    assert named == {*rows[0]["result"], "says"}
 
 
 @pytest.mark.slow

@@ -45,7 +45,8 @@ Layer = Annotated[
     str | None,
     typer.Option(
         metavar="LAYER",
-        help="The upper layer: a number of highest disks, type:2, ids:1,4,7-9, ids:@FILE, group:NAME of a restart, "
+        help="The upper layer: a number of highest disks that touch something, type:2 or type:NAME, ids:1,4,7-9, "
+        "ids:@FILE, group:NAME of a restart, "
         "or a region such as 'y>10 and x<5'. By default the upper layer of the file.",
     ),
 ]
@@ -120,11 +121,14 @@ def import_(
         return
     if slides or balance is not None:
         raise typer.BadParameter("--slides and --balance are for a LAMMPS deck (.in): leave them out")
+    from faultgouge.pywrap.exchange.upper_layer import layer_remark
+
     disks = _place_disks(file, frame, floor, width, contacts)
     laws = {"kn": kn, "kt": _number_or_text(kt), "mu": mu, "exponent": exponent}
     packing = _packing(disks, top, scene, laws | {"fy": fy, "fx": fx, "inertia_factor": inertia})
-    if disks.remark:
-        say(f"{file}: {disks.remark}")
+    for remark in (disks.remark, layer_remark(disks, top, packing.top)):
+        if remark:
+            say(f"{file}: {remark}")
     keeps(f"nothing has been written to {output} yet")
     packing = _in_balance(file, packing, relax)
     assumed = disks.slips is None and packing.law.frictional
@@ -251,7 +255,7 @@ def _place_disks(file: Path, frame: int | None, floor: float, width: str | None,
     disks = read_disks(file, frame).above(floor)
     if width is not None:
         disks = replace(disks, box_length=_width(width))
-    return disks if contacts is None else replace(disks, slips=read_slips(contacts))
+    return disks if contacts is None else replace(disks, slips=read_slips(contacts, disks.length_unit))
 
 
 def _width(text: str) -> float | None:

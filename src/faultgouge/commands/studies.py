@@ -46,8 +46,10 @@ def explain(scene: ScenePath, as_json: AsJson = False) -> None:
     elif is_root():
         from rich.console import Console
 
-        from faultgouge.assessment.explain.explanation_table import explanation_table, in_words
+        from faultgouge.assessment.explain.explanation_table import explanation_table, in_words, units_in_words
 
+        if explanation.units is not None:
+            print_line(units_in_words(explanation.units))
         print_line(f"{in_words(explanation)}\n")
         console = Console(highlight=False)
         # a file or a pipe has no width, and a table of 80 columns is hard to read

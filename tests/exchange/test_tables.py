@@ -1,0 +1,180 @@
+"""Tables of laboratories: decimal commas, units in heads, comments; slips and upper layers that fit no contact."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from faultgouge.analysis import BadInputError, MindlinLaw, PackingFileError
+from faultgouge.pywrap.exchange import packing_of, read_disks, upper_layer
+from faultgouge.pywrap.exchange.csv_json import read_slips
+from faultgouge.pywrap.exchange.upper_layer import layer_remark
+
+LAW = MindlinLaw(2e5, 5e4, 0.5)
+
+
+@pytest.fixture
+def read(tmp_path):
+    def write_and_read(text, name="lab.csv"):
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        return read_disks(tmp_path / name)
+
+    return write_and_read
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x;y;radius\n1,25;0,5;0,5\n2,24;5,0e-1;,5\n",
+        "x\ty\tradius\n1,25\t0,5\t0,5\n2,24\t0,5\t0,5\n",
+        "x y radius\n1,25 0,5 0,5\n2,24 0,5 0,5\n",
+        "# tracked on 3 May, camera 2\n// frame 7\nx;y;radius\n1.25;0.5;0.5\n# the second disk\n2.24;0.5;0.5\n",
+        "// tracked\n# x y radius\n1.25 0.5 0.5\n2.24 0.5 0.5\n",
+        "\ufeffx;y;radius\n1,25;0,5;0,5\n2,24;0,5;0,5\n",
+        "x,y,radius\n1.25,0.5,0.5\n2.24,0.5,0.5\n",
+    ],
+    ids=["semicolons", "tabs", "blanks", "comments", "head in a comment", "byte order mark", "plain"],
+)
+def test_tables_as_others_write_them(read, text):
+    disks = read(text)
+    assert disks.position.tolist() == [[1.25, 0.5], [2.24, 0.5]]
+    assert disks.radius.tolist() == [0.5, 0.5]
+    assert disks.remark == ""
+
+
+@pytest.mark.parametrize(
+    "text", ["x;y;radius\n1.234,5;1;1\n", "x,y,radius\n1,25,0,5,0,5\n", "# only\n# words\n", "x y radius\n"]
+)
+def test_what_no_number_and_no_table_is(read, text):
+    with pytest.raises(PackingFileError, match=r"is no number|it has 6 columns|is no table"):
+        read(text)
+
+
+@pytest.mark.parametrize("head", ["x [mm];y [mm];radius [µm]", "x (mm) y (mm) radius (μm)", "x[mm],y[mm],radius[um]"])
+def test_lengths_are_converted_to_the_unit_of_x(read, head):
+    mark = ";" if ";" in head else "," if "," in head else " "
+    disks = read(f"{head}\n{mark.join(('1.25', '0.5', '512.5'))}\n{mark.join(('2.24', '0.5', '500'))}\n")
+    assert disks.radius.tolist() == [0.5125, 0.5]
+    assert disks.position.tolist() == [[1.25, 0.5], [2.24, 0.5]]
+    assert disks.remark == "lengths are in mm: give law and load in these units"
+
+
+def test_angles_masses_and_densities_are_converted_too(read):
+    disks = read("x [cm],y [mm],diameter [mm],angle [deg],type [-],vx [mm/s],density [kg/m^3]\n1,5,10,90,2,7,2000\n")
+    assert (disks.position.tolist(), disks.radius.tolist()) == ([[1.0, 0.5]], [0.5])
+    assert disks.angle[0] == pytest.approx(np.pi / 2, rel=1e-14)
+    assert disks.mass[0] == pytest.approx(2.0 * np.pi / 6, rel=1e-14)  # g, of a sphere of 1 cm and 2 g/cm^3
+    assert disks.remark == "lengths are in cm and masses in g: give law and load in these units"
+
+
+@pytest.mark.parametrize(
+    ("head", "says"),
+    [
+        ("x [mm],y,radius [um]", "x is in mm, and y has no unit: give every length one, or none"),
+        ("x [mm],y [mm],radius [kg]", "the unit of radius, 'kg', does not convert to mm"),
+        ("x [mm],y [mm],radius [pixels of mine]", "the unit of radius, 'pixels of mine', does not convert to mm"),
+    ],
+)
+def test_units_that_do_not_convert_are_refused(read, head, says):
+    with pytest.raises(PackingFileError, match=says.replace("[", r"\[")):
+        read(f"{head}\n1,1,1\n")
+
+
+ROW = "id,x [mm],y [mm],radius [mm]\n1,1,0.5,0.5\n2,1.999,0.5,0.5\n3,3.2,0.5,0.5\n4,1.5,1.365,0.5\n"
+
+
+def with_slips(read, tmp_path, rows, head="id1;id2;slip [µm]"):
+    disks = read(ROW)
+    (tmp_path / "contacts.csv").write_text(f"{head}\n{rows}", encoding="utf-8")
+    return replace(disks, slips=read_slips(tmp_path / "contacts.csv", disks.length_unit))
+
+
+def test_slips_are_in_the_unit_of_the_disks(read, tmp_path):
+    disks = with_slips(read, tmp_path, "1;2;0,5\n4;1;-0,25\n3;4;0\n")
+    contacts = packing_of(disks, LAW, upper_layer(disks, 1), fy=1.0).contacts
+    found = dict(zip(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True), contacts.slip.tolist(), strict=True))
+    assert found[0, 1] == 0.5e-3
+    assert found[0, 3] == -0.25e-3
+
+
+@pytest.mark.parametrize(
+    ("rows", "says"),
+    [
+        ("1;2;0,5\n2;3;1\n", "1 slip is of disks that do not touch: 2 and 3 are 0.201 apart: leave such rows out"),
+        ("2;3;1\n4;0;2\n", "2 slips are of disks that do not touch: 2 and 3 are 0.201 apart"),
+        ("4;0;2\n", "4 and the floor are 0.865 apart"),
+    ],
+)
+def test_slips_of_disks_that_do_not_touch_are_refused(read, tmp_path, rows, says):
+    disks = with_slips(read, tmp_path, rows)
+    with pytest.raises(PackingFileError, match=says):
+        packing_of(disks, LAW, upper_layer(disks, 1), fy=1.0)
+
+
+@pytest.mark.parametrize("head", ["id1;id2;slip", "id1;id2;slip [kg]"])
+def test_slips_without_the_unit_of_the_disks_are_refused(read, tmp_path, head):
+    with pytest.raises(PackingFileError, match="slip"):
+        with_slips(read, tmp_path, "1;2;0,5\n", head)
+
+
+def test_slips_with_a_unit_of_disks_without_are_refused(tmp_path):
+    (tmp_path / "contacts.csv").write_text("id1,id2,slip [um]\n1,2,3\n")
+    with pytest.raises(PackingFileError, match="slip is in um, and the disks have no unit"):
+        read_slips(tmp_path / "contacts.csv")
+
+
+XYZ = """4
+Lattice="9 0 0 0 9 0 0 0 1" Properties=species:S:1:pos:R:3:radius:R:1
+Fe 1 0.5 0 0.5
+Fe 2 0.5 0 0.5
+Al 1.5 1.36 0 0.5
+2 1.5 5 0 0.5
+"""
+
+
+def test_types_have_names(read):
+    disks = read(XYZ, "a.xyz")
+    assert upper_layer(disks, "type:Al").tolist() == [False, False, True, False]
+    assert upper_layer(disks, "type:2").tolist() == [False, False, False, True]
+    with pytest.raises(BadInputError, match=r"has no type Cu \(its types: Fe, Al, 2\)"):
+        upper_layer(disks, "type:Cu")
+
+
+def test_types_of_gsd_have_names(tmp_path):
+    hoomd = pytest.importorskip("gsd.hoomd", reason="gsd comes with the extra export")
+    frame = hoomd.Frame()
+    frame.particles.N, frame.particles.position = 2, [[0, 0.5, 0], [1, 0.5, 0]]
+    frame.particles.diameter, frame.particles.typeid, frame.particles.types = [1, 1], [1, 0], ["Al", "Fe"]
+    frame.configuration.box = [9, 9, 0, 0, 0, 0]
+    with hoomd.open(str(tmp_path / "a.gsd"), "w") as file:
+        file.append(frame)
+    disks = read_disks(tmp_path / "a.gsd")
+    assert upper_layer(disks, "type:Al").tolist() == [False, True]
+    assert upper_layer(disks, "type:2").tolist() == [True, False]  # the second type, which has no such name
+
+
+def test_the_highest_disks_are_those_that_touch_something(read):
+    disks = read(XYZ, "a.xyz")
+    layer = upper_layer(disks, 2)
+    assert layer.tolist() == [True, False, True, False]
+    says = "--top 2 leaves out 1 of the highest disks, which touch nothing: 4"
+    assert layer_remark(disks, "2", layer) == says
+    both = upper_layer(disks, "y>1")
+    assert layer_remark(disks, "y>1", both) == "1 of the 2 disks of the upper layer touch nothing: 4"
+    every = upper_layer(disks, 4)
+    assert every.all()
+    assert "1 of the 4 disks" in layer_remark(disks, "4", every)
+
+
+def test_of_disks_that_are_not_at_rest_yet_the_highest_are_taken(read):
+    disks = read("x,y,radius\n" + "".join(f"{k},{2 + k},0.4\n" for k in range(4)) + "9,0.5,0.5\n")
+    assert upper_layer(disks, 1).tolist() == [False, False, False, True, False]
+
+
+def test_a_table_of_a_laboratory_as_a_command(faultgouge_here, tmp_path):
+    text = "# tracked\nx [mm];y [mm];radius [µm]\n1,0;0,499;500\n2,0;0,499;500\n1,5;1,363;500\n7,0;4,0;500\n"
+    (tmp_path / "lab.csv").write_text(text, encoding="utf-8")
+    options = ("--top", "1", "--kn", "2e5", "--fy", "3", "--relax", "--width", "2")
+    done = faultgouge_here("import", "lab.csv", *options, "-o", "lab.h5", code=None)
+    assert "lab.csv: lengths are in mm: give law and load in these units" in done.stderr
+    assert "--top 1 leaves out 1 of the highest disks, which touch nothing: 4" in done.stderr
