@@ -141,6 +141,7 @@ def test_cohesive_spheres_in_a_cone(tmp_path):
     assert len(found.contacts) > 100  # of pairs; the region hands out none
     assert found.contacts.normal_force.min() < 0  # cohesion
     assert found.operator_error < 1e-5
+    assert found.proof < 1e-5  # ten steps of Verlet, so that no error of the step is in it
     # in proportion to the time step, as LAMMPS takes dashpots at the half step; extrapolated to none
     runs = [compare_motion(lmp, found, 0.005, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
     assert runs[0].difference / runs[1].difference == pytest.approx(2, rel=0.1)
