@@ -1,5 +1,7 @@
 """The proof of a look by LAMMPS's own motion: what it refuses with which sentence, and what it takes."""
 
+import shutil
+
 import pytest
 from granular_packings import command, instance, start, with_law
 
@@ -29,9 +31,10 @@ run 60000
 
 @pytest.fixture(scope="module")
 def bed(tmp_path_factory):
-    """Spheres."""
-    lmp = at_rest(tmp_path_factory.mktemp("log") / "log.lammps", 3, "0.5")
-    yield lmp
+    """Spheres, and the file of their log."""
+    log = tmp_path_factory.mktemp("log") / "log.lammps"
+    lmp = at_rest(log, 3, "0.5")
+    yield lmp, log
     lmp.close()
 
 
@@ -43,12 +46,18 @@ def sliding(tmp_path_factory):
     lmp.close()
 
 
-def look(lmp, lines: str = "", run: int = 0):
-    """A look in a copy of the process, in which some lines were given and LAMMPS has run before."""
+def look(bed, folder, lines: str = "", run: int = 0):
+    """A look in a copy of the process, in which some lines were given and LAMMPS has run before.
+
+    The copy writes to no file that was open, so that its log goes on in another one.
+    """
     from faultgouge.pywrap import from_lammps
     from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
 
+    lmp, log = bed
+
     def work():
+        lmp.command(f'log "{shutil.copy(log, folder)}" append')
         command(lmp, lines)
         lmp.command(f"run {run} post no")
         return from_lammps(lmp)
@@ -73,11 +82,11 @@ def look(lmp, lines: str = "", run: int = 0):
         ("damping/cundall 0.3 0.3", "fix trap damping/cundall damps as the forces"),
     ],
 )
-def test_fixes_that_act_as_contacts_do_not_tell(bed, fix, says):
+def test_fixes_that_act_as_contacts_do_not_tell(bed, tmp_path, fix, says):
     from faultgouge.pywrap import SnapshotError
 
     with pytest.raises(SnapshotError, match=f"^LAMMPS's forces do not change as K says: .*{says}") as refusal:
-        look(bed, f"fix trap all {fix}", 60000)
+        look(bed, tmp_path, f"fix trap all {fix}", 60000)
     assert "\n" not in str(refusal.value)
 
 
@@ -89,20 +98,20 @@ def test_fixes_that_act_as_contacts_do_not_tell(bed, fix, says):
         ("propel/self velocity 0.01", "fix trap propel/self pushes particles along their velocities"),
     ],
 )
-def test_fixes_that_act_on_what_moves(bed, fix, says):
+def test_fixes_that_act_on_what_moves(bed, tmp_path, fix, says):
     from faultgouge.pywrap import SnapshotError
 
     with pytest.raises(SnapshotError, match=says):
-        look(bed, f"fix trap all {fix}")
+        look(bed, tmp_path, f"fix trap all {fix}")
 
 
 @pytest.mark.parametrize(
     "fix",
     ["addforce 0.01 0 0", "indent 1.0 sphere 0 0 100 1", "setforce NULL NULL NULL", "ave/time 1 1 1 c_thermo_temp"],
 )
-def test_fixes_without_effect_on_small_motion(bed, fix):
+def test_fixes_without_effect_on_small_motion(bed, tmp_path, fix):
     """Some of them were refused by their names before there was a proof."""
-    assert look(bed, f"fix trap all {fix}", 60000).proof < 1e-5
+    assert look(bed, tmp_path, f"fix trap all {fix}", 60000).proof < 1e-5
 
 
 def test_proof_is_kept(sliding, tmp_path):
@@ -169,32 +178,6 @@ run 60000
     with pytest.raises(SnapshotError, match=r"as K says: .*some are not in the log"):
         from_lammps(lmp)
     lmp.close()
-
-
-def test_log_of_another_instance(tmp_path):
-    """Two instances of one process with one log: the commands of the second are found for the first."""
-    from faultgouge.pywrap import SnapshotError, from_lammps
-
-    made = []
-    for kt in ("NULL", "2e3"):
-        lmp = instance(tmp_path / "log.lammps")
-        start(lmp, 3, 20)
-        command(lmp, f"""
-pair_style gran/hertz/history 3e3 {kt} 40 40 0.5 1
-pair_coeff * *
-fix floor all wall/gran hertz/history 3e3 {kt} 40 40 0.5 1 zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0.1 0 -1
-fix move all nve/sphere
-fix drag all viscous 1.5
-timestep 0.002
-run 60000
-""")  # fmt: skip
-        made.append(lmp)
-    with pytest.raises(SnapshotError, match=r"as K says: .*another run or instance|no log to read"):
-        from_lammps(made[0])
-    assert from_lammps(made[1]).proof < 1e-5
-    for lmp in made:
-        lmp.close()
 
 
 def test_bonds(tmp_path):
