@@ -66,7 +66,9 @@ def spectrum(
     ] = False,
     gain: Annotated[
         bool,
-        typer.Option("--gain", help="Also how much a stable packing amplifies its worst push; up to 150 disks."),
+        typer.Option(
+            "--gain", help="Also how much a stable packing amplifies its worst push; up to 300 disks or 150 spheres."
+        ),
     ] = False,
     rise: Annotated[
         bool, typer.Option("--rise", help="Also the motion while F_x rises slowly: drift and vibration over its rate.")
@@ -86,6 +88,8 @@ def spectrum(
     from faultgouge.analysis import spectrum as eigenvalues_of
     from faultgouge.analysis.progress import show_progress
 
+    if values and (gain or rise or verbose):
+        raise typer.BadParameter("--values computes nothing but eigenvalues: leave --gain, --rise and --verbose out")
     packing, assumed = stored_configuration(file, frame_at(file, frame, time))
     size = packing.configuration.coordinates
     if size > LARGE:
@@ -195,14 +199,17 @@ def _print_growing_motions(result: Spectrum, dissipative: bool, verbose: bool) -
 
 
 def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
-    """The transient gains of a stable packing; None if unstable, too large, or where it fails."""
+    """The transient gains of a stable packing; None, with the reason, if unstable, too large, or where it fails."""
     from faultgouge.analysis.motion.transient import MOST_DISKS, NoGainError, transient_gains
 
-    if packing.coordinates > 3 * MOST_DISKS:
+    most = 3 * MOST_DISKS
+    if packing.coordinates > most:
+        say(f"no gain: it is computed of up to {most} coordinates, and this packing has {packing.coordinates}")
         return None
     try:
         displacement, energy = transient_gains(packing)
-    except NoGainError:
+    except NoGainError as error:
+        say(f"no gain: {error}")
         return None
     except Exception as error:  # whatever it is: the eigenvalues are worth more
         reason = (str(error).splitlines() or ["no reason given"])[0]
