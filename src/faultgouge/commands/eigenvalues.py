@@ -91,6 +91,8 @@ def spectrum(
     if values and (gain or rise or verbose):
         raise typer.BadParameter("--values computes nothing but eigenvalues: leave --gain, --rise and --verbose out")
     packing, assumed = stored_configuration(file, frame_at(file, frame, time))
+    if rise and not packing.configuration.top.any():
+        raise typer.BadParameter(f"--rise: {file} has no upper layer that a load could push; leave it out")
     size = packing.configuration.coordinates
     if size > LARGE:
         # four matrices of doubles; 18000 coordinates took 10.2 GB
@@ -202,9 +204,9 @@ def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None, with the reason, if unstable, too large, or where it fails."""
     from faultgouge.analysis.motion.transient import MOST_DISKS, NoGainError, transient_gains
 
-    most = 3 * MOST_DISKS
-    if packing.coordinates > most:
-        say(f"no gain: it is computed of up to {most} coordinates, and this packing has {packing.coordinates}")
+    most, size = 3 * MOST_DISKS, packing.configuration.coordinates
+    if size > most:
+        say(f"no gain: it is computed of up to {most} coordinates, and this packing has {size}")
         return None
     try:
         displacement, energy = transient_gains(packing)
