@@ -26,7 +26,7 @@ from scipy.sparse import csr_array
 from ..arrays import Floats, Indices
 from ..configuration import Configuration, HasConfiguration
 from ..operators.damping import damping_matrix
-from ..operators.sliders import sliders_of
+from ..operators.sliders import sliders_of, with_sticking_contacts
 from ..operators.stiffness import stiffness_matrix
 from .eigenvalues import (
     SAFETY,
@@ -106,19 +106,19 @@ class Motion:
     damping: csr_array
 
     @classmethod
-    def of(cls, packing: HasConfiguration, *, sliding: bool = False, dissipation: bool = True) -> "Motion":
+    def of(cls, packing: HasConfiguration, *, sliding: bool | None = None, dissipation: bool = True) -> "Motion":
         """Assemble the operators.
 
         Parameters
         ----------
         packing : Configuration or Packing
             The equilibrium.
-        sliding : bool
-            Whether all contacts at Coulomb's bound slide on, in place of sticking.
+        sliding : bool, optional
+            Whether all contacts at Coulomb's bound slide on, or all stick; as the configuration says by default.
         dissipation : bool
             Whether dashpots and drag count.
         """
-        configuration = packing.configuration
+        configuration = packing.configuration if sliding is None else with_sticking_contacts(packing.configuration)
         k = stiffness_matrix(configuration)
         c = damping_matrix(configuration) if dissipation and configuration.damped else csr_array(k.shape)
         if sliding:

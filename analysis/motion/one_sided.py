@@ -98,7 +98,7 @@ class OneSidedSystem:
     @classmethod
     def of(cls, packing: HasConfiguration, share: float = STEP) -> "OneSidedSystem":
         """Assemble the equations, with the packing's own dashpots and drag."""
-        return cls(Motion.of(packing), share)
+        return cls(Motion.of(packing, sliding=False), share)
 
     @cached_property
     def step(self) -> float:

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, floats
 from ..configuration import Configuration, HasConfiguration
 from ..operators.asymmetry import asymmetry
+from ..operators.sliders import with_sticking_contacts
 from .eigenvalues import in_balance
 from .motion import Motion, Rates
 from .one_sided import OneSidedSystem
@@ -230,7 +231,9 @@ def stability(
     ValueError
         If the direction has another shape, or is "fx" of a packing without an upper layer.
     """
-    configuration = packing.configuration
+    configuration = with_sticking_contacts(packing.configuration)
+    if configuration is not packing.configuration:
+        spectrum_of_stiffness = None  # of contacts that slide
     direction = None if rise is None else _direction(configuration, rise)
     large = configuration.coordinates > LARGE
     found = spectrum(configuration) if spectrum_of_stiffness is None and not large else spectrum_of_stiffness

@@ -62,7 +62,7 @@ LOOKS = 12
 """Vectors that join the space, at the most."""
 
 MOST_DISKS = 300
-"""Disks up to which commands compute the gain unasked."""
+"""Disks up to which commands compute the gain."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,6 +67,15 @@ class Sliders:
         return len(self.contact)
 
 
+def with_sticking_contacts(configuration: Configuration) -> Configuration:
+    """The configuration whose one-sided contacts all stick, whatever is chosen for them."""
+    contacts = configuration.contacts
+    slides = contacts.sliding & ~contacts.one_sided
+    if np.array_equal(slides, contacts.sliding):
+        return configuration
+    return derive_frozen(configuration, contacts=derive_frozen(contacts, sliding=slides))
+
+
 def sliders_of(configuration: Configuration) -> Sliders:
     """The one-sided contacts of a configuration; see :class:`Sliders`."""
     which = np.flatnonzero(configuration.contacts.one_sided)

@@ -13,10 +13,12 @@ import fcntl
 import os
 import signal
 import stat
-from collections.abc import Callable
-from contextlib import suppress
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from multiprocessing import Pipe
-from typing import Any, TypeVar
+from multiprocessing.connection import Connection
+from typing import Any, NoReturn, TypeVar
 
 from mpi4py import MPI
 
@@ -71,30 +73,54 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
         With what went wrong in the copy.
     """
     here, there = Pipe(duplex=False)
-    this = os.getpid()
-    child = silent_copy(there.fileno())
-    if child == 0:
-        try:
-            signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process decides what Ctrl-C ends
-            end_with(this)
-            there.send(work())
-        except Exception as error:  # whatever it is, the parent says it
-            there.send(error if isinstance(error, SnapshotError) else SnapshotError(explain_error(error)))
-        finally:
-            os._exit(0)
-    there.close()
+    this, child = os.getpid(), 0
     try:
+        with _interrupts_wait():
+            child = silent_copy(there.fileno())
+            if child == 0:
+                _send_and_end(work, there, this)
+        there.close()
         found = here.recv()
     except EOFError:
         found = SnapshotError("LAMMPS ended while its packing was looked at; does the deck run on as it stands?")
     finally:
         here.close()
-        with suppress(ProcessLookupError):
-            os.kill(child, signal.SIGKILL)  # it has sent all that it has to say, unless there was an interrupt
-        os.waitpid(child, 0)
+        if child:
+            with suppress(ProcessLookupError):
+                os.kill(child, signal.SIGKILL)  # it has sent all that it has to say, unless there was an interrupt
+            os.waitpid(child, 0)
     if isinstance(found, SnapshotError):
         raise found
     return found
+
+
+def _send_and_end(work: Callable[[], Found], there: Connection, parent: int) -> NoReturn:
+    """The life of a copy: its work, and what it has found for the parent."""
+    try:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process decides what Ctrl-C ends
+        end_with(parent)
+        there.send(work())
+    except Exception as error:  # whatever it is, the parent says it
+        there.send(error if isinstance(error, SnapshotError) else SnapshotError(explain_error(error)))
+    finally:
+        os._exit(0)
+
+
+@contextmanager
+def _interrupts_wait() -> Iterator[None]:
+    """Let Ctrl-C wait: at a fork it would leave a copy that nobody ends, or let the copy go on as the program."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or before is None:
+        yield  # Ctrl-C goes to another thread, or is not Python's
+        return
+    came: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if came:
+            signal.raise_signal(signal.SIGINT)
 
 
 def quieten(lmp: Any, *, drag: bool = False) -> None:

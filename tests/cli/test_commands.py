@@ -223,6 +223,9 @@ def test_spectrum_calls_no_packing_stable_that_buckles_or_moves(faultgouge_here,
     assert "negative eigenvalue -1.50251247" in said["buckles"]
     assert "the packing moves: the residual force on a particle is" in said["moves"]
     assert "volume fraction" in said["stands"]
+    done = faultgouge_here("spectrum", "buckles.h5", "--gain", "--json")
+    assert json.loads(done.stdout)["transient_gain"] is None
+    assert "no gain: the packing is unstable" in done.stderr
 
 
 @pytest.mark.slow
@@ -431,6 +434,7 @@ def test_a_scene_that_cannot_be_run(refusal, tmp_path, command, change, code, sa
         ("spectrum no.h5", 2, "no.h5 does not exist"),
         ("spectrum scene.toml", 2, "scene.toml is not a readable HDF5 file"),
         ("spectrum no.disks", 2, "no.disks cannot be read"),
+        ("spectrum ramp.h5 --values --gain", 2, "--values computes nothing but eigenvalues"),
         ("onset scene.toml --modes 600", 2, "as in --modes 0:600"),
         ("onset scene.toml --modes 900:910", 2, "are no part of"),
         ("draw ramp.h5 -o p.bmp", 2, "a .png, a .svg or a .pdf"),

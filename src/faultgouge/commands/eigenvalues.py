@@ -67,7 +67,9 @@ def spectrum(
     ] = False,
     gain: Annotated[
         bool,
-        typer.Option("--gain", help="Also how much a stable packing amplifies its worst push; up to 150 disks."),
+        typer.Option(
+            "--gain", help="Also how much a stable packing amplifies its worst push; up to 300 disks or 150 spheres."
+        ),
     ] = False,
     rise: Annotated[
         bool, typer.Option("--rise", help="Also the motion while F_x rises slowly: drift and vibration over its rate.")
@@ -88,7 +90,11 @@ def spectrum(
     from faultgouge.analysis.arrays import derive_frozen
     from faultgouge.analysis.progress import show_progress
 
+    if values and (gain or rise or verbose):
+        raise typer.BadParameter("--values computes nothing but eigenvalues: leave --gain, --rise and --verbose out")
     stored, assumed = stored_configuration(file, frame_at(file, frame, time))
+    if rise and not stored.configuration.top.any():
+        raise typer.BadParameter(f"--rise: {file} has no upper layer that a load could push; leave it out")
     spring = spring_in(file)
     packing = derive_frozen(stored.configuration, spring=spring) if spring else stored
     size = packing.configuration.coordinates
@@ -202,14 +208,17 @@ def _print_growing_motions(result: Spectrum, dissipative: bool, verbose: bool) -
 
 
 def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
-    """The transient gains of a stable packing; None if unstable, too large, or where it fails."""
+    """The transient gains of a stable packing; None, with the reason, if unstable, too large, or where it fails."""
     from faultgouge.analysis.motion.transient import MOST_DISKS, NoGainError, transient_gains
 
-    if packing.coordinates > 3 * MOST_DISKS:
+    most, size = 3 * MOST_DISKS, packing.configuration.coordinates
+    if size > most:
+        say(f"no gain: it is computed of up to {most} coordinates, and this packing has {size}")
         return None
     try:
         displacement, energy = transient_gains(packing)
-    except NoGainError:
+    except NoGainError as error:
+        say(f"no gain: {error}")
         return None
     except Exception as error:  # whatever it is: the eigenvalues are worth more
         reason = (str(error).splitlines() or ["no reason given"])[0]

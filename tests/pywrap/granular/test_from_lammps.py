@@ -548,7 +548,25 @@ command(lmp, "fix load all gravity 1.0 vector 0.1 0 -1\\nfix move all nve/sphere
 given = ["pair_style gran/hertz/history 3e3 NULL 100 100 3.0 1", "fix move all nve/sphere",
          "fix floor all wall/gran hertz/history 3e3 9e2 100 100 3.0 1 zplane 0 NULL contacts"]
 found = from_lammps(lmp, given, balance=1e9)
-threading.Timer(1.0, os.killpg, (os.getpgid(0), signal.SIGINT)).start()
+fork = os.fork
+
+
+def ctrl_c():
+    os.killpg(os.getpgid(0), signal.SIGINT)
+
+
+def fork_before_ctrl_c():
+    child = fork()
+    if child:
+        ctrl_c()
+        time.sleep(0.1)
+    return child
+
+
+if {at_the_fork}:
+    os.fork = fork_before_ctrl_c
+else:
+    threading.Timer(1.0, ctrl_c).start()
 try:
     compare_motion(lmp, found, 1e6, 1e-5, timestep=1e-3)
 except KeyboardInterrupt:
@@ -559,10 +577,11 @@ except KeyboardInterrupt:
 """
 
 
-def test_ctrl_c_ends_the_copy(tmp_path):
+@pytest.mark.parametrize("at_the_fork", [False, True])
+def test_ctrl_c_ends_the_copy(tmp_path, at_the_fork):
     """A copy that would run for days; Ctrl-C of a terminal goes to the program and to its copies."""
     from pathlib import Path
 
-    words = [sys.executable, "-c", INTERRUPTED.format(tests=str(Path(__file__).parent))]
-    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=300, start_new_session=True)
+    words = [sys.executable, "-c", INTERRUPTED.format(tests=str(Path(__file__).parent), at_the_fork=at_the_fork)]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60, start_new_session=True)
     assert done.stdout.split("\n")[-2:] == ["no copy is left", ""], done.stderr
