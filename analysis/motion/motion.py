@@ -25,7 +25,7 @@ from scipy.sparse import csr_array
 
 from ..arrays import Floats, Indices
 from ..configuration import Configuration, HasConfiguration
-from ..operators.linearised_contacts import stiffness_and_damping
+from ..operators.damping import damping_matrix
 from ..operators.sliders import sliders_of
 from ..operators.stiffness import stiffness_matrix
 from .eigenvalues import (
@@ -47,8 +47,8 @@ SLICED = 2000
 """Coordinates beyond which eigenvalues without dissipation are taken in slices, for which `spectrum` is."""
 
 DENSE = 600
-"""Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, a second; of more those next to the
-imaginary axis and the fastest growing ones."""
+"""Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, a second; of more those next to
+the imaginary axis and the fastest growing ones."""
 
 DISCS_UP_TO = 6000
 """Coordinates up to which the slowest decay is looked for with dissipation, too: one or two minutes."""
@@ -135,11 +135,8 @@ class Motion:
             Whether dashpots and drag count.
         """
         configuration = packing.configuration
-        if dissipation and configuration.damped:
-            k, c = stiffness_and_damping(configuration)
-        else:
-            k = stiffness_matrix(configuration)
-            c = csr_array(k.shape)
+        k = stiffness_matrix(configuration)
+        c = damping_matrix(configuration) if dissipation and configuration.damped else csr_array(k.shape)
         if sliding:
             sliders = sliders_of(configuration)
             k = csr_array(k + sliders.force @ sliders.excess)
@@ -148,7 +145,7 @@ class Motion:
         a, g = (mass_weighted(matrix, configuration) for matrix in (k, c))
         active = active_coordinates(a)
         root = np.sqrt(configuration.coordinate_mass[active])
-        return cls(configuration, active, root, _restricted(a, active), _restricted(g, active))
+        return cls(configuration, active, root, a[active][:, active], g[active][:, active])
 
     @property
     def dissipative(self) -> bool:
@@ -218,14 +215,3 @@ class Motion:
         order = np.flatnonzero((values.imag >= 0) & ~free)
         order = order[np.argsort(-values[order].real, kind="stable")]
         return Rates(values[order], grows[order], int(free.sum()) // 2)
-
-
-def _restricted(matrix: csr_array, active: Indices) -> csr_array:
-    """The rows and columns of some coordinates, in ascending order."""
-    moves = np.zeros(matrix.shape[0], np.bool_)
-    moves[active] = True
-    number = np.cumsum(moves, dtype=matrix.indices.dtype) - 1
-    kept = moves[matrix.indices] & np.repeat(moves, np.diff(matrix.indptr))
-    before = np.concatenate([[0], np.cumsum(kept)]).astype(matrix.indptr.dtype)
-    indptr = np.append(before[matrix.indptr[:-1][active]], before[-1])
-    return csr_array((matrix.data[kept], number[matrix.indices[kept]], indptr), shape=(len(active), len(active)))

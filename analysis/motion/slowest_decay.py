@@ -21,13 +21,13 @@ from ..factors.sparse_lu import general_lu
 from ..progress import report_progress
 
 NEAREST = 60
-"""Eigenvalues of a disc: 40 cost as much for the same length of the axis."""
+"""Eigenvalues of a disc."""
 
 DISCS = 40
 """Discs at the most: about a minute for 1,000 spheres."""
 
 FIRST = 0.02
-"""Middle of the first disc, as a share of the largest frequency; not zero, where motions without a force have theirs."""
+"""Middle of the first disc, as a share of the largest frequency; not zero, where motions without a force are."""
 
 AHEAD = 0.8
 """Distance of a new middle from what is covered, in units of the last disc's reach, as radii change."""

@@ -71,16 +71,6 @@ def assembled_stiffness(configuration: Configuration, parting: ArrayLike = 0.5) 
 
 def assembled_damping(configuration: Configuration) -> csr_array:
     """C = -dF/d(dq/dt) of a configuration; see :func:`~faultgouge.analysis.damping_matrix`."""
-    return _damping(configuration, _Blocks.of(configuration))
-
-
-def stiffness_and_damping(configuration: Configuration) -> tuple[csr_array, csr_array]:
-    """K and C of a configuration, whose blocks have the same places."""
-    blocks = _Blocks.of(configuration)
-    return blocks.matrix(configuration.contacts), _damping(configuration, blocks)
-
-
-def _damping(configuration: Configuration, blocks: "_Blocks") -> csr_array:
     c = configuration.contacts
     none, still = np.zeros(len(c)), np.zeros((len(c), 3))
     # where no normal rotates the tangential force is but the direction in which a contact slides
@@ -88,7 +78,7 @@ def _damping(configuration: Configuration, blocks: "_Blocks") -> csr_array:
         c, normal_force=none, closing=still, parting=still, distance=np.full(len(c), np.inf), lever_slope=none,
         normal_stiffness=c.normal_dashpot, tangential_stiffness=c.tangential_dashpot,
     )  # fmt: skip
-    matrix = blocks.matrix(dashpots)
+    matrix = _Blocks.of(configuration).matrix(dashpots)
     if not configuration.drag_rate:
         return matrix
     return csr_array(matrix + diags_array(configuration.drag_rate * configuration.coordinate_mass))
@@ -123,7 +113,9 @@ class _Blocks:
         count, axes, c = len(configuration), configuration.axes, configuration.contacts
         i, j, every = c.i[~c.wall], c.j[~c.wall], np.arange(count)
         # two particles that touch through two images have two contacts, which are added
-        pairs, place = np.unique(np.concatenate([every * (count + 1), i * count + j, j * count + i]), return_inverse=True)
+        pairs, place = np.unique(
+            np.concatenate([every * (count + 1), i * count + j, j * count + i]), return_inverse=True
+        )
         row, column = np.divmod(pairs, count)
         length = np.bincount(row, minlength=count)
         before = np.concatenate([[0], np.cumsum(length)])
