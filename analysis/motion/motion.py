@@ -40,14 +40,30 @@ from .eigenvalues import (
     zero_uncertainty,
 )
 from .fastest_growing import fastest_growing
+from .slowest_decay import slowest_decay
 from .state_space import StateSpace
 
 SLICED = 2000
 """Coordinates beyond which eigenvalues without dissipation are taken in slices, for which `spectrum` is."""
 
 DENSE = 600
-"""Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, five seconds; of more the fastest
-growing ones."""
+"""Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, a second; of more those next to
+the imaginary axis and the fastest growing ones."""
+
+DISCS_UP_TO = 6000
+"""Coordinates up to which the slowest decay is looked for with dissipation, too: one or two minutes."""
+
+PERIODS = 100.0
+"""Periods of the fastest motion in which growth is looked for, where the slowest decay is not known for certain."""
+
+TIMES = (10.0, 300.0)
+"""The fewest and the most of them, where discs cover the imaginary axis."""
+
+SEEN = 3.5
+"""Rate times t from which growth is seen, see :mod:`~faultgouge.analysis.motion.fastest_growing`."""
+
+CERTAIN = 1e-7
+"""Re s > 0 of discs is believed from this share of the largest frequency on: it is found to some 1e-9 of that."""
 
 FREE = 1e-6
 """Eigenvalues s below this share of the largest are those of motions that no force opposes: rounding leaves sqrt(u) of
@@ -148,7 +164,7 @@ class Motion:
         if not size:
             return Rates(np.zeros(0, complex), np.zeros(0, bool), 0)
         if size > (DENSE if self.dissipative else SLICED):
-            return self._fastest()
+            return self._next_to_the_axis() if self.dissipative and size <= DISCS_UP_TO else self._fastest()
         return self._damped_rates() if self.dissipative else self._undamped_rates()
 
     def _fastest(self) -> Rates:
@@ -157,6 +173,20 @@ class Motion:
         values = found.values if self.dissipative else 1j * np.sqrt(found.values.astype(complex))
         values = np.where(values.real < 0, -values, values)
         return Rates(values, np.ones(len(values), bool), 0, found.limit)
+
+    def _next_to_the_axis(self) -> Rates:
+        """Of the motions that decay most slowly or grow slowly, and of those that grow fast."""
+        slow = slowest_decay(self.stiffness, self.damping)
+        frequency = np.sqrt(abs(self.stiffness).sum(axis=1).max())
+        # growth is looked for from where the discs end
+        partly = np.isfinite(slow.covered)
+        periods = PERIODS if partly else float(np.clip(SEEN * frequency / (4 * np.pi * slow.width), *TIMES))
+        fast = fastest_growing(self.stiffness, self.damping, periods=(min(TIMES[0], periods), periods))
+        new = [value for value in fast.values if np.abs(slow.values - value).min(initial=np.inf) > CERTAIN * frequency]
+        values = np.concatenate([slow.values, np.array(new, complex)])
+        values = values[np.argsort(-values.real, kind="stable")]
+        searched = 0.0 if not partly and fast.limit <= 2 * slow.width else fast.limit
+        return Rates(values, values.real > CERTAIN * frequency, slow.free, searched)
 
     def _undamped_rates(self) -> Rates:
         values, left, right = all_modes(self.stiffness)

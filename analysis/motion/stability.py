@@ -137,12 +137,15 @@ class Stability:
                 f"{self.one_sided['amplification']:.3g} times the mean square velocity of the push (followed for t = "
                 f"{self.one_sided['time']:.4g})"
             )
-        if self.dissipative and self.growth_rate < 0:
-            return f"stable: every motion decays, the slowest with D as exp({self.growth_rate:.6g} t){free}"
+        slowest = f"the slowest with D as exp({self.growth_rate:.6g} t){free}"
         if self.searched:
+            decay = f"of the motions that were found all decay, {slowest}; " if self.growth_rate < 0 else ""
             return (
-                f"stable: no motion was found to grow; growth of D below exp({self.searched:.2g} t) was not looked for"
+                f"stable: no motion was found to grow; {decay}growth of D below exp({self.searched:.2g} t) was not "
+                "looked for everywhere"
             )
+        if self.dissipative and self.growth_rate < 0:
+            return f"stable: every motion decays, {slowest}"
         return f"stable: no motion grows{free}"
 
     @property

@@ -29,11 +29,13 @@ Dashpots follow from the same formulas with velocities in place of displacements
 law in three dimensions.)
 """
 
-import numpy as np
-from numpy.typing import ArrayLike
-from scipy.sparse import coo_array, csr_array, diags_array
+from dataclasses import dataclass
 
-from ..arrays import Floats, derive_frozen
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array, diags_array
+
+from ..arrays import Floats, Indices, derive_frozen
 from ..configuration import Configuration, LinearisedContacts
 
 
@@ -63,44 +65,8 @@ def contact_derivatives(contacts: LinearisedContacts, parting: ArrayLike = 0.5) 
 
 
 def assembled_stiffness(configuration: Configuration, parting: ArrayLike = 0.5) -> csr_array:
-    """K = -dF/dq of a configuration; see :func:`~faultgouge.analysis.stiffness_matrix`.
-
-    Rows (F, T/R) and columns (translation, R theta) of both partners, from the blocks of each contact.
-    """
-    count, c, pair = len(configuration), configuration.contacts, ~configuration.contacts.wall
-    force, torque, growth = contact_derivatives(c, parting)
-    partners = np.stack([c.i, np.where(pair, c.j, 0)])
-    radius = configuration.radius[partners]
-    rolling, lever = c.slip_arm.T / radius, c.lever_arm.T / radius
-    takes_part = configuration.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
-    # axes first: all that follows walks along contacts
-    force, torque, growth = (np.ascontiguousarray(np.moveaxis(each, 0, -1)) for each in (force, torque, growth))
-    blocks = np.empty((2, 2, 6, 6, len(c)))
-    for p, of in enumerate((-1.0, 1.0)):  # the partner whose force changes, and the sign of -F
-        for q, by in enumerate((1.0, -1.0)):  # the partner that moves
-            both = (takes_part[p] & takes_part[q]).astype(np.float64)
-            blocks[p, q, :3, :3] = (of * by * both) * force[0]
-            blocks[p, q, :3, 3:] = (of * both * rolling[q]) * force[1]
-            # -T/R = (l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
-            blocks[p, q, 3:, :3] = (by * both * lever[p]) * torque[0] - (by * both * c.lever_slope / radius[p]) * growth
-            blocks[p, q, 3:, 3:] = (both * lever[p] * rolling[q]) * torque[1]
-    if configuration.dimension == 2:
-        in_plane = np.array([0, 1, 5])
-        blocks = blocks[:, :, in_plane[:, None], in_plane]
-    diagonal = np.zeros((*blocks.shape[2:4], count))
-    for row, column in np.ndindex(*diagonal.shape[:2]):
-        for p in (0, 1):
-            diagonal[row, column] += np.bincount(partners[p], blocks[p, p, row, column], count)
-    first, second = partners[:, pair].astype(np.int32)  # half the memory of what the sparse format sorts
-    every, axis = np.arange(count, dtype=np.int32), np.arange(0, len(diagonal) * count, count, dtype=np.int32)
-    values = np.concatenate([diagonal, blocks[0, 1][..., pair], blocks[1, 0][..., pair]], axis=2)
-    rows = axis[:, None, None] + np.concatenate([every, first, second])
-    columns = axis[:, None] + np.concatenate([every, second, first])
-    where = tuple(np.broadcast_to(index, values.shape).ravel() for index in (rows, columns))
-    # two particles that touch through two images have two contacts, which are added
-    matrix = coo_array((values.ravel(), where), shape=(configuration.coordinates, configuration.coordinates)).tocsr()
-    matrix.eliminate_zeros()
-    return matrix
+    """K = -dF/dq of a configuration; see :func:`~faultgouge.analysis.stiffness_matrix`."""
+    return _Blocks.of(configuration).matrix(configuration.contacts, parting)
 
 
 def assembled_damping(configuration: Configuration) -> csr_array:
@@ -112,10 +78,99 @@ def assembled_damping(configuration: Configuration) -> csr_array:
         c, normal_force=none, closing=still, parting=still, distance=np.full(len(c), np.inf), lever_slope=none,
         normal_stiffness=c.normal_dashpot, tangential_stiffness=c.tangential_dashpot,
     )  # fmt: skip
-    matrix = assembled_stiffness(derive_frozen(configuration, contacts=dashpots))
+    matrix = _Blocks.of(configuration).matrix(dashpots)
     if not configuration.drag_rate:
         return matrix
     return csr_array(matrix + diags_array(configuration.drag_rate * configuration.coordinate_mass))
+
+
+@dataclass(frozen=True, eq=False)
+class _Blocks:
+    """Where the blocks of the contacts are in a matrix of all coordinates: one for each particle, and two for each pair
+    of particles that touch.
+
+    Attributes
+    ----------
+    configuration : Configuration
+        Whose particles they are.
+    place : ndarray of int, shape (N + 2P,)
+        Which block of the matrix has the diagonal of each particle, and (i, j) and (j, i) of the P contacts of pairs.
+    order : ndarray of int, shape (axes B,)
+        Where the entries (axis, block) are in one axis of the rows.
+    indices, indptr : ndarray of int32
+        Columns and rows of the matrix, as in CSR.
+    """
+
+    configuration: Configuration
+    place: Indices
+    order: Indices
+    indices: NDArray[np.int32]
+    indptr: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, configuration: Configuration) -> "_Blocks":
+        """Sort the pairs of particles that have a block."""
+        count, axes, c = len(configuration), configuration.axes, configuration.contacts
+        i, j, every = c.i[~c.wall], c.j[~c.wall], np.arange(count)
+        # two particles that touch through two images have two contacts, which are added
+        pairs, place = np.unique(
+            np.concatenate([every * (count + 1), i * count + j, j * count + i]), return_inverse=True
+        )
+        row, column = np.divmod(pairs, count)
+        length = np.bincount(row, minlength=count)
+        before = np.concatenate([[0], np.cumsum(length)])
+        # a row has the columns of all partners along x, then those along y, ...
+        order = axes * before[row] + np.arange(len(pairs)) - before[row] + np.arange(axes)[:, None] * length[row]
+        indices = np.empty(order.size, np.int32)
+        indices[order] = column + count * np.arange(axes)[:, None]
+        indptr = np.concatenate([[0], np.cumsum(np.tile(axes * length, axes))]).astype(np.int32)
+        return cls(configuration, place, order.ravel(), np.tile(indices, axes), indptr)
+
+    def matrix(self, contacts: LinearisedContacts, parting: ArrayLike = 0.5) -> csr_array:
+        """-dF/dq of contacts of the same particles.
+
+        Rows (F, T/R) and columns (translation, R theta) of both partners, from the blocks of each contact.
+        """
+        diagonal, off_diagonal = self._numbers(contacts, parting)
+        axes, count = self.configuration.axes, self.configuration.coordinates
+        data = np.empty((axes, len(self.order)))
+        blocks = len(self.order) // axes
+        for row in range(axes):
+            numbers = np.concatenate([diagonal[row], off_diagonal[row]], axis=1)
+            data[row, self.order] = np.concatenate([np.bincount(self.place, each, blocks) for each in numbers])
+        matrix = csr_array((data.ravel(), self.indices.copy(), self.indptr.copy()), shape=(count, count))
+        matrix.has_canonical_format = True
+        matrix.eliminate_zeros()
+        return matrix
+
+    def _numbers(self, c: LinearisedContacts, parting: ArrayLike) -> tuple[Floats, Floats]:
+        """The diagonal blocks, shape (axes, axes, N), and (i, j) and (j, i) of contacts of pairs, (axes, axes, 2P)."""
+        configuration, pair = self.configuration, ~c.wall
+        force, torque, growth = contact_derivatives(c, parting)
+        partners = np.stack([c.i, np.where(pair, c.j, 0)])
+        radius = configuration.radius[partners]
+        rolling, lever = c.slip_arm.T / radius, c.lever_arm.T / radius
+        takes_part = configuration.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
+        # axes first: all that follows walks along contacts
+        force, torque, growth = (np.ascontiguousarray(np.moveaxis(each, 0, -1)) for each in (force, torque, growth))
+        blocks = np.empty((2, 2, 6, 6, len(c)))
+        for p, of in enumerate((-1.0, 1.0)):  # the partner whose force changes, and the sign of -F
+            for q, by in enumerate((1.0, -1.0)):  # the partner that moves
+                both = (takes_part[p] & takes_part[q]).astype(np.float64)
+                blocks[p, q, :3, :3] = (of * by * both) * force[0]
+                blocks[p, q, :3, 3:] = (of * both * rolling[q]) * force[1]
+                # -T/R = (l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
+                turning = (by * both * lever[p]) * torque[0]
+                blocks[p, q, 3:, :3] = turning - (by * both * c.lever_slope / radius[p]) * growth
+                blocks[p, q, 3:, 3:] = (both * lever[p] * rolling[q]) * torque[1]
+        if configuration.dimension == 2:
+            in_plane = np.array([0, 1, 5])
+            blocks = blocks[:, :, in_plane[:, None], in_plane]
+        diagonal = np.zeros((*blocks.shape[2:4], len(configuration)))
+        for row, column in np.ndindex(*diagonal.shape[:2]):
+            for p in (0, 1):
+                diagonal[row, column] += np.bincount(partners[p], blocks[p, p, row, column], len(configuration))
+        return diagonal, np.concatenate([blocks[0, 1][..., pair], blocks[1, 0][..., pair]], axis=2)
 
 
 def rescaling_operators(configuration: Configuration) -> tuple[csr_array, csr_array]:

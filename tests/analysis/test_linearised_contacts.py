@@ -413,3 +413,19 @@ def test_dashpots_of_given_operators_count(d):
     assert float(stable_timestep(given)) == pytest.approx(float(stable_timestep(made)), rel=1e-9)
     assert largest_damping_rate(given) == pytest.approx(largest_damping_rate(made), rel=1e-9)
     assert largest_damping_rate(derive_frozen(made, contacts=bare)) == 0.0
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_k_and_c_are_sums_over_contacts(d):
+    """Two particles may touch through two images, and one of them may be fixed."""
+    bed = make(d)
+    c = bed.contacts
+    twice = c.chosen(np.append(np.arange(len(c)), [3, 0]))
+    bed = derive_frozen(bed, contacts=twice, free=np.arange(len(bed)) != 2)
+    for operator in (stiffness_matrix, damping_matrix):
+        matrix = operator(bed)
+        assert matrix.has_canonical_format
+        assert np.all(matrix.data != 0)
+        each = [operator(derive_frozen(bed, contacts=twice.chosen([k]))).toarray() for k in range(len(twice))]
+        # roundings of a dozen terms
+        np.testing.assert_allclose(matrix.toarray(), np.sum(each, axis=0), rtol=0, atol=1e-14 * np.abs(each).max())
