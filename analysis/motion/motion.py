@@ -46,15 +46,18 @@ from .state_space import StateSpace
 SLICED = 2000
 """Coordinates beyond which eigenvalues without dissipation are taken in slices, for which `spectrum` is."""
 
-DENSE = 600
-"""Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, a second; of more those next to
-the imaginary axis and the fastest growing ones."""
+DENSE = 1000
+"""Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, some seconds; of more those next
+to the imaginary axis and the fastest growing ones."""
 
 DISCS_UP_TO = 6000
 """Coordinates up to which the slowest decay is looked for with dissipation, too: one or two minutes."""
 
 PERIODS = 100.0
 """Periods of the fastest motion in which growth is looked for, where the slowest decay is not known for certain."""
+
+PERIODS_OF_LARGE = (10.0, 30.0)
+"""The same of packings of more coordinates than that: half a minute for 70,000."""
 
 TIMES = (10.0, 300.0)
 """The fewest and the most of them, where discs cover the imaginary axis."""
@@ -169,7 +172,7 @@ class Motion:
 
     def _fastest(self) -> Rates:
         """Of motions that surely grow; the others are not known."""
-        found = fastest_growing(self.stiffness, self.damping if self.dissipative else None)
+        found = fastest_growing(self.stiffness, self.damping if self.dissipative else None, periods=PERIODS_OF_LARGE)
         values = found.values if self.dissipative else 1j * np.sqrt(found.values.astype(complex))
         values = np.where(values.real < 0, -values, values)
         return Rates(values, np.ones(len(values), bool), 0, found.limit)
