@@ -39,6 +39,9 @@ forces; what is out of balance by the share e of the mean contact force adds som
 wrong stiffness of one contact in a hundred gives 1e-2 or more. An eigenvalue of K far below the largest may still be
 wrong by this share of the largest."""
 
+CLOSE = 0.99
+"""Share of Coulomb's bound from which on a contact of a packing that creeps may slide: dashpots bear the rest."""
+
 OTHER = 1e-6
 """Stiffness that is none of contacts, as a share of K's mean diagonal, from which on a packing is refused: far below
 the smallest eigenvalues, some 1e-4 of the largest, and far above rounding, 1e-11 and less."""
@@ -126,6 +129,13 @@ def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extr
         raise NotProvedError(f"{says}; {' and '.join(causes)}.")
     if configuration.operators == "differences":
         raise SnapshotError(f"{says}, though K and C are differences of these forces: do they depend on the time?")
+    contacts = configuration.contacts
+    close = np.count_nonzero((configuration.mobilised > CLOSE) & ~contacts.at_bound)
+    if close:
+        raise SnapshotError(
+            f"{says}; {close} contacts are just below Coulomb's bound and may be sliding while the packing creeps: run on "
+            f"with drag until it rests; or the commands are not those of the instance: {GIVE_LINES}."
+        )
     raise SnapshotError(
         f"{says}; the commands are those of another run or instance, or some are not in the log (echo none, a full "
         f"disk), or a restart has lost histories of contacts: {GIVE_LINES}, as they hold now."
