@@ -133,8 +133,8 @@ def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extr
     close = np.count_nonzero((configuration.mobilised > CLOSE) & ~contacts.at_bound)
     if close:
         raise SnapshotError(
-            f"{says}; {close} contacts are just below Coulomb's bound and may be sliding while the packing creeps: run on "
-            f"with drag until it rests; or the commands are not those of the instance: {GIVE_LINES}."
+            f"{says}; {close} contacts are just below Coulomb's bound and may be sliding while the packing creeps: run "
+            f"on with drag until it rests; or the commands are not those of the instance: {GIVE_LINES}."
         )
     raise SnapshotError(
         f"{says}; the commands are those of another run or instance, or some are not in the log (echo none, a full "
