@@ -8,7 +8,8 @@ motion has not settled. The time is `CHUNK` stable time steps as often as needed
 Under a load that rises at a constant rate the motion is proportional to the rate. Its *drift* is the mean velocity of
 each particle over a window, its *vibration* what is left: root mean squares over particles and axes. A load that begins
 to rise makes a packing vibrate that would follow a load which always rose, for as long as its dashpots need. So a drag
-takes this vibration away at first, and fades out; what vibrates later sustains itself.
+takes this vibration away at first, and fades out; what vibrates later sustains itself. Vibration may grow slowly from
+next to nothing, so that no packing is said to follow the load before the whole time is over.
 """
 
 from typing import Any
@@ -73,7 +74,7 @@ def _chunks(system: OneSidedSystem, columns: int, time: float | None) -> tuple[f
     """Time of a chunk, and how many there are at most."""
     chunk = CHUNK * system.step / system.share
     if time is not None:
-        return time / 8, 8
+        return time / 16, 16
     entries = (system.motion.stiffness.nnz + system.motion.damping.nnz) * columns
     return chunk, int(np.clip(WORK / (entries * chunk / system.step), 4, 40))
 
@@ -210,24 +211,34 @@ def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = 
         mean = (system.displacement(state.z)[..., 0] - start) / chunk
         windows.append((_root_mean(mean**2), _root_mean(np.maximum(squares - mean**2, 0.0))))
         report_progress(f"under the rising load: t = {state.time:.4g}, vibration {windows[-1][1]:.3g}")
-        if time is None and number >= 2 * FADE + 3 and _steady(windows[FADE:]):
+        if time is None and _vibrates(windows[FADE:]):
             break
     after = windows[FADE:]
     last = np.array(after[-(len(after) // 4 or 1) :])
     drift, vibration = np.sqrt(np.mean(last**2, axis=0)).tolist()
-    return {"drift": drift, "vibration": vibration, "time": state.time, "steady": _steady(after)}
+    steady = _vibrates(after) or _vanishes(after)
+    return {"drift": drift, "vibration": vibration, "time": state.time, "steady": steady}
 
 
-def _steady(windows: list[tuple[float, float]]) -> bool:
-    """Whether the vibrations of the third and of the last quarter agree, or vanish beside the drift and do not grow."""
+def _vibrates(windows: list[tuple[float, float]]) -> bool:
+    """Whether the vibrations of the third and of the last quarter agree, and are more than what a start leaves."""
+    before, after = _last_quarters(windows)
+    return bool(abs(after[1] - before[1]) <= WINDOWS * after[1] and after[1] > VANISHES * after[0])
+
+
+def _vanishes(windows: list[tuple[float, float]]) -> bool:
+    """Whether there is next to no vibration, and none that grows: windows of so little are uneven."""
+    before, after = _last_quarters(windows)
+    return bool(after[1] <= VANISHES * after[0] and after[1] <= 2 * before[1])
+
+
+def _last_quarters(windows: list[tuple[float, float]]) -> tuple[Floats, Floats]:
+    """Mean drift and vibration of the third and of the last quarter, of two windows at least; otherwise not numbers."""
     quarter = len(windows) // 4
-    if not quarter:
-        return False
-    before, after = (
-        np.mean(np.array(windows)[part], axis=0) for part in (slice(-2 * quarter, -quarter), slice(-quarter, None))
-    )
-    vanishes = max(after[1], before[1]) < VANISHES * after[0] and after[1] <= before[1]
-    return bool(abs(after[1] - before[1]) <= WINDOWS * after[1] or vanishes)
+    if quarter < 2:
+        return np.full(2, np.nan), np.full(2, np.nan)
+    third, fourth = windows[-2 * quarter : -quarter], windows[-quarter:]
+    return np.mean(third, axis=0), np.mean(fourth, axis=0)
 
 
 def _root_mean(squares: Floats) -> float:

@@ -49,9 +49,9 @@ COMPARED = (0.2, 0.9)
 """F_x/F_y and restitution of the packings that LAMMPS integrates."""
 
 RATES = (3e-4, 3e-5, 3e-6)
-"""Rates of the load in LAMMPS, force / time: over the 30 units of time of a run the load rises by 1e-2 at the most."""
+"""Rates of the load in LAMMPS, force / time: over the 60 units of time of a run the load rises by 2e-2 at the most."""
 
-WINDOWS, STAGES, LOOKS = 12, 40, 400
+WINDOWS, STAGES, LOOKS = 24, 40, 400
 """Windows of a run, stages in which the drag fades, and looks at velocities in each of the last two windows."""
 
 POURED_LAWS = ("granular hertz, mindlin/force", "granular hertz, mindlin_rescale/force")
