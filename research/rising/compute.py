@@ -7,7 +7,7 @@ under a load that rises.
 **Which packings.** *Ramps*: layers of 100 disks (k_n = 2e5, F_y = 3, mu = 1) that settle without friction and are then
 loaded in increments of 1e-3 F_y, either with the slider from the beginning (law "coulomb") or with the smoothed law
 ("total"), at 0.1, 0.2 and 0.3 F_y, with dashpots of the restitutions 0.9 and 0.97 (C_T = 2/7 C_N). *Poured*: layers of
-50 spheres under LAMMPS's own laws on a slope of 0.25, with two stiffnesses and dashpots of one restitution.
+50 spheres under LAMMPS's own laws on slopes of 0.2 and 0.3, with two stiffnesses and dashpots of one restitution.
 
 **The rule.** Packings are those of the seeds 1, 2, 3, ... in this order, all of them, with all that is asked of one
 seed before the next; the number of seeds is what the time allowed.
@@ -21,6 +21,7 @@ import json
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -58,7 +59,7 @@ POURED_LAWS = ("granular hertz, mindlin/force", "granular hertz, mindlin_rescale
 STIFFNESSES = (KN, KN / 10**1.5)
 """Overlaps go as k_n^(-2/3): some 1e-3 and 1e-2 of a diameter. Dashpots go as k_n^(2/3), with one restitution."""
 
-SLOPE, POURED_SEEDS = 0.25, 5
+SLOPES, POURED_SEEDS = (0.2, 0.3), 5
 
 
 def layers(seed: int) -> Iterator[dict[str, Any]]:
@@ -143,13 +144,13 @@ def rise_in_lammps(packing: Packing, rate: float) -> dict[str, float]:
     return {"drift": float(drift), "vibration": float(vibration)}
 
 
-def poured(law: str, kn: float, seed: int) -> dict[str, Any]:
+def poured(law: str, kn: float, slope: float, seed: int) -> dict[str, Any]:
     """The row of one packing of spheres."""
     begin = time.process_time()
-    key = {"law": law, "kn": kn, "seed": seed}
+    key = {"law": law, "kn": kn, "slope": slope, "seed": seed}
     with TemporaryDirectory() as folder:
         lmp = pour(law, 3, 50, MU, seed, Path(folder) / "log", GAMMA * (kn / KN) ** (2 / 3), kn)
-        lmp.command(f"variable slope equal {SLOPE}")
+        lmp.command(f"variable slope equal {slope}")
         found = rest(lmp)
         lmp.close()
     row = {"rests": False} if found is None else {"rests": True} | verdict(stability(found), found)
@@ -167,13 +168,13 @@ def compute_layers(table: Path, watch: Any = print) -> None:
 
 def compute_poured(table: Path, watch: Any = print) -> None:
     """Add the packings of spheres that a table lacks, seed by seed."""
-    known = {(row["law"], row["kn"], row["seed"]) for row in read(table)}
+    names = ("law", "kn", "slope", "seed")
+    known = {tuple(row[name] for name in names) for row in read(table)}
     for seed in range(1, POURED_SEEDS + 1):
-        for kn in STIFFNESSES:
-            for law in POURED_LAWS:
-                if (law, kn, seed) not in known:
-                    append(table, [poured(law, kn, seed)])
-                    watch(f"{law}, kn = {kn:g}, seed {seed}", flush=True)
+        for law, kn, slope in product(POURED_LAWS, STIFFNESSES, SLOPES):
+            if (law, kn, slope, seed) not in known:
+                append(table, [poured(law, kn, slope, seed)])
+                watch(f"{law}, kn = {kn:g}, slope {slope}, seed {seed}", flush=True)
 
 
 def append(table: Path, rows: list[dict[str, Any]]) -> None:
