@@ -9,7 +9,8 @@ Under a load that rises at a constant rate the motion is proportional to the rat
 each particle over a window, its *vibration* what is left: root mean squares over particles and axes. A load that begins
 to rise makes a packing vibrate that would follow a load which always rose, for as long as its dashpots need. So a drag
 takes this vibration away at first, and fades out; what vibrates later sustains itself. Vibration may grow slowly from
-next to nothing, so that no packing is said to follow the load before the whole time is over.
+next to nothing, so that no packing is said to follow the load before the whole time is over. A vibration was seen to be
+steady for four chunks and then to grow to another one; so half of the time at least is followed.
 """
 
 from typing import Any
@@ -211,7 +212,7 @@ def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = 
         mean = (system.displacement(state.z)[..., 0] - start) / chunk
         windows.append((_root_mean(mean**2), _root_mean(np.maximum(squares - mean**2, 0.0))))
         report_progress(f"under the rising load: t = {state.time:.4g}, vibration {windows[-1][1]:.3g}")
-        if time is None and _vibrates(windows[FADE:]):
+        if time is None and 2 * (number + 1) >= most and _vibrates(windows[FADE:]):
             break
     after = windows[FADE:]
     last = np.array(after[-(len(after) // 4 or 1) :])
