@@ -93,9 +93,7 @@ LARGE = 50
 """Particles beyond which packings come after all others: one takes minutes."""
 
 
-def pour(
-    law: str, d: int, count: int, mu: float, seed: int, log: Path, gamma: float = GAMMA, kn: float = KN
-) -> Any:
+def pour(law: str, d: int, count: int, mu: float, seed: int, log: Path, gamma: float = GAMMA, kn: float = KN) -> Any:
     """LAMMPS with a layer of particles of two sizes above a plane floor, five or six particles deep."""
     from mpi4py import MPI
 

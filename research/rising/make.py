@@ -72,7 +72,9 @@ def under_the_load(rows: list[Row]) -> dict[str, Any]:
     return {
         "asked": len(known),
         "vibrate": share(len(steady), len(known)),
-        "follow": share(sum(each["steady"] and r <= VIBRATES for r, each in zip(ratio, known, strict=True)), len(known)),
+        "follow": share(
+            sum(each["steady"] and r <= VIBRATES for r, each in zip(ratio, known, strict=True)), len(known)
+        ),
         "open": sum(not each["steady"] for each in known),
         "ratio": [float(np.median(steady)), min(steady), max(steady)] if steady else None,
     }
@@ -160,7 +162,9 @@ def check() -> list[str]:
     wrong = []
     for row in layers(1):
         key = tuple(row[name] for name in names)
-        same = row["stable"] is known[key]["stable"] and np.isclose(row["sticking"], known[key]["sticking"], rtol=AGREES)
+        same = row["stable"] is known[key]["stable"] and np.isclose(
+            row["sticking"], known[key]["sticking"], rtol=AGREES
+        )
         if not same:
             wrong.append(f"{key}: {row['stable']}, {row['sticking']:.6g}; before {known[key]['stable']}")
     return wrong

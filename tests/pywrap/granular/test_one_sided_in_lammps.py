@@ -163,7 +163,7 @@ def test_what_is_said_to_rest_is_at_rest_in_lammps(small, law):
 
 
 def test_a_motion_that_has_not_settled_gets_no_verdict(small):
-    """Two derivatives: each swing opens or closes a contact with its own, and sliders creep on for hundreds of units."""
+    """Two derivatives: a contact closes and opens with its own, and sliders creep on for hundreds of units of time."""
     lmp, here = small("mindlin_rescale/force")
     told = stability(here, time=20.0)
     assert told.stable is None
@@ -196,13 +196,13 @@ def test_what_grows_out_of_rounding_noise_is_never_called_stable(poured, law):
         assert found.max() == pytest.approx(told.one_sided["amplification"], rel=AGREES)
         return
     assert noise[-1] > 1e4 * noise[0]
-    # 1e-11: D grows by nine decades, to 1e-13, and rounding begins four decades below
-    times = np.linspace(0, told.one_sided["time"], 41)[21:].round(2)
-    course = pushed(lmp, here, push, times, 5e-4, 1e-11)
-    assert course.max() == pytest.approx(told.one_sided["amplification"], rel=2 * AGREES)
-    largest = np.log(course[:, np.argmax(course[-1])])
-    rates = [np.polyfit(times[part], largest[part], 1)[0] for part in (slice(0, 10), slice(10, 20))]
-    assert told.growth_rate == pytest.approx(np.mean(rates), rel=AGREES)
+    times = np.linspace(0, told.one_sided["time"], 21)[1:].round(2)
+    (velocity,) = velocities(here, push[:, :1])
+    expected = one_sided_motion(here, velocity, times=times).mean_square_displacement
+    # with 1e-9 far above the residual forces, of 1e-12; beyond D = 1e-12 contacts near the bound arrive there
+    times, expected = times[expected < 1e6], expected[expected < 1e6]
+    assert expected[-1] > 1e4 * expected[0]
+    np.testing.assert_allclose(pushed(lmp, here, push[:, :1], times, 5e-4, 1e-9)[:, 0], expected, rtol=AGREES)
 
 
 @pytest.fixture(scope="module")
