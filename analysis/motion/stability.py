@@ -246,10 +246,11 @@ def stability(
         own = Motion.of(configuration).rates
     sticking, grows = LinearNeighbour(own.growth_rate), bool(own.grows.any())
     why = [*reasons, *_what_is_wrong(configuration)]
+    small_motion = not why
     sliding, one_sided, rising = sticking, None, None
     if contacts.one_sided.any():
         sliding = LinearNeighbour(Motion.of(configuration, sliding=True).rates.growth_rate)
-        if not why:
+        if small_motion:
             system = OneSidedSystem.of(configuration, (2 if large else 1) * STEP)
             one_sided = follow_pushes(system, sticking.growth_rate, grows, time, 1 if large else PUSHES)
             if one_sided["grows"] is None:
@@ -258,7 +259,7 @@ def stability(
                     f"where D is {one_sided['amplification']:.3g} times the mean square velocity of the push"
                 )
             grows = one_sided["grows"]
-    if direction is not None and not why:
+    if direction is not None and small_motion:
         rising = follow_load(OneSidedSystem.of(configuration, STEP), direction, time)
     given = configuration.stiffness is not None  # and contacts, as far as they are known, have no derivatives
     shares = {} if given else asymmetry(configuration)

@@ -46,10 +46,10 @@ class Law:
     style: str
     model: str = ""
 
-    def lines(self, mu: float = MU, gamma: float = GAMMA) -> tuple[str, str]:
+    def lines(self, mu: float = MU, gamma: float = GAMMA, kn: float = KN) -> tuple[str, str]:
         """Pair style with coefficients, and what fix wall/gran has of it."""
         hertz = "hertz" in self.style
-        kn, kt = (KN, KT) if hertz else (HOOKE * KN, HOOKE * KT)
+        kn, kt = (kn, kn / KN * KT) if hertz else (HOOKE * kn, HOOKE * kn / KN * KT)
         if not self.model:
             words = f"{self.style}/history {kn} {kt} {gamma} {gamma / 2} {mu} 1"
             return f"pair_style gran/{words}\npair_coeff * *", words
@@ -93,7 +93,7 @@ LARGE = 50
 """Particles beyond which packings come after all others: one takes minutes."""
 
 
-def pour(law: str, d: int, count: int, mu: float, seed: int, log: Path, gamma: float = GAMMA) -> Any:
+def pour(law: str, d: int, count: int, mu: float, seed: int, log: Path, gamma: float = GAMMA, kn: float = KN) -> Any:
     """LAMMPS with a layer of particles of two sizes above a plane floor, five or six particles deep."""
     from mpi4py import MPI
 
@@ -104,7 +104,7 @@ def pour(law: str, d: int, count: int, mu: float, seed: int, log: Path, gamma: f
     width, layer = 1.05 * across, across ** (d - 1)
     high = f"0 {width} 0 {width} 0 60" if d == 3 else f"0 {width} 0 60 -0.5 0.5"
     lmp = lammps_instance(MPI.COMM_SELF, log)
-    pair, wall = LAWS[law].lines(mu, gamma)
+    pair, wall = LAWS[law].lines(mu, gamma, kn)
     places = []
     for k in range(count):
         x, y = (np.array([k % layer % across, k % layer // across]) + 0.5) * 1.05 + rng.uniform(-0.1, 0.1, 2)

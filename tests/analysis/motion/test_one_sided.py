@@ -181,3 +181,20 @@ def test_stability_of_three_disks():
     assert twice["drift"] == pytest.approx(2 * rising["drift"], rel=1e-9)
     with pytest.raises(ValueError, match="upper layer"):
         stability(at_rest, rise="fx")
+
+
+def test_what_follows_a_load_that_rises_does_not_vibrate():
+    """With dashpots that take hundreds of units of time to stop what the beginning of the rise has set going."""
+    lossy = replace(_three(), law=replace(_three().law, mu=50.0, cn=0.02, ct=0.01)).configuration
+    at_rest = derive_frozen(lossy, load=-lossy.contact_force)
+    rising = stability(at_rest, rise=np.tile([1.0, 0.0], (3, 1))).rising
+    assert rising["steady"]
+    assert 0 < rising["vibration"] < 1e-2 * rising["drift"]
+
+
+def test_a_rising_load_is_followed_where_pushes_have_not_settled():
+    at_rest = _three().configuration
+    at_rest = derive_frozen(at_rest, load=-at_rest.contact_force)
+    found = stability(at_rest, rise=np.tile([1.0, 0.0], (3, 1)), time=0.05)
+    assert found.stable is None
+    assert found.rising["drift"] > 0

@@ -1,0 +1,276 @@
+"""One-sided motion, and the verdict on it, beside LAMMPS's own motion: of LAMMPS's laws and of the standard law here.
+
+Particles are pushed by 1e-7 times normal velocities, far above what rounding moves (1e-11) and far below the overlaps
+(1e-3 to 1e-2), so that one-sided motion is that of LAMMPS to first order. D and velocities are compared over powers of
+the push or of the rate of loading.
+"""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from granular_packings import command, instance, start, with_law
+
+from faultgouge.analysis import one_sided_motion, stability
+from faultgouge.analysis.motion.one_sided_outcome import PUSHES, random_pushes
+
+PUSH = 1e-7
+"""Length / time. Displacements stay below 1e-5."""
+
+AGREES = 0.1
+"""Relative difference of D. Steps of one-sided motion are a twentieth of the stable one, and D is an amplitude squared
+after growth by up to twelve decades: 1 to 5 % were measured."""
+
+SMALL = {
+    "gran/hertz/history": (2, "0.3", "0.3", 0.05, "40"),
+    "mindlin/force": (2, "3.0", "0.3", 0.1, "4"),
+    "mindlin_rescale/force": (2, "3.0", "0.3", 0.1, "4"),
+}
+"""Disks that come to rest with contacts at Coulomb's bound: dimension, friction at first and then, slope, dashpots."""
+
+POURED = {
+    "granular hertz, mindlin/force": (0.3, 40.0),
+    "granular hertz, mindlin_rescale/force": (0.25, 4.0),
+    "gran/hertz/history": (0.25, 4.0),
+    "granular hertz, mindlin": (0.25, 4.0),
+}
+"""Fifty spheres on a slope: slope and dashpots."""
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """Makes LAMMPS with a few particles at rest, and their configuration."""
+    from faultgouge.pywrap import from_lammps
+
+    made = []
+
+    @cache
+    def make(law):
+        d, first, then, slope, dashpot = SMALL[law]
+        lmp = instance(tmp_path_factory.mktemp("log") / "log.lammps")
+        made.append(lmp)
+        start(lmp, d, 18)
+        with_law(lmp, law, d, dashpot, dashpot, ("", ""), first)
+        command(lmp, f"""
+fix load all gravity 1.0 vector {slope} -1 0
+fix move all nve/sphere
+fix drag all viscous 1.5
+timestep 0.002
+thermo 100000
+run 30000 post no
+""")  # fmt: skip
+        if then != first:
+            with_law(lmp, law, d, dashpot, "", ("", ""), then)
+        lmp.command("run 60000 post no")
+        return lmp, from_lammps(lmp)
+
+    yield make
+    for lmp in made:
+        lmp.close()
+
+
+@pytest.fixture(scope="module")
+def poured(tmp_path_factory):
+    """Makes LAMMPS with fifty spheres at rest, and their configuration."""
+    from faultgouge.pywrap import from_lammps
+    from research.lammps_laws.compute import pour, rest
+
+    made = []
+
+    @cache
+    def make(law):
+        slope, dashpot = POURED[law]
+        lmp = pour(law, 3, 50, 0.5, 1, tmp_path_factory.mktemp("log") / "log.lammps", dashpot)
+        made.append(lmp)
+        lmp.command(f"variable slope equal {slope}")
+        assert rest(lmp) is not None
+        lmp.command("run 40000 post no")  # forces of 1e-9 would move particles as far as the push does
+        return lmp, from_lammps(lmp)
+
+    yield make
+    for lmp in made:
+        lmp.close()
+
+
+def pushed(lmp, here, push, times, dt, size=PUSH):
+    """D of LAMMPS's particles over the push squared: shape (T, P) for pushes of all coordinates, shape (.., P)."""
+    from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of, set_velocity
+    from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy, quieten
+
+    def follow(velocity):
+        lmp.command("log none")
+        quieten(lmp, drag=True)
+        lmp.command(f"timestep {dt}")
+        at_rest = owned_array(lmp, "x")[rows_of(lmp, here)].copy()
+        set_velocity(lmp, here, size * velocity)
+        found, steps = [], 0
+        low, high, *_ = lmp.extract_box()
+        width = np.subtract(high, low)
+        for time in times:
+            lmp.command(f"run {round(time / dt) - steps} post no")
+            steps = round(time / dt)
+            away = owned_array(lmp, "x")[rows_of(lmp, here)] - at_rest
+            away[:, 0] -= width[0] * np.round(away[:, 0] / width[0])
+            found.append(float(np.mean(np.sum(away**2, axis=1))) / size**2)
+        return found
+
+    return np.transpose([in_a_copy(lambda v=v: follow(v)) for v in push.T])
+
+
+def velocities(here, push):
+    """Pushes of all coordinates as velocities of the particles, shape (P, N, d)."""
+    return [column.reshape(here.axes, len(here))[: here.dimension].T for column in push.T]
+
+
+def compare(lmp, here, times, dt, size=PUSH, agrees=AGREES):
+    """D over the push squared as LAMMPS has it, where one-sided motion has the same; shape (T,)."""
+    assert here.contacts.one_sided.any()
+    push = random_pushes(here, 1)[:, :1]
+    found = pushed(lmp, here, push, times, dt, size)[:, 0]
+    (velocity,) = velocities(here, push)
+    expected = one_sided_motion(here, velocity, times=times).mean_square_displacement
+    np.testing.assert_allclose(expected, found, rtol=agrees)
+    return found
+
+
+@pytest.mark.parametrize("law", SMALL)
+def test_few_disks_after_a_push(small, law):
+    """1 % is ten times what was measured."""
+    lmp, here = small(law)
+    found = compare(lmp, here, [0.5, 1.0, 2.0, 4.0, 8.0], 1e-3, agrees=0.01)
+    linear = one_sided_motion(stuck(here), velocities(here, random_pushes(here, 1))[0], times=[8.0])
+    assert abs(found[-1] / linear.mean_square_displacement[0] - 1) > 0.05  # sticking contacts move otherwise
+
+
+def stuck(here):
+    """The configuration with more friction: no contact is at the bound."""
+    from faultgouge.analysis.arrays import derive_frozen
+
+    return derive_frozen(here, contacts=derive_frozen(here.contacts, friction=10 * here.contacts.friction))
+
+
+@pytest.mark.parametrize("law", ["gran/hertz/history", "mindlin/force"])
+def test_what_is_said_to_rest_is_at_rest_in_lammps(small, law):
+    """Each push in LAMMPS, twice as long as it was followed: the same amplification, and D does not grow."""
+    lmp, here = small(law)
+    told = stability(here)
+    assert told.stable is True
+    times = np.linspace(0, 2 * told.one_sided["time"], 61)[1:].round(1)
+    found = pushed(lmp, here, random_pushes(here, PUSHES), times, 2e-3)
+    assert found.max() == pytest.approx(told.one_sided["amplification"], rel=AGREES)
+    assert found[30:].max() <= found[:30].max() * (1 + AGREES)
+
+
+def test_a_motion_that_has_not_settled_gets_no_verdict(small):
+    """Two derivatives: a contact closes and opens with its own, and sliders creep on for hundreds of units of time."""
+    lmp, here = small("mindlin_rescale/force")
+    told = stability(here, time=20.0)
+    assert told.stable is None
+    assert "has not settled" in told.reasons[0]
+    found = pushed(lmp, here, random_pushes(here, PUSHES), np.linspace(0, 20.0, 41)[1:], 1e-3)
+    assert found.max() == pytest.approx(told.one_sided["amplification"], rel=AGREES)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("law", POURED)
+def test_spheres_after_a_push(poured, law):
+    """A push of 1e-9, since D grows in three of the four."""
+    lmp, here = poured(law)
+    compare(lmp, here, np.arange(1.0, 10.0, 2.0), 5e-4, size=1e-9)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("law", POURED)
+def test_what_grows_out_of_rounding_noise_is_never_called_stable(poured, law):
+    """LAMMPS without any push, for 30 units of time, and with those of the verdict."""
+    lmp, here = poured(law)
+    told = stability(here)
+    push = random_pushes(here, PUSHES)
+    noise = pushed(lmp, here, 0 * push[:, :1], [1.0, 30.0], 5e-4)[:, 0] * PUSH**2
+    assert told.stable is not None
+    if told.stable:
+        assert noise[-1] < 100 * noise[0] < 1e-20
+        times = np.linspace(0, told.one_sided["time"], 61)[1:].round(1)
+        found = pushed(lmp, here, push, times, 5e-4)
+        assert found.max() == pytest.approx(told.one_sided["amplification"], rel=AGREES)
+        return
+    assert noise[-1] > 1e4 * noise[0]
+    times = np.linspace(0, told.one_sided["time"], 21)[1:].round(2)
+    (velocity,) = velocities(here, push[:, :1])
+    expected = one_sided_motion(here, velocity, times=times).mean_square_displacement
+    # with 1e-9 far above the residual forces, of 1e-12; beyond displacements of 5e-8 a contact near the bound arrives
+    times, expected = times[expected < 1e3], expected[expected < 1e3]
+    assert expected[-1] > 100 * expected[0]
+    np.testing.assert_allclose(pushed(lmp, here, push[:, :1], times, 5e-4, 1e-9)[:, 0], expected, rtol=AGREES)
+
+
+@pytest.fixture(scope="module")
+def layer():
+    """The layer of README with Coulomb's slider, at 0.2 F_y of its own ramp, with dashpots of the restitution 0.9."""
+    from faultgouge.pywrap import Scene, settle
+    from research.laws.both_laws import as_slider, at_loads
+    from research.modes.loss import with_dashpots
+
+    found = []
+    scene = Scene.from_mapping(
+        {
+            "packing": {"seed": 1}, "law": {"kn": 2e5, "history": "coulomb"}, "load": {"fy": 3.0},
+            "ramp": {"step": 3e-3, "until": 0.6}, "modes": {"fx_over_fy": [0.2]},
+        }
+    )  # fmt: skip
+    start = settle(scene)
+    at_loads(scene, replace(start, packing=as_slider(start.packing)), lambda packing: found.append(packing) or {})
+    return with_dashpots(found[0], 171.0)
+
+
+def pushed_layer(packing, push, times, size=PUSH):
+    """D over the push squared of all disks as the plugin moves them, shape (T,)."""
+    from mpi4py import MPI
+
+    from faultgouge.analysis import mean_square_displacement
+    from faultgouge.pywrap import Engine
+    from faultgouge.pywrap.granular.lammps_arrays import owned_array, set_velocity
+    from faultgouge.pywrap.runs.undamped import time_step
+
+    dt, found = time_step(packing), []
+    with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
+        set_velocity(engine.lammps, packing.configuration, size * push)
+        still = np.isin(owned_array(engine.lammps, "id"), packing.rattlers + 1)
+        owned_array(engine.lammps, "v")[still] = 0.0
+        for time in times:
+            moved = dynamics.advance(round(time / dt) - dynamics.steps)
+            found.append(mean_square_displacement(moved.position, packing.position, packing.box_length) / size**2)
+    return np.array(found)
+
+
+def test_the_standard_law_after_a_push(layer):
+    """Dashpots of the plugin feel the velocity of the full step, and those of one-sided motion that of the half step:
+    1 % of D."""
+    here = layer.configuration
+    assert here.contacts.one_sided.any()
+    assert len(layer.contacts) - here.contacts.one_sided.sum() > 100
+    push = random_pushes(here, 1)
+    times = np.array([0.2, 0.5, 1.0, 2.0, 4.0])
+    for column, velocity in zip(push.T, velocities(here, push), strict=True):
+        expected = one_sided_motion(layer, velocity, times=times)
+        assert np.any(expected.slid[-1] > 0)
+        np.testing.assert_allclose(pushed_layer(layer, column, times), expected.mean_square_displacement, rtol=0.02)
+
+
+@pytest.mark.slow
+def test_the_standard_law_under_a_load_that_rises(layer):
+    """The layer vibrates for ever in proportion to the rate: as one-sided motion says, and not with more friction."""
+    from research.rising.compute import rise_in_lammps
+
+    told = stability(layer, rise="fx")
+    assert told.stable is True
+    assert told.rising["steady"]
+    assert told.rising["vibration"] > 0.05 * told.rising["drift"]
+    for rate in (1e-5, 1e-6):
+        found = rise_in_lammps(layer, rate)
+        assert found["vibration"] == pytest.approx(told.rising["vibration"], rel=0.2)
+        assert found["drift"] == pytest.approx(told.rising["drift"], rel=0.05)
+    sticks = replace(layer, law=replace(layer.law, mu=100.0))
+    for each in (stability(sticks, rise="fx").rising, rise_in_lammps(sticks, 1e-5)):
+        assert each["vibration"] < 0.01 * each["drift"]
