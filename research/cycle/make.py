@@ -85,9 +85,8 @@ def before_or_control(rows: Sequence[Row], law: str) -> dict[str, dict[str, Any]
                 before, control = state["before", number], state["control", number]
                 alone[0] += before > control
                 alone[1] += control > before
-        found[name] = {"before": alone[0], "control": alone[1], "p": None}
-        if sum(alone):
-            found[name]["p"] = float(binomtest(alone[0], sum(alone)).pvalue)
+        chance = float(binomtest(alone[0], sum(alone)).pvalue) if sum(alone) else None
+        found[name] = {"before": alone[0], "control": alone[1], "p": chance}
     return found
 
 

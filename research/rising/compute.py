@@ -121,7 +121,8 @@ def rise_in_lammps(packing: Packing, rate: float) -> dict[str, float]:
     chunk = 300 * dt / 0.05  # as of one-sided motion: `time_step` is 0.05 of the stable one
     look = max(1, round(chunk / LOOKS / dt))
     steps = look * LOOKS
-    signal = Signal([0.0, 2 * WINDOWS * chunk], [0.0, rate * 2 * WINDOWS * chunk])
+    end = 2 * WINDOWS * chunk
+    signal = Signal(np.array([0.0, end]), np.array([0.0, rate * end]))
     values = []
     with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(dt, signal=signal) as dynamics:
         for stage in range(STAGES):
@@ -137,7 +138,8 @@ def rise_in_lammps(packing: Packing, rate: float) -> dict[str, float]:
                 motion = dynamics.advance(look)
                 squares += motion.velocity**2 / LOOKS
             moved = motion.position - start
-            moved[:, 0] -= packing.box_length * np.round(moved[:, 0] / packing.box_length)
+            if packing.box_length is not None:
+                moved[:, 0] -= packing.box_length * np.round(moved[:, 0] / packing.box_length)
             mean = moved / (steps * dt)
             values.append((np.mean(mean**2), np.mean(np.maximum(squares - mean**2, 0.0))))
     drift, vibration = np.sqrt(np.mean(values, axis=0)) / rate
