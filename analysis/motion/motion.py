@@ -56,8 +56,8 @@ DISCS_UP_TO = 6000
 PERIODS = 100.0
 """Periods of the fastest motion in which growth is looked for, where the slowest decay is not known for certain."""
 
-PERIODS_OF_LARGE = (10.0, 30.0)
-"""The same of packings of more coordinates than that: half a minute for 70,000."""
+PERIODS_OF_LARGE = (10.0, 10.0)
+"""The same of packings of more coordinates than that: of 70,000, ten seconds without dissipation and fifty with it."""
 
 TIMES = (10.0, 300.0)
 """The fewest and the most of them, where discs cover the imaginary axis."""
