@@ -66,20 +66,18 @@ def test_deck(faultgouge_here, tmp_path, shape):
     assert np.array_equal(rows[:, : snapshot.dimension], snapshot.position)
     assert "goes into .vtp, .xyz" in faultgouge_here("export", "pile.h5", "-o", "pile.data", code=2).stderr
     assert "nothing moves in it" in faultgouge_here("movie", "pile.h5", code=None).stderr
+    assert "3 contacts (3 with walls)" in faultgouge_here("draw", "pile.h5", "-o", "pile.png").stdout
+    faultgouge_here("view", "pile.h5", "-o", "page.html")
+    assert f"3 {'spheres' if shape is ROUND else 'disks'} as LAMMPS left them" in (tmp_path / "page.html").read_text()
     if shape is ROUND:
-        for command in ("draw", "view"):
-            assert "`faultgouge export pile.h5 --mode 0" in faultgouge_here(command, "pile.h5", code=2).stderr
         assert "(.xyz) or ParaView (.pvd)" in faultgouge_here("movie", "pile.h5", "--mode", "0", code=2).stderr
         too_large = faultgouge_here("export", "pile.h5", "--mode", "99", "-o", "pile.vtp", code=2).stderr
         assert "15 modes, counted from 0" in too_large
         _check_film_of_spheres(faultgouge_here, tmp_path, snapshot)
         return
-    assert "3 contacts (3 with walls)" in faultgouge_here("draw", "pile.h5", "-o", "pile.png").stdout
     assert "mode 1 of 9" in faultgouge_here("draw", "pile.h5", "--mode", "1", "-o", "mode.png").stdout
     assert "no slips" in faultgouge_here("draw", "pile.h5", "--color", "slip", code=2).stderr
     faultgouge_here("movie", "pile.h5", "--mode", "1", "--seconds", "0.2", "-o", "mode.gif")
-    faultgouge_here("view", "pile.h5", "-o", "page.html")
-    assert "3 disks as LAMMPS left them" in (tmp_path / "page.html").read_text()
 
 
 def _check_film_of_spheres(faultgouge_here, tmp_path, snapshot):

@@ -39,7 +39,7 @@ STYLES = ("gran/hooke/history", "gran/hertz/history", "mindlin", "mindlin_rescal
 
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize(
-    "law", [pytest.param(each, marks=() if each in STYLES[1:4:2] else pytest.mark.slow) for each in LAWS]
+    "law", [pytest.param(each, marks=() if each in STYLES[1:4:2] else pytest.mark.long) for each in LAWS]
 )
 def test_measured_laws_and_differences_agree(tmp_path, law, d):
     """K within 1e-5, which `granular` and its bound of 1e-10 of Coulomb's needs, and C within 1e-6, of the largest."""
