@@ -160,6 +160,7 @@ def test_time_step_beside_rayleighs(faultgouge_here, tmp_path):
     deck = deck.replace("wall/gran hertz/history ${kn} NULL 10 NULL 0.9 1", f"wall/gran granular {law}")
     (tmp_path / "pile.in").write_text(deck)
     said = faultgouge_here("import", "pile.in", "-o", "pile.h5").stdout
+    assert re.search(r"^(stable|unstable): ", said, re.MULTILINE)
     step, share, usual = map(float, re.search(r"step (\S+), (\S+) of Rayleigh's formula \((\S+)\)", said).groups())
     assert usual == pytest.approx(np.pi * 0.5 / np.sqrt(400) / (0.1631 * 0.25 + 0.8766), rel=1e-3)
     assert share == pytest.approx(step / usual, rel=1e-2)

@@ -158,6 +158,19 @@ def _import_deck(file: Path, output: Path, slides: bool, balance: float | None) 
         print_line(remark)
     print_line(f"{repr(snapshot).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
     print_line(_time_steps(snapshot))
+    print_line(_verdict(snapshot, output))
+
+
+def _verdict(configuration: Configuration, output: Path) -> str:
+    """What `spectrum` says first of the packing, for those whose spectrum takes seconds."""
+    from faultgouge.analysis import stability
+    from faultgouge.analysis.motion.stability import LARGE
+    from faultgouge.analysis.progress import show_progress
+
+    if not is_root() or configuration.coordinates > LARGE // 4:
+        return f"whether the packing is stable says `faultgouge spectrum {output}`"
+    with status("stability") as show, show_progress(show):
+        return str(stability(configuration))
 
 
 def _time_steps(configuration: Configuration) -> str:
