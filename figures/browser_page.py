@@ -157,6 +157,9 @@ def _best_frame(verdicts: Sequence[Stability]) -> int:
     return len(verdicts) - 1
 
 
+SINGLE = np.finfo(np.float32)
+
+
 def _legs(values: Floats) -> list[np.ndarray]:
     """Numbers of the packings on each part of the path on which the axis rises, or falls."""
     ends = [0, *turning_points(values), len(values) - 1]
@@ -164,7 +167,10 @@ def _legs(values: Floats) -> list[np.ndarray]:
 
 
 def _array(values: ArrayLike, kind: str) -> dict[str, str]:
-    """An array as `page.js` decodes it."""
+    """An array as `page.js` decodes it; in doubles where single precision overflows or loses it, in any units."""
+    size = np.abs(np.asarray(values))[np.isfinite(values)] if kind == "f4" else np.zeros(0)
+    if np.any(size > SINGLE.max) or np.any((size > 0) & (size < SINGLE.tiny)):
+        kind = "f8"
     return {"type": kind, "base64": base64.b64encode(np.asarray(values, dtype=f"<{kind}").tobytes()).decode()}
 
 

@@ -1,5 +1,5 @@
 // The page: a load, a pair, what moves; and what each of them changes.
-const TYPES = {f4: Float32Array, i1: Int8Array, u1: Uint8Array, u2: Uint16Array, i2: Int16Array}
+const TYPES = {f4: Float32Array, f8: Float64Array, i1: Int8Array, u1: Uint8Array, u2: Uint16Array, i2: Int16Array}
 
 function decode(value) {
   if (Array.isArray(value)) return value.map(decode)

@@ -363,7 +363,7 @@ def test_packing_in_which_nothing_touches(faultgouge_here, tmp_path):
         command, *output = words
         for mode in ("pair", "0"):
             says = faultgouge_here(command, "far.h5", "--mode", mode, *output, code=None).stderr
-            assert f"--mode {mode}: the packing has 0 modes" in says
+            assert "the packing has 0 modes" in says
     assert "no frame 3: leave --frame out" in faultgouge_here("draw", "far.h5", "--frame", "3", code=2).stderr
 
 

@@ -103,7 +103,7 @@ def test_a_cycle_is_stored_drawn_and_goes_on_to_the_bit(tmp_path, faultgouge_her
     assert "rattlers" not in drawn  # said of a packing
     # a view of three loads has both turning points, too; all turning points and frames of either direction are there
     for command, says in (
-        ("view cycle.h5 --loads 3 -o cycle.html", "5 loads, "),
+        ("view cycle.h5 --loads 3 -o cycle.html", "5 packings, "),
         ("movie cycle.h5 --seconds 0.5 --dots 40 -o cycle.gif", "5 frames"),
         ("export cycle.h5 --frames all -o cycle.xyz", "26 frames of equilibria"),
     ):

@@ -154,22 +154,25 @@ def stored_drive(file: Path) -> tuple[dict[str, Any], list[Slip]] | None:
 def spring_in(file: Path) -> float:
     """Stiffness of the spring of a drive.h5, force / length on each disk of the layer; 0 of all other files."""
     from faultgouge.analysis import RunFile
-    from faultgouge.pywrap.runs.drive_recorder import drive_of
 
     if file.suffix == ".disks" or stored_snapshot(file) is not None:
         return 0.0
     with RunFile(file) as run:
+        if run.attributes.get("task") != "drive":
+            return 0.0
+        from faultgouge.pywrap.runs.drive_recorder import drive_of
+
         settings = drive_of(run)
     return 0.0 if settings is None or settings.spring == "rigid" else float(settings.spring)
 
 
 def frame_at(file: Path, frame: int, time: float | None) -> int:
     """The number of the state of a drive.h5 nearest to a time; without a time, the frame."""
+    if time is None:
+        return frame
     from faultgouge.analysis import BadInputError, RunFile
     from faultgouge.pywrap.runs.drive_recorder import drive_of
 
-    if time is None:
-        return frame
     if file.suffix != ".disks":
         with RunFile(file) as run:
             if drive_of(run) is not None:
