@@ -1,9 +1,11 @@
 """Driven runs with both laws, and the eigenvalues of some of their states.
 
-**The rule**, which was written down before the eigenvalues of the chosen states were computed: `scene` has the numbers
-of scenes/drive.toml. Seeds 1, 2, 3, ... in this order, each with the smoothed law (history `total`) and then with the
-standard one (`coulomb`), as many as a quarter of an hour allows; every run that was over counts, with its slips or
-without. Of a run these states count:
+**The rule.** `scene` has the numbers of scenes/drive.toml. Seeds 1, 2, 3, ... in this order, each with the smoothed
+law (history `total`) and then with the standard one (`coulomb`), as many as a quarter of an hour allows; every run that
+was over counts, with its slips or without. The choice of states was written down before their eigenvalues were
+computed; what counts as growth, and the tests, were settled after four seeds had been seen.
+
+Of a run these states count:
 
 - `before`: the state in which a slip begins;
 - `control`: the stored state nearest to a third of the time from the end of the last slip, or from the beginning;
