@@ -159,7 +159,7 @@ class Stability:
     @property
     def _has_two_neighbours(self) -> bool:
         """Whether contacts at the bound slide on ahead and stick on the way back."""
-        return self.sliding != self.sticking
+        return self.one_sided is not None or self.sliding != self.sticking
 
     @property
     def _at_the_bound(self) -> Iterator[str]:
