@@ -1,6 +1,6 @@
 """run.h5: the equilibria of a run, bitwise, written one after the other.
 
-The file is H5MD 1.1, which MDAnalysis opens after ``import faultgouge.pywrap.exchange.mdanalysis``::
+The file is H5MD 1.1, which MDAnalysis opens after ``import faultgouge.analysis.files.mdanalysis``::
 
     /h5md                          version, author, creator (the program's name and version)
     /particles/disks/position      (T, N, 3)  centres, z = 0; a link /observables/position leads to them

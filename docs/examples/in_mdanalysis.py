@@ -4,8 +4,8 @@ from pathlib import Path
 
 import MDAnalysis
 
+from faultgouge.analysis.files.mdanalysis import MeanSquareDisplacement
 from faultgouge.pywrap import Record, Scene, ramp
-from faultgouge.pywrap.exchange.mdanalysis import MeanSquareDisplacement
 
 scene = Scene.from_mapping(
     {

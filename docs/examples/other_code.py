@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from faultgouge.analysis import MindlinLaw, spectrum
+from faultgouge.analysis.files.formats import packing_of, read_disks, upper_layer
 from faultgouge.pywrap import Engine, bring_to_rest, equilibrate
-from faultgouge.pywrap.exchange import packing_of, read_disks, upper_layer
 
 # a table as another code may write it: three rows of disks on a floor, every second row shifted by a radius
 rows = [(k + 0.5 * (row % 2), 0.5 + row * 0.866) for row in range(3) for k in range(6)]

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from ...analysis import Packing
+from ...analysis.files.formats.lammps_data import box_lines
 
 
 def data_file(packing: Packing) -> str:
@@ -21,28 +22,6 @@ def data_file(packing: Packing) -> str:
     columns = zip(packing.top.tolist(), (2 * packing.radius).tolist(), x.tolist(), y.tolist(), strict=True)
     lines += [f"{n} {1 + top} {d!r} 1.0 {a!r} {b!r} 0.0" for n, (top, d, a, b) in enumerate(columns, 1)]
     return "\n".join(lines) + "\n"
-
-
-def box_lines(packing: Packing) -> list[str]:
-    """The box of a data file, with room around the disks."""
-    x = packing.position[:, 0]
-    period = packing.box_length
-    margin = 4 * packing.radius.max()
-    left, right = (0.0, period) if period is not None else (x.min() - margin, x.max() + margin)
-    bottom, top = box_heights(packing)
-    # LAMMPS makes bins along z, too: the disks lie in the plane z = 0, in a box as thick as one of them
-    thickness = float(packing.radius.min())
-    return [
-        f"{float(left)!r} {float(right)!r} xlo xhi",
-        f"{bottom!r} {top!r} ylo yhi",
-        f"{-thickness!r} {thickness!r} zlo zhi",
-    ]
-
-
-def box_heights(packing: Packing) -> tuple[float, float]:
-    """Where the box ends below and above, length: a layer that erupts has room for its own height twice more."""
-    margin = 4 * packing.radius.max()
-    return -float(margin), float(3 * (packing.position[:, 1].max() + margin))
 
 
 def sort_contacts(path: Path) -> None:

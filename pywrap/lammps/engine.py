@@ -20,8 +20,9 @@ from numpy.typing import ArrayLike
 
 from ...analysis import Packing
 from ...analysis.arrays import Floats
+from ...analysis.files.formats.lammps_data import box_heights
 from ...analysis.motion.signals import Signal
-from .data_file import box_heights, data_file, sort_contacts
+from .data_file import data_file, sort_contacts
 from .decks import Decks
 from .dynamics import Dynamics, Weakening
 from .instance import lammps_instance

@@ -11,7 +11,8 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis import BadInputError, MindlinLaw, Packing, PackingFileError, RunFile
 from ...analysis.arrays import Floats
-from ..exchange import Disks, format_of, is_hdf5, packing_of, read_disks, upper_layer
+from ...analysis.files.formats import Disks, format_of, is_hdf5, packing_of, upper_layer
+from ..lammps.restart_file import read_disks
 from .random_start import layer_size, random_start
 from .validation import Positive, Section, refusal_sentence
 

@@ -18,7 +18,7 @@ the same for packings of all sizes.
 
 import numpy as np
 
-from ..exchange import Disks
+from ...analysis.files.formats import Disks
 
 CELL = 1.25
 """Smallest side of a cell, in largest diameters: a quarter is the room for placing a largest disk."""

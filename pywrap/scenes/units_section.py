@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from ..exchange.table_units import registry
+from ...analysis.files.formats.table_units import registry
 from .validation import Section, refusal_sentence
 
 DIMENSIONS = {

@@ -14,10 +14,10 @@ from mpi4py import MPI
 
 from ...analysis import MindlinLaw, NoEquilibriumError, Packing
 from ...analysis.arrays import Floats
+from ...analysis.files.formats import packing_of
 from ...analysis.progress import Watch, report_progress, show_progress
 from ..equilibria.quasistatic import Equilibrium, equilibrate, idle_disks
 from ..equilibria.rattlers import clear_rattlers
-from ..exchange import packing_of
 from ..lammps.engine import Engine
 from ..scenes.packing_section import GeneratedPacking
 from ..scenes.scene import Scene

@@ -38,10 +38,10 @@ from scipy.linalg import eigvals
 
 from faultgouge.analysis import Configuration, Packing, damping_matrix, spectrum, stiffness_matrix
 from faultgouge.analysis.arrays import Floats, Indices
+from faultgouge.analysis.files.formats.lammps_data import box_lines
 from faultgouge.analysis.motion.eigenvalues import active_coordinates, mass_weighted
 from faultgouge.pywrap import Scene, from_lammps, ramp, settle
 from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
-from faultgouge.pywrap.lammps.data_file import box_lines
 from faultgouge.pywrap.lammps.instance import lammps_instance
 from faultgouge.pywrap.scenes.units import dashpot
 from faultgouge.studies.result_rows import append_row, read_rows

@@ -12,8 +12,8 @@ from reference_layer import LAYER, REFERENCE, SMALL, toml
 
 from faultgouge.analysis import RunFile
 from faultgouge.analysis.files.atomic_write import lock_output, write_text
+from faultgouge.analysis.files.formats import write_packing
 from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.exchange import write_packing
 from faultgouge.pywrap.lammps.plain_file_names import plain_name, temporary_folder
 
 SCENE = LAYER + toml({"ramp": {"step": 1e-3, "until": 2e-3}, "output": {"dumps": True}})

@@ -210,7 +210,7 @@ def test_a_packing_of_ones_own(faultgouge, tmp_path):
     [
         ("analysis", "faultgouge.analysis"),
         ("pywrap", "faultgouge.pywrap"),
-        ("exchange", "faultgouge.pywrap.exchange"),
+        ("formats", "faultgouge.analysis.files.formats"),
         ("figures", "faultgouge.figures"),
     ],
 )

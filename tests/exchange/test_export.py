@@ -17,8 +17,7 @@ import pytest
 from reference_layer import LAYER, toml
 
 from faultgouge.analysis import Contacts, MindlinLaw, PackingFileError, RunFile, nearest_image, normal_modes
-from faultgouge.pywrap import Scene, SceneError
-from faultgouge.pywrap.exchange import (
+from faultgouge.analysis.files.formats import (
     ModeVectors,
     choose_frames,
     frames_of,
@@ -28,6 +27,7 @@ from faultgouge.pywrap.exchange import (
     write_frames,
     write_packing,
 )
+from faultgouge.pywrap import Scene, SceneError
 
 FILMS = pytest.mark.parametrize("suffix", [".xyz", ".gsd"], indirect=True)
 READERS = "needs a large library that is no dependency: make readers"
@@ -44,7 +44,7 @@ def mdanalysis():
 @pytest.fixture
 def ours(mdanalysis):
     """The module that registers parser and reader of run.h5."""
-    return import_module("faultgouge.pywrap.exchange.mdanalysis")
+    return import_module("faultgouge.analysis.files.mdanalysis")
 
 
 def back(disks):
@@ -309,10 +309,10 @@ def test_positions_are_an_observable_too_and_a_file_without_that_link_is_continu
 
 
 def test_without_mdanalysis_the_import_says_the_one_command(monkeypatch):
-    monkeypatch.delitem(sys.modules, "faultgouge.pywrap.exchange.mdanalysis", raising=False)
+    monkeypatch.delitem(sys.modules, "faultgouge.analysis.files.mdanalysis", raising=False)
     monkeypatch.setitem(sys.modules, "MDAnalysis.analysis.base", None)
     with pytest.raises(ImportError, match=r"pip install MDAnalysis"):
-        import_module("faultgouge.pywrap.exchange.mdanalysis")
+        import_module("faultgouge.analysis.files.mdanalysis")
 
 
 def test_a_file_that_only_claims_to_be_a_run_is_refused_when_the_parser_is_there(tmp_path, ours):

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from reference_layer import BIN
 
-from faultgouge.analysis import BadInputError, RunFile, nearest_image
+from faultgouge.analysis import BadInputError, PackingFileError, RunFile, nearest_image
 from faultgouge.analysis.files.atomic_write import MAGIC
+from faultgouge.analysis.files.formats import read_disks, upper_layer, write_packing
 from faultgouge.pywrap import Scene, SceneError, settle
-from faultgouge.pywrap.exchange import read_disks, upper_layer, write_packing
+from faultgouge.pywrap.lammps import restart_file
 
 LAW = ("--kn", "2e5", "--fy", "3")
 
@@ -158,7 +159,9 @@ def test_lammps_reads_its_data_and_a_restart_has_all_of_it_and_groups(lmp, tmp_p
         "pair_coeff * *\ncomm_modify vel yes\nrun 0\nwrite_restart packing.restart\n"
     )
     assert done.returncode == 0, done.stdout
-    disks = read_disks(tmp_path / "packing.restart")
+    with pytest.raises(PackingFileError, match="LAMMPS itself reads it"):
+        read_disks(tmp_path / "packing.restart")
+    disks = restart_file.read_disks(tmp_path / "packing.restart")
     np.testing.assert_array_equal(upper_layer(disks, "group:upper"), sheared.top)
     np.testing.assert_array_equal(upper_layer(disks, "group:odd"), np.arange(len(sheared)) % 2 == 0)
     np.testing.assert_array_equal(upper_layer(disks, "type:2"), sheared.top)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import BadInputError, MindlinLaw, PackingFileError
-from faultgouge.pywrap.exchange import packing_of, read_disks, upper_layer
-from faultgouge.pywrap.exchange.csv_json import read_slips
-from faultgouge.pywrap.exchange.upper_layer import layer_remark
+from faultgouge.analysis.files.formats import packing_of, read_disks, upper_layer
+from faultgouge.analysis.files.formats.csv_json import read_slips
+from faultgouge.analysis.files.formats.upper_layer import layer_remark
 
 LAW = MindlinLaw(2e5, 5e4, 0.5)
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from faultgouge.pywrap.exchange import Disks
+from faultgouge.analysis.files.formats import Disks
 from faultgouge.pywrap.scenes.random_start import layer_size, random_start
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import MindlinLaw, read_packing
+from faultgouge.analysis.files.formats import write_packing
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.exchange import write_packing
 from faultgouge.pywrap.scenes.quantities import DIMENSIONS
 from faultgouge.pywrap.scenes.scene import SECTIONS
 from faultgouge.pywrap.scenes.units import dashpot, quality_factor, real_units, restitution

@@ -26,8 +26,8 @@ from .terminal import (
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
+    from faultgouge.analysis.files.formats import Disks
     from faultgouge.pywrap import Scene
-    from faultgouge.pywrap.exchange import Disks
 
 app = typer.Typer()
 
@@ -121,7 +121,7 @@ def import_(
         return
     if slides or balance is not None:
         raise typer.BadParameter("--slides and --balance are for a LAMMPS deck (.in): leave them out")
-    from faultgouge.pywrap.exchange.upper_layer import layer_remark
+    from faultgouge.analysis.files.formats.upper_layer import layer_remark
 
     disks = _place_disks(file, frame, floor, width, contacts)
     laws = {"kn": kn, "kt": _number_or_text(kt), "mu": mu, "exponent": exponent}
@@ -213,9 +213,9 @@ def export(
     displacements; a .pvd for ParaView comes with a folder of .vtp.
     """
     from faultgouge.analysis import Configuration
-    from faultgouge.pywrap.exchange import ModeVectors
-    from faultgouge.pywrap.exchange.formats import check_writer, write_packing
-    from faultgouge.pywrap.exchange.snapshot_export import check_snapshot_writer, write_snapshot_for_others
+    from faultgouge.analysis.files.formats import ModeVectors
+    from faultgouge.analysis.files.formats.registry import check_writer, write_packing
+    from faultgouge.analysis.files.formats.snapshot_export import check_snapshot_writer, write_snapshot_for_others
 
     lock_output(context, output, file)
     if frames is not None:
@@ -243,8 +243,8 @@ def export(
 def _export_frames(file: Path, says: str, output: Path) -> None:
     """The frames of a ramp or of an undamped run."""
     from faultgouge.analysis import PackingFileError, RunFile
-    from faultgouge.pywrap.exchange.formats import check_frames_writer, write_frames
-    from faultgouge.pywrap.exchange.frames import choose_frames, frames_of
+    from faultgouge.analysis.files.formats.frames import choose_frames, frames_of
+    from faultgouge.analysis.files.formats.registry import check_frames_writer, write_frames
 
     check_frames_writer(output)
     if file.suffix == ".disks":
@@ -262,8 +262,8 @@ def _place_disks(file: Path, frame: int | None, floor: float, width: str | None,
     """The disks of the file, with what options say instead of it."""
     from dataclasses import replace
 
-    from faultgouge.pywrap.exchange import read_disks
-    from faultgouge.pywrap.exchange.csv_json import read_slips
+    from faultgouge.analysis.files.formats.csv_json import read_slips
+    from faultgouge.pywrap.lammps.restart_file import read_disks
 
     disks = read_disks(file, frame).above(floor)
     if width is not None:
@@ -289,7 +289,7 @@ def _number_or_text(text: str | None) -> float | str | None:
 
 def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[str, Any]) -> Packing:
     """The packing under the law and the load of the scene, of the options, or of the file."""
-    from faultgouge.pywrap.exchange import packing_of, upper_layer
+    from faultgouge.analysis.files.formats import packing_of, upper_layer
     from faultgouge.pywrap.settling.settle import law_of, load_of
 
     options = {key: value for key, value in options.items() if value is not None}
@@ -307,7 +307,7 @@ def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[st
 def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict[str, Any]) -> None:
     """Say in one sentence all that neither file nor options say, with the command that would do."""
     from faultgouge.analysis import BadInputError
-    from faultgouge.pywrap.exchange.upper_layer import WAYS
+    from faultgouge.analysis.files.formats.upper_layer import WAYS
 
     gaps = {"--top 10": "which disks are the upper layer"} if top is None and disks.top is None else {}
     if scene is None and "kn" not in values:

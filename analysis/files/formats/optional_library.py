@@ -4,7 +4,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ...analysis import BadInputError
+from ...errors import BadInputError
 
 
 def needed_library(module: str, path: Path) -> Any:

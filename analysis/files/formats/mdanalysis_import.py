@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...analysis import BadInputError, PackingFileError
+from ...errors import BadInputError, PackingFileError
 from .disks import Disks, of_columns
 from .optional_library import needed_library
 

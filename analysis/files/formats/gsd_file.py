@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import Packing, PackingFileError
-from ...analysis.files.atomic_write import replace_whole
-from ...analysis.files.plain_file import check_plain
+from ...errors import PackingFileError
+from ...packing.packing import Packing
+from ..atomic_write import replace_whole
+from ..plain_file import check_plain
 from . import export_quantities
 from .disks import Disks, of_columns
 from .export_quantities import Frame, ModeVectors

@@ -10,10 +10,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ...analysis import BadInputError, Configuration
-from ...analysis.arrays import Floats
-from ...analysis.counted import counted
-from ...analysis.files.atomic_write import replace_whole
+from ...arrays import Floats
+from ...configuration import Configuration
+from ...counted import counted
+from ...errors import BadInputError
+from ..atomic_write import replace_whole
 from .export_quantities import ModeVectors
 from .vtp import write_frame_list, write_poly_data, write_xml
 

@@ -7,8 +7,8 @@ a packing out of balance to rest.
 
 from .disks import Disks, Slips, packing_of
 from .export_quantities import Frame, ModeVectors
-from .formats import format_of, is_hdf5, read_disks, write_frames, write_packing
 from .frames import choose_frames, frames_of
+from .registry import format_of, is_hdf5, read_disks, write_frames, write_packing
 from .upper_layer import upper_layer
 
 __all__ = [

@@ -14,9 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis import FLOOR, Contacts, MindlinLaw, Packing, PackingFileError, nearest_image, touching
-from ...analysis.arrays import Floats, Indices
-from ...analysis.packing.geometry import neighbour_tree
+from ...arrays import Floats, Indices
+from ...errors import PackingFileError
+from ...packing.contacts import FLOOR, Contacts
+from ...packing.geometry import nearest_image, neighbour_tree, touching
+from ...packing.law import MindlinLaw
+from ...packing.packing import Packing
 
 FLAT = 1e-6
 """Spread of z up to which disks lie in a plane, in smallest radii: text with seven digits, or float32, leaves less."""

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...analysis import PackingFileError
-from ...analysis.files.atomic_write import replace_whole
+from ...errors import PackingFileError
+from ..atomic_write import replace_whole
 from . import export_quantities
 from .disks import Disks, of_columns
 from .export_quantities import Frame, ModeVectors

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...analysis import PackingFileError
+from ...errors import PackingFileError
 from .disks import Disks, of_columns
 from .text_columns import block_of_frame, columns_of, lines_of, numbers_in, strip_comments
 

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis import Packing
-from ...analysis.arrays import Floats
-from ...analysis.files.runfile_header import differing_parameters
+from ...arrays import Floats
+from ...packing.packing import Packing
+from ..runfile_header import differing_parameters
 from .disks import Slips
 
 KEYS = ("kn", "kt", "mu", "exponent", "rescaled", "coulomb", "cn", "ct", "tau", "fx", "fy", "inertia_factor")

@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ...analysis import MindlinLaw, PackingFileError, read_packing
-from ...analysis.arrays import Floats
-from ...analysis.files.dumps import CONTACT, dump_frames
+from ...arrays import Floats
+from ...errors import PackingFileError
+from ...packing.law import MindlinLaw
+from ..dumps import CONTACT, dump_frames
+from ..json_packing import read_packing
 from .disks import Disks, Slips, of_columns
 from .table_units import decimal_point, in_one_unit, is_number, mass_unit, split_unit
 from .text_columns import columns_of, lines_of

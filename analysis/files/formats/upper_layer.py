@@ -8,8 +8,9 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis import BadInputError, touching
-from ...analysis.files.plain_file import read_plain_text
+from ...errors import BadInputError
+from ...packing.geometry import touching
+from ..plain_file import read_plain_text
 from .disks import Disks
 
 WAYS = (

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...analysis import PackingFileError, read_dump
-from ...analysis.files.dumps import DumpFrame, dump_frames
+from ...errors import PackingFileError
+from ..dumps import DumpFrame, dump_frames, read_dump
 from . import export_quantities
 from .disks import Disks, of_columns
 from .text_columns import choose_frame

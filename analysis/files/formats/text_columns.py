@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...analysis import PackingFileError
-from ...analysis.arrays import Floats
-from ...analysis.files.plain_file import open_text
+from ...arrays import Floats
+from ...errors import PackingFileError
+from ..plain_file import open_text
 
 WORDS = {"true": 1.0, "false": 0.0, "t": 1.0, "f": 0.0}
 """Words that stand for numbers."""

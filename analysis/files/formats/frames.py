@@ -7,8 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...analysis import BadInputError, Packing, RunFile, nearest_image, touching
-from ...analysis.motion.hysteresis import turning_points
+from ...errors import BadInputError
+from ...motion.hysteresis import turning_points
+from ...packing.geometry import nearest_image, touching
+from ...packing.packing import Packing
+from ..runfile import RunFile
 from .export_quantities import Frame
 
 

@@ -12,11 +12,15 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...analysis import BadInputError, Packing, PackingFileError
-from ...analysis.files.atomic_write import BEGINNINGS
-from ...analysis.files.plain_file import open_plain, open_text
+from ...errors import BadInputError, PackingFileError
+from ...packing.packing import Packing
+from ..atomic_write import BEGINNINGS
+from ..plain_file import open_plain, open_text
 from .disks import Disks
 from .export_quantities import Frame, ModeVectors
+
+MAGIC = b"LammpS RestartT"
+"""How restarts of LAMMPS begin."""
 
 NUMBER = re.compile(r"[-+.\deE]+")
 
@@ -34,7 +38,7 @@ class Format(NamedTuple):
         Of files that are read; a file that is written has the first. Of a format that the first line tells, what that
         line is.
     reader, writer : str
-        Functions in the module; empty for what is not done.
+        Functions in the module; empty for what is not done. Restarts are read by LAMMPS itself, in pywrap.
     frames : bool
         Whether a file that is read may hold several frames.
     text : bool
@@ -59,7 +63,7 @@ class Format(NamedTuple):
 
 DATA = Format("LAMMPS data (atom style sphere)", "lammps_data", (".data",), "read_data", "write_data", modes=False)
 DUMP = Format("LAMMPS dump", "lammps_dump", (".dump", ".lammpstrj"), "read_custom_dump", frames=True)
-RESTART = Format("LAMMPS restart", "lammps_restart", (".restart",), "read_restart", text=False)
+RESTART = Format("LAMMPS restart", "", (".restart",), "LAMMPS itself", text=False)
 YADE = Format("YADE's text", "yade_mercury", ("line 1 is #format x_y_z_r",), "read_yade")
 MERCURY = Format("MercuryDPM's data", "yade_mercury", (".data, line 1 is N time bounds",), "read_mercury", frames=True)
 OTHER = Format("what MDAnalysis reads with radii", "mdanalysis_import", (), "read_universe", frames=True)
@@ -93,6 +97,15 @@ def list_formats() -> str:
     return ", ".join([*listed, "each text also as .gz", "run.h5", "LAMMPS decks (.in, in.NAME)", f"and {OTHER.words}"])
 
 
+def is_restart(path: Path) -> bool:
+    """Whether a file begins as LAMMPS restarts do."""
+    try:
+        with open_plain(path) as stream:
+            return stream.read(len(MAGIC)) == MAGIC
+    except OSError:
+        return False
+
+
 def is_hdf5(path: Path) -> bool:
     """Whether a file begins like HDF5 or like a run.h5."""
     with open_plain(path) as stream:
@@ -107,8 +120,6 @@ def format_of(path: Path) -> Format:
     PackingFileError
         If no reader knows the format.
     """
-    from .lammps_restart import is_restart
-
     begun = _by_beginning(path)
     if begun is not None:
         return begun
@@ -157,13 +168,15 @@ def read_disks(path: Path, frame: int | None = None) -> Disks:
     Raises
     ------
     PackingFileError
-        If the file is missing, has no known format, or does not contain disks in a plane.
+        If the file is missing, has no known format, is a restart, or does not contain disks in a plane.
     """
     if not path.is_file():
         raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
     found = format_of(path)
     if not found.frames and frame not in (None, 0, -1):
         raise PackingFileError(f"{path} has one frame; there is no --frame {frame}.")
+    if found is RESTART:
+        raise PackingFileError(f"{path} is a restart: LAMMPS itself reads it, in faultgouge import.")
     disks: Disks = _import_module(found, found.reader)(path, *([frame] if found.frames else []))
     return disks
 
@@ -186,7 +199,7 @@ def write_frames(path: Path, frames: Iterable[Frame]) -> None:
     path : Path
         The file; its suffix is the format.
     frames : iterable of Frame
-        See :func:`~faultgouge.pywrap.exchange.frames.frames_of`.
+        See :func:`~faultgouge.analysis.files.formats.frames.frames_of`.
 
     Raises
     ------

@@ -15,28 +15,25 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ...analysis import PackingFileError
-from ...analysis.files.plain_file import open_plain
-from ..lammps.instance import lammps_instance
-from ..lammps.plain_file_names import plain_name
-from .disks import Disks, of_columns
+from ...analysis.files.formats import Disks, registry
+from ...analysis.files.formats.disks import of_columns
+from .instance import lammps_instance
+from .plain_file_names import plain_name
 
-MAGIC = b"LammpS RestartT"
 MOST_GROUPS = 32
 """Places for groups in LAMMPS."""
 
 
-def is_restart(path: Path) -> bool:
-    """Whether a file begins as LAMMPS restarts do."""
-    try:
-        with open_plain(path) as stream:
-            return stream.read(len(MAGIC)) == MAGIC
-    except OSError:
-        return False
+def read_disks(path: Path, frame: int | None = None) -> Disks:
+    """Disks of a file of any format, restarts included; all else is as in :func:`faultgouge.analysis.files.formats`."""
+    if path.is_file() and frame in (None, 0, -1) and registry.format_of(path) is registry.RESTART:
+        return read_restart(path)
+    return registry.read_disks(path, frame)
 
 
 def read_restart(path: Path) -> Disks:
     """Disks of a restart."""
-    if not is_restart(path):
+    if not registry.is_restart(path):
         raise PackingFileError(f"{path} is no LAMMPS restart file, or cannot be read.")
     lammps = lammps_instance(MPI.COMM_SELF, None)
     try:

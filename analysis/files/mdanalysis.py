@@ -1,7 +1,7 @@
 """Reader of run.h5 for MDAnalysis: import this module, and a Universe opens the file.
 
     import MDAnalysis
-    import faultgouge.pywrap.exchange.mdanalysis
+    import faultgouge.analysis.files.mdanalysis
 
     universe = MDAnalysis.Universe("run.h5")
     layer = universe.select_atoms("type top")
@@ -20,7 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import PackingFileError, RunFile, mean_square_displacement
+from ..errors import PackingFileError
+from ..motion.growth import mean_square_displacement
+from .runfile import RunFile
 
 try:
     from MDAnalysis.analysis.base import AnalysisBase
@@ -30,7 +32,7 @@ try:
     from MDAnalysis.topology.base import TopologyReaderBase
 except ImportError:
     raise ImportError(
-        "faultgouge.pywrap.exchange.mdanalysis needs the library MDAnalysis: pip install MDAnalysis"
+        "faultgouge.analysis.files.mdanalysis needs the library MDAnalysis: pip install MDAnalysis"
     ) from None
 
 FORMAT = "H5"

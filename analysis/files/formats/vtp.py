@@ -17,9 +17,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis import Packing
-from ...analysis.counted import counted
-from ...analysis.files.atomic_write import make_folder, write_whole
+from ...counted import counted
+from ...packing.packing import Packing
+from ..atomic_write import make_folder, write_whole
 from . import export_quantities
 from .export_quantities import Frame, ModeVectors
 

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...analysis import PackingFileError
-from ...analysis.files.atomic_write import write_text
-from ..lammps.data_file import box_lines
+from ...errors import PackingFileError
+from ...packing.packing import Packing
+from ..atomic_write import write_text
 from . import export_quantities
 from .disks import Disks, of_columns, sphere_volume
 from .export_quantities import Frame, ModeVectors
@@ -105,3 +105,25 @@ def write_data(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) ->
     exact = density * volume == packing.mass
     odd = "" if exact.all() else f" ({np.sum(~exact)} masses with a last bit of their own)"
     return f"LAMMPS reads places, radii, masses{odd} and types, and skips angles, slips, law and load in comments"
+
+
+def box_lines(packing: Packing) -> list[str]:
+    """The box of a data file, with room around the disks."""
+    x = packing.position[:, 0]
+    period = packing.box_length
+    margin = 4 * packing.radius.max()
+    left, right = (0.0, period) if period is not None else (x.min() - margin, x.max() + margin)
+    bottom, top = box_heights(packing)
+    # LAMMPS makes bins along z, too: the disks lie in the plane z = 0, in a box as thick as one of them
+    thickness = float(packing.radius.min())
+    return [
+        f"{float(left)!r} {float(right)!r} xlo xhi",
+        f"{bottom!r} {top!r} ylo yhi",
+        f"{-thickness!r} {thickness!r} zlo zhi",
+    ]
+
+
+def box_heights(packing: Packing) -> tuple[float, float]:
+    """Where the box ends below and above, length: a layer that erupts has room for its own height twice more."""
+    margin = 4 * packing.radius.max()
+    return -float(margin), float(3 * (packing.position[:, 1].max() + margin))

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import PackingFileError
-from ...analysis.arrays import Floats
+from ...arrays import Floats
+from ...errors import PackingFileError
 
 HEAD = re.compile(r"\s*(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*")
 """A name with a unit behind it in brackets."""
