@@ -31,7 +31,7 @@ from pydantic import ValidationError, model_validator
 from pydantic_core import InitErrorDetails
 
 from .command_sections import COMMANDS, Command
-from .estimate import refuse_impossible
+from .impossible import refuse_impossible
 from .quantities import as_numbers
 from .scene_keys import SceneKeys
 from .sections import Inertia

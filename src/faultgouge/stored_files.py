@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from .analysis import BadInputError, Configuration, Packing, RunFile, read_dump
-from .analysis.files.snapshot_file import holds_snapshot, read_snapshot
+from .analysis.files.configuration_file import holds_configuration, read_configuration
 
 
 def load(file: str | Path, frame: int = -1) -> Packing | Configuration:
@@ -39,7 +39,7 @@ def load(file: str | Path, frame: int = -1) -> Packing | Configuration:
             f"{path} does not say law and load: `faultgouge import {path} --top 10 --kn 2e5 --fy 3 -o packing.h5` "
             "makes a run.h5 of it."
         )
-    if holds_snapshot(path):
-        return read_snapshot(path)
+    if holds_configuration(path):
+        return read_configuration(path)
     with RunFile(path) as run:
         return run.packing(frame)

@@ -136,7 +136,7 @@ def compute_point(task: str, point: SweepPoint, bed: Packing | None, keep: bool)
     if point.scene is not None:
         with threadpool_limits(1):
             try:
-                row["result"] = task_of(task).run(point.scene, _starter(point.scene, beds))
+                row["result"] = task_of(task)(point.scene, _starter(point.scene, beds))
                 row["says"] = row["result"].pop("says", None)
             except FAILURES as error:
                 says = str(error) or type(error).__name__

@@ -261,13 +261,6 @@ def test_results_go_to_standard_output_and_progress_to_standard_error(faultgouge
         assert result not in done.stderr
 
 
-def test_an_estimate_is_progress(faultgouge_here, tmp_path, monkeypatch):
-    monkeypatch.setattr("faultgouge.pywrap.scenes.estimate.describe_work", lambda *_: "about a day")
-    for more in ((), ("--json",)):
-        done = faultgouge_here("onset", "scene.toml", *more, code=1)  # no onset up to the end of this ramp
-        assert (done.stdout, done.stderr.splitlines()[0]) == ("", "about a day")
-
-
 @pytest.mark.slow
 def test_a_bed_is_settled_once_for_all_friction_coefficients(faultgouge_here, tmp_path, monkeypatch):
     """And the dumps of a ramp are written by the LAMMPS that has the packing, and by no other."""

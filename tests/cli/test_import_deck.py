@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from reference_layer import BIN
 
-from faultgouge.analysis.files.snapshot_file import read_snapshot
+from faultgouge.analysis.files.configuration_file import read_configuration
 
 DECK = """
 units lj
@@ -49,7 +49,7 @@ def test_deck(faultgouge_here, tmp_path, shape):
     (folder / "pile.in").write_text(DECK.format(**shape, word="contacts"))
     done = faultgouge_here("import", "own/pile.in", "-o", "pile.h5")
     assert f"3 {'disks' if shape is FLAT else 'spheres'}, " in done.stdout
-    snapshot = read_snapshot(tmp_path / "pile.h5")
+    snapshot = read_configuration(tmp_path / "pile.h5")
     assert snapshot.residual < 1e-6
     found = json.loads(faultgouge_here("spectrum", "pile.h5", "--json").stdout)
     assert [complex(*each) for each in found["eigenvalues"]] == pytest.approx(list(eigenvalues(snapshot)), abs=1e-8)
@@ -112,13 +112,13 @@ def test_refused_before_the_run(faultgouge_here, tmp_path):
 
 def test_walls_that_hand_out_no_contacts(faultgouge_here, tmp_path):
     """The word `contacts` changes no motion, and the contacts are found without it."""
-    from faultgouge.analysis.files.snapshot_file import read_snapshot
+    from faultgouge.analysis.files.configuration_file import read_configuration
 
     found = {}
     for word in ("contacts", ""):
         (tmp_path / f"pile{word}.in").write_text(DECK.format(**ROUND, word=word))
         faultgouge_here("import", f"pile{word}.in", "-o", f"pile{word}.h5")
-        found[word] = read_snapshot(tmp_path / f"pile{word}.h5")
+        found[word] = read_configuration(tmp_path / f"pile{word}.h5")
     one, other = (found[word].contacts for word in ("contacts", ""))
     assert found[""].operators == "laws"
     assert np.array_equal(one.i, other.i)
@@ -132,7 +132,7 @@ COHESIVE = "jkr 1e3 0.05 0.3 10 tangential mindlin 800 1 0.5 rolling sds 100 1 0
 
 def test_any_model_in_a_region(faultgouge_here, tmp_path):
     """K and C by differences of forces, and the command says so, with the time step."""
-    from faultgouge.analysis.files.snapshot_file import read_snapshot
+    from faultgouge.analysis.files.configuration_file import read_configuration
 
     deck = DECK.format(**ROUND, word="").replace("gran/hertz/history ${kn} NULL 10 NULL 0.9 1", "granular", 1)
     deck = deck.replace("pair_coeff * *", f"pair_coeff * * {COHESIVE}")
@@ -144,7 +144,7 @@ def test_any_model_in_a_region(faultgouge_here, tmp_path):
     assert "3 spheres, " in said
     assert "K and C by differences of forces to " in said
     assert "largest stable time step " in said
-    found = read_snapshot(tmp_path / "glue.h5")
+    found = read_configuration(tmp_path / "glue.h5")
     assert found.operators == "differences"
     assert found.operator_error < 1e-5
     assert "eigenvalues" in json.loads(faultgouge_here("spectrum", "glue.h5", "--json").stdout)
@@ -168,7 +168,7 @@ def test_time_step_beside_rayleighs(faultgouge_here, tmp_path):
 
 def test_a_state_that_moves_is_kept(faultgouge_here, tmp_path):
     """Where the run was too short, the restart goes on as the deck itself does, tangential histories and all."""
-    from faultgouge.analysis.files.snapshot_file import read_snapshot
+    from faultgouge.analysis.files.configuration_file import read_configuration
 
     deck = DECK.format(**ROUND, word="contacts")
     short = deck.replace("run 6000", "run 1500")
@@ -182,7 +182,7 @@ def test_a_state_that_moves_is_kept(faultgouge_here, tmp_path):
     faultgouge_here("import", "on.in", "-o", "on.h5")
     (tmp_path / "whole.in").write_text(deck)
     faultgouge_here("import", "whole.in", "-o", "whole.h5")
-    on, whole = (read_snapshot(tmp_path / f"{name}.h5") for name in ("on", "whole"))
+    on, whole = (read_configuration(tmp_path / f"{name}.h5") for name in ("on", "whole"))
     # the first step after a restart has the dashpots of another half step, a force of 1e-4 here
     assert on.position == pytest.approx(whole.position, abs=1e-6)
     tangential = whole.contacts.tangential_force
@@ -373,7 +373,7 @@ def test_closed_streams(tmp_path, closed):
     (tmp_path / "pile.in").write_text(DECK.format(**FLAT, word="contacts"))
     done = subprocess.run(f"{BIN}/faultgouge import pile.in -o pile.h5 {closed}", shell=True, cwd=tmp_path, check=False)
     assert done.returncode == 0
-    assert read_snapshot(tmp_path / "pile.h5").residual < 1e-6
+    assert read_configuration(tmp_path / "pile.h5").residual < 1e-6
 
 
 def test_deleted_folder(tmp_path):
@@ -393,7 +393,7 @@ def test_names_that_the_locale_cannot_decode(tmp_path):
     done = subprocess.run(words, cwd=tmp_path, env=plain, capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "written to häufchen.h5\n" in done.stdout.decode()
-    assert len(read_snapshot(tmp_path / "häufchen.h5")) == 3
+    assert len(read_configuration(tmp_path / "häufchen.h5")) == 3
 
 
 def two_on_three():
@@ -429,14 +429,14 @@ def test_contacts_at_the_bound_stick_or_slide(faultgouge_here, tmp_path):
     deck = two_on_three()
     (tmp_path / "rough.in").write_text(deck)
     faultgouge_here("import", "rough.in", "-o", "rough.h5")
-    c = read_snapshot(tmp_path / "rough.h5").contacts
+    c = read_configuration(tmp_path / "rough.h5").contacts
     used = np.linalg.norm(c.tangential_force, axis=1) / c.normal_force
     mu = used[~c.wall].max() * (1 - 1e-7)
     (tmp_path / "slid.in").write_text(f"{deck}pair_style gran/hertz/history 1e3 NULL 10 NULL {mu:.17g} 1\nrun 0\n")
     found, verdicts = {}, set()
     for acts, more in (("stick", ()), ("slide", ("--slides",))):
         faultgouge_here("import", "slid.in", "-o", f"{acts}.h5", *more)
-        snapshot = read_snapshot(tmp_path / f"{acts}.h5")
+        snapshot = read_configuration(tmp_path / f"{acts}.h5")
         count = int(snapshot.contacts.at_bound.sum())
         assert count > 0
         assert snapshot.contacts.sliding.sum() == (count if more else 0)
@@ -450,14 +450,14 @@ def test_contacts_at_the_bound_stick_or_slide(faultgouge_here, tmp_path):
 
 def test_laws_that_are_others_than_their_lines_say(faultgouge_here, tmp_path):
     """A wall of hooke/history has another tangential stiffness in LAMMPS of 22 Jul 2025, one of hertz/history not."""
-    from faultgouge.analysis.files.snapshot_file import read_snapshot
+    from faultgouge.analysis.files.configuration_file import read_configuration
 
     deck = DECK.format(**FLAT, word="contacts")
     hooke = deck.replace("wall/gran hertz/history ${kn}", "wall/gran hooke/history 1e3")
     for name, text in (("hertz", deck), ("hooke", hooke)):
         (tmp_path / f"{name}.in").write_text(text)
         said = faultgouge_here("import", f"{name}.in", "-o", f"{name}.h5").stdout
-        found = read_snapshot(tmp_path / f"{name}.h5")
+        found = read_configuration(tmp_path / f"{name}.h5")
         c = found.contacts
         measured = c.tangential_stiffness[c.wall].mean() / (2 / 7 * 1e3)
         share = re.search(r"fix floor: LAMMPS has a tangential stiffness (\S+) times that of the line", said)

@@ -78,7 +78,6 @@ def test_a_run_says_what_is_kept(tmp_path, command, ranks, at, group, number):
     with RunFile(path) as run:
         held = "1 equilibrium" if len(run) == 1 else f"{len(run)} equilibria"
         assert not run.complete
-    assert errors.startswith(f"{command}: about ")
     assert says.startswith(f"Error: {ENDS[number][1]}: run.h5 holds {held}")
     assert says.endswith("the same command continues from there.")
 

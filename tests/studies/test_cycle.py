@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import expm
 
 from faultgouge.analysis import RunFile, stability, stiffness_matrix
-from faultgouge.analysis.files.snapshot_file import read_snapshot, write_snapshot
+from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 from faultgouge.analysis.motion.motion import Motion
 from faultgouge.pywrap import Equilibrium, Scene, SceneError
 from faultgouge.pywrap.runs.drive import settle_for_drive
@@ -93,8 +93,8 @@ def test_the_spring_resists_the_mean_displacement_of_the_layer_alone(slow):
 def test_a_stored_configuration_keeps_its_spring(slow, tmp_path):
     with RunFile(slow) as file:
         configuration = drawn(file.packing(-1), SPRING)
-    write_snapshot(tmp_path / "run.h5", configuration)
-    assert read_snapshot(tmp_path / "run.h5") == configuration != drawn(configuration, 0.0)
+    write_configuration(tmp_path / "run.h5", configuration)
+    assert read_configuration(tmp_path / "run.h5") == configuration != drawn(configuration, 0.0)
 
 
 def test_the_states_of_a_run_go_on_where_they_were_cut_off(slow, tmp_path):

@@ -25,7 +25,7 @@ from faultgouge.studies.sweep import workers
 from faultgouge.studies.sweep.draw import draw_sweep, onsets_figure, reach_of
 from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS, estimate
+from faultgouge.studies.sweep.tasks import TASKS, remaining_work
 from faultgouge.studies.sweep.user_function import user_function
 from faultgouge.studies.sweep.workers import WorkerError, compute_points
 
@@ -167,12 +167,12 @@ def test_a_function_that_cannot_be_called_is_refused_before_work(tmp_path, task,
         Sweep.from_mapping({"task": task, "scene": SMALL}, TASKS, tmp_path)
 
 
-def test_known_rows_tell_how_long_a_function_takes(tmp_path):
+def test_known_rows_tell_how_long_a_scene_takes(tmp_path):
     (tmp_path / "ask.py").write_text(FUNCTIONS)
     sweep = function_sweep(tmp_path, "contacts")
-    assert "is not known before the first" in estimate(sweep.located_task, sweep.points)[-1]
+    assert "is not known before the first" in remaining_work(sweep.points)[-1]
     known = [{"says": None, "cpu_seconds": seconds} for seconds in (1.0, 30.0, 90.0)]
-    assert estimate(sweep.located_task, sweep.points, known)[-1].startswith("about 60 s of one core")
+    assert remaining_work(sweep.points, known)[-1].startswith("about 60 s of one core")
 
 
 @pytest.mark.slow

@@ -20,15 +20,14 @@ from .terminal import (
     Time,
     frame_at,
     lock_output,
+    packing_with_doubts,
     print_json,
     print_line,
     read_scene,
     report_fallback,
     say,
-    say_work,
     spring_in,
     status,
-    stored_configuration,
     stored_files,
     table_of,
 )
@@ -92,7 +91,7 @@ def spectrum(
 
     if values and (gain or rise or verbose):
         raise typer.BadParameter("--values computes nothing but eigenvalues: leave --gain, --rise and --verbose out")
-    stored, assumed = stored_configuration(file, frame_at(file, frame, time))
+    stored, assumed = packing_with_doubts(file, frame_at(file, frame, time))
     if rise and not stored.configuration.top.any():
         raise typer.BadParameter(f"--rise: {file} has no upper layer that a load could push; leave it out")
     spring = spring_in(file)
@@ -266,13 +265,12 @@ def onset(
     from faultgouge.analysis.progress import show_progress
     from faultgouge.pywrap.settling.settle import shared_bed
 
-    wanted = read_scene(scene, "onset")
+    wanted = read_scene(scene, "onset", "onset")
     part = None if modes is None else _modes(modes)
     if part is not None and wanted.damping is not None:
         raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
     if every:
         _check_all_windows(wanted, part)
-    say_work(wanted, "onset --all" if every else "onset")
     if output:
         lock_output(context, output, scene, *stored_files(wanted))
     folder = _search_folder(slices, output)

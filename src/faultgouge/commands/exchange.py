@@ -20,8 +20,8 @@ from .terminal import (
     progress,
     say,
     status,
+    stored_configuration,
     stored_packing,
-    stored_snapshot,
 )
 
 if TYPE_CHECKING:
@@ -145,20 +145,20 @@ def import_(
 
 def _import_deck(file: Path, output: Path, slides: bool, balance: float | None) -> None:
     """Run a deck and keep its last state."""
-    from faultgouge.analysis.files.snapshot_file import write_snapshot
+    from faultgouge.analysis.files.configuration_file import write_configuration
     from faultgouge.pywrap.granular.from_lammps import BALANCE
     from faultgouge.pywrap.granular.run_deck import run_deck
 
     keeps(f"nothing has been written to {output} yet")
     with status(f"{file}: LAMMPS runs"):
-        snapshot = run_deck(file, slides=slides, balance=BALANCE if balance is None else balance, keep=output)
+        configuration = run_deck(file, slides=slides, balance=BALANCE if balance is None else balance, keep=output)
     if is_root():
-        write_snapshot(output, snapshot, {"deck": file.read_text(errors="replace")})
-    for remark in snapshot.remarks:
+        write_configuration(output, configuration, {"deck": file.read_text(errors="replace")})
+    for remark in configuration.remarks:
         print_line(remark)
-    print_line(f"{repr(snapshot).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
-    print_line(_time_steps(snapshot))
-    print_line(_verdict(snapshot, output))
+    print_line(f"{repr(configuration).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
+    print_line(_time_steps(configuration))
+    print_line(_verdict(configuration, output))
 
 
 def _verdict(configuration: Configuration, output: Path) -> str:
@@ -214,8 +214,8 @@ def export(
     """
     from faultgouge.analysis import Configuration
     from faultgouge.analysis.files.formats import ModeVectors
+    from faultgouge.analysis.files.formats.configuration_export import check_configuration_writer, export_configuration
     from faultgouge.analysis.files.formats.registry import check_writer, write_packing
-    from faultgouge.analysis.files.formats.snapshot_export import check_snapshot_writer, write_snapshot_for_others
 
     lock_output(context, output, file)
     if frames is not None:
@@ -223,18 +223,18 @@ def export(
             raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")
         _export_frames(file, frames, output)
         return
-    snapshot = stored_snapshot(file, frame)
-    if snapshot is None:
+    configuration = stored_configuration(file, frame)
+    if configuration is None:
         check_writer(output, mode is not None)
     else:
-        check_snapshot_writer(output)
-    packing = snapshot or stored_packing(file, frame)
+        check_configuration_writer(output)
+    packing = configuration or stored_packing(file, frame)
     if not is_root():
         return
     modes = [] if mode is None else modes_of(packing, mode)[0]
     vectors = [ModeVectors(f"mode_{each.number}", each.eigenvalue, each.displacement) for each in modes]
     if isinstance(packing, Configuration):
-        words = write_snapshot_for_others(output, packing, vectors)
+        words = export_configuration(output, packing, vectors)
     else:
         words = f"F_x = {packing.fx:g}: {write_packing(output, packing, vectors)}"
     print_line(f"{words}; written to {output}")

@@ -18,6 +18,7 @@ from .terminal import (
     frame_at,
     growth_in,
     lock_output,
+    packing_with_doubts,
     print_line,
     progress,
     say,
@@ -25,7 +26,6 @@ from .terminal import (
     stored_drive,
     stored_packing,
     stored_series,
-    stored_snapshot,
 )
 
 if TYPE_CHECKING:
@@ -93,9 +93,9 @@ def draw(
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
     lock_output(context, output, file)
     number, series, cycle, driven = frame_at(file, -1 if frame is None else frame, time), None, [], None
-    snapshot = stored_snapshot(file, number)
-    packing = snapshot or stored_packing(file, number)
-    if snapshot is None and frame is None and time is None and mode is None:
+    configuration = stored_configuration(file, number)
+    packing = configuration or stored_packing(file, number)
+    if configuration is None and frame is None and time is None and mode is None:
         driven = stored_drive(file)
         series, cycle = stored_series(file), [] if driven else _cycle(file)
     if not is_root():
@@ -173,13 +173,13 @@ def movie(
     output = output or Path("film").with_suffix(usual_suffix())
     if dots is None and output.suffix.lower() == ".gif":
         dots = DOTS
-    snapshot = stored_snapshot(file)
-    if snapshot is not None and mode is None:
+    configuration = stored_configuration(file)
+    if configuration is not None and mode is None:
         raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
     count = max(2, round(seconds * rate))
     periods = max(1, round(seconds / 2))
-    if snapshot is not None and snapshot.dimension == 3:
-        _frames_of_spheres(context, snapshot, str(mode), output, count, periods)
+    if configuration is not None and configuration.dimension == 3:
+        _frames_of_spheres(context, configuration, str(mode), output, count, periods)
         return
     check_name(output)
     lock_output(context, output, file)
@@ -189,7 +189,7 @@ def movie(
 
     film: Film
     if mode:
-        packing = snapshot or stored_packing(file, frame)
+        packing = configuration or stored_packing(file, frame)
         modes, what = modes_of(packing, mode)
         film = ModeFilm(packing, modes, what, count, periods=periods, dots=dots)
     else:
@@ -231,7 +231,7 @@ def view(
     from faultgouge.figures.browser_page import Axis, equally_spaced, loads_shown, write_view
     from faultgouge.figures.followed_pairs import seconds
 
-    last, assumed = stored_configuration(file)
+    last, assumed = packing_with_doubts(file)
     lock_output(context, output, file)
     if not is_root():
         return
@@ -265,12 +265,12 @@ def view(
 
 
 def _frames_of_spheres(
-    context: typer.Context, snapshot: Configuration, which: str, output: Path, count: int, periods: int
+    context: typer.Context, configuration: Configuration, which: str, output: Path, count: int, periods: int
 ) -> None:
     """The motion of a mode of spheres, for programs that show spheres."""
     from faultgouge.analysis import BadInputError
     from faultgouge.analysis.files.formats import ModeVectors
-    from faultgouge.analysis.files.formats.snapshot_export import write_mode_frames
+    from faultgouge.analysis.files.formats.configuration_export import write_mode_frames
 
     if output.suffix not in (".xyz", ".pvd"):
         raise BadInputError(
@@ -278,11 +278,11 @@ def _frames_of_spheres(
         )
     lock_output(context, output)
     if is_root():
-        (mode, *others), _ = modes_of(snapshot, which)
+        (mode, *others), _ = modes_of(configuration, which)
         if others:
             raise BadInputError("--mode pair: the packing has no complex pair; give the number of a mode, from 0")
         vectors = ModeVectors(f"mode_{mode.number}", mode.eigenvalue, mode.displacement)
-        write_mode_frames(output, snapshot, vectors, count, periods)
+        write_mode_frames(output, configuration, vectors, count, periods)
         print_line(f"{counted(count, 'frame')} of {mode.plain}; written to {output}")
 
 

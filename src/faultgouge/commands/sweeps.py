@@ -19,7 +19,9 @@ app = typer.Typer()
 Shard = Annotated[
     str, typer.Option(metavar="K/N", help="Only part K of N, for job arrays; each part needs its own folder.")
 ]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the remaining work and an estimate of its time.")]
+DryRun = Annotated[
+    bool, typer.Option("--dry-run", help="Print the remaining work, and how long it takes by the rows that are there.")
+]
 
 
 @app.command(epilog="Example: faultgouge sweep genericity.toml -o sweep")
@@ -46,7 +48,7 @@ def sweep(
     from faultgouge.studies.sweep.run_sweep import LINES, missing_points, read_results, require_result, run_sweep
     from faultgouge.studies.sweep.sweep_plan import Sweep
     from faultgouge.studies.sweep.sweep_plan import shard as part_of
-    from faultgouge.studies.sweep.tasks import TASKS, estimate
+    from faultgouge.studies.sweep.tasks import TASKS, remaining_work
 
     wanted, part = Sweep.from_toml(file, TASKS), _shard(shard)
     _warn_of_seeds(wanted)
@@ -54,7 +56,7 @@ def sweep(
         if is_root():
             known = read_results(output / LINES)
             missing = missing_points(part_of(wanted.points, part), known)
-            for line in estimate(wanted.task, missing, known.values()):
+            for line in remaining_work(missing, known.values()):
                 print_line(line)
         return
     keeps(f"{output}/{LINES} has the scenes that have ended; the same command continues from there", output)
@@ -149,19 +151,20 @@ def modes(
     from faultgouge.studies.cycle.study import holds_drive
     from faultgouge.studies.modes.study import modes as count_modes
     from faultgouge.studies.modes.study import read_modes_sweep
-    from faultgouge.studies.sweep.run_sweep import LINES, require_result
+    from faultgouge.studies.sweep.run_sweep import LINES, missing_points, read_results, require_result
     from faultgouge.studies.sweep.sweep_plan import shard as part_of
-    from faultgouge.studies.sweep.tasks import estimate
+    from faultgouge.studies.sweep.tasks import remaining_work
 
     if holds_drive(file):
         _along_cycles(file, output)
         return
     wanted, part = read_modes_sweep(file), _shard(shard)
     _warn_of_seeds(wanted)
-    if is_root():
-        for line in estimate(wanted.task, part_of(wanted.points, part)):
-            (print_line if dry_run else say)(line)
     if dry_run:
+        if is_root():
+            known = read_results(output / LINES)
+            for line in remaining_work(missing_points(part_of(wanted.points, part), known), known.values()):
+                print_line(line)
         return
     keeps(f"{output}/{LINES} has the scenes that have ended; the same command continues from there", output)
     result = count_modes(wanted, output, part, say, lambda rows, count: progress(rows, "scenes", count), workers)

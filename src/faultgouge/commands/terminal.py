@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from faultgouge.analysis.motion.growth import GrowthOfRun
     from faultgouge.analysis.motion.slips import Slip
     from faultgouge.pywrap import Equilibrium, Scene
-    from faultgouge.pywrap.scenes.estimate import Task
+    from faultgouge.pywrap.scenes.impossible import Task
 
 T = TypeVar("T")
 
@@ -49,34 +49,26 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON."
 
 
 def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
-    """What a command reads of a scene, a TOML file; if its task is long, what is to be done and how long is said."""
+    """What a command reads of a scene, a TOML file; a task that would never end is refused."""
+    from faultgouge.pywrap.scenes.impossible import refuse_endless
     from faultgouge.pywrap.scenes.scene import Scene
 
     scene = Scene.from_toml(path, command=command)
     if task is not None:
-        say_work(scene, task)
+        refuse_endless(scene, task)
     return scene
 
 
-def say_work(scene: Scene, task: Task) -> None:
-    """Say what a long task has to do with a scene, and how long that takes; it is refused if it is too much."""
-    from faultgouge.pywrap.scenes.estimate import describe_work
-
-    ahead = describe_work(scene, task)
-    if ahead:
-        say(ahead)
-
-
-def stored_snapshot(file: Path, frame: int = -1) -> Configuration | None:
-    """The snapshot of a run.h5 that holds one; None of all other files. It is the file's only frame."""
+def stored_configuration(file: Path, frame: int = -1) -> Configuration | None:
+    """The configuration of a run.h5 that holds one; None of all other files. It is the file's only frame."""
     from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.files.snapshot_file import holds_snapshot, read_snapshot
+    from faultgouge.analysis.files.configuration_file import holds_configuration, read_configuration
 
-    if not holds_snapshot(file):
+    if not holds_configuration(file):
         return None
     if frame not in (-1, 0):
         raise BadInputError(f"{file} has one packing, and no frame {frame}: leave --frame out.")
-    return read_snapshot(file)
+    return read_configuration(file)
 
 
 def stored_files(scene: Scene) -> list[Path]:
@@ -110,13 +102,13 @@ NONE_GIVEN = "none were given"
 """Attribute tangential_forces of a file whose contacts began with slips of zero, as nothing was known of them."""
 
 
-def stored_configuration(file: Path, frame: int = -1) -> tuple[Packing | Configuration, list[str]]:
+def packing_with_doubts(file: Path, frame: int = -1) -> tuple[Packing | Configuration, list[str]]:
     """A stored packing of this package or of LAMMPS, and why its stability cannot be known."""
     from faultgouge.analysis import RunFile
 
-    snapshot = stored_snapshot(file)
-    if snapshot is not None:
-        return snapshot, []
+    configuration = stored_configuration(file)
+    if configuration is not None:
+        return configuration, []
     packing = stored_packing(file, frame)
     if file.suffix == ".disks":
         return packing, []
@@ -155,7 +147,7 @@ def spring_in(file: Path) -> float:
     """Stiffness of the spring of a drive.h5, force / length on each disk of the layer; 0 of all other files."""
     from faultgouge.analysis import RunFile
 
-    if file.suffix == ".disks" or stored_snapshot(file) is not None:
+    if file.suffix == ".disks" or stored_configuration(file) is not None:
         return 0.0
     with RunFile(file) as run:
         if run.attributes.get("task") != "drive":

@@ -5,7 +5,7 @@ import pytest
 from granular_packings import LAWS, command, instance, start, with_law
 
 from faultgouge.analysis import damping_matrix, spectrum, stiffness_matrix
-from faultgouge.analysis.files.snapshot_file import read_snapshot, write_snapshot
+from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 
 
 def bed(tmp_path, law: str, d: int):
@@ -149,8 +149,8 @@ def test_cohesive_spheres_in_a_cone(tmp_path):
     assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
     said = spectrum(found)
     assert len(said.pairs) == 0
-    write_snapshot(tmp_path / "cone.h5", found)
-    assert read_snapshot(tmp_path / "cone.h5") == found
+    write_configuration(tmp_path / "cone.h5", found)
+    assert read_configuration(tmp_path / "cone.h5") == found
     with pytest.raises(ValueError, match="leave parting and sliding out"):
         stiffness_matrix(found, parting=0.0)
     lmp.close()

@@ -473,14 +473,14 @@ def test_analysis_of_packings_of_lammps(beds, tmp_path, d):
     from scipy.linalg import expm
 
     from faultgouge.analysis import eigenvalues, linear_response, transient_gain
-    from faultgouge.analysis.files.snapshot_file import read_snapshot, write_snapshot
+    from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
     from faultgouge.pywrap import from_lammps
 
     found = from_lammps(beds("mindlin/force", d, True))
     assert set(found.kind) == {1, 2}
     assert (found.box[1, 0] != 0) == (d == 3)
-    write_snapshot(tmp_path / "run.h5", found)
-    assert read_snapshot(tmp_path / "run.h5") == found
+    write_configuration(tmp_path / "run.h5", found)
+    assert read_configuration(tmp_path / "run.h5") == found
     k, c = stiffness_matrix(found).toarray(), damping_matrix(found).toarray()
     active = np.flatnonzero(np.any(k != 0, axis=1))
     k, c, mass = k[np.ix_(active, active)], c[np.ix_(active, active)], found.coordinate_mass[active]

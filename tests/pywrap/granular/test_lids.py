@@ -5,7 +5,7 @@ import pytest
 from granular_packings import command, instance
 
 from faultgouge.analysis import stiffness_matrix
-from faultgouge.analysis.files.snapshot_file import read_snapshot, write_snapshot
+from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 
 CELL = """
 units lj
@@ -85,8 +85,8 @@ def test_a_lid_moves_as_one(tmp_path, lid):
     assert runs[0].difference / runs[1].difference == pytest.approx(2, rel=0.1)
     rest = 2 * runs[1].velocity - runs[0].velocity - runs[0].linear_velocity
     assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
-    write_snapshot(tmp_path / "cell.h5", found)
-    assert read_snapshot(tmp_path / "cell.h5") == found
+    write_configuration(tmp_path / "cell.h5", found)
+    assert read_configuration(tmp_path / "cell.h5") == found
     lmp.close()
 
 

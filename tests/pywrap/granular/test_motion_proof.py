@@ -135,7 +135,7 @@ def test_fixes_without_effect_on_small_motion(bed, fix):
 
 def test_proof_is_kept(sliding, tmp_path):
     """The proof is in the file and in what is printed, and no part of the comparison of two packings."""
-    from faultgouge.analysis.files.snapshot_file import read_snapshot, write_snapshot
+    from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
     from faultgouge.pywrap import from_lammps
 
     found, other = from_lammps(sliding), from_lammps(sliding, prove=False)
@@ -146,8 +146,8 @@ def test_proof_is_kept(sliding, tmp_path):
     assert "not proved>" in repr(other)
     assert found == other
     for each in (found, other):
-        write_snapshot(tmp_path / "run.h5", each)
-        assert read_snapshot(tmp_path / "run.h5").proof == each.proof
+        write_configuration(tmp_path / "run.h5", each)
+        assert read_configuration(tmp_path / "run.h5").proof == each.proof
         (tmp_path / "run.h5").unlink()
 
 

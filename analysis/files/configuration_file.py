@@ -39,16 +39,16 @@ MATRICES = ("stiffness", "damping", "constraint")
 PARTS = ("data", "indices", "indptr")
 
 
-def write_snapshot(
-    path: Path, snapshot: Configuration, attributes: Mapping[str, str | int | float] | None = None
+def write_configuration(
+    path: Path, configuration: Configuration, attributes: Mapping[str, str | int | float] | None = None
 ) -> None:
-    """Write a snapshot; an existing file is replaced.
+    """Write a configuration; an existing file is replaced.
 
     Parameters
     ----------
     path : Path
         The file.
-    snapshot : Configuration
+    configuration : Configuration
         What it is to hold.
     attributes : mapping, optional
         Attributes of the root, such as the deck.
@@ -64,25 +64,25 @@ def write_snapshot(
         header.create_group("author").attrs["name"] = CREATOR
         header.create_group("creator").attrs.update({"name": CREATOR, "version": program_version()})
         particles = file.create_group("particles/particles")
-        position = np.zeros((1, len(snapshot), 3))
-        position[0, :, : snapshot.dimension] = snapshot.position
+        position = np.zeros((1, len(configuration), 3))
+        position[0, :, : configuration.dimension] = configuration.position
         for name, value in (("value", position), ("step", np.zeros(1, int)), ("time", np.zeros(1))):
             particles.create_dataset(f"position/{name}", data=value)
         box = particles.create_group("box")
         box.attrs["dimension"] = 3
-        box.attrs["boundary"] = ["periodic" if each else "none" for each in snapshot.periodic]
-        box.create_dataset("edges", data=np.linalg.norm(snapshot.box, axis=1))
+        box.attrs["boundary"] = ["periodic" if each else "none" for each in configuration.periodic]
+        box.create_dataset("edges", data=np.linalg.norm(configuration.box, axis=1))
         group = file.create_group("snapshot")
         for name in SCALARS:
-            group.attrs[name] = getattr(snapshot, name)
-        if snapshot.proof is not None:
-            group.attrs["proof"] = snapshot.proof
-        if snapshot.remarks:
-            group.attrs["remarks"] = list(snapshot.remarks)
+            group.attrs[name] = getattr(configuration, name)
+        if configuration.proof is not None:
+            group.attrs["proof"] = configuration.proof
+        if configuration.remarks:
+            group.attrs["remarks"] = list(configuration.remarks)
         for name in ARRAYS:
-            group.create_dataset(name, data=getattr(snapshot, name))
-        contacts = {f"contacts/{name}": getattr(snapshot.contacts, name) for name in PER_CONTACT}
-        given = {name: matrix for name in MATRICES if (matrix := getattr(snapshot, name)) is not None}
+            group.create_dataset(name, data=getattr(configuration, name))
+        contacts = {f"contacts/{name}": getattr(configuration.contacts, name) for name in PER_CONTACT}
+        given = {name: matrix for name in MATRICES if (matrix := getattr(configuration, name)) is not None}
         parts = {f"{name}/{each}": getattr(matrix, each) for name, matrix in given.items() for each in PARTS}
         for name, values in (contacts | parts).items():
             group.create_dataset(name, data=values, **(CHECKSUM if len(values) else {}), chunks=len(values) > 0 or None)
@@ -91,8 +91,8 @@ def write_snapshot(
         write(path, file)
 
 
-def holds_snapshot(path: Path) -> bool:
-    """Whether a file is an HDF5 file with a snapshot in it; false for what is no HDF5 file.
+def holds_configuration(path: Path) -> bool:
+    """Whether a file is an HDF5 file with a configuration in it; false for what is no HDF5 file.
 
     Raises
     ------
@@ -115,8 +115,8 @@ def holds_snapshot(path: Path) -> bool:
         return False
 
 
-def read_snapshot(path: Path) -> Configuration:
-    """The snapshot of a file.
+def read_configuration(path: Path) -> Configuration:
+    """The configuration of a file.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def read_snapshot(path: Path) -> Configuration:
             return Configuration(contacts=contacts, **arrays, **numbers, **matrices, proof=proof, remarks=remarks)
         except Exception as error:  # h5py raises nearly every exception there is, depending on what is damaged
             said = (str(error).strip() or type(error).__name__).rstrip(".")
-            raise PackingFileError(f"{path} holds no snapshot that can be read: {said}.") from error
+            raise PackingFileError(f"{path} holds no configuration that can be read: {said}.") from error
 
 
 def _matrix(group: "h5py.Group", size: int) -> csr_array:

@@ -7,15 +7,15 @@ from test_linearised_contacts import make
 
 from faultgouge.analysis import PackingFileError, RunFile
 from faultgouge.analysis.files.checksummed_file import new_file, write
-from faultgouge.analysis.files.snapshot_file import holds_snapshot, read_snapshot, write_snapshot
+from faultgouge.analysis.files.configuration_file import holds_configuration, read_configuration, write_configuration
 
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_to_the_bit(d, tmp_path):
     snapshot = make(d)
-    write_snapshot(tmp_path / "run.h5", snapshot, {"deck": "run 0"})
-    assert holds_snapshot(tmp_path / "run.h5")
-    found = read_snapshot(tmp_path / "run.h5")
+    write_configuration(tmp_path / "run.h5", snapshot, {"deck": "run 0"})
+    assert holds_configuration(tmp_path / "run.h5")
+    found = read_configuration(tmp_path / "run.h5")
     assert found == snapshot
     assert found != make(d, slides=False)
     assert not found.position.flags.writeable
@@ -23,28 +23,28 @@ def test_to_the_bit(d, tmp_path):
 
 def test_without_contacts(tmp_path):
     bare = make(3).loaded(np.inf)
-    write_snapshot(tmp_path / "run.h5", bare)
-    assert read_snapshot(tmp_path / "run.h5") == bare
+    write_configuration(tmp_path / "run.h5", bare)
+    assert read_configuration(tmp_path / "run.h5") == bare
 
 
 def test_damage_is_refused(tmp_path):
     path = tmp_path / "run.h5"
-    write_snapshot(path, make(3))
+    write_configuration(path, make(3))
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1
     path.write_bytes(content)
-    for reads in (read_snapshot, holds_snapshot):
+    for reads in (read_configuration, holds_configuration):
         with pytest.raises(PackingFileError, match=r"damaged: its .* bytes do not have the checksum"):
             reads(path)
     with pytest.raises(PackingFileError, match="does not exist"):
-        read_snapshot(tmp_path / "none.h5")
-    assert not holds_snapshot(tmp_path / "none.h5")
+        read_configuration(tmp_path / "none.h5")
+    assert not holds_configuration(tmp_path / "none.h5")
 
 
 def test_damage_anywhere_is_refused_by_the_checksum(tmp_path):
     """HDF5 is not asked before: it has errors of its own for what it meets."""
     path, rng = tmp_path / "run.h5", np.random.default_rng(0)
-    write_snapshot(path, make(3))
+    write_configuration(path, make(3))
     content = path.read_bytes()
     for _ in range(200):
         changed = bytearray(content)
@@ -52,11 +52,11 @@ def test_damage_anywhere_is_refused_by_the_checksum(tmp_path):
             changed[at] ^= 1 << int(rng.integers(8))
         path.write_bytes(changed)
         with pytest.raises(PackingFileError, match="damaged"):
-            holds_snapshot(path)
+            holds_configuration(path)
 
 
 def test_a_snapshot_is_no_run(tmp_path):
-    write_snapshot(tmp_path / "run.h5", make(2))
+    write_configuration(tmp_path / "run.h5", make(2))
     with pytest.raises(PackingFileError, match=r"as LAMMPS left it, and no run .* spectrum, draw"):
         RunFile(tmp_path / "run.h5")
 
@@ -86,11 +86,11 @@ def huge(file):
 )
 def test_what_the_checksum_does_not_cover_is_refused(tmp_path, change, says):
     path = tmp_path / "run.h5"
-    write_snapshot(path, make(2))
+    write_configuration(path, make(2))
     with h5py.File(path) as stored, new_file() as file:
         for name in stored:
             stored.copy(name, file)
         change(file)
         write(path, file)
     with pytest.raises(PackingFileError, match=says):
-        read_snapshot(path)
+        read_configuration(path)

@@ -1,4 +1,4 @@
-"""Snapshots for ParaView (.vtp) and OVITO (.xyz): particles with forces and modes, contacts as lines.
+"""Configurations for ParaView (.vtp) and OVITO (.xyz): particles with forces and modes, contacts as lines.
 
 The motion of a mode, growth left out, is a film of frames: an .xyz of many frames, or a .pvd with a folder of .vtp. A
 .vtp is laid out as that of a Packing (:mod:`.vtp`): N centres, then two ends for each contact.
@@ -19,13 +19,13 @@ from .export_quantities import ModeVectors
 from .vtp import write_frame_list, write_poly_data, write_xml
 
 
-def check_snapshot_writer(path: Path) -> None:
+def check_configuration_writer(path: Path) -> None:
     """Refuse a suffix that is neither .vtp nor .xyz, before work begins."""
     if path.suffix not in (".vtp", ".xyz"):
-        raise BadInputError(f"-o {path}: a snapshot goes into .vtp, .xyz; give it one of these suffixes.")
+        raise BadInputError(f"-o {path}: a configuration goes into .vtp, .xyz; give it one of these suffixes.")
 
 
-def write_snapshot_for_others(path: Path, snapshot: Configuration, modes: Sequence[ModeVectors] = ()) -> str:
+def export_configuration(path: Path, configuration: Configuration, modes: Sequence[ModeVectors] = ()) -> str:
     """Write a .vtp or an .xyz; what is in it, in words.
 
     Raises
@@ -35,12 +35,12 @@ def write_snapshot_for_others(path: Path, snapshot: Configuration, modes: Sequen
     OutputError
         If the file cannot be written.
     """
-    check_snapshot_writer(path)
+    check_configuration_writer(path)
     if path.suffix == ".vtp":
-        write_xml(path, _poly_data(snapshot, _in_space(snapshot), modes))
+        write_xml(path, _poly_data(configuration, _in_space(configuration), modes))
     else:
-        _write_xyz(path, snapshot, [(_in_space(snapshot), modes)])
-    what = {"particle": len(snapshot), "contact": len(snapshot.contacts), "mode": len(modes)}
+        _write_xyz(path, configuration, [(_in_space(configuration), modes)])
+    what = {"particle": len(configuration), "contact": len(configuration.contacts), "mode": len(modes)}
     return ", ".join(counted(number, noun) for noun, number in what.items())
 
 
@@ -48,7 +48,9 @@ FARTHEST = 0.5
 """Longest displacement in a film of a mode, in units of the smallest radius: particles stay beside their neighbours."""
 
 
-def write_mode_frames(path: Path, snapshot: Configuration, mode: ModeVectors, count: int, periods: int = 1) -> None:
+def write_mode_frames(
+    path: Path, configuration: Configuration, mode: ModeVectors, count: int, periods: int = 1
+) -> None:
     """Write the motion of a mode, growth left out: frames with displaced particles, their displacement and rotation.
 
     Parameters
@@ -63,37 +65,37 @@ def write_mode_frames(path: Path, snapshot: Configuration, mode: ModeVectors, co
     OutputError
         If a file cannot be written.
     """
-    reach = FARTHEST * snapshot.radius.min() / max(1.0, np.abs(mode.displacement).max())
+    reach = FARTHEST * configuration.radius.min() / max(1.0, np.abs(mode.displacement).max())
     frames = []
     for k in range(count):
         moved = np.real(reach * mode.displacement * np.exp(2j * np.pi * periods * k / count))
         there = ModeVectors("displacement", mode.eigenvalue, moved.astype(np.complex128))
-        frames.append((_in_space(snapshot) + snapshot.vectors(moved)[0], [there]))
+        frames.append((_in_space(configuration) + configuration.vectors(moved)[0], [there]))
     if path.suffix == ".xyz":
-        _write_xyz(path, snapshot, frames)
+        _write_xyz(path, configuration, frames)
     else:
-        write_frame_list(path, ((float(k), _poly_data(snapshot, *frame)) for k, frame in enumerate(frames)))
+        write_frame_list(path, ((float(k), _poly_data(configuration, *frame)) for k, frame in enumerate(frames)))
 
 
-def _in_space(snapshot: Configuration) -> Floats:
-    return np.pad(snapshot.position, ((0, 0), (0, 3 - snapshot.dimension)))
+def _in_space(configuration: Configuration) -> Floats:
+    return np.pad(configuration.position, ((0, 0), (0, 3 - configuration.dimension)))
 
 
-def _of_particles(snapshot: Configuration, modes: Sequence[ModeVectors]) -> dict[str, Floats]:
-    c, pair = snapshot.contacts, ~snapshot.contacts.wall
+def _of_particles(configuration: Configuration, modes: Sequence[ModeVectors]) -> dict[str, Floats]:
+    c, pair = configuration.contacts, ~configuration.contacts.wall
     count, pressure = (
-        np.bincount(c.i, weight, len(snapshot)) + np.bincount(c.j[pair], weight[pair], len(snapshot))
+        np.bincount(c.i, weight, len(configuration)) + np.bincount(c.j[pair], weight[pair], len(configuration))
         for weight in (np.ones(len(c)), c.normal_force)
     )
     values: dict[str, Floats] = {
-        "radius": snapshot.radius,
-        "mass": snapshot.mass,
-        "id": snapshot.ids.astype(np.float64),
-        "type": snapshot.kind.astype(np.float64),
-        "free": snapshot.free.astype(np.float64),
-        "load": snapshot.load[:, 0],
-        "net_force": snapshot.net_force[:, 0],
-        "net_torque": snapshot.net_force[:, 1],
+        "radius": configuration.radius,
+        "mass": configuration.mass,
+        "id": configuration.ids.astype(np.float64),
+        "type": configuration.kind.astype(np.float64),
+        "free": configuration.free.astype(np.float64),
+        "load": configuration.load[:, 0],
+        "net_force": configuration.net_force[:, 0],
+        "net_torque": configuration.net_force[:, 1],
         "normal_force": pressure.astype(np.float64),
         "coordination": count.astype(np.float64),
     }
@@ -103,42 +105,44 @@ def _of_particles(snapshot: Configuration, modes: Sequence[ModeVectors]) -> dict
             (f"{mode.name}_imag", mode.displacement.imag),
         ):
             if name == mode.name or np.any(moved):
-                values[name], values[f"{name}_rotation"] = snapshot.vectors(moved)
+                values[name], values[f"{name}_rotation"] = configuration.vectors(moved)
     return values
 
 
-def _poly_data(snapshot: Configuration, position: Floats, modes: Sequence[ModeVectors]) -> ElementTree.Element:
+def _poly_data(configuration: Configuration, position: Floats, modes: Sequence[ModeVectors]) -> ElementTree.Element:
     """Particles where they have been moved to, with the contacts that they have at rest."""
-    c = snapshot.contacts
-    first, rest = position[c.i], _in_space(snapshot)
-    reach = np.where(c.wall, snapshot.radius[c.i] - c.overlap, c.distance)
+    c = configuration.contacts
+    first, rest = position[c.i], _in_space(configuration)
+    reach = np.where(c.wall, configuration.radius[c.i] - c.overlap, c.distance)
     numbers = {f"{mode.name}_eigenvalue": mode.eigenvalue.real for mode in modes}
     numbers |= {f"{mode.name}_eigenvalue_imag": mode.eigenvalue.imag for mode in modes}
     on_contacts = {
-        "contact_i": snapshot.ids[c.i].astype(np.float64),
-        "contact_j": np.where(c.wall, 0, snapshot.ids[np.maximum(c.j, 0)]).astype(np.float64),
+        "contact_i": configuration.ids[c.i].astype(np.float64),
+        "contact_j": np.where(c.wall, 0, configuration.ids[np.maximum(c.j, 0)]).astype(np.float64),
         "contact_force": c.normal_force[:, None] * c.normal + c.tangential_force,
         "contact_normal_force": c.normal_force,
         "contact_tangential_force": c.tangential_force,
         "contact_overlap": c.overlap,
-        "contact_mobilised": snapshot.mobilised,
+        "contact_mobilised": configuration.mobilised,
     }
     moved = np.where(c.wall[:, None], 0.0, position[np.maximum(c.j, 0)] - rest[np.maximum(c.j, 0)])
     second = rest[c.i] - reach[:, None] * c.normal + moved
     ends = np.stack([first, second], axis=1).reshape(-1, 3)
-    return write_poly_data(position, ends, numbers, _of_particles(snapshot, modes), on_contacts)
+    return write_poly_data(position, ends, numbers, _of_particles(configuration, modes), on_contacts)
 
 
-def _write_xyz(path: Path, snapshot: Configuration, frames: Sequence[tuple[Floats, Sequence[ModeVectors]]]) -> None:
+def _write_xyz(
+    path: Path, configuration: Configuration, frames: Sequence[tuple[Floats, Sequence[ModeVectors]]]
+) -> None:
     """Frames, each of positions and modes."""
-    lattice, origin = (" ".join(map(repr, each.ravel().tolist())) for each in (snapshot.box, snapshot.origin))
-    sides = " ".join("T" if each else "F" for each in snapshot.periodic)
+    lattice, origin = (" ".join(map(repr, each.ravel().tolist())) for each in (configuration.box, configuration.origin))
+    sides = " ".join("T" if each else "F" for each in configuration.periodic)
     with replace_whole(path) as new, new.open("w") as stream:
         for position, modes in frames:
-            columns = {"pos": position} | _of_particles(snapshot, modes)
+            columns = {"pos": position} | _of_particles(configuration, modes)
             columns = {("forces" if name == "net_force" else name): value for name, value in columns.items()}
             sizes = [f"{name}:R:{1 if value.ndim == 1 else value.shape[1]}" for name, value in columns.items()]
             rows = np.column_stack([value if value.ndim == 2 else value[:, None] for value in columns.values()])
             box = f'Lattice="{lattice}" Origin="{origin}" pbc="{sides}"'
-            stream.write(f"{len(snapshot)}\n{box} Properties={':'.join(sizes)}\n")
+            stream.write(f"{len(configuration)}\n{box} Properties={':'.join(sizes)}\n")
             stream.writelines(" ".join(map(repr, row)) + "\n" for row in rows.tolist())
