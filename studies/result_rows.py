@@ -44,11 +44,6 @@ def read_keyed_rows(path: Path, key: str, what: str) -> list[dict[str, Any]]:
     return rows
 
 
-def read_rows(path: Path) -> list[dict[str, Any]]:
-    """The rows of a table that is whole."""
-    return [json.loads(line) for line in path.read_text().splitlines()]
-
-
 def row_columns(rows: Sequence[Mapping[str, Any]], *names: str) -> Floats:
     """Numbers of rows, shape (names, rows); nan where there is none."""
     return np.array([[row[name] for row in rows] for name in names], dtype=np.float64)

@@ -6,12 +6,13 @@ import re
 import pytest
 
 import faultgouge
-from faultgouge.analysis import BadInputError, Packing, RunFile
+from faultgouge.analysis import BadInputError, MindlinLaw, Packing, PackingFileError, RunFile
 
 
 def test_every_name_that_is_offered_is_there():
-    for name, module in faultgouge.OFFERS.items():
-        assert getattr(faultgouge, name) is getattr(importlib.import_module(f"faultgouge.{module}"), name)
+    for name, place in faultgouge.OFFERS.items():
+        module, _, other = place.partition(":")
+        assert getattr(faultgouge, name) is getattr(importlib.import_module(f"faultgouge.{module}"), other or name)
         assert name in dir(faultgouge)
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = faultgouge.nothing
@@ -29,8 +30,34 @@ def test_onset_of_a_scene_prints_as_the_command_does(tmp_path):
 def test_load_takes_files_of_all_kinds(tmp_path, cluster_file):
     packing = faultgouge.load(cluster_file)
     assert isinstance(packing, Packing)
-    with pytest.raises(BadInputError, match="faultgouge import"):
-        faultgouge.load(tmp_path / "table.csv")
+    faultgouge.draw(packing)
+    assert faultgouge.view(cluster_file, tmp_path / "page.html") == 1
+    assert (tmp_path / "page.html").read_text().startswith("<!doctype html>")
+
+
+def test_load_takes_disks_of_other_codes_with_their_law_and_load(tmp_path):
+    table = tmp_path / "table.csv"
+    table.write_text("x, y, radius\n0.0, 0.49, 0.5\n1.0, 0.49, 0.5\n0.5, 1.35, 0.5\n")
+    with pytest.raises(BadInputError, match=r"table.csv does not say law and fy: load\('table.csv', law=MindlinLaw"):
+        faultgouge.load(table)
+    packing = faultgouge.load(table, law=MindlinLaw(2e5, 6e4, 0.5), fy=3.0, top=1)
+    assert packing.top.tolist() == [False, False, True]
+    assert packing.fy == 3.0
+    assert len(packing.contacts) == 4
+    with pytest.raises(PackingFileError, match="does not exist"):
+        faultgouge.load(tmp_path / "nothing.csv")
+
+
+def test_a_sweep_is_a_call(tmp_path):
+    scene = {"packing": {"disks": 30, "top": 6, "width": 6.5}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+    request = {
+        "task": "onset",
+        "sweep": {"packing.seed": [3]},
+        "scene": scene | {"ramp": {"step": 1e-2, "until": 0.02}},
+    }
+    [row] = faultgouge.sweep(request, tmp_path / "out", workers=1)
+    assert row["values"] == {"packing.seed": 3}
+    assert (tmp_path / "out" / "results.csv").is_file()
 
 
 @pytest.fixture

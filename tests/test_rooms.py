@@ -25,6 +25,7 @@ FLOORS = {
         ("figures", "pywrap"),
         ("assessment", "studies"),
         ("signal_guard", "notebook", "stored_files"),
+        ("browser_view",),
         ("commands", "exit_status"),
         ("cli",),
         ("__main__",),

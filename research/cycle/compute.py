@@ -28,7 +28,8 @@ from faultgouge.pywrap import Equilibrium, Scene
 from faultgouge.pywrap.runs.drive import settle_for_drive
 from faultgouge.pywrap.runs.drive_recorder import DriveRecord, slips_in
 from faultgouge.studies.cycle.compute import cycle_state
-from faultgouge.studies.result_rows import append_row, read_rows
+from faultgouge.studies.result_rows import append_row
+from research.tables import read_rows
 
 LAWS = ("total", "coulomb")
 SPRING = 10.0

@@ -21,9 +21,10 @@ from scipy.stats import binomtest
 
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.figures.pages import render
-from faultgouge.studies.result_rows import read_rows
-from faultgouge.studies.statistics import interval, share
+from faultgouge.studies.statistics import share
 from research.cycle.compute import LAWS, UNTIL, compute
+from research.statistics import interval
+from research.tables import read_rows
 
 HERE = Path(__file__).parent
 TABLE = "cycles.jsonl"

@@ -13,9 +13,10 @@ import numpy as np
 from faultgouge.analysis import NoEquilibriumError
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.onset.damped import ramp_scene
-from faultgouge.studies.packing_tools import with_seed
-from faultgouge.studies.result_rows import keep_rows, read_rows
+from faultgouge.studies.result_rows import keep_rows
 from research.dissipation.compute import RATIOS, over_distance, over_strength, weak_cases
+from research.packing_tools import with_seed
+from research.tables import read_rows
 
 HERE = Path(__file__).parent
 

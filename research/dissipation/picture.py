@@ -8,8 +8,8 @@ from typing import Any
 
 from faultgouge.analysis.motion.power_law import fit_power_law
 from faultgouge.figures.style import save_as
-from faultgouge.studies.result_rows import read_rows
 from research.dissipation.draw import dissipation_figure
+from research.tables import read_rows
 
 TABLES = Path(__file__).parent / "tables"
 

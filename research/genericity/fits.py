@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from faultgouge.analysis.packing.packing import Floats
-from faultgouge.studies.statistics import Bools, bootstrap_interval, resample
+from faultgouge.studies.statistics import Bools
+from research.statistics import bootstrap_interval, resample
 
 DRAWS = 300
 """Fits to resampled packings: the ends of an interval are then known to a tenth of its width."""

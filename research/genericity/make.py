@@ -20,13 +20,13 @@ import numpy as np
 
 from faultgouge.analysis.files.atomic_write import write_json, write_text
 from faultgouge.figures.pages import render
-from faultgouge.studies.statistics import interval
 from faultgouge.studies.study import draw_all, save_png
 from faultgouge.studies.sweep.run_sweep import LINES, read_results, run_sweep
 from research.genericity.draw import mechanism_figure, modes_figure, onsets_figure, size_figure
 from research.genericity.numbers import LOADS, numbers, read_tables
 from research.genericity.sets import PACKINGS, SHARES, SIZES, sets
 from research.genericity.table import Table
+from research.statistics import interval
 
 HERE = Path(__file__).parent
 TABLES = HERE / "tables"

@@ -22,9 +22,9 @@ from faultgouge.analysis import Packing
 from faultgouge.pywrap import Engine, Equilibrium, Scene
 from faultgouge.pywrap.runs.undamped import time_step
 from faultgouge.pywrap.scenes.units import dashpot
-from faultgouge.studies.packing_tools import distance_of_bearing_disks, shake_disks
 from research.laws.both_laws import as_slider, at_loads
 from research.modes.loss import fastest, impact_velocity, with_dashpots
+from research.packing_tools import distance_of_bearing_disks, shake_disks
 
 RESTITUTIONS = (0.97, 0.9)
 

@@ -11,12 +11,13 @@ import numpy as np
 
 from faultgouge.analysis.files.atomic_write import write_json, write_text
 from faultgouge.figures.pages import render
-from faultgouge.studies.result_rows import read_rows
-from faultgouge.studies.statistics import interval, median, median_interval, share
+from faultgouge.studies.statistics import median, median_interval, share
 from research.laws.both_laws import BRANCHES, RESTITUTIONS
 from research.laws.sets import sets as all_sets
 from research.modes.loss import GROWS
 from research.modes.page import finite, part
+from research.statistics import interval
+from research.tables import read_rows
 from research.yielding.page import SEEN_GROWTH, UNREST, rows_of
 
 Row = dict[str, Any]

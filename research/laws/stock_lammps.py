@@ -44,11 +44,12 @@ from faultgouge.pywrap import Scene, from_lammps, ramp, settle
 from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
 from faultgouge.pywrap.lammps.instance import lammps_instance
 from faultgouge.pywrap.scenes.units import dashpot
-from faultgouge.studies.result_rows import append_row, read_rows
+from faultgouge.studies.result_rows import append_row
 from research.laws.both_laws import as_slider
 from research.laws.growth import DRAWS, LOOK, TIME, TO, growth_of_course
 from research.laws.sets import sets
 from research.modes.loss import TANGENTIAL, impact_velocity
+from research.tables import read_rows
 
 TABLE = Path(__file__).with_name("stock_lammps.jsonl")
 SEEDS = range(1, 13)

@@ -22,8 +22,8 @@ from faultgouge.pywrap import Engine, Equilibrium, Scene
 from faultgouge.pywrap.runs.undamped import time_step
 from faultgouge.pywrap.scenes.units import dashpot
 from faultgouge.studies.modes.count_pairs import along_ramp
-from faultgouge.studies.packing_tools import distance_of_bearing_disks, shake_disks
 from research.modes.loss import TANGENTIAL, fastest, impact_velocity, with_dashpots
+from research.packing_tools import distance_of_bearing_disks, shake_disks
 
 RESTITUTIONS = (0.97, 0.9, 0.8)
 

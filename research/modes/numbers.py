@@ -10,8 +10,9 @@ import numpy as np
 
 from faultgouge.analysis.packing.packing import Floats
 from faultgouge.studies.modes.table import QUANTITIES, Table, medians_over_load
-from faultgouge.studies.statistics import exponent, median, share
+from faultgouge.studies.statistics import median, share
 from research.modes.loss import GROWS, RESTITUTIONS
+from research.statistics import exponent
 
 DRAWS = 2000
 """Resamples of the packings for the interval of an exponent."""

@@ -8,8 +8,8 @@ from typing import Any
 
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.studies.modes.table import Table
-from faultgouge.studies.result_rows import read_rows
 from faultgouge.studies.sweep.run_sweep import LINES, read_results
+from research.tables import read_rows
 
 TABLE_SUFFIX = ".jsonl"
 

@@ -12,13 +12,13 @@ import numpy as np
 from faultgouge.analysis.files.atomic_write import write_json, write_text
 from faultgouge.figures.pages import render
 from faultgouge.studies.modes.draw import over_load
-from faultgouge.studies.statistics import interval
 from faultgouge.studies.study import draw_all, save_png
 from research.modes.draw import collapse
 from research.modes.loss import EVERY, RESTITUTIONS
 from research.modes.numbers import COMPARISONS, QUALITIES, numbers
 from research.modes.packing_rows import read_tables
 from research.modes.sets import SIZES
+from research.statistics import interval
 
 GENERICITY = Path(__file__).parents[1] / "genericity" / "genericity.json"
 """The exponents of spacings and couplings."""

@@ -35,11 +35,11 @@ from faultgouge.analysis.motion.signals import Signal
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.runs.undamped import time_step
 from faultgouge.pywrap.scenes.units import dashpot
-from faultgouge.studies.result_rows import read_rows
 from research.lammps_laws.compute import GAMMA, KN, MU, pour, rest
 from research.laws.both_laws import as_slider, at_loads
 from research.modes.loss import impact_velocity, with_dashpots
 from research.modes.sets import sets
+from research.tables import read_rows
 
 SEEDS = 20
 LOADS = (0.1, 0.2, 0.3)

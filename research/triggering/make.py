@@ -20,8 +20,8 @@ from faultgouge.analysis import NoEquilibriumError, OnsetError
 from faultgouge.pywrap import Scene, SceneError, reach
 from faultgouge.pywrap.onset.undamped import onset_run
 from faultgouge.pywrap.scenes.validation import require_section
-from faultgouge.studies.packing_tools import with_seed
 from faultgouge.studies.triggering.forecast import Forecast, forecast
+from research.packing_tools import with_seed
 
 SCENE = Path(__file__).parents[2] / "scenes" / "triggered.toml"
 

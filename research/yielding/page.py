@@ -17,9 +17,11 @@ from scipy.stats import binomtest
 from faultgouge.analysis.packing.packing import Floats
 from faultgouge.figures.pages import render
 from faultgouge.figures.style import INK, save, styled
-from faultgouge.studies.result_rows import read_rows, row_columns
-from faultgouge.studies.statistics import interval, median, share
+from faultgouge.studies.result_rows import row_columns
+from faultgouge.studies.statistics import median, share
 from research.modes.loss import GROWS
+from research.statistics import interval
+from research.tables import read_rows
 from research.yielding.compute import CONTROLLED_RATE, LOADINGS, LOSSES, SHARES, TIME
 
 UNREST = ("flows", "bursts", "fails at rest")

@@ -16,16 +16,18 @@ if "IPython" in sys.modules:
     show_pictures()
 
 OFFERS = {
-    "Scene": "pywrap", "settle": "pywrap", "ramp": "pywrap", "perturb": "pywrap", "from_lammps": "pywrap",
-    "relax": "pywrap", "drive": "pywrap.runs.drive", "onset": "pywrap.onset.first_onset", "stability": "analysis",
-    "spectrum": "analysis", "load": "stored_files",
+    "Scene": "pywrap", "settle": "pywrap", "ramp": "pywrap", "perturb": "pywrap", "drive": "pywrap.runs.drive",
+    "onset": "pywrap.onset.first_onset", "from_lammps": "pywrap", "relax": "pywrap", "load": "stored_files",
+    "stability": "analysis", "spectrum": "analysis", "draw": "figures:draw_packing", "view": "browser_view",
+    "sweep": "studies.sweep.run_sweep",
 }  # fmt: skip
-"""Names of this package, and the modules that have them."""
+"""Names of this package, and the modules that have them; behind a colon the name there, where that is another."""
 
 
 def __getattr__(name: str) -> Any:
     if name in OFFERS:
-        return getattr(import_module(f"{__name__}.{OFFERS[name]}"), name)
+        module, _, other = OFFERS[name].partition(":")
+        return getattr(import_module(f"{__name__}.{module}"), other or name)
     # the version when it is asked for: importlib.metadata takes as long to import as all that --help needs
     if name == "__version__":
         from importlib.metadata import version

@@ -1,31 +1,54 @@
 """Packings of files, of whatever kind."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
-from .analysis import BadInputError, Configuration, Packing, RunFile, read_dump
+from .analysis import BadInputError, Configuration, MindlinLaw, Packing, RunFile, read_dump
 from .analysis.files.configuration_file import holds_configuration, read_configuration
+from .analysis.files.formats import is_hdf5
+
+NONE_GIVEN = "none were given"
+"""Attribute tangential_forces of a file whose contacts began with slips of zero, as nothing was known of them."""
 
 
-def load(file: str | Path, frame: int = -1) -> Packing | Configuration:
-    """Read a packing: a run.h5, the dumps that decks write (NAME.disks), or a LAMMPS deck (NAME.in), which is run.
+def load(
+    file: str | Path,
+    frame: int = -1,
+    *,
+    law: MindlinLaw | None = None,
+    fy: float | None = None,
+    fx: float = 0.0,
+    top: str | int | None = None,
+) -> Packing | Configuration:
+    """Read a packing of any file.
 
     Parameters
     ----------
     file : str or Path
-        The file.
+        A run.h5 or a drive.h5; the dumps that decks write (NAME.disks); a LAMMPS deck (NAME.in, in.NAME), which is
+        run; or disks of another code (docs/howto_own_packing.md), as they stand, for which law and load are given.
     frame : int
         Number of the equilibrium, or of the dump; negative numbers count from the last.
+    law : MindlinLaw, optional
+        The contact law of disks of another code.
+    fy, fx : float
+        Their load on each disk of the upper layer, force.
+    top : str or int, optional
+        Their upper layer, where the file does not say which it is: the number of its disks, or as `faultgouge import
+        --top` has it.
 
     Returns
     -------
     Packing or Configuration
+        A Configuration of what LAMMPS moved by its own laws.
 
     Raises
     ------
     BadInputError
-        If the file is none of these.
+        If the file does not say law, load or upper layer, and they are not given.
     PackingFileError
-        If the file is missing or damaged.
+        If the file is missing, damaged, or of no known format.
     """
     path = Path(file)
     if path.suffix == ".disks":
@@ -34,12 +57,35 @@ def load(file: str | Path, frame: int = -1) -> Packing | Configuration:
         from .pywrap.granular.run_deck import run_deck
 
         return run_deck(path)
-    if path.suffix in (".csv", ".json", ".data", ".xyz", ".gsd", ".dump", ".restart"):
-        raise BadInputError(
-            f"{path} does not say law and load: `faultgouge import {path} --top 10 --kn 2e5 --fy 3 -o packing.h5` "
-            "makes a run.h5 of it."
-        )
     if holds_configuration(path):
         return read_configuration(path)
+    if path.suffix == ".h5" or (path.is_file() and is_hdf5(path)):
+        with RunFile(path) as run:
+            return run.packing(frame)
+    return _load_disks(path, frame, law, {"fx": fx} if fy is None else {"fx": fx, "fy": fy}, top)
+
+
+def _load_disks(
+    path: Path, frame: int, law: MindlinLaw | None, given: dict[str, float], top: str | int | None
+) -> Packing:
+    from .analysis.files.formats import packing_of, upper_layer
+    from .pywrap.lammps.restart_file import read_disks
+
+    disks = read_disks(path, None if frame == -1 else frame)
+    missing = [name for name, value in (("law", law), ("fy", given.get("fy"))) if value is None]
+    if law is None or missing:
+        raise BadInputError(
+            f"{path} does not say {' and '.join(missing)}: load({path.name!r}, law=MindlinLaw(kn, kt, mu), fy=3.0, "
+            "top=10) takes the disks as they stand, and `faultgouge import` brings them to rest."
+        )
+    return packing_of(disks, law, upper_layer(disks, top), **given)
+
+
+def doubts_about(path: Path) -> list[str]:
+    """Why the stability of the packings of a file cannot be known, if it cannot."""
+    if path.suffix == ".disks" or holds_configuration(path):
+        return []
     with RunFile(path) as run:
-        return run.packing(frame)
+        unknown = run.attributes.get("tangential_forces") == NONE_GIVEN
+    why = "the tangential forces were not given, and were taken as zero: K is then symmetric, whatever they are"
+    return [why] if unknown else []

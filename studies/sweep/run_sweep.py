@@ -15,7 +15,7 @@ version stay in results.jsonl, and are not in the table.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
 from importlib.metadata import version
@@ -32,6 +32,7 @@ from .. import result_rows
 from ..executors import Progress, Say, open_executor
 from .sweep_plan import Sweep, SweepPoint, shard
 from .table import Row, write_tables
+from .tasks import TASKS
 from .workers import compute_points
 
 LINES, ASKED = "results.jsonl", "sweep.json"
@@ -41,6 +42,22 @@ class FailedSweepError(FaultgougeError):
     """Every scene of a sweep has failed; rank 0 alone has the rows, and knows."""
 
     one_rank = True
+
+
+def sweep(request: str | Path | Mapping[str, Any], output: str | Path, workers: int | None = 1) -> list[Row]:
+    """Run a sweep, or continue one: what the command `faultgouge sweep` does.
+
+    Parameters
+    ----------
+    request : str, Path or mapping
+        SWEEP.toml, or what it would hold.
+    output : str or Path
+        The folder of the rows, and of their table.
+    workers : int, optional
+        As of :func:`run_sweep`, which also says what is returned and raised.
+    """
+    wanted = Sweep.from_mapping(request, TASKS) if isinstance(request, Mapping) else Sweep.from_toml(request, TASKS)
+    return run_sweep(wanted, Path(output), workers=workers)
 
 
 def run_sweep(

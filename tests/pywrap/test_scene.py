@@ -281,7 +281,7 @@ def test_what_no_machine_holds_is_refused(monkeypatch):
     with pytest.raises(SceneError, match=r"the scene asks ramp for a file of 7.5e.02 TB: take a larger ramp.step"):
         refuse_endless(scene, "ramp")
     monkeypatch.setattr("os.sysconf", lambda name: 1024)
-    with pytest.raises(SceneError, match="the scene asks onset for 4 GB of memory, and this machine has 0.001: take"):
+    with pytest.raises(SceneError, match=r"the scene asks onset for 4 GB of memory, and this machine has 0.001: take"):
         refuse_endless(scene, "onset")
 
 

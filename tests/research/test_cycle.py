@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from faultgouge.studies.result_rows import read_rows
 from research.cycle.compute import EVERY, LAWS, chosen
 from research.cycle.make import TABLE, concordance, numbers, ordered_pairs, write_page
+from research.tables import read_rows
 
 CYCLE = Path(__file__).parents[2] / "research" / "cycle"
 ROWS = read_rows(CYCLE / "tables" / TABLE)

@@ -12,9 +12,9 @@ from faultgouge.analysis.damped_onset.windows import without_dissipation
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.onset.damped import damped_onset_run, ramp_scene
 from faultgouge.pywrap.scenes.units import real_units
-from faultgouge.studies.packing_tools import with_seed
 from research.dissipation.compute import RATIOS, over_distance, over_strength, weak_cases
 from research.dissipation.weak_limit import balancing_ratio, drag_onset, weak_limit
+from research.packing_tools import with_seed
 
 TABLES = Path(__file__).parents[2] / "research" / "dissipation" / "tables"
 

@@ -12,7 +12,7 @@ from scipy.stats import mannwhitneyu
 
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.scenes.units import real_units
-from faultgouge.studies.statistics import exponent, interval, median
+from faultgouge.studies.statistics import median
 from faultgouge.studies.sweep.run_sweep import run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.tasks import TASKS
@@ -21,6 +21,7 @@ from research.modes.packing_rows import condense, read_known
 from research.modes.page import critical, part, write_page
 from research.modes.random_matrices import weak_share
 from research.modes.sets import quartz, sets
+from research.statistics import exponent, interval
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "research" / "modes"

@@ -3,7 +3,7 @@
 import shutil
 from pathlib import Path
 
-from faultgouge.studies.result_rows import read_rows
+from research.tables import read_rows
 from research.yielding.compute import CONTROLLED_RATE
 from research.yielding.page import (
     SEEN_GROWTH,

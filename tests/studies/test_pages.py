@@ -12,10 +12,10 @@ from faultgouge.analysis import RunFile
 from faultgouge.figures.pages import WIDTH, fill_paragraphs
 from faultgouge.figures.style import report_failure
 from faultgouge.pywrap import Scene
-from faultgouge.studies.packing_tools import distance_of_bearing_disks
 from faultgouge.studies.reproduce.compute import growth_run, recorded_ramp, summary_of
 from faultgouge.studies.reproduce.page import report
 from faultgouge.studies.sweep.draw import draw_sweep
+from research.packing_tools import distance_of_bearing_disks
 
 
 @pytest.fixture

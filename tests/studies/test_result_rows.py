@@ -3,7 +3,8 @@
 import pytest
 
 from faultgouge.pywrap import SceneError
-from faultgouge.studies.result_rows import append_row, read_keyed_rows, read_rows
+from faultgouge.studies.result_rows import append_row, read_keyed_rows
+from research.tables import read_rows
 
 
 def test_rows_come_back_from_a_folder_that_was_not_there(tmp_path):

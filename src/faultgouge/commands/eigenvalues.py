@@ -20,7 +20,6 @@ from .terminal import (
     Time,
     frame_at,
     lock_output,
-    packing_with_doubts,
     print_json,
     print_line,
     read_scene,
@@ -28,7 +27,9 @@ from .terminal import (
     say,
     spring_in,
     status,
+    stored_configuration,
     stored_files,
+    stored_packing,
     table_of,
 )
 
@@ -88,10 +89,12 @@ def spectrum(
     from faultgouge.analysis import spectrum as eigenvalues_of
     from faultgouge.analysis.arrays import derive_frozen
     from faultgouge.analysis.progress import show_progress
+    from faultgouge.stored_files import doubts_about
 
     if values and (gain or rise or verbose):
         raise typer.BadParameter("--values computes nothing but eigenvalues: leave --gain, --rise and --verbose out")
-    stored, assumed = packing_with_doubts(file, frame_at(file, frame, time))
+    number = frame_at(file, frame, time)
+    stored = stored_configuration(file, number) or stored_packing(file, number)
     if rise and not stored.configuration.top.any():
         raise typer.BadParameter(f"--rise: {file} has no upper layer that a load could push; leave it out")
     spring = spring_in(file)
@@ -105,7 +108,7 @@ def spectrum(
         return
     result = eigenvalues_of(packing)
     with status("stability") as show, show_progress(show):
-        verdict = stability(packing, "fx" if rise else None, spectrum_of_stiffness=result, reasons=assumed)
+        verdict = stability(packing, "fx" if rise else None, spectrum_of_stiffness=result, reasons=doubts_about(file))
     gains = _gain_of(packing) if gain else None
     if not as_json:
         _print_spectrum(stored, result, verdict, gains, verbose)

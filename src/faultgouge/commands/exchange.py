@@ -11,7 +11,6 @@ from ..mpi_rank import is_root
 from ..signal_guard import keeps
 from .pictures import modes_of
 from .terminal import (
-    NONE_GIVEN,
     Frame,
     PackingFile,
     counted,
@@ -361,6 +360,7 @@ def _in_balance(file: Path, packing: Packing, relax: bool) -> Packing:
 def _store(output: Path, packing: Packing, assumed: bool) -> None:
     from faultgouge.analysis import RunFile
     from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+    from faultgouge.stored_files import NONE_GIVEN
 
     attributes = {"task": "import"} | ({"tangential_forces": NONE_GIVEN} if assumed else {})
     with RunFile.create(output, packing, attributes) as file:

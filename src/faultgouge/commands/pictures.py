@@ -18,7 +18,6 @@ from .terminal import (
     frame_at,
     growth_in,
     lock_output,
-    packing_with_doubts,
     print_line,
     progress,
     say,
@@ -226,42 +225,15 @@ def view(
     """
     if output.suffix.lower() != ".html":
         raise typer.BadParameter(f"-o {output}: a page is an .html")
-    from faultgouge.analysis import Configuration, RunFile
-    from faultgouge.analysis.motion.hysteresis import turning_points
-    from faultgouge.figures.browser_page import Axis, equally_spaced, loads_shown, write_view
-    from faultgouge.figures.followed_pairs import seconds
+    from faultgouge.browser_view import view as write_page
+    from faultgouge.stored_files import load
 
-    last, assumed = packing_with_doubts(file)
+    load(file)
     lock_output(context, output, file)
     if not is_root():
         return
-    packings: list[Packing] | list[Configuration]
-    axis: Axis | None = None
-    if isinstance(last, Configuration):
-        packings, series = [last], None
-        particles = "disks" if last.dimension == 2 else "spheres"
-        title = f"{file.name}: {len(last)} {particles} as LAMMPS left them"
-    elif file.suffix == ".disks":
-        packings, series = [last], None
-        title = f"{file.name}: {len(last)} disks, Fₓ = {last.fx:g}"
-    else:
-        with RunFile(file) as run:
-            most = loads_shown(len(last)) if loads is None else loads
-            driven = "time" in run.observables
-            turns = [] if driven else turning_points(run.fx)
-            chosen = sorted({*equally_spaced(len(run), most), *turns})
-            packings = [run.packing(k) for k in chosen]
-            axis = Axis("t", "time of the run", run.observable("time")[chosen]) if driven else None
-            series = run.series("undamped") if "undamped" in run.names_of_series else None
-            ends = [run.fx[k] for k in sorted({0, *turns, len(run) - 1})]
-        span = f", Fₓ = {' to '.join(f'{fx:g}' for fx in ends)}" if not driven else ""
-        what = "states of a driven run" if driven else "undamped run" if series is not None else "equilibria"
-        title = f"{file.name}: {what} of {len(packings[0])} disks{span}"
-    if seconds(packings) > 5:
-        say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
-    write_view(packings, output, title, series, lambda them: progress(them, "loads"), axis, assumed)
-    count = "1 packing" if len(packings) == 1 else f"{len(packings)} packings"
-    print_line(f"{count}, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
+    count = write_page(file, output, loads, say, lambda them: progress(them, "loads"))
+    print_line(f"{counted(count, 'packing')}, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
 
 
 def _frames_of_spheres(

@@ -98,26 +98,6 @@ def stored_packing(file: Path, frame: int = -1) -> Packing:
         return run.packing(frame)
 
 
-NONE_GIVEN = "none were given"
-"""Attribute tangential_forces of a file whose contacts began with slips of zero, as nothing was known of them."""
-
-
-def packing_with_doubts(file: Path, frame: int = -1) -> tuple[Packing | Configuration, list[str]]:
-    """A stored packing of this package or of LAMMPS, and why its stability cannot be known."""
-    from faultgouge.analysis import RunFile
-
-    configuration = stored_configuration(file)
-    if configuration is not None:
-        return configuration, []
-    packing = stored_packing(file, frame)
-    if file.suffix == ".disks":
-        return packing, []
-    with RunFile(file) as run:
-        unknown = run.attributes.get("tangential_forces") == NONE_GIVEN
-    why = "the tangential forces were not given, and were taken as zero: K is then symmetric, whatever they are"
-    return packing, [why] if unknown else []
-
-
 def stored_series(file: Path) -> dict[str, Any] | None:
     """The time series of the undamped run in a perturb.h5; None of another file, or where the run has not begun."""
     from faultgouge.analysis import RunFile

@@ -1,0 +1,42 @@
+"""Intervals of what resampled packings give, for the pages of research."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from faultgouge.analysis.arrays import Floats, Indices
+
+Values = TypeVar("Values", Indices, Floats)
+
+
+def interval(value: Sequence[float | None] | None, digits: str = ".2g", beyond: str = "none") -> str:
+    """A number with its interval, "0.15 (0.14 to 0.18)"; "-" where nothing is known, `beyond` for no bound."""
+    if value is None or (value[0] is not None and np.isnan(value[0])):
+        return "-"
+    middle, low, high = (beyond if each is None or np.isinf(each) else format(each, digits) for each in value)
+    return f"{middle} ({low} to {high})"
+
+
+def resample(groups: Sequence[Values], draws: int) -> Iterator[list[Values]]:
+    """Each group drawn again, with replacement, so many times."""
+    generator = np.random.default_rng(0)
+    return ([generator.choice(group, len(group)) for group in groups] for _ in range(draws))
+
+
+def bootstrap_interval(value: float, draws: Sequence[float] | Floats) -> dict[str, float]:
+    """A number with the 95 % interval of what resampled packings give in its place: {"value", "low", "high"}."""
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return {"value": float(value), "low": float(low), "high": float(high)}
+
+
+def exponent(
+    sizes: Sequence[float] | Floats, samples: Sequence[Floats], middle: Callable[[Floats], float], draws: int
+) -> dict[str, float]:
+    """The exponent of a power law over the size, with its interval; of each sample `middle` gives the logarithm."""
+    logs = np.log(sizes)
+
+    def fit_slope(groups: Sequence[Floats]) -> float:
+        return float(np.polyfit(logs, [middle(each) for each in groups], 1)[0])
+
+    return bootstrap_interval(fit_slope(samples), [fit_slope(each) for each in resample(samples, draws)])
