@@ -27,15 +27,15 @@ from .plain_file import open_plain
 HEADER_SIZE = 512
 """Bytes of the header: the smallest user block of HDF5."""
 
-MAGIC = b"faultgouge run file, sealed\n"
+SEAL = b"faultgouge run file, sealed\n"
 HDF5 = b"\x89HDF\r\n\x1a\n"
-BEGINNINGS = HDF5, MAGIC
+BEGINNINGS = HDF5, SEAL
 """How a run.h5 begins: without a seal, as version 0.1.0 wrote it, and with one."""
 
 LONGEST_NAME = 200
 """Letters of a name that other names beside it begin with: file systems take 255 bytes."""
 
-BLOCK = 1 << 20
+BYTES_AT_A_TIME = 1 << 20
 """Bytes that are read at a time."""
 
 
@@ -206,10 +206,10 @@ def has_checksum(path: Path) -> bool:
             header = stream.read(HEADER_SIZE)
             if header.startswith(HDF5):
                 return False
-            if not header.startswith(MAGIC):
+            if not header.startswith(SEAL):
                 raise PackingFileError(f"{path} is not a readable HDF5 file: it begins like none.")
             digest, size = hashlib.sha256(), 0
-            while block := stream.read(BLOCK):
+            while block := stream.read(BYTES_AT_A_TIME):
                 digest.update(block)
                 size += len(block)
     except OSError as error:
@@ -223,5 +223,5 @@ def has_checksum(path: Path) -> bool:
 
 
 def _header(digest: str, size: int) -> bytes:
-    words = MAGIC + f"sha256 {digest}\nbytes {size}\nHDF5 from byte {HEADER_SIZE} on\n".encode()
+    words = SEAL + f"sha256 {digest}\nbytes {size}\nHDF5 from byte {HEADER_SIZE} on\n".encode()
     return words.ljust(HEADER_SIZE - 1) + b"\n"

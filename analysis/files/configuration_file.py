@@ -36,7 +36,7 @@ LATER = ("slider", "viscous_slider", "top", "drag_rate", "spring", "operator_err
 """Fields that files of version 1 do not have."""
 
 MATRICES = ("stiffness", "damping", "constraint")
-PARTS = ("data", "indices", "indptr")
+MATRIX_PARTS = ("data", "indices", "indptr")
 
 
 def write_configuration(
@@ -83,7 +83,7 @@ def write_configuration(
             group.create_dataset(name, data=getattr(configuration, name))
         contacts = {f"contacts/{name}": getattr(configuration.contacts, name) for name in PER_CONTACT}
         given = {name: matrix for name in MATRICES if (matrix := getattr(configuration, name)) is not None}
-        parts = {f"{name}/{each}": getattr(matrix, each) for name, matrix in given.items() for each in PARTS}
+        parts = {f"{name}/{each}": getattr(matrix, each) for name, matrix in given.items() for each in MATRIX_PARTS}
         for name, values in (contacts | parts).items():
             group.create_dataset(name, data=values, **(CHECKSUM if len(values) else {}), chunks=len(values) > 0 or None)
         for name, said in (attributes or {}).items():
@@ -148,7 +148,7 @@ def read_configuration(path: Path) -> Configuration:
 
 def _matrix(group: "h5py.Group", size: int) -> csr_array:
     """A square sparse matrix; an error if it is none."""
-    data, indices, indptr = (dataset(group, name, size)[()] for name in PARTS)
+    data, indices, indptr = (dataset(group, name, size)[()] for name in MATRIX_PARTS)
     matrix = csr_array((data, indices, indptr), shape=(len(indptr) - 1,) * 2)
     matrix.check_format()
     return matrix

@@ -38,7 +38,7 @@ except ImportError:
 FORMAT = "H5"
 """What MDAnalysis calls files whose names end so; those of plain H5MD end in .h5md for MDAnalysis."""
 
-TYPES = "bed", "top"
+DISK_TYPES = "bed", "top"
 
 
 class RunFileParser(TopologyReaderBase):
@@ -59,7 +59,7 @@ class RunFileParser(TopologyReaderBase):
         count = len(packing)
         attributes = [
             Atomids(np.arange(1, count + 1)),
-            Atomtypes(np.array(TYPES, dtype=object)[packing.top.astype(int)]),
+            Atomtypes(np.array(DISK_TYPES, dtype=object)[packing.top.astype(int)]),
             Masses(packing.mass),
             Radii(packing.radius),
             Resids(np.array([1])),

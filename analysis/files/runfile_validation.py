@@ -22,7 +22,7 @@ BEST_COMPRESSION = 1100
 """More bytes than this a stored byte cannot stand for: deflate packs up to 1032 times. A shape beyond is damage, and
 reading it would take all memory."""
 
-BLOCK = 1 << 20
+BYTES_OF_A_CHUNK = 1 << 20
 """Bytes that are read at a time, or one chunk, where that is larger: a chunk is unpacked as a whole."""
 
 LARGEST_CHUNK = 1 << 30
@@ -127,7 +127,7 @@ def _check_finite(item: h5py.Dataset, rows: int | None = None) -> None:
         finite = bool(np.isfinite(item[()]))
     else:
         end = len(item) if rows is None else rows
-        block = max(1, BLOCK * len(item) // max(item.nbytes, 1))
+        block = max(1, BYTES_OF_A_CHUNK * len(item) // max(item.nbytes, 1))
         if item.chunks:
             block = -(-block // item.chunks[0]) * item.chunks[0]
         finite = all(np.isfinite(item[k : min(k + block, end)]).all() for k in range(0, end, block))

@@ -16,10 +16,10 @@ from ...analysis.packing.packing import Floats
 from ...pywrap.lammps.dynamics import MotionState
 from ..timing import in_turns
 
-TURNS, FEW = 11, 5
+TURNS, FEW_TURNS = 11, 5
 """Turns of a comparison: quartiles of fewer jump; and turns of what may take long."""
 
-SHARE = 10e-3
+SECONDS_A_TURN = 10e-3
 """Seconds that one of the two takes in a turn, if it can be chosen: far above the clock and the call."""
 
 

@@ -33,11 +33,11 @@ from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.sections import Ramp
 from ...pywrap.scenes.units import real_units
 from ...pywrap.settling.settle import settle
-from .cost_comparison import FEW, SHARE, TURNS, Cost, Part, same_motion
+from .cost_comparison import FEW_TURNS, SECONDS_A_TURN, TURNS, Cost, Part, same_motion
 from .processors import ranks, threads
 from .switches import UNREACHABLE_VELOCITY, Feature, InstanceContents, UndampedRun, features
 
-LARGEST = 400
+SETTLED_DISKS = 400
 """Disks up to which a packing is settled to be explained: half a second. Of a larger one a strip of as many is, of the
 same depth."""
 
@@ -181,7 +181,7 @@ def _dumps(scene: Scene, start: Equilibrium, folder: Path) -> Part:
                 engine.dump(files / "run.1")
 
         # an equilibrium by damped dynamics takes half a second
-        cost = Cost.of("equilibrium", lambda: reach(False), lambda: reach(True), turns=FEW)
+        cost = Cost.of("equilibrium", lambda: reach(False), lambda: reach(True), turns=FEW_TURNS)
         parts = InstanceContents.of(engine, log).parts
     adds = [f"part {part}" for part in parts if part == "write.in"]
     adds += [f"file {path.name}" for path in sorted(files.iterdir())]
@@ -224,18 +224,18 @@ def _affordable(scene: Scene) -> tuple[Scene, str]:
     section = scene.packing
     if not isinstance(section, GeneratedPacking):
         return scene, f"the packing of {section.file.name}"
-    if section.disks <= LARGEST:
+    if section.disks <= SETTLED_DISKS:
         return scene, f"the packing that the scene settles to, {section.disks} disks"
-    share = LARGEST / section.disks
+    share = SETTLED_DISKS / section.disks
     strip = {
-        "disks": LARGEST,
+        "disks": SETTLED_DISKS,
         "top": max(1, round(section.top * share)),
         "width": max(section.width * share, 4 * max(section.radii)),  # the narrowest periodic box
     }
     update: dict[str, Any] = {"packing": section.model_copy(update=strip)}
     if scene.perturb and isinstance(scene.perturb.target, tuple):
         update["perturb"] = scene.perturb.model_copy(update={"target": "top"})
-    remark = f"a strip of {LARGEST} of the {section.disks} disks, as deep as the whole, settled like it"
+    remark = f"a strip of {SETTLED_DISKS} of the {section.disks} disks, as deep as the whole, settled like it"
     return scene.model_copy(update=update), remark
 
 
@@ -257,12 +257,12 @@ def _run_of(scene: Scene, packing: Packing) -> UndampedRun:
 
 
 def _steps(dynamics: Dynamics) -> int:
-    """Steps that take SHARE of a second."""
+    """Steps that take SECONDS_A_TURN of a second."""
     trial = 200
     dynamics.advance(trial)
     start = perf_counter()
     dynamics.advance(trial)
-    return max(50, int(SHARE * trial / (perf_counter() - start)))
+    return max(50, int(SECONDS_A_TURN * trial / (perf_counter() - start)))
 
 
 def _defaults(scene: Scene) -> dict[str, Any]:

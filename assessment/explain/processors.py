@@ -11,10 +11,10 @@ from mpi4py import MPI
 
 from ...analysis import Packing, dynamical_matrix
 from ...analysis.packing.packing import Floats
-from .cost_comparison import FEW, Cost, Part, same_motion
+from .cost_comparison import FEW_TURNS, Cost, Part, same_motion
 from .switches import UndampedRun
 
-DENSE = 400
+SOLVED_EQUATIONS = 400
 """Equations of the linear solve that threads are tried on, at the most."""
 
 
@@ -69,7 +69,7 @@ def threads(packing: Packing) -> Part:
     from threadpoolctl import threadpool_info, threadpool_limits
 
     here = max((pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"), default=1)
-    matrix = dynamical_matrix(packing)[0][:DENSE, :DENSE].toarray()
+    matrix = dynamical_matrix(packing)[0][:SOLVED_EQUATIONS, :SOLVED_EQUATIONS].toarray()
     force = np.ones(len(matrix))
     solutions: dict[int, Floats] = {}
 
@@ -79,7 +79,7 @@ def threads(packing: Packing) -> Part:
 
     # two threads that wait for one core take a third of a second
     per = f"dense solve of {len(matrix)} equations"
-    cost = Cost.of(per, lambda: solve(1), lambda: solve(2), turns=FEW, parallel=True)
+    cost = Cost.of(per, lambda: solve(1), lambda: solve(2), turns=FEW_TURNS, parallel=True)
     reason = f"{here} thread{'s' * (here > 1)} in BLAS, by OPENBLAS_NUM_THREADS; the plugin has none"
     identical = np.array_equal(solutions[1], solutions[2])
     same = "the solution" if identical else "the solution differs in its last digits"

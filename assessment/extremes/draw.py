@@ -14,10 +14,10 @@ from matplotlib.lines import Line2D
 from ...figures.style import INK, styled
 from .cases.case import Case, Outcome
 
-WIDTH, ROW = 5.4, 0.135
+PICTURE_WIDTH, ROW = 5.4, 0.135
 """Width of the picture and height of a row, inch: names of seven points can be read at the width of a page."""
 
-COLOURS = {"holds": "C1", "refused": "C2", "fails": "C0"}
+STATUS_COLOURS = {"holds": "C1", "refused": "C2", "fails": "C0"}
 
 LOWEST = 1e-6
 """Left end of the picture, in units of the bound; what is smaller, such as an exact zero, is drawn there."""
@@ -39,7 +39,7 @@ def extremes_figure(done: Sequence[tuple[Case, Outcome]]) -> Figure:
     """
     groups = [list(members) for _, members in groupby(done, lambda each: each[0].group)]
     rows = sum(len(group) + 1.5 for group in groups)
-    figure = Figure(figsize=(WIDTH, ROW * rows + 0.9), layout="constrained")
+    figure = Figure(figsize=(PICTURE_WIDTH, ROW * rows + 0.9), layout="constrained")
     axes = figure.add_subplot()
     names: dict[float, str] = {}
     place = 0.0
@@ -59,10 +59,10 @@ def extremes_figure(done: Sequence[tuple[Case, Outcome]]) -> Figure:
     axes.tick_params(axis="y", length=0, which="both")
     axes.minorticks_off()
     marks = [
-        Line2D([], [], color=COLOURS[status], marker="s" if status == "refused" else "o", linestyle="")
-        for status in COLOURS
+        Line2D([], [], color=STATUS_COLOURS[status], marker="s" if status == "refused" else "o", linestyle="")
+        for status in STATUS_COLOURS
     ]
-    count = {status: sum(outcome.status == status for _, outcome in done) for status in COLOURS}
+    count = {status: sum(outcome.status == status for _, outcome in done) for status in STATUS_COLOURS}
     legend = [f"{count['holds']} hold", f"{count['refused']} refused, as they should be", f"{count['fails']} fail"]
     figure.legend(marks, legend, loc="outside upper center", ncols=3)
     return figure
@@ -77,7 +77,7 @@ def _typeset(name: str) -> str:
 
 
 def _draw(axes: Any, place: float, outcome: Outcome) -> None:
-    colour = COLOURS[outcome.status]
+    colour = STATUS_COLOURS[outcome.status]
     if outcome.figure is None or outcome.bound is None:
         axes.plot(8, place, "s" if outcome.status == "refused" else "X", color=colour)
         return

@@ -16,7 +16,7 @@ from .methods.work_precision_study import Point, StatedError, Study
 
 MARKERS = "osD^vP"
 DASHES = ("--", ":", "-.", (0, (5, 1, 1, 1, 1, 1)))
-LARGEST, SMALLEST = 6.5, 3.0
+LARGEST_MARKER, SMALLEST_MARKER = 6.5, 3.0
 """Sizes of the markers of the first and of the last method, points."""
 
 ZERO_ABOVE = 0.25
@@ -44,7 +44,7 @@ def figure_of(study: Study) -> Figure:
     families = list(dict.fromkeys(map(_family, study.methods)))
     for method in study.methods:
         points, number = study.of(method), families.index(_family(method))
-        size = LARGEST - (LARGEST - SMALLEST) * number / max(1, len(families) - 1)
+        size = LARGEST_MARKER - (LARGEST_MARKER - SMALLEST_MARKER) * number / max(1, len(families) - 1)
         style: dict[str, Any] = {"color": f"C{number}", "marker": MARKERS[number], "markersize": size}
         style |= {"clip_on": False, "zorder": 3 + 0.1 * number}
         if method != _family(method):

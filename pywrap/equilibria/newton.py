@@ -34,7 +34,7 @@ from ..lammps.trial_state import EPSILON, Trial
 from .newton_matrix import IDLE, StiffnessFactors, factor_stiffness
 from .rattlers import middle_of_cage
 
-ITERATIONS = 40
+NEWTON_ITERATIONS = 40
 """Newton iterations before an increment is halved. Three or four do, but where a disk is pushed out between two others:
 their contacts open as delta^p -> 0, on which Newton's method gains a factor of 5 an iteration for p = 3/2, and 12 reach
 the floor."""
@@ -51,10 +51,10 @@ FREEING_ITERATIONS = 3
 its force goes as delta^p, a root of that order, and the factor makes the convergence quadratic again. Later ones take
 Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
 
-MOVES = 3
+RATTLER_MOVES = 3
 """Times that a rattler is moved in an increment: what it lies against may be another one that is moved later."""
 
-NOISE = 10
+FLOORS_OF_ROUNDING = 10
 """Rounding floors up to which a residual that no longer falls is one."""
 
 REUSE_ITERATIONS = 3
@@ -67,12 +67,12 @@ REUSE_SIZE = 300
 REUSE_LIMIT = 0.1
 """Factor of the residual in one iteration up to which the factors of K are good for another one."""
 
-GAIN = 1e-2
+FIRST_GAIN = 1e-2
 """Factor by which the first iteration reduces the residual, where nothing is known yet: 1e-2 is that of an increment of
 1e-3 from no displacement, and smaller ones have smaller factors."""
 
 
-NEAR = 0.25
+FARTHEST_MOVE = 0.25
 """Displacement, in units of the smallest radius, up to which no centre of a disk comes to lie in another disk."""
 
 REACH = 0.99
@@ -128,7 +128,7 @@ def iterate_newton(
     """
     base, since, rattlers = start.packing, start.graph, _Rattlers(start, IDLE if patient else 0.0)
     displacement, factors, answers = guess or Guess(np.zeros(3 * len(base)))
-    iterations, gain = PATIENT if patient else (ITERATIONS, FRUITFUL)
+    iterations, gain = PATIENT if patient else (NEWTON_ITERATIONS, FRUITFUL)
     course = _Course(start.floor, answers, force_tolerance, gain)
     evaluations = 0
     for iteration in range(iterations):
@@ -151,7 +151,7 @@ def iterate_newton(
             return None, evaluations
         if iteration < FREEING_ITERATIONS and factors.expelled.any():
             step.reshape(3, -1)[:, factors.expelled] *= base.law.exponent
-        if base.compensated and trial.residual < NOISE * _floor_of(displacement, trial):
+        if base.compensated and trial.residual < FLOORS_OF_ROUNDING * _floor_of(displacement, trial):
             base, since, displacement = trial.packing, trial.graph, np.zeros_like(displacement)
         displacement = displacement + step
     return None, evaluations
@@ -190,7 +190,7 @@ class _Course:
         """
         residual = trial.residual
         if self.best is not None and residual > self._gain * self.best.residual:
-            if self.best.residual < NOISE * self.floor:
+            if self.best.residual < FLOORS_OF_ROUNDING * self.floor:
                 if residual < self.best.residual and self.floor < self.best.residual:
                     self.best = trial  # below the floor the one that moved less is as good
                 return True
@@ -205,7 +205,7 @@ class _Course:
         if residual <= (0.1 * self.floor if self._tolerance is None else self._tolerance):
             return True
         # The next residual falls by at least the factor of this one, rounding apart: it may be far below the floor.
-        factor = self._last / self._earlier if self._earlier < np.inf else GAIN
+        factor = self._last / self._earlier if self._earlier < np.inf else FIRST_GAIN
         return residual < self.floor and factor * self._last < 0.1 * self.floor
 
     def may_reuse_factors(self, residual: float, disks: int) -> bool:
@@ -224,7 +224,7 @@ class _Rattlers:
 
     def __init__(self, start: Trial, share: float) -> None:
         # no more than an equilibrium may leave
-        nothing = max(NOISE * start.floor, share * float(start.derivatives.normal_force.max(initial=0.0)))
+        nothing = max(FLOORS_OF_ROUNDING * start.floor, share * float(start.derivatives.normal_force.max(initial=0.0)))
         self._loose = (_count_bearing_contacts(start, nothing) == 0) & ~start.still.top
         self._moved = np.zeros(len(self._loose), dtype=np.int64)
 
@@ -232,7 +232,7 @@ class _Rattlers:
         """Those that a neighbour ran into, and disks with one contact left, which become rattlers; to be moved."""
         count = _count_bearing_contacts(trial, trial.floor)
         hit = ((count == 1) & ~trial.still.top) | (self._loose & (count > 0))
-        disks = np.flatnonzero(hit & (self._moved < MOVES))
+        disks = np.flatnonzero(hit & (self._moved < RATTLER_MOVES))
         self._moved[disks] += 1
         return disks
 
@@ -269,7 +269,7 @@ def _lammps_refuses(displacement: Floats, packing: Packing) -> bool:
     """
     moved = displacement.reshape(3, -1)[:2]
     far = np.hypot(*moved)
-    if far.max(initial=0.0) <= NEAR * packing.radius.min():
+    if far.max(initial=0.0) <= FARTHEST_MOVE * packing.radius.min():
         return False
     if np.any(far > REACH * packing.radius):
         return True

@@ -29,17 +29,17 @@ SMOOTH = "; without friction (mu = 0) nothing holds a layer back on a smooth flo
 SMALLEST_SHARE = 2.0**-10
 """The share of an increment below which halving ends."""
 
-PARTS = 3, 7
+INCREMENT_PARTS = 3, 7
 """Parts of an increment that are tried where halving has led nowhere: no load is one that halving has met."""
 
 RESTS = 1e-9
 """Force on a disk, in units of F_y, at which dynamics end."""
 
-FEWEST_STEPS, MOST_STEPS, DISK_STEPS = 20_000, 800_000, 80_000_000
+FEWEST_STEPS, MOST_DYNAMICS_STEPS, DISK_STEPS = 20_000, 800_000, 80_000_000
 """Bounds of the number of steps of dynamics, and that number times the number of disks in between. Just beyond the end
 of a branch the packing creeps, the longer the nearer: 800,000 steps of 100 disks take 5 s."""
 
-LOOKS = 8
+LOOKS_AT_LAYER = 8
 """Looks at the layer during dynamics."""
 
 ATTEMPTS = (
@@ -175,7 +175,7 @@ def _otherwise(
 ) -> Equilibrium:
     """The equilibrium at fx by the ways of `ATTEMPTS`, in that order; `here` if none leads there."""
     routes: list[tuple[str, Equilibrium, list[float]]] = [("more iterations", here, [fx])]
-    for count in PARTS:
+    for count in INCREMENT_PARTS:
         routes.append((f"{count} increments", last, np.linspace(last.fx, fx, count + 1)[1:].tolist()))
     routes.append(("a larger increment and back", last, [2 * fx - last.fx, fx]))
     for way, start, loads in routes:
@@ -192,9 +192,9 @@ def _at_rest(engine: Engine, start: Equilibrium, fx: float) -> Equilibrium | Non
     engine.restore(start.packing)
     engine.set_fx(fx)
     here, flown, steps = start.packing, 0.0, 0
-    most = min(MOST_STEPS, max(FEWEST_STEPS, DISK_STEPS // len(here)))
+    most = min(MOST_DYNAMICS_STEPS, max(FEWEST_STEPS, DISK_STEPS // len(here)))
     while abs(flown) < 2 * here.radius.mean() and steps < most:
-        rest = engine.relax(RESTS * here.fy, steps=max(FEWEST_STEPS, most // LOOKS))
+        rest = engine.relax(RESTS * here.fy, steps=max(FEWEST_STEPS, most // LOOKS_AT_LAYER))
         before, here, steps = here, engine.packing, steps + rest.steps
         if rest.status != "no":
             return Equilibrium(here, rest.residual, rounding_floor(here), steps)

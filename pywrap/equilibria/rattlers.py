@@ -26,10 +26,10 @@ from ...analysis.packing.geometry import neighbour_tree
 TRAVEL = 0.3
 """How far a disk may move along x and along y, in radii: cages are a few tenths wide."""
 
-ROUNDS = 20
+LINEAR_PROGRAMS = 20
 """Linear programs for a disk at the most; two or three do."""
 
-GAIN = 0.05
+WIDENING = 0.05
 """Share by which a linear program has to widen the narrowest gap for another one to follow."""
 
 
@@ -93,7 +93,7 @@ def _to_the_middle(branch: Floats, contact: Floats, height: float, radius: float
     unit = 2.0 ** np.frexp(radius)[1]
     branch, contact, height, radius = branch / unit, contact / unit, height / unit, radius / unit
     move, room = np.zeros(2), TRAVEL * radius
-    for _ in range(ROUNDS):
+    for _ in range(LINEAR_PROGRAMS):
         distance = np.hypot(branch[:, 0] + move[0], branch[:, 1] + move[1])
         normal = np.vstack([(branch + move) / distance[:, None], [0.0, 1.0]])  # the floor is the last one
         gap = np.append(distance - contact, height + move[1] - radius)
@@ -105,6 +105,6 @@ def _to_the_middle(branch: Floats, contact: Floats, height: float, radius: float
             bounds=[*zip(-room - move, room - move, strict=True), (narrowest, radius)],
         ).x
         move += step[:2]
-        if step[2] - narrowest <= GAIN * abs(narrowest):
+        if step[2] - narrowest <= WIDENING * abs(narrowest):
             break
     return unit * move

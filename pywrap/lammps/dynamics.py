@@ -22,7 +22,7 @@ from .decks import Decks
 from .lammps_state import LammpsState
 from .plain_file_names import shared_folder
 
-PERIODS = "image"
+PERIODS_AWAY = "image"
 """Of the state of a layer that is drawn: by how many periods each disk is away from where it began."""
 
 
@@ -219,7 +219,7 @@ class Dynamics:
 
     def state(self) -> dict[str, Floats]:
         """All that the run has at this moment, by LAMMPS's names, for `resume`."""
-        periods = {PERIODS: self._state.periods()} if self._drawn else {}
+        periods = {PERIODS_AWAY: self._state.periods()} if self._drawn else {}
         return self._state.checkpoint() | periods
 
     def resume(self, step: int, state: Mapping[str, Floats]) -> None:
@@ -228,9 +228,9 @@ class Dynamics:
         Forces are computed anew. A run that is continued elsewhere is the same to the bit as one that resumes its own
         state at the same steps.
         """
-        self._state.write_checkpoint({name: values for name, values in state.items() if name != PERIODS})
-        if PERIODS in state:
-            self._state.write_periods(state[PERIODS])
+        self._state.write_checkpoint({name: values for name, values in state.items() if name != PERIODS_AWAY})
+        if PERIODS_AWAY in state:
+            self._state.write_periods(state[PERIODS_AWAY])
         self._weaken()  # anew: the fix would remember the friction that the last forces of this instance had
         self._decks.command(f"reset_timestep {step}")
         self._decks.command("run 0 post no")

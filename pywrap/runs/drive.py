@@ -44,7 +44,7 @@ STATES = 100
 SAMPLES_A_PERIOD, SAMPLES_A_PART = 20, 10
 """Rows of the series: so many in a period of the layer on the spring, and at least so many in a part of the run."""
 
-SLOW, TOO_FAST = 100.0, 10.0
+SLOW_ENOUGH, TOO_FAST = 100.0, 10.0
 """Periods of the slowest vibration in which the spring loads the layer to mu F_y: below the first a run is warned, and
 below the second refused."""
 
@@ -208,11 +208,11 @@ def check_drive(scene: Scene, start: Packing) -> list[str]:
     )
     if loading < TOO_FAST * period:
         raise SceneError(
-            f"{says}, and slow driving takes {SLOW:g} or more: lower it to "
-            f"{settings.fastest * loading / (SLOW * period):.1g}, or take a softer spring"
+            f"{says}, and slow driving takes {SLOW_ENOUGH:g} or more: lower it to "
+            f"{settings.fastest * loading / (SLOW_ENOUGH * period):.1g}, or take a softer spring"
         )
-    if loading < SLOW * period:
-        warnings.append(f"{says}: slow driving takes {SLOW:g} or more")
+    if loading < SLOW_ENOUGH * period:
+        warnings.append(f"{says}: slow driving takes {SLOW_ENOUGH:g} or more")
     unit = (layer_force(start, 1.0) / start.coordinate_mass)[active]
     moved = np.zeros(start.coordinates)
     moved[active] = general_lu(matrix.tocsc()).solve(unit)

@@ -13,7 +13,7 @@ BED = ("precision", "packing", "law", "load", "damping", "units", "perturb.inert
 """Sections that determine the settled packing and its masses. Every command reads them, and of [perturb] one key."""
 PATH = (*BED, "relax", "ramp")
 """Sections that determine the equilibria along F_x."""
-RUN = (*PATH, "perturb", "friction")
+UNDAMPED_SECTIONS = (*PATH, "perturb", "friction")
 """Sections that determine undamped runs."""
 
 
@@ -45,11 +45,11 @@ class Command:
 COMMANDS: Mapping[str, Command] = {
     "settle": Command(BED),
     "ramp": Command((*PATH, "output"), ("ramp",)),
-    "perturb": Command((*RUN, "output"), ("perturb",)),
+    "perturb": Command((*UNDAMPED_SECTIONS, "output"), ("perturb",)),
     "drive": Command((*BED, "drive"), ("drive", "damping")),
     "onset": Command(PATH, ("ramp",)),
-    "reproduce": Command(RUN, ("ramp",)),
-    "triggering": Command(RUN, ("ramp",)),
+    "reproduce": Command(UNDAMPED_SECTIONS, ("ramp",)),
+    "triggering": Command(UNDAMPED_SECTIONS, ("ramp",)),
     "trigger": Command((*PATH, "friction", "trigger"), ("ramp", "friction")),
     "eruptions": Command((*PATH, "eruptions"), ("ramp", "eruptions")),
     "modes": Command((*PATH, "modes"), ("ramp",)),

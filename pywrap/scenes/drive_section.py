@@ -17,7 +17,7 @@ LOADINGS = 2.0
 """Time for each slip of a run that ends after a number of slips, in units of the time in which the spring loads a layer
 at rest to mu F_y: the run ends then, whether it has slipped or not."""
 
-NOISE = 1e-12
+PROBE_SCALE = 1e-12
 """Scale of a signal that shows by how much any small disturbance moves the next slip: far above the rounding of forces,
 and far below every force."""
 
@@ -158,7 +158,7 @@ class Drive(Section):
 
     def with_noise(self) -> Drive:
         """The same drive with its signal as small as noise."""
-        return self.model_copy(update={"scale": NOISE})
+        return self.model_copy(update={"scale": PROBE_SCALE})
 
     def forcing(self) -> Signal | None:
         """The signal as LAMMPS takes it, the force on a disk or the acceleration of the floor, by time of the run."""

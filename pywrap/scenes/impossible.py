@@ -28,7 +28,7 @@ EPSILON = 2.3e-16
 FORCE_CHAINS = 10.0
 """The largest contact force, in units of F_y, for which LAMMPS's time steps are made."""
 
-MOST_STEPS = 1e13
+STEPS_OF_A_YEAR = 1e13
 """A year of LAMMPS's steps: 2e-6 s each and more, on a core of 2020."""
 LARGEST_FILE = 1e13
 """10 TB."""
@@ -45,13 +45,13 @@ SETTLING_WITH_FRICTION = 25.0
 with k_n = 2e5 and 2e6 and harmonic with 2e4."""
 OVERDAMPED_STEPS = 16_000
 """Steps of the default length in one increment of overdamped dynamics."""
-LARGE = 300
+STAGED_DISKS = 300
 """Disks beyond which a packing settles in stages."""
 STEPS_TO_REST = 10_000_000
-"""Steps after which the decks give up on a packing of up to `LARGE` disks: 10,000 looks of 1000 steps."""
+"""Steps after which the decks give up on a packing of up to `STAGED_DISKS` disks: 10,000 looks of 1000 steps."""
 SINKING_STEPS = 400_000
 """Steps after which they give up on a stage of a larger one."""
-LEAST_SHARE = 0.4
+LEAST_SETTLING_SHARE = 0.4
 """Of `SETTLING_STEPS`, what a larger packing takes at the least in its first stage; and of `SETTLING_WITH_FRICTION`."""
 ROUNDING_LIMIT = 5e-5
 """Rounding of a force, in units of F_y, beyond which a bed never comes to the 1e-3 F_y that the first stage asks."""
@@ -78,7 +78,7 @@ def refuse_endless(scene: SceneKeys, task: Task) -> None:
     if perturb is not None and task in ("perturb", "reproduce"):
         steps = perturb.time / (perturb.time_step or _undamped_step(scene))
     memory, written = disks * BYTES_IN_MEMORY, disks * BYTES_WRITTEN * equilibria
-    if steps > MOST_STEPS:
+    if steps > STEPS_OF_A_YEAR:
         found = f"{steps:.2g} time steps, a year and more: lower perturb.time, or raise perturb.time_step"
     elif memory > _installed_memory():
         found = (
@@ -115,9 +115,9 @@ def refuse_impossible(scene: SceneKeys) -> tuple[str, str] | None:
         )
     steps = _settling_steps(scene)
     if packing.settle_friction:
-        ends = LEAST_SHARE * steps < STEPS_TO_REST
+        ends = LEAST_SETTLING_SHARE * steps < STEPS_TO_REST
     else:
-        ends = steps < STEPS_TO_REST if packing.disks <= LARGE else LEAST_SHARE * steps < SINKING_STEPS
+        ends = steps < STEPS_TO_REST if packing.disks <= STAGED_DISKS else LEAST_SETTLING_SHARE * steps < SINKING_STEPS
     if not ends:
         return "law.kn", (
             f"= {law.kn:g} is too stiff for load.fy = {fy:g}: settling takes about {_count(steps)} time steps, more "

@@ -20,7 +20,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
-from .units import HERTZ, MISMATCH, Layer, RealUnits, check_exponent, hertz_stiffness, layer_of, units_of
+from .units import HERTZ_EXPONENT, MISMATCH, Layer, RealUnits, check_exponent, hertz_stiffness, layer_of, units_of
 from .units_section import Units, is_stress, quantity
 from .validation import SceneError, is_number
 
@@ -34,8 +34,8 @@ FREQUENCY: Powers = (0, 0, -1)
 VELOCITY: Powers = (0, 1, -1)
 FORCE: Powers = (1, 1, -2)
 STRESS: Powers = (1, -1, -2)
-STIFFNESS: Powers = (1, 1 - HERTZ, -2)
-DASHPOT: Powers = (1, 1 - HERTZ, -1)
+STIFFNESS: Powers = (1, 1 - HERTZ_EXPONENT, -2)
+DASHPOT: Powers = (1, 1 - HERTZ_EXPONENT, -1)
 VISCOSITY: Powers = (1, 0, -1)
 SPRING: Powers = (1, 0, -2)
 
@@ -113,7 +113,7 @@ def as_numbers(scene: Scene, folder: Path, name: str) -> Scene:
         units = Units.model_validate(scene["units"])
         if _is_plain(scene):
             return scene
-        check_exponent(_section(scene, "law").get("exponent", HERTZ))
+        check_exponent(_section(scene, "law").get("exponent", HERTZ_EXPONENT))
         converted = {**scene, "packing": _packing_in_numbers(units, _section(scene, "packing"))}
     except ValidationError:
         return scene
@@ -235,7 +235,7 @@ def _stiffness(given: str | None, units: Units, layer: Layer) -> float:
                 f'law.kn = "{given}" is not the stiffness of Hertz\'s contact of these grains, {hertz:.6g} N/m^1.5: '
                 "leave law.kn out, or correct units.youngs_modulus"
             )
-    return _round(STIFFNESS_OF_ONE * layer.mass * layer.diameter ** (1 - HERTZ))
+    return _round(STIFFNESS_OF_ONE * layer.mass * layer.diameter ** (1 - HERTZ_EXPONENT))
 
 
 def _numbers(place: str, value: Any, powers: Powers | tuple[Powers, Powers], real: RealUnits) -> Any:

@@ -134,12 +134,12 @@ class Scene(SceneKeys):
 
     @classmethod
     def _check(cls, mapping: Mapping[str, Any], folder: Path, name: str, command: str | None) -> "Scene":
-        wanted = COMMANDS.get(command or "", ALL)
+        wanted = COMMANDS.get(command or "", ALL_SECTIONS)
         context: dict[str, Any] = {"folder": folder}
         try:
             if isinstance(mapping, Mapping) and "units" in mapping:
                 mapping = as_numbers(mapping, folder, name)
-            if wanted is not ALL and isinstance(mapping, Mapping):
+            if wanted is not ALL_SECTIONS and isinstance(mapping, Mapping):
                 _check_keys(mapping)
                 mapping = wanted.part(mapping)
                 if "perturb" not in wanted.reads:
@@ -195,5 +195,5 @@ def _models(annotation: Any) -> tuple[type[Section], ...]:
 
 SECTIONS = {name: models for name, field in SceneKeys.model_fields.items() if (models := _models(field.annotation))}
 
-ALL = Command(tuple(SceneKeys.model_fields))
+ALL_SECTIONS = Command(tuple(SceneKeys.model_fields))
 """Every section."""

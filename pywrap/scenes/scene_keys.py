@@ -12,7 +12,7 @@ from .study_sections import Eruptions, ModesSection, Trigger
 from .units_section import Units
 from .validation import Section
 
-STEPS = 3e4
+DEFAULT_INCREMENTS = 3e4
 """Increments of F_x up to F_y where a scene does not say: the paper's 1e-4 of 3."""
 
 
@@ -53,7 +53,7 @@ class SceneKeys(Section):
     @classmethod
     def _step_of_the_load(cls, ramp: object, info: ValidationInfo) -> object:
         if isinstance(ramp, Mapping) and "step" not in ramp and "load" in info.data:
-            return {**ramp, "step": info.data["load"].fy / STEPS}
+            return {**ramp, "step": info.data["load"].fy / DEFAULT_INCREMENTS}
         return ramp
 
     _inertia: Inertia = PrivateAttr(Inertia())

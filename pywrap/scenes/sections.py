@@ -14,7 +14,7 @@ from ...analysis.packing.law import EXPONENTS
 from .signal_keys import SignalKeys
 from .validation import NotNegative, Positive, Section, is_number, refusal_sentence
 
-NUMBER = r"\d+(?:\.\d*)?(?:[eE][-+]?\d+)?"
+NUMBER_PATTERN = r"\d+(?:\.\d*)?(?:[eE][-+]?\d+)?"
 """A number without a sign, in text."""
 
 EQUILIBRIA = 10_000_000
@@ -63,7 +63,7 @@ class Law(Section):
             return kt
         if "kn" not in info.data:
             return 0.0  # kn is missing or refused, and that is what gets reported
-        match = re.fullmatch(rf"(?:({NUMBER})(?:/({NUMBER}))? )?kn", kt.strip())
+        match = re.fullmatch(rf"(?:({NUMBER_PATTERN})(?:/({NUMBER_PATTERN}))? )?kn", kt.strip())
         numerator, denominator = (float(number or 1) for number in match.groups()) if match else (0.0, 0.0)
         if denominator == 0:
             raise refusal_sentence("", f'= "{kt}" is no share of kn: give a number, or a share such as "2/7 kn"')
@@ -322,6 +322,6 @@ class Output(Section):
 
 def _multiple_of_v0(text: str) -> float:
     """10 for "10 v0"; 0 for what is no multiple."""
-    match = re.fullmatch(rf"(?:({NUMBER}) )?v0", text.strip())
+    match = re.fullmatch(rf"(?:({NUMBER_PATTERN}) )?v0", text.strip())
     factor = float(match[1] or 1) if match else 0.0
     return factor if is_number(factor) else 0.0

@@ -43,7 +43,7 @@ from .scene_keys import SceneKeys
 from .units_section import Units
 from .validation import refusal_sentence
 
-HERTZ = 1.5
+HERTZ_EXPONENT = 1.5
 """Exponent of Hertz's contact."""
 
 MISMATCH = 0.01
@@ -195,7 +195,7 @@ def hertz_stiffness(units: Units) -> float:
 
 def check_exponent(exponent: float) -> None:
     """Refuse a law that is not Hertz's, which has no stiffness from the moduli of its grains."""
-    if exponent != HERTZ:
+    if exponent != HERTZ_EXPONENT:
         raise refusal_sentence("units", f"takes k_n from Hertz's contact, and law.exponent = {exponent}: leave one out")
 
 

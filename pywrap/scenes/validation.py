@@ -39,7 +39,7 @@ NotNegative: TypeAlias = Annotated[float, Field(ge=0, allow_inf_nan=False), Afte
 
 T = TypeVar("T")
 
-KEYS = {
+KEYS_TO_ADD = {
     "ramp": "step and until",
     "perturb": "fx and time",
     "damping": "cn, ct or tau",
@@ -163,5 +163,5 @@ def is_number(value: object) -> TypeGuard[float]:
 def require_section(section: T | None, name: str) -> T:
     """A section of a scene that a task cannot do without."""
     if section is None:
-        raise SceneError(f"the scene has no section [{name}]: add it, with {KEYS[name]}")
+        raise SceneError(f"the scene has no section [{name}]: add it, with {KEYS_TO_ADD[name]}")
     return section

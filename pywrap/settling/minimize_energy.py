@@ -38,7 +38,7 @@ from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
 from ..equilibria.rattlers import place_disks
 from ..lammps.engine import Engine
 
-SMALL = 300
+DYNAMICS_DISKS = 300
 """Disks up to which dynamics goes all the way: a second or two."""
 
 TOLERANCES = tuple(10.0**-k for k in range(4, 10))
@@ -49,30 +49,30 @@ ABOVE_ROUNDING = 20.0
 """Roundings of a contact's force to which dynamics can bring a disk: a disk has up to six contacts, the stiffest of
 which carry ten times F_y, and velocity Verlet stirs the last digits at each step."""
 
-STEPS = 400_000
-"""Time steps of one stage of dynamics, at the most, for more than SMALL disks: a layer may sink for ever. With the
-upper layer of `loose.layer_size` a stage takes 10,000 to 50,000, whatever the size of the packing."""
+STAGE_STEPS = 400_000
+"""Time steps of one stage of dynamics, at the most, for more than DYNAMICS_DISKS disks: a layer may sink for ever. With
+the upper layer of `loose.layer_size` a stage takes 10,000 to 50,000, whatever the size of the packing."""
 
-ITERATIONS = 60
+MINIMIZER_ITERATIONS = 60
 """Iterations before dynamics takes over again; where no rearrangement is under way, 15 to 40 do."""
 
 FLOATING = 1e-8
 """Stiffness, in units of that of a contact that carries F_y, that is added to what has none: to what nothing holds."""
 
-LONGEST = 0.1
+LONGEST_DISPLACEMENT = 0.1
 """Longest displacement in one iteration, in smallest radii: no disk jumps over another."""
 
 UPHILL = 0.5
 """A step is shortened if the slope at its end is uphill and steeper than this share of the slope at its begin."""
 
-LIGHT = 0.02
+LIGHT_VISCOSITY = 0.02
 """Viscosity for few disks, in units of what is critical for a contact that carries F_y, of disks of mass one: about
 sqrt(F_y) in the paper's units, that of bed.in, and as good in any others."""
 
 DENSITY = 0.8
 """Area fraction to which a high start is gathered: below that of any jammed packing of disks, 0.82 to 0.85."""
 
-SHEAR = 0.2
+SHEAR_SPEED = 0.2
 """Speed of shear waves in a packing without friction, in units of that of a sound wave along a row of contacts: a
 packing that has hardly more contacts than it needs resists compression, and shear little. With it the number of steps
 is the least, within a factor of two in the damping, for 1000, 3000 and 10,000 disks."""
@@ -97,12 +97,12 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
         At rest to the rounding floor; where that is not found, to the last of the tolerances; or as it was when the
         steps ran out.
     """
-    if loose.law.frictional or len(loose) <= SMALL:
+    if loose.law.frictional or len(loose) <= DYNAMICS_DISKS:
         finest = max(TOLERANCES[-1] * loose.fy, ABOVE_ROUNDING * contact_rounding(loose))
         if bed:
             engine.settle(finest)
         else:
-            engine.damp(loose, finest, STEPS, LIGHT * float(np.sqrt(_stiffest(loose))))
+            engine.damp(loose, finest, STAGE_STEPS, LIGHT_VISCOSITY * float(np.sqrt(_stiffest(loose))))
         packing = engine.packing
         try:
             return equilibrate(engine, Equilibrium.of(packing), 0.0).packing
@@ -110,9 +110,11 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
             return packing if loose.law.frictional else minimize_energy(packing)[0]
     report_progress(f"dynamics down to {TOLERANCES[0]:.0e} F_y on a disk")
     if bed:
-        engine.settle(TOLERANCES[0] * loose.fy, _height(loose) / loose.position[:, 1].max(), _viscosity(loose), STEPS)
+        engine.settle(
+            TOLERANCES[0] * loose.fy, _height(loose) / loose.position[:, 1].max(), _viscosity(loose), STAGE_STEPS
+        )
     else:
-        engine.damp(loose, TOLERANCES[0] * loose.fy, STEPS, _viscosity(loose))
+        engine.damp(loose, TOLERANCES[0] * loose.fy, STAGE_STEPS, _viscosity(loose))
     for tolerance, finer in pairwise(TOLERANCES):
         packing = engine.packing
         if largest_force(packing) > (1 + 1e-6) * tolerance * loose.fy:  # but for the rounding of forces
@@ -122,11 +124,11 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
         if found:
             return packing
         report_progress(f"dynamics down to {finer:.0e} F_y on a disk")
-        engine.damp(packing, finer * loose.fy, STEPS)
+        engine.damp(packing, finer * loose.fy, STAGE_STEPS)
     return minimize_energy(engine.packing)[0]
 
 
-def minimize_energy(packing: Packing, iterations: int = ITERATIONS) -> tuple[Packing, bool]:
+def minimize_energy(packing: Packing, iterations: int = MINIMIZER_ITERATIONS) -> tuple[Packing, bool]:
     """The packing at the energy's minimum downhill from it, by Newton's method with implicit steps.
 
     Parameters
@@ -172,7 +174,7 @@ def is_minimum(packing: Packing) -> bool:
 def _downhill(packing: Packing, step: Floats) -> tuple[Packing, float]:
     """As far along a step as it leads downhill, and the share of it that this is."""
     move = step.reshape(2, -1).T
-    share = min(1.0, LONGEST * packing.radius.min() / np.hypot(*move.T).max())
+    share = min(1.0, LONGEST_DISPLACEMENT * packing.radius.min() / np.hypot(*move.T).max())
     slope = packing.net_force[: len(step)] @ step
     while True:
         there = place_disks(packing, packing.position + share * move)
@@ -223,9 +225,10 @@ def _height(packing: Packing) -> float:
 def _viscosity(packing: Packing) -> float:
     """Damping that is critical for the slowest shear wave across the height, mass / time: 2 m omega.
 
-    Its omega is pi c / (2 height), with c = SHEAR d (k / m)^(1/2) and the stiffness k of a contact under the pressure.
+    Its omega is pi c / (2 height), with c = SHEAR_SPEED d (k / m)^(1/2) and the stiffness k of a contact under the
+    pressure.
     """
     diameter = 2 * float(packing.radius.mean())
     carried = packing.fy * packing.top.sum() * diameter / _width(packing)
     stiffness = float(packing.law.normal_stiffness(packing.law.overlap_of_force(carried)))
-    return float(np.pi * SHEAR * diameter * np.sqrt(packing.mass.mean() * stiffness) / _height(packing))
+    return float(np.pi * SHEAR_SPEED * diameter * np.sqrt(packing.mass.mean() * stiffness) / _height(packing))

@@ -12,7 +12,7 @@ from typing import Any
 
 from faultgouge.analysis import dynamical_matrix, eigenvalues
 from faultgouge.studies.modes.count_in_slices import count_in_slices
-from faultgouge.studies.modes.count_pairs import ALL, PairCounts
+from faultgouge.studies.modes.count_pairs import DENSE_DISKS, PairCounts
 from faultgouge.studies.result_rows import append_row
 from research.modes.bounds import at_loads
 
@@ -24,7 +24,7 @@ def rows(disks: int, seed: int) -> Iterator[dict[str, Any]]:
     """The counts of one packing at each load that it bears."""
     for load, packing in at_loads(disks, seed, LOADS[disks]):
         row = {"disks": disks, "seed": seed, "fx_over_fy": load}
-        if disks <= ALL:
+        if disks <= DENSE_DISKS:
             every = PairCounts.of(eigenvalues(packing))
             row |= {"pairs": len(every.omega)} | {key: every.as_dict()[key] for key in ("growth_rate", "least_q")}
         values, error = count_in_slices(packing)

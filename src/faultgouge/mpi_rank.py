@@ -11,7 +11,7 @@ from typing import Any
 RANKS = ("PMI_RANK", "PMIX_RANK", "OMPI_COMM_WORLD_RANK", "SLURM_PROCID")
 """Where MPICH, PMIx, OpenMPI and Slurm tell a process its rank."""
 
-SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
+RANK_VARIABLES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
 """Where launchers tell the number of ranks; SLURM_NTASKS would be that of a whole allocation."""
 
 
@@ -24,7 +24,7 @@ def rank() -> int:
 def size() -> int:
     """Number of ranks in MPI's world; 1 without MPI."""
     world = _world()
-    return _first(SIZES, 1) if world is None else int(world.size)
+    return _first(RANK_VARIABLES, 1) if world is None else int(world.size)
 
 
 def is_root() -> bool:

@@ -14,7 +14,7 @@ import time
 DEATH_SIGNAL = 1
 """PR_SET_PDEATHSIG of Linux's prctl."""
 
-EVERY = 0.2
+SECONDS_BETWEEN_LOOKS = 0.2
 """Seconds between two looks at the parent, where the kernel does not tell."""
 
 _watching = threading.Event()
@@ -42,4 +42,4 @@ def _watch(parent: int) -> None:
     while _watching.is_set():
         if os.getppid() != parent:
             os.kill(os.getpid(), signal.SIGKILL)
-        time.sleep(EVERY)
+        time.sleep(SECONDS_BETWEEN_LOOKS)

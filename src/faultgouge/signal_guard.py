@@ -12,7 +12,7 @@ CPU time (SIGXCPU) ends the child, the guard prints a sentence as well; also if 
 at its command `quit`, with whatever code.
 
 Under mpiexec every rank has its guard. mpiexec passes a signal to all ranks, and kills the other ranks when the work of
-one rank has ended. The guards therefore end `TOGETHER`, and the work after them. Only rank 0 prints.
+one rank has ended. The guards therefore end `SECONDS_TO_END`, and the work after them. Only rank 0 prints.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from .mpi_rank import is_root, size
 GRACE = 0.8
 """Seconds that the work has after a signal to close files and to end other processes."""
 
-TOGETHER, LAST = 1.2, 1.7
+SECONDS_TO_END, SECONDS_TO_WAIT = 1.2, 1.7
 """Seconds after a signal at which the guards of several ranks end, all with the same exit code, and until which their
 work is there: mpiexec kills all ranks as soon as the work of one is gone, and then reports the kill."""
 
@@ -108,7 +108,7 @@ def _work(work: Callable[[], None], guard: bool) -> NoReturn:
         os.kill(os.getppid(), signalled.args[0])  # where the work alone was signalled
         if size() > 1:
             parent_death.outlive()
-        time.sleep(max(0.0, signalled.args[1] + LAST - time.monotonic()))
+        time.sleep(max(0.0, signalled.args[1] + SECONDS_TO_WAIT - time.monotonic()))
         os._exit(128 + signalled.args[0])
     finally:
         has_ended()
@@ -164,7 +164,7 @@ def _interrupted(number: int, begin: float) -> NoReturn:
     if is_root():
         _say(f"{SIGNALS[signal.Signals(number)]}: {_kept()}")
     if size() > 1:
-        time.sleep(max(0.0, begin + TOGETHER - time.monotonic()))
+        time.sleep(max(0.0, begin + SECONDS_TO_END - time.monotonic()))
     os._exit(128 + number)
 
 

@@ -32,7 +32,7 @@ from ...analysis.motion.eigenvalues import all_modes, growing_undamped, in_balan
 from ...analysis.motion.motion import Motion
 from ...analysis.motion.spectrum import participation_ratio
 
-ALONE = 1.5
+LONE_PARTICIPATION = 1.5
 """Disks that take part in a motion, below which the motion is that of one disk."""
 
 TRIED = 20
@@ -107,7 +107,7 @@ def linear_state(configuration: Configuration, sliding: bool) -> LinearState:
     zero = zero_uncertainty(configuration, rounding)
     overlap = np.abs(np.sum(left.conj() * right, axis=0))
     complex_, negative = growing_undamped(values, overlap, rounding, zero)
-    shared = _disks(motion, right) >= ALONE
+    shared = _disks(motion, right) >= LONE_PARTICIPATION
     grows = (complex_ | negative) & shared
     rates = 2 * np.abs(np.sqrt(values[grows].astype(complex)).imag)
     return LinearState(
@@ -126,7 +126,7 @@ def _damped_rate(motion: Motion) -> float:
     for s in values[:TRIED]:
         pencil = s * s * np.eye(len(stiffness)) + s * damping + stiffness
         vector = np.linalg.svd(pencil)[2][-1].conj()
-        if _disks(motion, vector[:, None])[0] >= ALONE:
+        if _disks(motion, vector[:, None])[0] >= LONE_PARTICIPATION:
             return float(2 * s.real)
     return float(2 * values[min(TRIED, len(values)) - 1].real)
 

@@ -12,7 +12,7 @@ from ...analysis.arrays import Floats
 from ...analysis.motion.slips import Slip
 from ...figures.style import styled
 
-LARGE = 1.0
+LINEAR_UP_TO = 1.0
 """Rates and eigenvalues up to which the axes are linear; beyond, they are logarithmic."""
 
 
@@ -70,7 +70,7 @@ def draw_cycle_spectrum(
     growth.set_ylabel("growth rate of $D$")
     lowest.set_ylabel("lowest eigenvalue")
     for axes in (growth, lowest):
-        axes.set_yscale("symlog", linthresh=LARGE)
+        axes.set_yscale("symlog", linthresh=LINEAR_UP_TO)
         axes.axhline(0, color="0.5", linewidth=0.6)
         if axes.get_legend_handles_labels()[0]:
             axes.legend(fontsize=6, loc="best")

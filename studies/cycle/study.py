@@ -20,7 +20,7 @@ from .compute import cycle_state
 from .draw import draw_cycle_spectrum
 
 NUMBERS = ("pairs", "undamped", "damped", "lowest", "alone")
-COLUMNS = (
+CYCLE_COLUMNS = (
     "frame", "time", "force", "displacement", "slips", "rests", "residual", "at_bound",
     *(f"{name}_{branch}" for branch in ("sticking", "sliding") for name in NUMBERS),
 )  # fmt: skip
@@ -80,7 +80,7 @@ def cycle(path: Path, output: Path, say: Say = print, progress: Progress = lambd
             slipping = any(slip.begins < time <= slip.ends for slip in slips)
             states.append(where | {"slips": slipping} | cycle_state(packing, spring))
             write_json(output / "cycle.json", result)
-            write_csv(output / "cycle.csv", COLUMNS, states)
+            write_csv(output / "cycle.csv", CYCLE_COLUMNS, states)
     with report_failure("the picture of the cycles", say):
         save(draw_cycle_spectrum(series, slips, states), output / "cycle")
     return result

@@ -5,10 +5,10 @@ from it at the rate :math:`2 |\mathrm{Im}\,\omega|` of the spectrum (:math:`2\,\
 and more decades, and then levels off. The largest D is the size of the eruption at that load.
 
 **Over.** A run is over at time t when two conditions hold: the largest D of its second half, (t/2, t], is at most 1.5
-times that of the quarter before, (t/4, t/2]; and t is long enough for D to grow by `DECADES` decades at the rate of the
-spectrum. A stable packing is observed for `QUIET` units of time and then reported as stable, unless D *rises*
-nevertheless. A run that is not over in the time of the scene is cut off, and its size is a lower bound. A layer that
-has slid by the diameter of a disk *flows*.
+times that of the quarter before, (t/4, t/2]; and t is long enough for D to grow by `DECADES_OF_D` decades at the rate
+of the spectrum. A stable packing is observed for `QUIET_TIME` units of time and then reported as stable, unless D
+*rises* nevertheless. A run that is not over in the time of the scene is cut off, and its size is a lower bound. A layer
+that has slid by the diameter of a disk *flows*.
 
 **What ends the growth** is determined when D first reaches a tenth of its largest value. Each sample examines the
 contacts: *opens* if an initial contact has opened by then; *slides* if none has opened, but a contact slides at its
@@ -39,13 +39,13 @@ from ...pywrap.lammps.dynamics import Dynamics, MotionState
 from ...pywrap.runs.undamped import time_step
 from ..packing_tools import contact_pairs, unit_of_time
 
-DECADES = 24.0
+DECADES_OF_D = 24.0
 """Decades of D between its noise, 1e-27 in the first steps, and the square of a tenth of an overlap."""
 
-QUIET = 50.0
+QUIET_TIME = 50.0
 """Times for which a stable packing is watched, in `unit_of_time`."""
 
-SAMPLES = 400
+LOOKS_AT_RUN = 400
 """Looks at disks and contacts in a run of the full time, and at least so many in a shorter one."""
 
 OVER = 1.5
@@ -61,9 +61,9 @@ WORK_STEPS = 2000
 Look = dict[str, float]
 """A packing in the course of a run."""
 
-RISES = 1e4
+RISE_OF_D = 1e4
 """Factor from the D of the first time unit from which D of a linearly stable packing has risen: rounding alone drifts
-by a few hundred times in `QUIET`."""
+by a few hundred times in `QUIET_TIME`."""
 
 WALK = 10.0
 """Factor from the D of a random walk, one rounding of a coordinate a time step, below which D has not risen: strong
@@ -146,8 +146,8 @@ def growth_rate(packing: Packing) -> float:
 def _course(dynamics: Dynamics, dt: float, longest: float) -> Iterator[tuple[float, MotionState]]:
     """Looks that are close together at first and further apart later, each at a step of its own."""
     last = int(longest / dt)
-    early = np.geomspace(min(100, last), last, SAMPLES).astype(np.int64)
-    steps = np.union1d(early, np.linspace(min(100, last), last, SAMPLES).astype(np.int64))
+    early = np.geomspace(min(100, last), last, LOOKS_AT_RUN).astype(np.int64)
+    steps = np.union1d(early, np.linspace(min(100, last), last, LOOKS_AT_RUN).astype(np.int64))
     done = 0
     for step in steps.tolist():
         yield step * dt, dynamics.advance(step - done)
@@ -158,8 +158,8 @@ def _over(looks: list[Look], rate: float, unit: float) -> bool:
     """Whether a run is over, see the module."""
     t = looks[-1]["time"]
     if rate == 0:
-        return t >= QUIET * unit
-    if t < DECADES * np.log(10) / rate:
+        return t >= QUIET_TIME * unit
+    if t < DECADES_OF_D * np.log(10) / rate:
         return False
     quarter = max((each["msd"] for each in looks if t / 4 < each["time"] <= t / 2), default=0.0)
     half = max(each["msd"] for each in looks if each["time"] > t / 2)
@@ -230,7 +230,7 @@ def _end_of_growth(
     """When and by what the growth ended, see the module."""
     ended: float | None = None
     drift = WALK * start.packing.coordinate_rounding**2 * columns["time"][-1] / time_step(start.packing)
-    ends: Ends = "stable" if columns["msd"].max() <= max(RISES * _noise(columns, unit), drift) else "rises"
+    ends: Ends = "stable" if columns["msd"].max() <= max(RISE_OF_D * _noise(columns, unit), drift) else "rises"
     if rate > 0:
         place = int(np.argmax(columns["msd"] >= TENTH * columns["msd"].max()))
         ended = float(columns["time"][place])

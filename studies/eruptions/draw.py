@@ -12,8 +12,8 @@ from ...figures.series import few_decades, positive
 from ...figures.style import INK, styled
 from ..result_rows import row_columns
 
-MARKERS = {"opens": "o", "slides": "s", "law": "D", "flows": "^", "cut off": "X", "rises": "v", "stable": "."}
-WORDS = {
+MARKER_OF = {"opens": "o", "slides": "s", "law": "D", "flows": "^", "cut off": "X", "rises": "v", "stable": "."}
+WORDS_OF = {
     "opens": "a contact opens",
     "slides": "a contact slides",
     "law": "curvature of the law",
@@ -33,11 +33,11 @@ def size_figure(runs: list[dict[str, Any]]) -> Figure:
     """
     figure = Figure(figsize=(3.4, 4.2), layout="constrained")
     sizes, contacts = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    for ends, marker in MARKERS.items():
+    for ends, marker in MARKER_OF.items():
         for damped in (False, True):
             rows = [row for row in runs if row["ends"] == ends and row["damped"] == damped]
             if rows:
-                face, label = ("white", f"{WORDS[ends]} (damped)") if damped else ("C0", WORDS[ends])
+                face, label = ("white", f"{WORDS_OF[ends]} (damped)") if damped else ("C0", WORDS_OF[ends])
                 places = row_columns(rows, "fx", "msd")
                 sizes.plot(*places, marker, color="C0", markersize=4, markerfacecolor=face, label=label)
     free = [row for row in runs if not row["damped"]]

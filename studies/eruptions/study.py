@@ -20,8 +20,8 @@ from ...pywrap.settling.settle import settle
 from ..packing_tools import path_from
 from ..result_rows import Rows
 from ..study import Figures, Result, SceneStudy, Work
-from .compute import DECADES, OVER, QUIET, Start, erupt
-from .draw import WORDS, course_figure, size_figure
+from .compute import DECADES_OF_D, OVER, QUIET_TIME, Start, erupt
+from .draw import WORDS_OF, course_figure, size_figure
 
 
 def _compute(scene: Scene, work: Work) -> Result:
@@ -74,14 +74,14 @@ def _page(result: Result) -> Result:
     return {
         "runs": runs,
         "fy": result["scene"]["load"]["fy"],
-        "words": WORDS,
+        "words": WORDS_OF,
         "beside": [(run, damped[run["fx"]]) for run in free if run["fx"] in damped],
         "damping": ", ".join(f"{key} = {value:g}" for key, value in damping.items() if value),
         "decades": float(np.log10(max(grown) / min(grown))) if grown else 0.0,
         "small": len(small),
         "noise": (min(run["noise"] for run in runs), max(run["noise"] for run in runs)),
         "balance": max(run["balance"] for run in free),
-        "criterion": (OVER, DECADES, QUIET),
+        "criterion": (OVER, DECADES_OF_D, QUIET_TIME),
     }
 
 

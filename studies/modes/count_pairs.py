@@ -19,8 +19,8 @@ pairs the vectors are computed, and decide.
 point, and no packing reaches such an equilibrium by itself. The loads of a packing end before this point ("turning
 point").
 
-**Large packings.** For more than `ALL` disks the pairs are counted in slices of the spectrum, with a stated error
-(:mod:`~faultgouge.studies.modes.count_in_slices`): the key pairs_error of a load.
+**Large packings.** For more than `DENSE_DISKS` disks the pairs are counted in slices of the spectrum, with a stated
+error (:mod:`~faultgouge.studies.modes.count_in_slices`): the key pairs_error of a load.
 
 **A bound.** The imaginary part of an eigenvalue is at most the norm of the antisymmetric part, :math:`|\mathrm{Im}\,
 \lambda| \le |(A - A^T)/2|_2` with A the mass-weighted operator (Bendixson, Acta Math. 25, 359 (1902)): the key bound. A
@@ -28,10 +28,10 @@ contact couples only two disks, so that the norm does not grow with the number o
 or more loaded: growth rates cannot grow without limit with the number of disks.
 
 **Where b matters.** A tangential force that depends on the overlap, :math:`b = \partial f_t/\partial\delta`, makes K
-non-symmetric. For packings of up to `SMALL` disks pairs are also counted with b of sticking contacts alone, of sliding
-contacts alone, and of none, at the same equilibria. (The rotation of the tangent, which is non-symmetric too, is kept.)
-With rescaled slips b is the mean of its values for closing and for opening contacts, and the key while has the pairs
-with either (:mod:`~faultgouge.analysis.packing.law`).
+non-symmetric. For packings of up to `SWITCH_DISKS` disks pairs are also counted with b of sticking contacts alone, of
+sliding contacts alone, and of none, at the same equilibria. (The rotation of the tangent, which is non-symmetric too,
+is kept.) With rescaled slips b is the mean of its values for closing and for opening contacts, and the key while has
+the pairs with either (:mod:`~faultgouge.analysis.packing.law`).
 """
 
 from __future__ import annotations
@@ -71,19 +71,19 @@ from ...pywrap.scenes.validation import require_section
 from ..packing_tools import Start, path_from
 from .count_in_slices import count_in_slices
 
-ALL = 1000
+DENSE_DISKS = 1000
 """Disks up to which all eigenvalues are computed: ten seconds a load, and 70 MB."""
 
-SMALL = 300
+SWITCH_DISKS = 300
 """Disks up to which b is switched: three more decompositions a load."""
 
-BESIDE = 1e-9
+SHIFT_OFFSET = 1e-9
 """Distance of a shift from the eigenvalue whose vectors are wanted, in units of the eigenvalue."""
 
 NORM = 1e-6
 """Relative error of the norm squared: it is a bound that is several times larger than what it bounds."""
 
-DIGITS = 7
+FREQUENCY_DIGITS = 7
 """Digits of the frequencies that are stored."""
 
 
@@ -136,7 +136,7 @@ def count_pairs(packing: Packing) -> PairCounts:
     packing : Packing
         In equilibrium.
     """
-    if len(packing) > ALL:
+    if len(packing) > DENSE_DISKS:
         found, error = count_in_slices(packing)
         size, negative = dynamical_matrix(packing)[0].shape[0], tuple(negative_eigenvalues(packing).tolist())
         return replace(PairCounts.of(found), modes=size, error=error, negative=negative)
@@ -151,7 +151,7 @@ def count_pairs(packing: Packing) -> PairCounts:
 
 
 def _is_real(packing: Packing, value: complex, rounding: float) -> bool:
-    found = eigenpairs(packing, value * (1 + BESIDE), 2)
+    found = eigenpairs(packing, value * (1 + SHIFT_OFFSET), 2)
     nearest = int(np.argmin(np.abs(found.values - value)))
     return exceeds_rounding(value, float(found.overlap[nearest]), rounding)
 
@@ -258,11 +258,13 @@ def _load(packing: Packing) -> dict[str, Any]:
         row["pairs_error"] = found.error
     if len(found.omega):
         value = found.omega[0] ** 2
-        pair = eigenpairs(packing, value * (1 + BESIDE), 1)
+        pair = eigenpairs(packing, value * (1 + SHIFT_OFFSET), 1)
         row |= {"participation": float(pair.participation[0]), "rotation": float(pair.rotation[0])}
-    if len(packing) <= SMALL:
+    if len(packing) <= SWITCH_DISKS:
         row["b_of"] = count_with_part_of_b(packing)
         if packing.law.rescales:
             row["while"] = pairs_by_branch(packing)
-    digits = [[float(f"{w.real:.{DIGITS}g}"), float(f"{w.imag:.{DIGITS}g}")] for w in found.omega.tolist()]
+    digits = [
+        [float(f"{w.real:.{FREQUENCY_DIGITS}g}"), float(f"{w.imag:.{FREQUENCY_DIGITS}g}")] for w in found.omega.tolist()
+    ]
     return row | {"frequencies": digits}

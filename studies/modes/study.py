@@ -18,7 +18,18 @@ from ..sweep.tasks import TASKS
 from .draw import PlaneFilm, over_load, plane
 from .table import Table, medians_over_load
 
-COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q", "pairs_error")
+MODES_COLUMNS = (
+    "disks",
+    "seed",
+    "fx",
+    "fx_over_fy",
+    "pairs",
+    "share",
+    "growth_rate",
+    "omega",
+    "least_q",
+    "pairs_error",
+)
 
 PACKING_KEYS = ("ends", "reach", "contacts")
 """What modes.json has of a packing beside its loads."""
@@ -26,7 +37,7 @@ PACKING_KEYS = ("ends", "reach", "contacts")
 PANELS = 4
 """Loads whose frequencies are drawn side by side."""
 
-RATE = 2.0
+FRAMES_A_SECOND = 2.0
 """Frames of the film a second."""
 
 
@@ -82,7 +93,7 @@ def modes(
     ]
     result = {"asked": sweep.as_dict(), "rows": lines, "packings": ends}
     write_json(output / "modes.json", result)
-    write_csv(output / "modes.csv", COLUMNS, lines)
+    write_csv(output / "modes.csv", MODES_COLUMNS, lines)
     with report_failure("a picture of the modes", say):
         _draw(rows, lines, output, say)
     return result
@@ -117,4 +128,4 @@ def _draw(rows: list[Row], lines: list[dict[str, Any]], output: Path, say: Say) 
         return
     step = max(1, -(-len(complex_loads) // PANELS))
     save(plane(complex_loads[::-1][::step][::-1]), output / "plane")
-    write_film(PlaneFilm(complex_loads), output / "plane.gif", RATE)
+    write_film(PlaneFilm(complex_loads), output / "plane.gif", FRAMES_A_SECOND)

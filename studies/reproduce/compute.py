@@ -30,7 +30,7 @@ from ..triggering.compute import Triggering, equilibrium_at, series_of, trigger
 EFOLDS = 48.0
 """Length of the undamped run in units of 1/rate: D grows by up to 20 decades in it."""
 
-LONGEST_RUN = 3_000_000
+MOST_RUN_STEPS = 3_000_000
 """Steps of the undamped run, at the most: about 20 s for 100 disks."""
 
 NEARBY = np.concatenate(
@@ -125,7 +125,9 @@ def growth_run(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
         )
     dt = time_step(start.packing)
     predicted = modes.growth_rate(dt)
-    settings = Perturb(fx=start.fx, time=min(EFOLDS / predicted, LONGEST_RUN * dt), inertia_factor=scene.inertia_factor)
+    settings = Perturb(
+        fx=start.fx, time=min(EFOLDS / predicted, MOST_RUN_STEPS * dt), inertia_factor=scene.inertia_factor
+    )
     # disks that have moved by a tenth of the smallest overlap certainly move otherwise than the spectrum says
     ceiling = (0.1 * start.packing.smallest_overlap) ** 2
     samples: list[Sample] = []

@@ -24,13 +24,13 @@ from .table import Row
 
 SEED = "packing.seed"
 
-COLOURS = 6
+STYLE_COLOURS = 6
 """Colours of the style: more scenes cannot be told apart."""
 
-ASIDE, EDGE = 0.035, 0.08
+ASIDE, EDGE_MARGIN = 0.035, 0.08
 """Distance of samples at one value, and of the outermost from the edge, in units of the range of values."""
 
-FEWEST = 6
+FEWEST_SCENES = 6
 """Scenes of a sample from which a median has an interval of 95 %: with five, all lie on one side of it once in 16."""
 
 Reach = tuple[float, bool]
@@ -133,10 +133,10 @@ def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
 
 def _labels(samples: Sequence[SeedSample]) -> list[str]:
     """What the colour of each sample stands for: the sample, or, of more than can be told apart, one key's value."""
-    if len(samples) <= COLOURS:
+    if len(samples) <= STYLE_COLOURS:
         return [sample.label for sample in samples]
     counts = {key: len({str(sample.values[key]) for sample in samples}) for key in samples[0].values}
-    key = max((key for key in counts if counts[key] <= COLOURS), key=lambda each: counts[each], default=None)
+    key = max((key for key in counts if counts[key] <= STYLE_COLOURS), key=lambda each: counts[each], default=None)
     return ["" if key is None else f"{key} = {sample.values[key]}" for sample in samples]
 
 
@@ -148,7 +148,7 @@ def _draw_onsets(axes: Axes, key: str, samples: Sequence[SeedSample], colours: S
         for shown, marker in ((sample.onset, "o"), (~sample.onset, "^")):
             x, y = np.full(shown.sum(), place), sample.reach[shown]
             axes.plot(x, y, marker, color=colour, mfc="none", ms=2.5, alpha=0.5)
-        if len(sample.onset) >= FEWEST:
+        if len(sample.onset) >= FEWEST_SCENES:
             _draw_median(axes, place, sample, highest, colour)
     axes.set(ylabel="$F_x^c$", ylim=(0, 1.1 * highest))
 
@@ -161,7 +161,7 @@ def _side_by_side(axes: Axes, places: Floats) -> Floats:
     same = along[:, None] == along
     rank = np.tril(same, -1).sum(axis=1) - 0.5 * (same.sum(axis=1) - 1)
     aside = along + ASIDE * span * rank
-    ends = aside.min() - EDGE * span, aside.max() + EDGE * span
+    ends = aside.min() - EDGE_MARGIN * span, aside.max() + EDGE_MARGIN * span
     axes.set_xlim(*np.exp(ends) if logarithmic else ends)
     return np.exp(aside) if logarithmic else aside
 
@@ -200,8 +200,8 @@ def eruptions_figure(found: Sequence[tuple[Row, dict[str, float]]]) -> Figure:
         new = row["key"] not in numbers
         number = numbers.setdefault(row["key"], len(numbers))
         label = ", ".join(f"{key} = {value}" for key, value in row["values"].items()) if new else None
-        axes.plot(run["fx"], run["msd"], "o", color=f"C{number % COLOURS}", markersize=3, label=label)
-    if 1 < len(numbers) <= COLOURS:
+        axes.plot(run["fx"], run["msd"], "o", color=f"C{number % STYLE_COLOURS}", markersize=3, label=label)
+    if 1 < len(numbers) <= STYLE_COLOURS:
         axes.legend()
     return figure
 
@@ -218,7 +218,7 @@ def _places(axes: Axes, key: str, values: Sequence[Any]) -> Floats:
     if all(isinstance(value, int | float) for value in values):
         if min(values) > 0 and max(values) > 20 * min(values):
             axes.set_xscale("log")
-        elif len(set(values)) <= COLOURS:
+        elif len(set(values)) <= STYLE_COLOURS:
             axes.set_xticks(sorted(set(values)))
         return np.array(values, float)
     names = list(dict.fromkeys(map(str, values)))

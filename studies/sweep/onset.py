@@ -37,7 +37,7 @@ from ..packing_tools import Start, contact_pairs, path_from
 
 Ends = Literal["onset", "until", "flows"]
 
-BESIDE = 1e-7
+DISTANCE_BELOW = 1e-7
 """Distance below the onset at which the pair is looked at, in units of F_x^c: its eigenvectors have an angle of about
 the root of that, and are well known."""
 
@@ -65,7 +65,7 @@ def onset(scene: Scene, start: Start) -> dict[str, Any]:
             row |= {"fx_c": window.fx_onset, "error": window.error, "error_of_path": window.path_error}
             row |= {"kind": window.kind, "lambda": window.eigenvalue}
             row |= {"fx_end": window.fx_end, "overlap": window.overlap, "doubtful": len(found.doubtful)}
-            row |= pair(path(seen.fx_onset * (1 - BESIDE)), rest.packing, window.eigenvalue)
+            row |= pair(path(seen.fx_onset * (1 - DISTANCE_BELOW)), rest.packing, window.eigenvalue)
     return row
 
 

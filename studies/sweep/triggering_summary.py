@@ -16,7 +16,7 @@ from ..statistics import quartiles, share
 from .table import Row
 from .triggering import grows, rise_in_decades
 
-RISES = (5, 10)
+RISES_IN_DECADES = (5, 10)
 """Rises in decades whose shares are given; the paper's figure 5 has 12."""
 
 QUARTILES = (0.25, 0.5, 0.75)
@@ -47,7 +47,9 @@ def summary(rows: Sequence[Row]) -> dict[str, Any]:
     rises, controls = ([rise_in_decades(each, of) for each in eruptions] for of in ("weakening", "control"))
 
     def at_least(values: list[float]) -> dict[str, Any]:
-        return {str(decades): share(sum(each >= decades for each in values), len(values)) for decades in RISES}
+        return {
+            str(decades): share(sum(each >= decades for each in values), len(values)) for decades in RISES_IN_DECADES
+        }
 
     return {
         "onsets": [_ends_of(mu, ramps) for mu in dict.fromkeys(end["mu"] for end in ramps)],

@@ -41,7 +41,7 @@ from ..packing_tools import path_from
 
 Row = dict[str, Any]
 
-COUNT = 24
+DEFAULT_FREQUENCIES = 24
 """Frequencies of a map whose scene names none."""
 
 FIRST_BRACKET = 0.05
@@ -50,10 +50,10 @@ FIRST_BRACKET = 0.05
 WIDEN = 1.5
 """Factor by which a bracket that does not hold is widened on the wrong side."""
 
-MOST = 24
+BISECTION_RUNS = 24
 """Runs of a bisection at the most: brackets over six decades."""
 
-CLOSE = 1e-2
+BISECTION_WIDTH = 1e-2
 """Relative width at which the bisection ends: its middle is then within half a percent."""
 
 
@@ -113,7 +113,7 @@ def frequencies(packing: Packing, wanted: Trigger) -> Floats:
         return np.array(sorted(wanted.omega))
     modes = np.sqrt(np.abs(spectrum(packing).eigenvalues))
     slowest = modes[modes > 1e-3 * modes.max()].min()  # one without a restoring force has no frequency
-    return np.geomspace(0.1 * slowest, modes.max(), COUNT)
+    return np.geomspace(0.1 * slowest, modes.max(), DEFAULT_FREQUENCIES)
 
 
 def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats) -> list[Row]:
@@ -171,7 +171,7 @@ def bisect_amplitude(wave: Wave) -> Row:
     """
     with threadpool_limits(1):
         below, above, runs, reached = _bracket(wave)
-        while above / below > 1 + CLOSE and runs < MOST:
+        while above / below > 1 + BISECTION_WIDTH and runs < BISECTION_RUNS:
             between = middle(below, above)
             time = _triggers(wave, between)
             runs += 1
@@ -188,14 +188,14 @@ def _bracket(wave: Wave) -> tuple[float, float, int, float]:
     predicted = wave.expected["predicted"]
     below, above = predicted * (1 - FIRST_BRACKET), predicted * (1 + FIRST_BRACKET)
     runs = 1
-    while (reached := _triggers(wave, above)) is None and runs < MOST:
+    while (reached := _triggers(wave, above)) is None and runs < BISECTION_RUNS:
         below, above, runs = above, above * WIDEN, runs + 1
     if reached is None:
         raise SceneError(f"no wave up to {above:.3g} triggers at omega = {wave.expected['omega']:g}: lower friction.v0")
     if below < predicted:
         runs += 1
         while (time := _triggers(wave, below)) is not None:
-            if runs >= MOST or _triggers(wave, 0.0) is not None:
+            if runs >= BISECTION_RUNS or _triggers(wave, 0.0) is not None:
                 raise SceneError(
                     f"at F_x = {wave.packing.fx:.6g} the layer exceeds v_0 = {threshold(wave.scene):g} without a wave, "
                     "by rounding noise, so that no amplitude is critical: raise friction.v0"

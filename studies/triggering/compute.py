@@ -62,7 +62,7 @@ GROWTH_FACTOR = 2.0
 """Factor between two largest D from which on they differ. Without an instability, the phases in which many modes happen
 to meet change the maximum by some ten percent."""
 
-AGREES = 0.25
+RATE_TOLERANCE = 0.25
 """Largest relative difference between the fitted rate and that of the spectrum of an instability, beside three standard
 errors. The spectrum is that of the start; after the jump the disks lie elsewhere, and the rate of a pair near its onset
 changes by some ten percent."""
@@ -247,7 +247,7 @@ def judge(run: Series, v0: float, foreseen: Forecast) -> TriggeringOutcome:
         verdict = "jump alone"
     elif fitted is not None and foreseen.rate > 0:
         off = abs(fitted.rate - foreseen.rate)
-        verdict = "grows" if off <= max(AGREES * foreseen.rate, 3 * fitted.error) else "unexplained"
+        verdict = "grows" if off <= max(RATE_TOLERANCE * foreseen.rate, 3 * fitted.error) else "unexplained"
     return TriggeringOutcome(verdict, when, jump, float(np.log10(top / jump)), fitted)
 
 

@@ -20,7 +20,7 @@ JUMP_SHARE = 0.05
 """Share of the run with mu(v) that shows the jump, from the moment on at which friction weakens: 10 of 200 time units,
 where the slowest modes of 100 disks have periods of 6, and the fastest pairs have just begun to stand out."""
 
-SAMPLES = 2000
+FORECAST_TIMES = 2000
 """Times at which the linear motion is looked at."""
 
 LINEAR = 0.1
@@ -57,7 +57,7 @@ def forecast(start: Equilibrium, mu: float, time: float, window: float | None = 
     """
     packing = start.packing
     weak = replace(packing, law=replace(packing.law, mu=mu))
-    times = time * np.arange(1, SAMPLES + 1) / SAMPLES
+    times = time * np.arange(1, FORECAST_TIMES + 1) / FORECAST_TIMES
     with np.errstate(over="ignore"):
         msd = LinearMotion.of(weak).response(times, force=weak.net_force - packing.net_force).msd
     msd = np.fmin(msd, np.finfo(float).max)

@@ -13,7 +13,7 @@ import pytest
 from reference_layer import BIN
 
 from faultgouge.analysis import BadInputError, PackingFileError, RunFile, nearest_image
-from faultgouge.analysis.files.atomic_write import MAGIC
+from faultgouge.analysis.files.atomic_write import SEAL
 from faultgouge.analysis.files.formats import read_disks, upper_layer, write_packing
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.lammps import restart_file
@@ -254,7 +254,7 @@ BAD = {
     "one ID twice": ("a.csv", lambda p: "id,x,y,radius\n1,1,1,1\n1,9,1,1\n", "has disk 1 twice"),
     "empty": ("a.csv", lambda p: "", "is no table"),
     "no touch": ("a.csv", lambda p: "x,y,radius\n1,3,0.5\n3,3,0.5\n", "no disk touches another"),
-    "a run.h5": ("a.h5", lambda p: MAGIC.decode(), "needs no import"),
+    "a run.h5": ("a.h5", lambda p: SEAL.decode(), "needs no import"),
     "unknown suffix": ("a.doc", lambda p: "?", "is of no format that is read: give dumps of the decks (.disks)"),
     "no data": ("a.data", lambda p: "LAMMPS\n\n3 atoms\n", "no section Atoms"),
     "data of points": ("a.data", lambda p: "LAMMPS\n\n1 atoms\n\nAtoms # atomic\n\n1 1 1 1 0\n", "atom style atomic"),

@@ -14,7 +14,7 @@ from faultgouge.pywrap import Equilibrium, Scene, SceneError
 from faultgouge.pywrap.runs.drive import settle_for_drive
 from faultgouge.pywrap.runs.drive_recorder import SERIES, DriveRecord
 from faultgouge.studies.cycle.compute import cycle_state, drawn
-from faultgouge.studies.cycle.study import COLUMNS, cycle
+from faultgouge.studies.cycle.study import CYCLE_COLUMNS, cycle
 
 SPRING = 10.0
 
@@ -111,7 +111,7 @@ def test_the_states_of_a_run_go_on_where_they_were_cut_off(slow, tmp_path):
     assert asked == [len(whole["states"]) - 2]
     with (part / "cycle.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert tuple(rows[0]) == COLUMNS
+    assert tuple(rows[0]) == CYCLE_COLUMNS
     assert [float(row["damped_sticking"]) for row in rows] == [state["damped_sticking"] for state in whole["states"]]
     assert (part / "cycle.png").stat().st_size > 10_000
 

@@ -19,7 +19,7 @@ from ...packing.packing import Packing
 from ..runfile_header import differing_parameters
 from .disks import Slips
 
-KEYS = ("kn", "kt", "mu", "exponent", "rescaled", "coulomb", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
+PARAMETER_NAMES = ("kn", "kt", "mu", "exponent", "rescaled", "coulomb", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
 """Names of law, load and inertia in files."""
 
 
@@ -90,9 +90,9 @@ def scalars(packing: Packing) -> dict[str, float]:
 
 
 def pick_numbers(values: Mapping[str, Any]) -> dict[str, float]:
-    """The names of `KEYS` among others, as numbers; what is no number is left out."""
+    """The names of `PARAMETER_NAMES` among others, as numbers; what is no number is left out."""
     found = {}
-    for key in KEYS:
+    for key in PARAMETER_NAMES:
         try:
             found[key] = float(values[key])
         except (KeyError, TypeError, ValueError):

@@ -23,9 +23,9 @@ from .export_quantities import Frame, ModeVectors
 from .optional_library import needed_library
 from .text_columns import choose_frame
 
-OWN = "particles/faultgouge/"
+OWN_QUANTITIES = "particles/faultgouge/"
 CONTACTS = "faultgouge/contacts"
-SINGLE = "GSD keeps positions and radii in float32, about 1e-7 of a coordinate: overlaps are lost below that"
+GSD_PRECISION = "GSD keeps positions and radii in float32, about 1e-7 of a coordinate: overlaps are lost below that"
 
 
 def read_gsd(path: Path, frame: int | None = None) -> Disks:
@@ -42,7 +42,11 @@ def read_gsd(path: Path, frame: int | None = None) -> Disks:
 
 def _disks(path: Path, frame: Any) -> Disks:
     log, particles, box = frame.log, frame.particles, frame.configuration.box
-    own = {key.removeprefix(OWN): np.asarray(value) for key, value in log.items() if key.startswith(OWN)}
+    own = {
+        key.removeprefix(OWN_QUANTITIES): np.asarray(value)
+        for key, value in log.items()
+        if key.startswith(OWN_QUANTITIES)
+    }
     if "x" in own:
         columns = {name: array.astype(np.float64) for name, array in own.items()}
         values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
@@ -66,7 +70,7 @@ def _disks(path: Path, frame: Any) -> Disks:
         "type": 1.0 + np.asarray(particles.typeid, dtype=np.float64),
         "angle": 2 * np.arctan2(turn[:, 3], turn[:, 0]),
     }
-    return of_columns(str(path), columns, _type_names(particles), box_length=float(box[0]), remark=SINGLE)
+    return of_columns(str(path), columns, _type_names(particles), box_length=float(box[0]), remark=GSD_PRECISION)
 
 
 def _type_names(particles: Any) -> list[str]:
@@ -93,7 +97,7 @@ def write_gsd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> 
                 frame.log[f"particles/{mode.name}"] = np.ascontiguousarray(mode.displacement.real.T)
                 frame.log[f"particles/{mode.name}_imag"] = np.ascontiguousarray(mode.displacement.imag.T)
             file.append(frame)
-    return f"{SINGLE}; the logged quantities have all of the packing in float64, and import takes these"
+    return f"{GSD_PRECISION}; the logged quantities have all of the packing in float64, and import takes these"
 
 
 def _forces(packing: Packing) -> dict[str, np.ndarray]:
@@ -132,7 +136,9 @@ def _frame(hoomd: Any, packing: Packing) -> Any:
     columns |= {"top": packing.top.astype(np.float64)}
     if packing.position_low is not None:
         columns |= {"x_low": packing.position_low[:, 0], "y_low": packing.position_low[:, 1]}
-    frame.log = {OWN + name: np.ascontiguousarray(column, dtype=np.float64) for name, column in columns.items()}
+    frame.log = {
+        OWN_QUANTITIES + name: np.ascontiguousarray(column, dtype=np.float64) for name, column in columns.items()
+    }
     numbers = export_quantities.scalars(packing) | ({} if box is None else {"box_length": box})
     frame.log |= {f"faultgouge/{key}": np.array([value], dtype=np.float64) for key, value in numbers.items()}
     return frame

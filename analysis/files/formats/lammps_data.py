@@ -25,9 +25,9 @@ from .disks import Disks, of_columns, sphere_volume
 from .export_quantities import Frame, ModeVectors
 from .text_columns import columns_of, lines_of, numbers_in, strip_comments
 
-MARK = "# faultgouge"
-CONTACT = "# contact"
-COLUMNS = ("id", "type", "diameter", "density", "x", "y", "z")
+HEADER_COMMENT = "# faultgouge"
+CONTACT_COMMENT = "# contact"
+SPHERE_COLUMNS = ("id", "type", "diameter", "density", "x", "y", "z")
 
 
 def read_data(path: Path) -> Disks:
@@ -42,13 +42,13 @@ def read_data(path: Path) -> Disks:
         raise PackingFileError(f"{path} is of atom style {style}, which has no radii: write it with atom_style sphere.")
     header = _header(path, lines[:start])
     rows = list(takewhile(lambda row: not row[1][0][0].isalpha(), strip_comments(lines[start + 1 :], start + 2)))
-    columns = columns_of(path, rows, COLUMNS, f"7 are needed: {', '.join(COLUMNS)}")
+    columns = columns_of(path, rows, SPHERE_COLUMNS, f"7 are needed: {', '.join(SPHERE_COLUMNS)}")
     if len(rows) != header["atoms"][0]:
         raise PackingFileError(f"{path} announces {header['atoms'][0]:g} atoms, and {len(rows)} are there.")
     if not rows:
         raise PackingFileError(f"{path} has no disks.")
     low, high = header["xlo xhi"]
-    marked = next((line for line in lines[:start] if MARK in line), None)
+    marked = next((line for line in lines[:start] if HEADER_COMMENT in line), None)
     if marked is None:
         return of_columns(str(path), columns, box_length=high - low)
     # a file that faultgouge wrote
@@ -56,8 +56,10 @@ def read_data(path: Path) -> Disks:
     names = ("mass", "angle", "x_low", "y_low")[: len(comments[0][1])]
     columns |= columns_of(path, comments, names, f"{len(names)} behind the #")
     columns["top"] = columns["type"] - 1
-    values = dict(part.split("=") for part in marked.partition(MARK)[2].split() if "=" in part)
-    contacts = " ".join(line.removeprefix(CONTACT) for line in lines[:start] if line.startswith(CONTACT))
+    values = dict(part.split("=") for part in marked.partition(HEADER_COMMENT)[2].split() if "=" in part)
+    contacts = " ".join(
+        line.removeprefix(CONTACT_COMMENT) for line in lines[:start] if line.startswith(CONTACT_COMMENT)
+    )
     slips = export_quantities.slips_of(numbers_in(contacts, path), "x_low" in columns)
     period = high - low if values.get("sides") == "p" else None
     return of_columns(str(path), columns, box_length=period, given=export_quantities.pick_numbers(values), slips=slips)
@@ -87,13 +89,13 @@ def write_data(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) ->
     density = packing.mass / volume  # no other double gives LAMMPS the mass to the bit where this one does not
     sides = "f" if packing.box_length is None else "p"
     lines = [
-        f"{MARK} sides={sides} "
+        f"{HEADER_COMMENT} sides={sides} "
         + " ".join(f"{key}={value!r}" for key, value in export_quantities.scalars(packing).items())
     ]
     lines += ["", f"{len(packing)} atoms", "2 atom types", *box_lines(packing), ""]
     # behind the numbers of the header: readers look for these in the first lines to know the format
     for first, second, *slips in export_quantities.contact_rows(packing).tolist():
-        lines.append(" ".join([CONTACT, str(int(first)), str(int(second)), *map(repr, slips)]))
+        lines.append(" ".join([CONTACT_COMMENT, str(int(first)), str(int(second)), *map(repr, slips)]))
     lines += ["", "Atoms # sphere", ""]
     extra = [packing.mass, packing.angle]
     if packing.position_low is not None:

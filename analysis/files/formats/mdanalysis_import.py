@@ -11,7 +11,9 @@ from ...errors import BadInputError, PackingFileError
 from .disks import Disks, of_columns
 from .optional_library import needed_library
 
-SINGLE = "MDAnalysis hands out positions in float32, about 1e-7 of a coordinate: overlaps are lost below that"
+MDANALYSIS_PRECISION = (
+    "MDAnalysis hands out positions in float32, about 1e-7 of a coordinate: overlaps are lost below that"
+)
 
 
 def has_parser(path: Path) -> bool:
@@ -40,4 +42,4 @@ def read_universe(path: Path, frame: int | None = None) -> Disks:
     columns["radius"] = np.asarray(atoms.radii, dtype=np.float64)
     size = universe.dimensions
     period = float(size[0]) if size is not None and size[0] > 0 else None
-    return of_columns(str(path), columns, box_length=period, remark=SINGLE)
+    return of_columns(str(path), columns, box_length=period, remark=MDANALYSIS_PRECISION)

@@ -19,10 +19,10 @@ from ..plain_file import open_plain, open_text
 from .disks import Disks
 from .export_quantities import Frame, ModeVectors
 
-MAGIC = b"LammpS RestartT"
+RESTART_BEGINNING = b"LammpS RestartT"
 """How restarts of LAMMPS begin."""
 
-NUMBER = re.compile(r"[-+.\deE]+")
+WORD_OF_NUMBER = re.compile(r"[-+.\deE]+")
 
 
 class Format(NamedTuple):
@@ -66,7 +66,7 @@ DUMP = Format("LAMMPS dump", "lammps_dump", (".dump", ".lammpstrj"), "read_custo
 RESTART = Format("LAMMPS restart", "", (".restart",), "LAMMPS itself", text=False)
 YADE = Format("YADE's text", "yade_mercury", ("line 1 is #format x_y_z_r",), "read_yade")
 MERCURY = Format("MercuryDPM's data", "yade_mercury", (".data, line 1 is N time bounds",), "read_mercury", frames=True)
-OTHER = Format("what MDAnalysis reads with radii", "mdanalysis_import", (), "read_universe", frames=True)
+MDANALYSIS = Format("what MDAnalysis reads with radii", "mdanalysis_import", (), "read_universe", frames=True)
 
 FORMATS = (
     Format("VTK", "vtp", (".vtp",), writer="write_vtp"),
@@ -94,14 +94,16 @@ FILMS = {each.suffixes[0]: each for each in FORMATS if each.film}
 def list_formats() -> str:
     """All formats that are read, in words."""
     listed = [f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS if each.reader]
-    return ", ".join([*listed, "each text also as .gz", "run.h5", "LAMMPS decks (.in, in.NAME)", f"and {OTHER.words}"])
+    return ", ".join(
+        [*listed, "each text also as .gz", "run.h5", "LAMMPS decks (.in, in.NAME)", f"and {MDANALYSIS.words}"]
+    )
 
 
 def is_restart(path: Path) -> bool:
     """Whether a file begins as LAMMPS restarts do."""
     try:
         with open_plain(path) as stream:
-            return stream.read(len(MAGIC)) == MAGIC
+            return stream.read(len(RESTART_BEGINNING)) == RESTART_BEGINNING
     except OSError:
         return False
 
@@ -138,7 +140,7 @@ def format_of(path: Path) -> Format:
 
     own = path.suffix.lower() == ".h5"  # MDAnalysis has a parser of it once `mdanalysis` is imported
     if path.suffix and not own and has_parser(path):
-        return OTHER
+        return MDANALYSIS
     raise PackingFileError(f"{path} is of no format that is read: give {list_formats()}.")
 
 
@@ -151,7 +153,7 @@ def _by_beginning(path: Path) -> Format | None:
         return None
     if words[:1] == ["#format"]:
         return YADE
-    numbers = len(words) in (6, 8) and all(NUMBER.fullmatch(word) for word in words)
+    numbers = len(words) in (6, 8) and all(WORD_OF_NUMBER.fullmatch(word) for word in words)
     return MERCURY if numbers and ".data" in path.name.lower() else None
 
 

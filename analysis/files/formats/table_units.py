@@ -17,7 +17,7 @@ import numpy as np
 from ...arrays import Floats
 from ...errors import PackingFileError
 
-HEAD = re.compile(r"\s*(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*")
+UNIT_HEAD = re.compile(r"\s*(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*")
 """A name with a unit behind it in brackets."""
 
 LENGTHS = ("x", "xu", "y", "yu", "z", "zu", "radius", "r", "diameter", "x_low", "y_low", "slip", "slip_low")
@@ -56,7 +56,7 @@ def unit_factor(source: str, name: str, unit: str, into: str) -> float:
 
 def split_unit(head: str) -> tuple[str, str]:
     """Name and unit of a column, the unit empty if there is none."""
-    match = HEAD.fullmatch(head)
+    match = UNIT_HEAD.fullmatch(head)
     name, unit = match.groups() if match else (head, "")
     return name.strip().strip('"').strip().lower(), "" if unit in NO_UNIT else unit
 

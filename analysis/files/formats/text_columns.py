@@ -12,7 +12,7 @@ from ...arrays import Floats
 from ...errors import PackingFileError
 from ..plain_file import open_text
 
-WORDS = {"true": 1.0, "false": 0.0, "t": 1.0, "f": 0.0}
+NUMBER_WORDS = {"true": 1.0, "false": 0.0, "t": 1.0, "f": 0.0}
 """Words that stand for numbers."""
 
 
@@ -32,8 +32,8 @@ def number_of(word: str, where: object) -> float:
     try:
         return float(word)
     except ValueError:
-        if word.strip().lower() in WORDS:
-            return WORDS[word.strip().lower()]
+        if word.strip().lower() in NUMBER_WORDS:
+            return NUMBER_WORDS[word.strip().lower()]
         raise PackingFileError(f"{where}: {word.strip()!r} is no number.") from None
 
 

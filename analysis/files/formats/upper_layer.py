@@ -25,7 +25,7 @@ LISTED = 10
 """Disks that are named; more are counted."""
 
 OPERATORS = {"<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": operator.ge}
-CONDITION = re.compile(r"\s*(x|y|radius)\s*(<=|>=|<|>)\s*([-+.\deE]+)\s*")
+REGION = re.compile(r"\s*(x|y|radius)\s*(<=|>=|<|>)\s*([-+.\deE]+)\s*")
 
 
 def upper_layer(disks: Disks, says: str | int | None) -> NDArray[np.bool_]:
@@ -156,7 +156,7 @@ def _region(disks: Disks, says: str) -> NDArray[np.bool_]:
     values = {"x": disks.position[:, 0], "y": disks.position[:, 1], "radius": disks.radius}
     chosen = np.ones(len(disks), dtype=np.bool_)
     for part in says.split(" and "):
-        match = CONDITION.fullmatch(part)
+        match = REGION.fullmatch(part)
         try:
             limit = float(match[3]) if match else None
         except ValueError:

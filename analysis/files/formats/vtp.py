@@ -25,7 +25,7 @@ from .export_quantities import Frame, ModeVectors
 
 Element = ElementTree.Element
 
-TYPES = {"f": "Float64", "i": "Int64"}
+VTK_TYPES = {"f": "Float64", "i": "Int64"}
 
 FORCES = ("angle", "net_force", "torque_over_radius", "mobilised", "contact_force", "contact_tangential_force")
 SLIPS = ("contact_slip", "contact_mobilised")
@@ -158,7 +158,7 @@ def _cells(piece: Element, name: str, points: NDArray, size: int) -> None:
 
 
 def _array(parent: Element, name: str, values: NDArray) -> None:
-    kind = {"type": TYPES[values.dtype.kind], "Name": name, "format": "binary"}
+    kind = {"type": VTK_TYPES[values.dtype.kind], "Name": name, "format": "binary"}
     if values.ndim > 1:
         kind["NumberOfComponents"] = str(values.shape[1])
     if parent.tag == "FieldData":

@@ -24,7 +24,7 @@ FLOORS = 10.0
 
 DIRECTIONS = 4
 
-SHARES = (0.1, -0.4, 1.0, 0.02, -0.99, 0.7, -1.0)
+SLIP_SHARES = (0.1, -0.4, 1.0, 0.02, -0.99, 0.7, -1.0)
 """Slips at which K is examined, in units of their limits."""
 
 
@@ -41,7 +41,7 @@ def balance(equilibrium: Equilibrium) -> Outcome:
 
 def derivative(packing: Packing) -> Outcome:
     """Whether K is the derivative of the forces in LAMMPS."""
-    packing = with_low_parts(with_slips(packing, SHARES))
+    packing = with_low_parts(with_slips(packing, SLIP_SHARES))
     law, overlap = packing.law, packing.geometry.overlap
     share = min(1.0, law.mu * law.kn / law.kt) if law.frictional else 1.0
     width = 2.0 ** np.floor(np.log2(1e-5 * share * overlap.min()))

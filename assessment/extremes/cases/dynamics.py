@@ -32,7 +32,7 @@ GROUP = "time stepping"
 DRIFT = 1e-5
 """Relative change of energy that counts as none: what is left of its oscillation after 40 samples."""
 
-AMPLITUDE = 1e-4
+MODE_AMPLITUDE = 1e-4
 """Amplitude of a mode in units of the smallest overlap: it moves as that of a frozen K up to this relative change of
 K."""
 
@@ -75,12 +75,12 @@ def _excite_mode(share: float, amplitude: float, steps: np.ndarray) -> np.ndarra
 def _below_the_limit(share: float, count: int) -> Outcome:
     steps = count // 100 * np.arange(1, 101)
     phase = np.arccos(1 - 2 * share**2)
-    error = np.abs(_excite_mode(share, AMPLITUDE, steps) - np.cos(steps * phase)).max()
+    error = np.abs(_excite_mode(share, MODE_AMPLITUDE, steps) - np.cos(steps * phase)).max()
     return measured_outcome(
         error,
         1e-3,
         f"stiffest mode against cos(n Omega dt) over {count} steps, in units of its amplitude; that is "
-        f"{AMPLITUDE:g} of the smallest overlap, so that K is frozen up to that and modes mix at the square of it",
+        f"{MODE_AMPLITUDE:g} of the smallest overlap, so that K is frozen up to that and modes mix at the square of it",
     )
 
 

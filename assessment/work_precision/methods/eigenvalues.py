@@ -23,13 +23,13 @@ from .extended import refined_near
 from .onset import OnsetMethods
 from .work_precision_study import Run, Settings, Study, Theory, study_of, timed_points
 
-COUNT = 6
+ARPACK_COUNT = 6
 """Eigenvalues that shift-invert is asked for: the pair and its neighbours."""
 
-APART = 1e-9
+DISTANCE_OF_PAIR = 1e-9
 """Distance below the onset, force, at which the pair is near its exceptional point."""
 
-FAR = 0.011
+LOAD_FAR_OFF = 0.011
 """F_x far from it."""
 
 DENSE, ARPACK, REFINED = "dense (LAPACK)", "shift-invert (ARPACK)", "dense, refined"
@@ -45,7 +45,7 @@ class Target:
         The configuration.
     shift : float
         Near the pair, but not on it, 1 / time^2.
-    exact : ndarray of complex, shape (COUNT,)
+    exact : ndarray of complex, shape (ARPACK_COUNT,)
         The eigenvalues nearest to it, in extended precision, 1 / time^2.
     error : float
         Largest relative error of these eigenvalues.
@@ -65,7 +65,7 @@ class Target:
     @classmethod
     def of(cls, packing: Packing, shift: float) -> Target:
         """Solve the eigenproblem and refine what is nearest to the shift."""
-        found, condition, rounding = refined_near(packing, shift, COUNT)
+        found, condition, rounding = refined_near(packing, shift, ARPACK_COUNT)
         exact = np.array([complex(each.value) for each in found])
         error = max(each.error / abs(each.value) for each in found)
         return cls(packing, shift, exact, float(error), condition, rounding)
@@ -87,7 +87,7 @@ class Target:
     @property
     def mean(self) -> complex:
         """Mean of the two of these eigenvalues that are closest to one another: the pair, 1 / time^2."""
-        apart = np.abs(self.exact[:, None] - self.exact) + np.diag(np.full(COUNT, np.inf))
+        apart = np.abs(self.exact[:, None] - self.exact) + np.diag(np.full(ARPACK_COUNT, np.inf))
         return complex(self.exact[list(np.unravel_index(np.argmin(apart), apart.shape))].mean())
 
     def off(self, values: Complexes) -> float:
@@ -102,18 +102,18 @@ class Target:
 
     def shift_invert(self, tolerance: float) -> tuple[Complexes, int | None]:
         """The nearest few by ARPACK, and the number of solves."""
-        found = eigenpairs(self.packing, self.shift, COUNT, tolerance=tolerance)
+        found = eigenpairs(self.packing, self.shift, ARPACK_COUNT, tolerance=tolerance)
         return found.values, found.solves
 
     def refine(self) -> tuple[Complexes, int | None]:
         """The nearest few by LAPACK and then Newton's method in extended precision, and the number of steps."""
-        found, *_ = refined_near(self.packing, self.shift, COUNT)
+        found, *_ = refined_near(self.packing, self.shift, ARPACK_COUNT)
         return np.array([complex(each.value) for each in found]), sum(each.steps for each in found)
 
 
 def far(settings: Settings) -> Study:
     """The eigenvalues about the pair that will coalesce, at half the load."""
-    packing = settings.at(FAR).packing
+    packing = settings.at(LOAD_FAR_OFF).packing
     _, pair = _near(settings)
     return _study("far", settings, packing, pair)
 
@@ -128,8 +128,8 @@ def _near(settings: Settings) -> tuple[Packing, float]:
     start = settings.ramp[0]
     with Engine(start.packing) as engine:
         onset, _ = OnsetMethods(engine, start, settings.scene).bisect(1e-3, 30)
-        below = max((each for each in settings.ramp if each.fx < onset - APART), key=lambda each: each.fx)
-        packing = equilibrate(engine, below, onset - APART).packing
+        below = max((each for each in settings.ramp if each.fx < onset - DISTANCE_OF_PAIR), key=lambda each: each.fx)
+        packing = equilibrate(engine, below, onset - DISTANCE_OF_PAIR).packing
     values, left, right = eig(dynamical_matrix(packing)[0].toarray(), left=True, right=True)
     return packing, float(values[np.argmin(np.abs(np.sum(left.conj() * right, axis=0)))].real)
 
@@ -150,8 +150,8 @@ def _study(name: str, settings: Settings, packing: Packing, pair: float) -> Stud
         "a few eigenvalues",
         points=points,
         numbers={
-            "count": COUNT,
-            "apart": APART,
+            "count": ARPACK_COUNT,
+            "apart": DISTANCE_OF_PAIR,
             "target": target,
             "disks": len(packing),
             "fx": packing.fx,

@@ -23,7 +23,7 @@ from ....analysis import Packing, dynamical_matrix
 from ....analysis.motion.eigenvalues import Complexes, unit_rounding
 from ....analysis.packing.packing import Floats
 
-ITERATIONS = 30
+NEWTON_STEPS = 30
 """Newton steps at the most. Near an exceptional point the bordered system is nearly singular and a step gains only a
 few digits."""
 
@@ -66,7 +66,7 @@ def refine_eigenvalue(matrix: Floats, value: complex, vector: Complexes, conditi
     x, lam = vector.astype(np.clongdouble), np.clongdouble(value)
     rounding = float(np.finfo(np.longdouble).eps * np.linalg.norm(matrix) * condition)
     moved, steps = np.inf, 0
-    while steps < ITERATIONS:
+    while steps < NEWTON_STEPS:
         residual = lam * x - (exact @ x.real + 1j * (exact @ x.imag))
         bordered = np.zeros((n + 1, n + 1), dtype=np.complex128)
         bordered[:n, :n] = matrix - complex(lam) * np.eye(n)

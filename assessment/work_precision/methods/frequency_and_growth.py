@@ -29,14 +29,14 @@ from ....pywrap import Engine, Equilibrium
 from .extended import refine_eigenvalue
 from .work_precision_study import Point, Settings, Study, Theory, compensate, fit_order, study_of, time_jobs
 
-SHARES = (0.8, 0.4, 0.2, 0.1, 0.05, 0.025)
+STEP_SHARES = (0.8, 0.4, 0.2, 0.1, 0.05, 0.025)
 """Time steps in units of the limit 2/omega_max."""
 
 RUN, CORRECTED, SPECTRUM = "run", "run, dispersion taken out", "eigenvalue of K, no run"
 CAREFUL = ", compensated"
 """Suffix of the name of a method in compensated arithmetic."""
 
-CAREFUL_AMPLITUDE, AMPLITUDE = 1e-12, 1e-8
+CAREFUL_AMPLITUDE, DISPLACED_BY = 1e-12, 1e-8
 """Length by which the disk that moves most is displaced: far above what a coordinate is known to, 1e-23 or 2e-15, and
 far below the overlaps, 1e-5 and more, so that the packing is nearly linear."""
 
@@ -91,7 +91,7 @@ class FastestMode:
     @property
     def amplitude(self) -> float:
         """Largest coordinate of the displacement that a run starts with, length."""
-        return CAREFUL_AMPLITUDE if self.packing.compensated else AMPLITUDE
+        return CAREFUL_AMPLITUDE if self.packing.compensated else DISPLACED_BY
 
     @property
     def exact(self) -> float:
@@ -150,7 +150,7 @@ def _study(
     name: str, settings: Settings, equilibrium: Equilibrium, mode: FastestMode, length: float, time: float
 ) -> Study:
     """Study runs of a given duration (the words call it a length) over the time step."""
-    steps = mode.limit * np.array(SHARES[: len(SHARES) - settings.quick])
+    steps = mode.limit * np.array(STEP_SHARES[: len(STEP_SHARES) - settings.quick])
     fine_mode = FastestMode.of(compensate(equilibrium).packing, mode.growing)
     points = _points(settings, mode, fine_mode, steps, time)
     noise, careful_noise = (
@@ -162,10 +162,10 @@ def _study(
         "fine_mode": fine_mode,
         "disks": len(mode.packing),
         "length": length,
-        "coarse": SHARES[1],
+        "coarse": STEP_SHARES[1],
         "noise": noise,
         "careful_noise": careful_noise,
-        "default": points[SHARES.index(0.05)].error,
+        "default": points[STEP_SHARES.index(0.05)].error,
         "raw": points[1].error,
         "spectrum": max(points[-1].error, mode.resolution),
         "slower": 2 / mode.limit / abs(np.sqrt(mode.eigenvalue)),

@@ -28,13 +28,13 @@ from .work_precision_study import Run, Settings, StatedError, Study, Theory, com
 OVERDAMPED, SCAN = "scan, overdamped", "scan, Newton"
 BISECTION, ROOT = "bisection", "root of the discriminant"
 
-BEYOND = 1e-5
+DISTANCE_BEYOND = 1e-5
 """Distance beyond the onset, force, at which the pair's imaginary part and overlap are measured for the floor."""
 
 INCREMENTS = (2e-3, 1e-3, 5e-4, 2.5e-4)
 """Increments of the ramps whose stated errors are compared with the true ones."""
 
-SMALL = 20
+RECOMPUTED_DISKS = 20
 """Disks of the scenes with contacts that change which are computed anew: each takes a second or two."""
 
 
@@ -94,11 +94,11 @@ class OnsetMethods:
         return with_path_error(found, path)
 
     def beyond(self, onset: float) -> tuple[float, float]:
-        """The error at which a bisection ends, and |y^H x| at the distance `BEYOND` above the onset."""
+        """The error at which a bisection ends, and |y^H x| at the distance `DISTANCE_BEYOND` above the onset."""
         path, _ = self._up(1e-3, "newton")
-        found = spectrum(path(onset + BEYOND))
+        found = spectrum(path(onset + DISTANCE_BEYOND))
         pair = max(found.pairs, key=lambda each: each.overlap * each.eigenvalue.imag)
-        return SAFETY * found.rounding * BEYOND / (pair.overlap * pair.eigenvalue.imag), pair.overlap
+        return SAFETY * found.rounding * DISTANCE_BEYOND / (pair.overlap * pair.eigenvalue.imag), pair.overlap
 
     def _up(self, increment: float, method: str) -> tuple[EquilibriumPath, int]:
         """The ramp up to the first equilibrium with a complex pair, and its number."""
@@ -134,14 +134,14 @@ def _study(settings: Settings, ways: OnsetMethods, reference: OnsetMethods) -> S
     points = timed_points(runs, settings, lambda found: max(abs(found - exact), resolution))
     lost, overlap = ways.beyond(exact)
     changing = [case for case in read() if case.counts]
-    small = [case for case in changing if case.disks <= SMALL]
+    small = [case for case in changing if case.disks <= RECOMPUTED_DISKS]
     few = small[:: max(1, len(small) // (2 if quick else 6))]
     numbers = {
         "exact": exact,
         "disks": len(settings.ramp[0].packing),
         "finest": finest,
         "check": check,
-        "beyond": BEYOND,
+        "beyond": DISTANCE_BEYOND,
         "overlap": overlap,
         "residual": max(each.residual for each in settings.ramp),
         "resolution": resolution,

@@ -32,7 +32,7 @@ VERLET, NEWTON = "Verlet with drag", "Newton"
 COMPENSATED_SUFFIX = ", compensated"
 """Ends the name of a method in compensated arithmetic."""
 
-CHUNK = 200
+STEPS_PER_LOOK = 200
 """Steps between two looks at the forces, so that the cost is known to so many steps."""
 
 STABLE = 0.95
@@ -67,7 +67,7 @@ class Increment:
         """The paper's dynamics until no disk feels more than a force."""
         self.engine.restore(self.start.packing)
         self.engine.set_fx(TO)
-        steps = self.engine.relax(tolerance, time_step=time_step, chunk=CHUNK).steps
+        steps = self.engine.relax(tolerance, time_step=time_step, chunk=STEPS_PER_LOOK).steps
         return self.engine.packing, steps
 
     def verlet(self, time_step: float, rate: float, steps: int) -> tuple[Packing, int]:

@@ -44,7 +44,7 @@ app = typer.Typer()
 MOST_PAIRS = 20
 """Lines of complex pairs: a packing of a thousand has hundreds."""
 
-LARGE = 6000
+SLOW_COORDINATES = 6000
 """Coordinates from which a spectrum takes minutes, and a gigabyte or more."""
 
 Slices = Annotated[
@@ -100,7 +100,7 @@ def spectrum(
     spring = spring_in(file)
     packing = derive_frozen(stored.configuration, spring=spring) if spring else stored
     size = packing.configuration.coordinates
-    if size > LARGE:
+    if size > SLOW_COORDINATES:
         # four matrices of doubles; 18000 coordinates took 10.2 GB
         say(f"{size} coordinates: their spectrum needs {32e-9 * size**2:.2g} GB, and a time that grows as their cube")
     if values:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-EVERY = 60.0
+SECONDS_BETWEEN_LINES = 60.0
 """Seconds between two lines of progress off a terminal."""
 
 ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a TOML file.", show_default=False)]
@@ -238,7 +238,7 @@ def status(what: str) -> Iterator[Callable[[str], None]]:
     latest, ended = deque([what], maxlen=1), Event()
 
     def speak() -> None:
-        while not ended.wait(EVERY):
+        while not ended.wait(SECONDS_BETWEEN_LINES):
             say(latest[0])
 
     thread = Thread(target=speak, daemon=True)
