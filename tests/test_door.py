@@ -71,3 +71,20 @@ def cluster_file(tmp_path):
         file.append(packing)
         file.complete = True
     return tmp_path / "run.h5"
+
+
+def test_the_stages_of_a_scene_are_calls(faultgouge_here, tmp_path):
+    """And what is printed of a packing is what the command prints."""
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        "[packing]\nseed = 3\ndisks = 30\ntop = 6\nwidth = 6.5\n[law]\nkn = 2e5\n[load]\nfy = 3.0\n"
+        "[perturb]\nfx = 2e-3\ntime = 0.1\n"
+    )
+    scene = faultgouge.Scene.from_toml(path)
+    printed = faultgouge_here("settle", "scene.toml", "-o", "run.h5").stdout
+    assert printed == f"{faultgouge.settle(scene)}; written to run.h5\n"
+    *_, last = faultgouge.perturb(scene)
+    assert last.time == pytest.approx(0.1, rel=1e-2)  # a whole number of steps
+    without = scene.model_copy(update={"perturb": scene.perturb.model_copy(update={"fx": None})})
+    with pytest.raises(faultgouge.pywrap.SceneError, match=r"perturb.fx is missing"):
+        faultgouge.perturb(without)

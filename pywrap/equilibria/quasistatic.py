@@ -18,6 +18,7 @@ import numpy as np
 
 from ...analysis import NoEquilibriumError, Packing, nearest_image
 from ...analysis.arrays import Indices
+from ...analysis.counted import counted
 from ..lammps.contact_graph import ContactGraph
 from ..lammps.engine import Engine
 from ..lammps.trial_state import rounding
@@ -82,6 +83,15 @@ class Equilibrium:
     def fx(self) -> float:
         """F_x on each disk of the upper layer."""
         return self.packing.fx
+
+    def __str__(self) -> str:
+        packing = self.packing
+        load = f"F_x = {packing.fx:g}: " if packing.fx else ""
+        return (
+            f"{load}{counted(len(packing), 'disk')}, {counted(len(packing.contacts), 'contact')}, "
+            f"{counted(len(packing.rattlers), 'rattler')}; "
+            f"residual {self.residual:.2g} (rounding floor {self.floor:.2g})"
+        )
 
 
 def rounding_floor(packing: Packing) -> float:

@@ -20,6 +20,7 @@ from ..lammps.engine import Engine
 from ..scenes.scene import Scene
 from ..scenes.sections import Friction, Perturb
 from ..scenes.validation import SceneError, require_section
+from .equilibrium_path import reach
 
 ACCURATE_SHARE = 0.05
 """Time step of undamped runs in units of the stability limit, 2/omega_max without dashpots: the fastest mode is then
@@ -103,7 +104,7 @@ def time_step(packing: Packing, wanted: float | None = None) -> float:
 
 def perturb(
     scene: Scene,
-    start: Equilibrium,
+    start: Equilibrium | None = None,
     samples: int = 2000,
     early: int = 200,
     communicator: MPI.Comm | None = None,
@@ -118,8 +119,8 @@ def perturb(
     ----------
     scene : Scene
         With a section [perturb].
-    start : Equilibrium
-        The equilibrium at the scene's perturb.fx.
+    start : Equilibrium, optional
+        The equilibrium at the scene's perturb.fx; by default the packing settles and goes there first.
     samples : int
         Lines of the time series, equally spaced; fewer if there are fewer steps.
     early : int
@@ -145,9 +146,14 @@ def perturb(
     ------
     SceneError
         Immediately, if the scene has no section [perturb], its time step is above the limit, or its time is shorter
-        than one step.
+        than one step; or, without `start`, if it has no perturb.fx.
     """
-    settings, packing = require_section(scene.perturb, "perturb"), start.packing
+    settings = require_section(scene.perturb, "perturb")
+    if start is None:
+        if settings.fx is None:
+            raise SceneError("perturb.fx is missing: give the load of the run, or the equilibrium from which it starts")
+        *_, start = reach(scene, settings.fx)
+    packing = start.packing
     dt, steps = sample_steps(settings, packing, samples, early)
     everyone = range(len(packing)) if settings.target == "all" else settings.target
     target = None if everyone == "top" else [int(disk) for disk in everyone]

@@ -17,7 +17,6 @@ from .terminal import (
     Out,
     ScenePath,
     check_output,
-    counted,
     growth_in,
     lock_output,
     print_json,
@@ -66,12 +65,7 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
         last = _settle_or_read(wanted, record)
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
             record.finish()
-    packing = last.packing
-    print_line(
-        f"{counted(len(packing), 'disk')}, {counted(len(packing.contacts), 'contact')}, "
-        f"{counted(len(packing.rattlers), 'rattler')}; "
-        f"residual {last.residual:.2g} (rounding floor {last.floor:.2g}); written to {output}"
-    )
+    print_line(f"{last}; written to {output}")
 
 
 @app.command(epilog="Example: mpiexec -n 2 faultgouge ramp paper.toml -o run.h5")
