@@ -148,8 +148,10 @@ def test_scripts_of_the_readme_run_in_an_empty_folder(tmp_path):
         done = subprocess.run([sys.executable, name], cwd=tmp_path, capture_output=True, text=True, timeout=600)
         assert done.returncode == 0, done.stderr
         printed[name] = done.stdout
-    assert re.match(r"stable: every motion decays, the slowest with D as exp\(-0\.0\d+ t\)", printed["pour.py"])
-    assert re.search(r"without dissipation: \d+ complex pairs", printed["pour.py"])
+    # on another machine the spheres come to rest at other places
+    verdict = re.search(r"^```text\n(.*?)^```$", (ROOT / "README.md").read_text(), re.MULTILINE | re.DOTALL)[1]
+    assert "stable: every motion decays" in verdict
+    assert re.sub(r"[\d.]+", "1", printed["pour.py"]) == re.sub(r"[\d.]+", "1", verdict)
     assert "F_x = 0.016 " in printed["ramp.py"]
 
 
