@@ -50,6 +50,16 @@ def test_links_lead_somewhere(page):
     assert lost == []
 
 
+def test_included_pages_link_to_pages_of_the_documentation(page):
+    """Other pages are not built, so that `make docs` would end with an error."""
+    included = re.match(r"```{include} (\S+)", page.read_text())
+    if included and page.is_relative_to(ROOT / "docs"):
+        origin = (page.parent / included[1]).resolve()
+        for link in re.findall(r"\]\((?!https?:)([^)#\s]+\.md)", origin.read_text()):
+            beside = "/" not in link and (page.parent / link).exists()
+            assert beside or (origin.parent / link).resolve().is_relative_to(ROOT / "docs"), link
+
+
 def test_no_line_of_prose_is_longer_than_a_screen(page):
     prose = NO_PROSE.sub("", page.read_text())
     assert [line for line in prose.splitlines() if len(line) > 120] == []
