@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from faultgouge.analysis import Packing, Stability
 from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.configuration import HasConfiguration
+from faultgouge.analysis.counted import counted
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.analysis.motion.hysteresis import layer_displacement, turning_points
 
@@ -187,7 +188,7 @@ def _frame(packing: HasConfiguration, axis: Axis, images: Images, followed: Ramp
         "value": float(axis.values[k]),
         "force": packing.fx if isinstance(packing, Packing) else None,
         "stable": verdict.stable,
-        "sentences": _sentences(verdict),
+        "sentences": sentences_of(verdict),
         "pairs": verdict.undamped.pairs,
         "rate": verdict.growth_rate,
         "undamped": verdict.undamped.growth_rate,
@@ -205,23 +206,35 @@ def _frame(packing: HasConfiguration, axis: Axis, images: Images, followed: Ramp
     }
 
 
-def _sentences(verdict: Stability) -> list[str]:
-    """The verdict, what the eigenvalues without dissipation say, and contacts at Coulomb's bound."""
+def sentences_of(verdict: Stability) -> list[str]:
+    """The verdict, what the eigenvalues without dissipation say, and contacts at Coulomb's bound.
+
+    Parameters
+    ----------
+    verdict : Stability
+        Of one packing.
+
+    Returns
+    -------
+    list of str
+        Sentences for the page, the verdict first.
+    """
     undamped, contacts = verdict.undamped, verdict.at_bound
-    found = [
-        f"{count} {'' if kind == 'negative' else 'pairs of '}eigenvalues {'is' if count == 1 else 'are'} {kind}"
-        for count, kind in ((undamped.pairs, "complex"), (undamped.negative, "negative"))
-        if count
-    ]
-    says = " and ".join(found).replace("1 pairs", "1 pair").replace("1 eigenvalues", "1 eigenvalue")
-    others = (
-        [f"{says}, D would grow as exp({undamped.growth_rate:.3g} t)" if verdict.dissipative else says] if found else []
+    kinds = (
+        (undamped.pairs, "pair of eigenvalues", "pairs of eigenvalues", "complex"),
+        (undamped.negative, "eigenvalue", "eigenvalues", "negative"),
     )
-    if verdict.dissipative and found:
-        others[0] = f"without dissipation {others[0]}"
+    found = [f"{counted(count, one, many)} {_is(count)} {kind}" for count, one, many, kind in kinds if count]
+    says = [verdict.sentences[0], *([" and ".join(found)] if found else [])]
+    if found and verdict.dissipative:
+        says[1] = f"without dissipation {says[1]}, D would grow as exp({undamped.growth_rate:.3g} t)"
     if contacts:
-        others.append(f"{contacts} contact{' is' if contacts == 1 else 's are'} at Coulomb's bound")
-    return [f"{each[0].upper()}{each[1:]}." for each in (verdict.sentences[0], *others)]
+        says.append(f"{counted(contacts, 'contact')} {_is(contacts)} at Coulomb's bound")
+    return [f"{each[0].upper()}{each[1:]}." for each in says]
+
+
+def _is(count: int) -> str:
+    return "is" if count == 1 else "are"
 
 
 def _pair(pair: FollowedPair, axis: Axis, legs: Sequence[np.ndarray]) -> dict[str, Any]:

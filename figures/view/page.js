@@ -205,7 +205,8 @@ function describe() {
   if (!chosen) return "No two eigenvalues are close to merging."
   if (!known(chosen)) return `No two modes at ${value(here)} have the shapes of the chosen pair.`
   const [[re, im], [other]] = members(chosen)
-  const grows = `D grows as ${exponential(growth(chosen))} without dissipation`
+  const without = data.dissipative ? " without dissipation" : ""
+  const grows = `D grows as ${exponential(growth(chosen))}${without}`
   return growth(chosen) ? `λ = ${digits(re, 5)} ± ${digits(im)} i: a complex pair. ${grows}.`
     : `λ = ${digits(re, 6)} and ${digits(other, 6)}: both real. Both modes oscillate.`
 }

@@ -18,6 +18,9 @@ pytestmark = [
     pytest.mark.skipif(not (PAGES / "live.html").exists(), reason="no pages are built: make docs"),
 ]
 
+VIEWS = ("live.html", "three.html")
+"""Pages of `faultgouge view`, which have no navigation."""
+
 ASIDE = ("sidebar-drawer", "toc-drawer")
 """Classes of the navigation on the left, and of a page's own contents on the right."""
 
@@ -51,7 +54,7 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def pages():
-    return {path: Page(path) for path in PAGES.rglob("*.html") if path.name != "live.html"}
+    return {path: Page(path) for path in PAGES.rglob("*.html") if path.name not in VIEWS}
 
 
 def test_no_raw_formula_in_titles_and_navigation(pages):
@@ -89,23 +92,56 @@ def test_the_search_finds(word):
     assert names & {"install", "lesson", "scenes"}, names
 
 
-def test_the_front_page_shows_the_demonstration_at_once():
-    """On a screen of 1280 x 900 the packing, the slider and the plots of eigenvalues are seen without scrolling."""
+@pytest.fixture
+def front_page():
+    """Opens the front page with its demonstration; at the end nothing went wrong in the browser."""
     playwright = pytest.importorskip("playwright.sync_api")
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     if chromium is None:
         pytest.skip("no Chromium is installed")
+    wrong = []
     with playwright.sync_playwright() as p:
         browser = p.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
-        page = browser.new_page(viewport={"width": 1280, "height": 900})
-        page.goto((PAGES / "index.html").as_uri())
-        frame = page.locator(".live iframe").bounding_box()
-        live = page.frame_locator(".live iframe")
-        live.locator("text=Imaginary parts of the pair").wait_for(timeout=60_000)
-        plots = [live.locator(f"text={title} parts of the pair").bounding_box() for title in ("Real", "Imaginary")]
+
+        def open_page(width, height):
+            page = browser.new_page(viewport={"width": width, "height": height})
+            page.on("pageerror", lambda error: wrong.append(str(error)))
+            page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+            page.goto((PAGES / "index.html").as_uri())
+            page.frame_locator(".live iframe").locator("#imaginary circle").first.wait_for(timeout=60_000)
+            return page
+
+        yield open_page
         browser.close()
+    assert wrong == []
+
+
+def test_the_front_page_shows_the_demonstration_at_once(front_page):
+    """On a screen of 1280 x 900 the packing, the slider and the plots of eigenvalues are seen without scrolling."""
+    page = front_page(1280, 900)
+    frame, live = page.locator(".live iframe").bounding_box(), page.frame_locator(".live iframe")
+    plots = [live.locator(f"text={title} parts of the chosen pair").bounding_box() for title in ("Real", "Imaginary")]
     assert frame["y"] + frame["height"] <= 900
     assert all(box["y"] + 150 < 900 for box in plots)
+
+
+def test_the_demonstration_plays(front_page):
+    """It opens where motion grows fastest."""
+    live = front_page(1280, 900).frame_locator(".live iframe")
+    assert "Unstable" in live.locator("#verdict").inner_text()
+    opens = live.locator("#where").inner_text()
+    live.locator("#play").click()
+    live.locator(f"#where:not(:text-is('{opens}'))").wait_for(timeout=10_000)
+
+
+def test_the_front_page_fits_a_telephone(front_page):
+    page = front_page(390, 844)
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    live = page.frame_locator(".live iframe")
+    for part in ("#verdict", "#play", "#growth"):
+        box = live.locator(part).bounding_box()
+        assert box["y"] + box["height"] <= 844
+        assert box["x"] + box["width"] <= 390
 
 
 def test_the_front_page_has_no_list_of_all_pages():

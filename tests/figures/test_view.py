@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from faultgouge.analysis import Configuration, LinearisedContacts
+from faultgouge.analysis import Configuration, LinearisedContacts, stability
 from faultgouge.analysis.arrays import derive_frozen
-from faultgouge.figures.browser_page import Axis, write_view
+from faultgouge.figures.browser_page import Axis, sentences_of, write_view
 
 pytestmark = pytest.mark.slow
 
@@ -169,6 +169,22 @@ def test_nothing_is_drawn_of_a_pair_that_is_unknown(there_and_back, opened):
     assert page.inner_text("#members") == "No two modes at Fₓ = 0.16 have the shapes of the chosen pair."
     assert page.query_selector_all("#imaginary circle") == []
     assert page.input_value("#motion") == "still"
+
+
+@pytest.mark.parametrize(
+    ("pairs", "negative", "says"),
+    [
+        (0, 0, []),
+        (1, 0, ["1 pair of eigenvalues is complex."]),
+        (41, 0, ["41 pairs of eigenvalues are complex."]),
+        (2, 1, ["2 pairs of eigenvalues are complex and 1 eigenvalue is negative."]),
+        (0, 21, ["21 eigenvalues are negative."]),
+    ],
+)
+def test_a_number_has_its_noun(column, pairs, negative, says):
+    verdict = stability(column)
+    verdict = replace(verdict, undamped=replace(verdict.undamped, pairs=pairs, negative=negative))
+    assert sentences_of(verdict)[1:] == says
 
 
 def test_spheres_can_be_turned(column, opened):
