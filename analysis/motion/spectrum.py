@@ -45,6 +45,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
 from ..configuration import HasConfiguration
+from ..counted import counted
 from ..errors import BadInputError
 from ..operators.stiffness import Form, stiffness_matrix
 from ..packing.packing import Floats, Indices
@@ -153,7 +154,8 @@ class Spectrum(TableDisplay):
     def __repr__(self) -> str:
         real = self.eigenvalues.real
         span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
-        return f"<Spectrum: {self._verdict}; {len(real)} eigenvalues of K{span}, {len(self.rattlers)} rattlers>"
+        numbers = f"{counted(len(real), 'eigenvalue')} of K{span}, {counted(len(self.rattlers), 'rattler')}"
+        return f"<Spectrum: {self._verdict}; {numbers}>"
 
     @property
     def _verdict(self) -> str:

@@ -201,7 +201,7 @@ def _contact_output(scene: Scene, run: UndampedRun, loaded: InstanceContents, st
 
 def _trajectory(scene: Scene, start: Equilibrium, run: UndampedRun, steps: int, folder: Path) -> Part:
     """A sample of an undamped run, with and without its positions in run.h5."""
-    wanted = scene.output is not None and scene.output.trajectory
+    wanted = scene.output is not None and bool(scene.output.trajectory)
     path = folder / "run.h5"
     with ExitStack() as stack:
         (_, plain), (_, watched) = (stack.enter_context(run.start(MPI.COMM_SELF)) for _ in range(2))
@@ -215,7 +215,7 @@ def _trajectory(scene: Scene, start: Equilibrium, run: UndampedRun, steps: int, 
         identical = same_motion(plain.advance(1), watched.advance(1))
     with RunFile(path) as file:
         adds = tuple(f"dataset trajectory/{name}" for name in file.series("trajectory"))
-    reason = "output.trajectory" if wanted else "no output.trajectory"
+    reason = "output.trajectory" if wanted else "no output.trajectory: 300 states of up to 1000 disks"
     return Part("trajectory", wanted, reason, adds, cost, "positions and velocities", identical)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import RunFile, solid_fraction
-from ...analysis.arrays import Floats
+from ...analysis.arrays import Floats, Indices
 from ...analysis.files.atomic_write import check_output, lock_output
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import MotionState, Weakening
@@ -26,6 +26,10 @@ R = TypeVar("R", bound="Record")
 S = TypeVar("S")
 T = TypeVar("T")
 Task = Literal["ramp", "perturb", "drive"]
+
+STATES_OF_FILM, DISKS_OF_FILM = 300, 1000
+"""Positions of an undamped run that a file stores unasked, at equal intervals of time, and of how many disks at the
+most: seven megabytes."""
 
 
 class Record:
@@ -162,12 +166,13 @@ class Record:
             First the samples that are already in the file.
         """
         assert scene.perturb is not None
-        _, steps = sample_steps(scene.perturb, start.packing)
+        dt, steps = sample_steps(scene.perturb, start.packing)
         known, checkpoint = raise_on_all_ranks(self.communicator, lambda: self._known(name, Sample))
         yield from known
         if len(known) == len(steps):
             return
-        trajectory = scene.output is not None and scene.output.trajectory and name == "undamped"
+        stored = _stored_steps(scene, len(start.packing), steps) if name == "undamped" else steps[:0]
+        shown = {step * dt for step in stored.tolist()}
         samples: list[Sample] = []
         motions: list[tuple[float, MotionState]] = []
 
@@ -176,7 +181,7 @@ class Record:
             start,
             communicator=self.communicator,
             weakening=weakening,
-            watch=(lambda time, motion: motions.append((time, motion))) if trajectory else None,
+            watch=lambda time, motion: motions.append((time, motion)) if time in shown else None,
             keep=lambda reached: self._keep(name, samples, motions, reached),
             resume=checkpoint,
         )
@@ -253,6 +258,17 @@ class Record:
             self._say_saved()
             self._file.close()
         self._alone.close()
+
+
+def _stored_steps(scene: Scene, disks: int, steps: Indices) -> Indices:
+    """Of the steps at which an undamped run is sampled those at which its positions are stored."""
+    wanted = None if scene.output is None else scene.output.trajectory
+    if wanted is not None:
+        return steps if wanted else steps[:0]
+    if disks > DISKS_OF_FILM:
+        return steps[:0]
+    times = np.linspace(0, steps[-1], STATES_OF_FILM + 1)[1:]
+    return np.unique(steps[np.searchsorted(steps, times)])
 
 
 def fallbacks(file: RunFile) -> dict[int, str]:

@@ -99,6 +99,15 @@ class Law(Section):
         """Every friction coefficient that the scene asks for, in its order."""
         return self.mu if isinstance(self.mu, tuple) else (self.mu,)
 
+    @property
+    def in_words(self) -> str:
+        """The law of friction, as pages name it."""
+        return {
+            "total": "the paper's smoothed law",
+            "rescaled": "the smoothed law with rescaled slips",
+            "coulomb": "the standard law",
+        }[self.history]
+
 
 class Damping(Section):
     """[damping] of dynamics; none in a scene without this section. Equilibria do not depend on it.
@@ -310,13 +319,13 @@ class Output(Section):
 
     Attributes
     ----------
-    trajectory : bool
-        Whether undamped runs store configurations along the way.
+    trajectory : bool or None
+        Whether undamped runs store the positions at every sample; None: a film's worth of them, in a small packing.
     dumps : bool
         Whether LAMMPS writes its own per-disk and per-contact dumps.
     """
 
-    trajectory: bool = False
+    trajectory: bool | None = None
     dumps: bool = False
 
 

@@ -59,6 +59,7 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
             another = _ramps(triggered, path, say)
         found = _trigger(shaken, another or runs, path, say)
         if isinstance(found, str):
+            say(f"{found.rstrip('.')}: no figures 2, 5 and 6")
             summary["triggering"] = {"says": found}
         else:
             draw_all(triggering_figures(found), output, say)
@@ -66,6 +67,8 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
         if another is not None:
             onsets = [{"mu": run.mu, "onset": run.onset.as_dict()} for run in another]
             summary["triggering"] |= {"scene": shaken.resolved(), "onsets": onsets}
+    else:
+        say("the scene has no sections [perturb] and [friction]: no figures 2, 5 and 6")
     write_json(output / "summary.json", summary)
     write_text(output / "report.md", report(scene, runs, growth, found, another))
     return summary

@@ -249,10 +249,13 @@ def test_results_go_to_standard_output_and_progress_to_standard_error(faultgouge
     )
     assert first.stdout.startswith("mu = 1: F_x^c = 0.02183305")
     assert "two eigenvalues merge there" in first.stdout
+    law = 'law of friction: the paper\'s smoothed law (history = "total")'
+    assert first.stdout.splitlines()[-1] == law
     assert first.stderr == ""
     table = faultgouge_here("onset", "scene.toml", "--all").stdout.splitlines()
     assert [line.split()[:2] for line in table[:2]] == [["mu", "="], ["from", "F_x"]]
-    assert len(table) == 2 + len(every["windows"])
+    assert len(table) == 2 + len(every["windows"]) + 1
+    assert table[-1] == law
     assert (len(found["windows"]), found["fx_c"]) == (1, every["fx_c"])
     assert every["windows"] == sorted(every["windows"], key=lambda window: window["fx_onset"])
     for command, result in (("settle", "100 disks"), ("ramp", "F_x = 0.022 reached"), ("perturb", "F_x = 0.022, mu")):
@@ -321,7 +324,8 @@ def test_onset_names_the_friction_coefficients_without_one(faultgouge_here, tmp_
     none = "no onset: No pair of eigenvalues is complex up to F_x = 0.015: raise the largest load."
     assert said[0] == f"mu = 1: {none}"
     assert said[1].startswith("mu = 0.3: F_x^c = 0.01394557")
-    assert said[-1] == f"mu = 0.8: {none}"
+    assert said[-2] == f"mu = 0.8: {none}"
+    assert said[-1].startswith("law of friction: ")
     found = json.loads(faultgouge_here("onset", "scene.toml", "--json").stdout)
     assert found["fx_c"] == pytest.approx(0.01394557065, abs=1e-10)
     assert [each["fx_c"] for each in found["each_mu"]] == [None, found["fx_c"], None]

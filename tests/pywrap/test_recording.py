@@ -109,6 +109,30 @@ def perturbed_scene(kind):
     )
 
 
+@pytest.mark.slow
+def test_a_film_of_an_undamped_run_is_stored_unasked(tmp_path):
+    """Its states are those of the whole trajectory, at equal intervals up to the end; none where a scene wants none."""
+    asked = {"all": {"trajectory": True}, "film": {}, "none": {"trajectory": False}}
+    kept = {}
+    for name, output in asked.items():
+        wanted = Scene.from_mapping(SCENE | {"perturb": {"fx": 1e-3, "time": 3.0}, "output": output})
+        *_, start = reach(wanted, wanted.perturb.fx)
+        with Record(tmp_path / f"{name}.h5", wanted, task="perturb") as record:
+            record.append(start)
+            times = [sample.time for sample in record.undamped(wanted, start)]
+        with RunFile(tmp_path / f"{name}.h5") as file:
+            kept[name] = file.series("trajectory") if "trajectory" in file.names_of_series else None
+    whole, film = kept["all"], kept["film"]
+    assert kept["none"] is None
+    np.testing.assert_array_equal(whole["time"], times)
+    assert len(film["time"]) == 300
+    assert film["time"][-1] == times[-1]
+    # a state is the first sample at or after its time, and samples are a two-thousandth of the run apart
+    np.testing.assert_allclose(film["time"], np.linspace(0, times[-1], 301)[1:], atol=6e-4 * times[-1])
+    same = np.isin(whole["time"], film["time"])
+    np.testing.assert_array_equal(whole["position"][same], film["position"])
+
+
 @pytest.mark.parametrize("kind", FORCED)
 @pytest.mark.slow
 def test_it_goes_on_to_the_bit(kind, tmp_path, monkeypatch):

@@ -18,6 +18,7 @@ from .terminal import (
     PackingFile,
     ScenePath,
     Time,
+    counted,
     frame_at,
     lock_output,
     print_json,
@@ -174,7 +175,10 @@ def _print_spectrum(
         shares = ", ".join(f"{name.replace('_', ' ')} {share:.3g}" for name, share in verdict.asymmetry.items())
         print(f"what makes K asymmetric, as shares: {shares}")
         if result.noise_pairs:
-            print(f"{result.noise_pairs} pairs have imaginary parts within their rounding error and count as real")
+            print(
+                f"{counted(result.noise_pairs, 'pair')} of eigenvalues with imaginary parts within the rounding error: "
+                "they count as real"
+            )
 
 
 def _print_size(packing: HasConfiguration, result: Spectrum) -> None:
@@ -185,10 +189,11 @@ def _print_size(packing: HasConfiguration, result: Spectrum) -> None:
     if isinstance(packing, Packing):
         what, fraction = f"F_x = {packing.fx:g}", f"; volume fraction {solid_fraction(packing):.4f}"
     else:
-        what, fraction = f"{len(packing)} {'spheres' if packing.dimension == 3 else 'disks'} as LAMMPS left them", ""
+        noun = "sphere" if packing.dimension == 3 else "disk"
+        what, fraction = f"{counted(len(packing), noun)} as LAMMPS left {'it' if len(packing) == 1 else 'them'}", ""
     span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ", as no particle touches another"
-    rattlers = f"{len(result.rattlers)} rattler{'' if len(result.rattlers) == 1 else 's'}"
-    print(f"{what}: {len(real)} eigenvalues of K{span}, {rattlers} left out{fraction}")
+    numbers = f"{counted(len(real), 'eigenvalue')} of K{span}, {counted(len(result.rattlers), 'rattler')} left out"
+    print(f"{what}: {numbers}{fraction}")
 
 
 def _print_growing_motions(result: Spectrum, dissipative: bool, verbose: bool) -> None:
@@ -294,6 +299,7 @@ def onset(
             found.append({"mu": mu, "fx_c": None, "no_onset": str(error)})
     if all(each["fx_c"] is None for each in found):
         raise OnsetError(f"None of the {len(found)} friction coefficients has an onset on this ramp.")
+    tell(f"law of friction: {wanted.law.in_words} (history = \"{wanted.law.history}\")")
     result = _write_result(output, found)
     if is_root() and folder is not None and not slices:
         shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
@@ -459,7 +465,7 @@ def _say_what_is_uncertain(
     alone = [each for each in windows if each.path_error is None and each.kind != "start"]
     if alone:
         say(
-            f"the error of {len(alone)} of {len(windows)} onsets, the first at F_x = {alone[0].fx_onset:.6g}, is that "
+            f"the error of {len(alone)} of {counted(len(windows), 'onset')}, the first at F_x = {alone[0].fx_onset:.6g}, is that "
             "of rounding alone: no equilibrium was found there a second time, so that the error of the path is not "
             "known; other increments may find one"
         )

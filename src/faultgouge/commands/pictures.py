@@ -157,8 +157,8 @@ def movie(
 ) -> None:
     """Make a film of an undamped run, of a mode, or of a ramp.
 
-    From perturb.h5 with its trajectory ([output] trajectory = true): the run and
-    D(t). Displacements are magnified by a power of ten, which is printed on the film
+    From perturb.h5: the run and D(t), of up to 1000 disks, or with trajectory = true
+    under [output]. Displacements are magnified by a power of ten, which is printed on the film
     and falls in steps. With --mode: the motion of a mode without its growth. From
     run.h5: the ramp, and F_x over the displacement of the upper layer. From drive.h5:
     its states, to scale, and the force over time. An .mp4 needs
