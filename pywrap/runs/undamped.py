@@ -24,8 +24,8 @@ from .equilibrium_path import reach
 
 ACCURATE_SHARE = 0.05
 """Time step of undamped runs in units of the stability limit, 2/omega_max without dashpots: the fastest mode is then
-resolved by 60 steps a period, and the dispersion of all others is smaller."""
-
+resolved by 60 steps a period, and the dispersion of all others is smaller. A growth rate is right to 5e-5, a fit of
+D(t) to some 4e-4; with 0.2 of the limit the rate would be off by 9e-4, which the fit shows."""
 
 SHORTEST_PART, MOST_PARTS = 10_000, 100
 """Steps after which an undamped run resumes its own state, and may be continued from there: at least so many, and at

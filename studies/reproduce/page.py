@@ -12,6 +12,7 @@ from ...analysis.packing.solid_fraction import solid_fraction, solid_fraction_be
 from ...figures.pages import render
 from ...pywrap import Scene
 from ...pywrap.onset.undamped import OnsetRun
+from ...pywrap.runs.undamped import ACCURATE_SHARE
 from ...pywrap.scenes.units import dashpot, quality_factor, real_units
 from ...pywrap.scenes.validation import require_section
 from ..triggering.compute import ABOVE_NOISE, Triggering, largest, summary
@@ -47,6 +48,7 @@ def report(
         triggering=triggering,
         says=found,
         another=another,
+        time_step_share=ACCURATE_SHARE,
         settled_with_friction=getattr(scene.packing, "settle_friction", False),
         **({} if triggering is None else _triggering_numbers(triggering)),
         **_in_si(scene, growth, triggering if another is None else None),

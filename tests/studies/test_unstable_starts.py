@@ -40,7 +40,7 @@ def test_onset_counts_the_pairs_and_states_no_digits_of_zero(faultgouge_here, pa
     said = faultgouge_here("onset", "scene.toml").stdout
     for mu, count in zip((0.5, 0.4), pairs, strict=True):
         assert f"mu = {mu}: {BEFORE}: {count} complex pairs; in the fastest motion D grows as exp(" in said
-    assert len(said.splitlines()) == 2
+    assert len(said.splitlines()) == 3  # the last one names the law
     table = [line for line in faultgouge_here("onset", "scene.toml", "--all").stdout.splitlines() if "start" in line]
     assert len(table) == sum(pairs)
     assert {line.split()[0] for line in table} == {"0"}
@@ -75,6 +75,7 @@ def test_two_unstable_starts_do_not_tell_whether_the_onset_is_lower():
 def test_reproduce(faultgouge_here, tmp_path, pairs):
     done = faultgouge_here("reproduce", "scene.toml", "-o", "out")
     assert f"mu = 0.5: {BEFORE}: {pairs[0]} complex pairs" in done.stderr
+    assert "no figures 2, 5 and 6" in done.stderr
     page = (tmp_path / "out/report.md").read_text()
     assert "| 0.5 | unstable at 0 |" in page
     assert f"At F_x = 0 the packing has {pairs[0]} complex pairs" in page

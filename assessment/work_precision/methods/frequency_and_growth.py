@@ -157,6 +157,7 @@ def _study(
         float(np.median([point.error for point in points if point.method == method]))
         for method in (CORRECTED, CORRECTED + CAREFUL)
     )
+    default, fifth = points[STEP_SHARES.index(0.05)], points[STEP_SHARES.index(0.2)]
     numbers = {
         "mode": mode,
         "fine_mode": fine_mode,
@@ -165,7 +166,9 @@ def _study(
         "coarse": STEP_SHARES[1],
         "noise": noise,
         "careful_noise": careful_noise,
-        "default": points[STEP_SHARES.index(0.05)].error,
+        "default": default.error,
+        "fifth": fifth.error,
+        "fifth_time": fifth.seconds / default.seconds,
         "raw": points[1].error,
         "spectrum": max(points[-1].error, mode.resolution),
         "slower": 2 / mode.limit / abs(np.sqrt(mode.eigenvalue)),
