@@ -299,7 +299,7 @@ def onset(
             found.append({"mu": mu, "fx_c": None, "no_onset": str(error)})
     if all(each["fx_c"] is None for each in found):
         raise OnsetError(f"None of the {len(found)} friction coefficients has an onset on this ramp.")
-    tell(f"law of friction: {wanted.law.in_words} (history = \"{wanted.law.history}\")")
+    tell(f'law of friction: {wanted.law.in_words} (history = "{wanted.law.history}")')
     result = _write_result(output, found)
     if is_root() and folder is not None and not slices:
         shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
