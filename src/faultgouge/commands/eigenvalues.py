@@ -466,8 +466,8 @@ def _say_what_is_uncertain(
     if alone:
         say(
             f"the error of {len(alone)} of {counted(len(windows), 'onset')}, the first at F_x = "
-            f"{alone[0].fx_onset:.6g}, is that of rounding alone: no equilibrium was found there a second time, so that the error of the path is not "
-            "known; other increments may find one"
+            f"{alone[0].fx_onset:.6g}, is that of rounding alone: no equilibrium was found there a second time, so "
+            "that the error of the path is not known; other increments may find one"
         )
 
 
