@@ -11,7 +11,7 @@ centres of each contact; the width of the bar is proportional to the normal forc
 Most contacts of a stable packing are far below Coulomb's bound, so that both fractions have a logarithmic scale.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
@@ -39,6 +39,9 @@ LEAST_SHARE = 1e-4
 
 WIDTH = 3.4
 """Width of a figure that holds one packing, inch."""
+
+WIDEST_OF_SPHERES = 9.0
+"""Width of the bar of the largest normal force among spheres, points."""
 
 
 def _slip_share(packing: HasConfiguration) -> Floats:
@@ -362,12 +365,12 @@ def _draw_spheres(packing: Configuration, axes: Axes | None, color: str, caption
     """Spheres with their force chains."""
     figure = new_figure(packing, 1) if axes is None else figure_of(axes)
     here = figure.add_subplot() if axes is None else axes
-    chains = SpheresArtist(here, packing).chains(here, _style_of_bars(packing, color), widest=9.0)
+    chains = SpheresArtist(here, packing).chains(here, _style_of_bars(packing, color), WIDEST_OF_SPHERES)
     if axes is None:
         if caption:
             figure.suptitle(in_words(packing).replace("; ", "\n"), fontsize=7.5)
         _add_colours(figure, here, chains, color)
-        here.set_title("width of a bar: normal force", fontsize=7, y=-0.1)
+        _add_widths(figure, packing, WIDEST_OF_SPHERES, _patches(packing))
     return figure
 
 
@@ -412,23 +415,39 @@ def in_words(packing: HasConfiguration) -> str:
 
 def _add_key(figure: Figure, artist: PackingArtist) -> None:
     """Add a key: the meaning of yellow, hollow and wide."""
-    packing, handles = artist.packing, []
-    if packing.top.any():
-        handles.append(Patch(facecolor=UPPER, edgecolor=EDGE, linewidth=0.6, label="upper layer"))
-    if len(packing.rattlers):
-        handles.append(Patch(facecolor="white", edgecolor=EDGE, linewidth=0.6, label="rattler (no contact)"))
-    if not packing.configuration.free.all():
-        handles.append(Patch(facecolor=FLOOR, edgecolor=EDGE, linewidth=0.6, label="held"))
+    handles = _patches(artist.packing)
     if handles:
         below: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "ncols": 2}
         figure.axes[0].legend(handles=handles, handlelength=1.0, handleheight=1.0, **below)
+    _add_widths(figure, artist.packing, artist.widest)
+
+
+def _patches(packing: HasConfiguration) -> list[Any]:
+    """The colours of the particles, for a key."""
+    spheres = packing.dimension == 3
+    kinds = {
+        "upper layer": (UPPER, not spheres and packing.top.any()),
+        "rattler (no contact)": ("white", not spheres and len(packing.rattlers) > 0),
+        "wall": (FLOOR, spheres and packing.configuration.contacts.wall.any()),
+        "held": (FLOOR, not packing.configuration.free.all()),
+    }
+    return [
+        Patch(facecolor=face, edgecolor=EDGE, linewidth=0.6, label=name)
+        for name, (face, shown) in kinds.items()
+        if shown
+    ]
+
+
+def _add_widths(figure: Figure, packing: HasConfiguration, widest: float, others: Sequence[Any] = ()) -> None:
+    """Add the meaning of the widths of bars, points, after other entries of a key."""
     largest = packing.normal_force.max(initial=0.0)
     if largest:
         unit = 10.0 ** np.floor(np.log10(largest))
         values = [part * unit for part in (0.5, 1, 2, 5) if part * unit <= largest]
-        bars: list[Any] = [Line2D([], [], color=INK, linewidth=artist.widest * value / largest) for value in values]
+        bars: list[Any] = [Line2D([], [], color=INK, linewidth=widest * value / largest) for value in values]
         names = [f"$f_n = {values[0]:g}$", *(f"${value:g}$" for value in values[1:])]
-        figure.legend(bars, names, loc="outside lower center", ncols=len(values), columnspacing=1.2)
+        entries, labels = [*others, *bars], [*(each.get_label() for each in others), *names]
+        figure.legend(entries, labels, loc="outside lower center", ncols=len(entries), columnspacing=1.2)
 
 
 def _draw_load(axes: Axes, artist: PackingArtist) -> None:
