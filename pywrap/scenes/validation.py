@@ -41,7 +41,7 @@ T = TypeVar("T")
 
 KEYS_TO_ADD = {
     "ramp": "step and until",
-    "perturb": "fx and time",
+    "perturb": "time",
     "damping": "cn, ct or tau",
     "drive": "spring, velocity and until",
     "friction": "v0, the velocity at which friction weakens",

@@ -228,6 +228,20 @@ def test_spectrum_calls_no_packing_stable_that_buckles_or_moves(faultgouge_here,
     assert "no gain: the packing is unstable" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("spectrum", "scene.toml"), "run `faultgouge ramp scene.toml -o run.h5`, and give run.h5"),
+        (("draw", "scene.toml"), "scene.toml is a scene, and this command reads a stored packing"),
+        (("view", "scene.toml"), "scene.toml is a scene, and this command reads a stored packing"),
+        (("onset", "run.h5"), "run.h5 is a stored run, and onset reads a scene: give its .toml file"),
+        (("stability", "run.h5"), "`faultgouge spectrum run.h5` says whether a packing is stable"),
+    ],
+)
+def test_a_file_of_the_wrong_kind_is_refused_with_what_to_do(refusal, words, says):
+    assert says in refusal(*words)
+
+
 @pytest.mark.slow
 def test_onset_as_json_and_among_some_modes(faultgouge_here, tmp_path):
     (tmp_path / "scene.toml").write_text(SCENE.replace("until = 0.004", "until = 0.022"))

@@ -20,6 +20,7 @@ from .terminal import (
     lock_output,
     print_line,
     progress,
+    refuse_scene,
     say,
     stored_configuration,
     stored_drive,
@@ -204,7 +205,10 @@ def view(
     file: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="run.h5, perturb.h5, or NAME.disks from the dumps of a deck.", show_default=False
+            metavar="FILE",
+            help="run.h5, perturb.h5, or NAME.disks from the dumps of a deck.",
+            show_default=False,
+            callback=refuse_scene,
         ),
     ],
     loads: Annotated[

@@ -136,7 +136,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
             fx = settings.fx
             if fx is None:
                 fx = load_at_onset(wanted)
-                say(f"the scene has no perturb.fx: the run starts at F_x = {fx:.10g}, by the onset")
+                say(f"the scene has no perturb.fx: the run starts at F_x = {fx:.10g}, chosen by the onset")
             total = ceil(fx / step_of(wanted) * (1 - 1e-9)) + 1
             for start in progress(reach(wanted, fx), "equilibria", total):
                 report_fallback(start)

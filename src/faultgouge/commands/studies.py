@@ -124,8 +124,17 @@ def extremes(output: NewFolder = Path("extremes"), quick: Quick = False, as_json
 
 
 @app.command(hidden=True)
-def stability(output: NewFolder = Path("stability"), quick: Quick = False, as_json: AsJson = False) -> None:
+def stability(
+    file: Annotated[Path | None, typer.Argument(show_default=False)] = None,
+    output: NewFolder = Path("stability"),
+    quick: Quick = False,
+    as_json: AsJson = False,
+) -> None:
     """The name of `extremes` until version 1, with the JSON under its old name, too."""
+    if file is not None:
+        raise typer.BadParameter(
+            f"stability takes no file: `faultgouge spectrum {file}` says whether a packing is stable"
+        )
     say("faultgouge stability is called faultgouge extremes now: stability is what spectrum tells of a packing")
     try:
         extremes(output, quick, as_json)

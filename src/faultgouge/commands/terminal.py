@@ -40,8 +40,26 @@ Workers = Annotated[
     int | None,
     typer.Option(min=1, metavar="N", show_default=False, help="Number of processes; all cores by default."),
 ]
+
+
+def refuse_scene(file: Path) -> Path:
+    """Refuse a scene where a stored packing is read."""
+    if file.suffix == ".toml":
+        raise typer.BadParameter(
+            f"{file} is a scene, and this command reads a stored packing: run `faultgouge ramp {file} -o run.h5`, and "
+            "give run.h5"
+        )
+    return file
+
+
 PackingFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="run.h5, or NAME.disks from the dumps of a deck.", show_default=False)
+    Path,
+    typer.Argument(
+        metavar="FILE",
+        help="run.h5, or NAME.disks from the dumps of a deck.",
+        show_default=False,
+        callback=refuse_scene,
+    ),
 ]
 Time = Annotated[float | None, typer.Option("--time", metavar="T", help="Of drive.h5: the state nearest to this time.")]
 Frame = Annotated[int, typer.Option(help="Number of the equilibrium; negative numbers count from the last.")]
@@ -53,6 +71,8 @@ def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
     from faultgouge.pywrap.scenes.impossible import refuse_endless
     from faultgouge.pywrap.scenes.scene import Scene
 
+    if path.suffix == ".h5":
+        raise typer.BadParameter(f"{path} is a stored run, and {command} reads a scene: give its .toml file")
     scene = Scene.from_toml(path, command=command)
     if task is not None:
         refuse_endless(scene, task)
