@@ -173,7 +173,7 @@ class Stability:
         yield f"{self.at_bound} of {_number(self.contacts, 'contact')} {_is(self.at_bound)} at Coulomb's bound" + (
             ": each slides on ahead and sticks on the way back"
             if self._has_two_neighbours
-            else ", where this law has one derivative: they slide"
+            else f" and {'slides' if self.at_bound == 1 else 'slide'}"
         )
         if self._has_two_neighbours:
             yield (

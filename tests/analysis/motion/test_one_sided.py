@@ -183,6 +183,13 @@ def test_stability_of_three_disks():
         stability(at_rest, rise="fx")
 
 
+@pytest.mark.parametrize(("count", "says"), [(1, "1 of 3 contacts is at Coulomb's bound and slides"), (2, "and slide")])
+def test_the_verdict_says_what_contacts_of_a_smoothed_law_do_at_the_bound(count, says):
+    found = stability(_three())
+    found = replace(found, contacts=3, at_bound=count, one_sided=None, sliding=found.sticking)
+    assert found.sentences[-1].endswith(says)
+
+
 def test_what_follows_a_load_that_rises_does_not_vibrate():
     """With dashpots that take hundreds of units of time to stop what the beginning of the rise has set going."""
     lossy = replace(_three(), law=replace(_three().law, mu=50.0, cn=0.02, ct=0.01)).configuration
