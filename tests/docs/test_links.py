@@ -137,6 +137,8 @@ def test_blocks_of_python_run_one_after_the_other(faultgouge, tmp_path, path):
     if "scene.toml" not in files(path):
         (tmp_path / "scene.toml").write_text(toml(SMALL))
     faultgouge("ramp", "scene.toml", "-o", "run.h5")
+    if 'RunFile("drive.h5")' in text:
+        faultgouge("drive", ROOT / "scenes" / "drive.toml", "-o", "drive.h5")
     script = re.findall(r"^```python\n(?!# [\w.]+\n)(.*?)^```", text, re.MULTILINE | re.DOTALL)
     (tmp_path / "blocks.py").write_text("\n".join(script))
     done = subprocess.run([sys.executable, "blocks.py"], cwd=tmp_path, capture_output=True, text=True, timeout=600)
