@@ -149,11 +149,12 @@ def _template() -> Any:
 
 
 def _best_frame(verdicts: Sequence[Stability]) -> int:
-    """Where the page opens: the fastest growth with dissipation, or else without; the last packing if nothing grows."""
-    with_loss = np.array([0.0 if verdict.stable else verdict.growth_rate for verdict in verdicts])
-    without = np.array([verdict.undamped.growth_rate for verdict in verdicts])
-    for rates in (with_loss, without):
-        if rates.max() > 0:
+    """Where the page opens: the fastest growth of a packing that rests, else of any; the last one if nothing grows."""
+    unstable = [verdict.growth_rate if verdict.stable is False else 0.0 for verdict in verdicts]
+    not_stable = [0.0 if verdict.stable else verdict.growth_rate for verdict in verdicts]
+    without = [verdict.undamped.growth_rate for verdict in verdicts]
+    for rates in (unstable, not_stable, without):
+        if max(rates) > 0:
             return int(np.argmax(rates))
     return len(verdicts) - 1
 

@@ -7,7 +7,7 @@ from faultgouge import Scene, drive, settle, spectrum
 
 scene = Scene.from_mapping(
     {
-        "packing": {"seed": 1, "disks": 40, "width": 7.5},
+        "packing": {"seed": 6, "disks": 40, "width": 7.5},
         "law": {"kn": 2e5},
         "load": {"fy": 3.0},
         "damping": {"cn": 60.0, "ct": 17.0},
@@ -27,7 +27,7 @@ for slip in slips:
         f"t = {slip.begins:.1f} to {slip.ends:.1f}: the layer slips by {slip.slip:.4f}, "
         f"and the force falls from {slip.force_before:.3f} to {slip.force_after:.3f}"
     )
-before = [state for state in states if state.time <= slips[0].begins][-1]
+before = min(states, key=lambda state: abs(state.time - slips[0].begins))
 print(f"largest force of the spring {largest:.3f}, on each disk of the layer")
 print(
     f"complex pairs at rest: {len(spectrum(states[0].packing).pairs)}, at t = {before.time:.1f}, before the first slip:"

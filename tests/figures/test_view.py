@@ -125,6 +125,17 @@ def test_the_page_opens_where_motion_grows_fastest_and_moves_along_the_load(ther
     page.click("#play")
 
 
+def test_the_page_opens_at_a_packing_that_rests(there_and_back, opened):
+    """Of a packing out of balance the verdict is not known, however fast its eigenvalues grow."""
+    last = there_and_back[8]
+    stiffer = derive_frozen(last, fx=0.17, law=replace(last.law, kn=4 * last.law.kn, kt=4 * last.law.kt))
+    page = opened([*there_and_back[:9], stiffer])
+    assert page.inner_text("#where") == "Fₓ = 0.16"
+    page.focus("#load")
+    page.keyboard.press("End")
+    assert "Not known whether the packing is stable" in page.inner_text("#verdict")
+
+
 def test_a_mode_moves_and_rests(there_and_back, opened):
     page = opened(there_and_back)
     first = page.evaluate(PICTURE)
@@ -157,8 +168,9 @@ def test_nothing_is_drawn_of_a_pair_that_is_unknown(there_and_back, opened):
     )
     moved = {name: getattr(last, name)[order] for name in ("position", "radius", "mass", "angle", "top")}
     page = opened([derive_frozen(last, fx=0.17, contacts=contacts, **moved), last])
-    at_first = page.input_value("#pair")
     page.focus("#load")
+    page.keyboard.press("Home")
+    at_first = page.input_value("#pair")
     page.keyboard.press("End")
     assert page.input_value("#pair") != at_first  # nobody has asked for that one: another pair is shown
     assert "a complex pair" in page.inner_text("#members")
