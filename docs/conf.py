@@ -37,7 +37,7 @@ nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300  # seconds for one cell
 nb_merge_streams = True
-exclude_patterns = ["_build", "README.md", "gallery", "sg_execution_times.rst", "auto_gallery/*.ipynb"]
+exclude_patterns = ["_build", "README.md", "gallery", "**sg_execution_times.rst", "auto_gallery/*.ipynb"]
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 

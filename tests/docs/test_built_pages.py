@@ -93,8 +93,8 @@ def test_the_search_finds(word):
 
 
 @pytest.fixture
-def front_page():
-    """Opens the front page with its demonstration; at the end nothing went wrong in the browser."""
+def new_page():
+    """Opens an empty page of a browser; at the end nothing went wrong in the browser."""
     playwright = pytest.importorskip("playwright.sync_api")
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     if chromium is None:
@@ -105,15 +105,39 @@ def front_page():
 
         def open_page(width, height):
             page = browser.new_page(viewport={"width": width, "height": height})
-            page.on("pageerror", lambda error: wrong.append(str(error)))
-            page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
-            page.goto((PAGES / "index.html").as_uri())
-            page.frame_locator(".live iframe").locator("#imaginary circle").first.wait_for(timeout=60_000)
+            page.on("pageerror", lambda error: wrong.append(f"{page.url}: {error}"))
+            page.on("console", lambda each: wrong.append(f"{page.url}: {each.text}") if each.type == "error" else None)
             return page
 
         yield open_page
         browser.close()
     assert wrong == []
+
+
+@pytest.fixture
+def front_page(new_page):
+    """Opens the front page with its demonstration."""
+
+    def open_page(width, height):
+        page = new_page(width, height)
+        page.goto((PAGES / "index.html").as_uri())
+        page.frame_locator(".live iframe").locator("#imaginary circle").first.wait_for(timeout=60_000)
+        return page
+
+    return open_page
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_no_page_is_wider_than_the_screen(new_page, pages, width):
+    """A formula that is not recognised as one is."""
+    page, wide = new_page(width, 900), []
+    for path in sorted(pages):
+        if path.is_relative_to(PAGES / "_modules"):
+            continue
+        page.goto(path.as_uri())
+        if page.evaluate("document.documentElement.scrollWidth") > width:
+            wide.append(str(path.relative_to(PAGES)))
+    assert wide == []
 
 
 def test_the_front_page_shows_the_demonstration_at_once(front_page):
