@@ -226,7 +226,7 @@ class GrowthOfRun:
             return f"{self.why[:1].upper()}{self.why[1:]}."
         fit = self.measured
         told = (
-            f"D grew by {fit.decades:.1f} decades at the rate {fit.rate:.6g} +- {fit.error:.1g}, fitted from "
+            f"D grew at the rate {fit.rate:.6g} +- {fit.error:.1g}, fitted over {fit.decades:.1f} decades, from "
             f"t = {fit.start:.6g} to {fit.end:.6g}"
         )
         if self.predicted is None:
