@@ -167,6 +167,14 @@ def test_scripts_of_the_readme_run_in_an_empty_folder(tmp_path):
     assert "F_x = 0.016 " in printed["ramp.py"]
 
 
+@pytest.mark.slow
+def test_the_first_commands_of_the_readme_run_in_an_empty_folder(faultgouge_here):
+    [line] = re.findall(r"^    (faultgouge init .*)$", (ROOT / "README.md").read_text(), re.MULTILINE)
+    first, second = (command.split()[1:] for command in line.split(" && "))
+    faultgouge_here(*first)
+    assert faultgouge_here(*second).stdout.startswith("mu = 1: F_x^c = 0.01500983")
+
+
 def test_no_output_is_stored():
     nbformat = pytest.importorskip("nbformat")
     assert sorted(path.stem for path in NOTEBOOKS.glob("*.ipynb")) == sorted(NAMES)
