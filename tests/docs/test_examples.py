@@ -72,6 +72,14 @@ def test_deck(printed):
     assert number(text, "differs from that of K and C by") < 2e-3  # in proportion to the time step, with dashpots
 
 
+def test_spheres(printed):
+    """Nothing grows, and the packing follows a load that rises: what vibrates is a hundredth of the drift at most."""
+    text = printed("spheres")
+    assert number(text, "<Configuration:") == 30
+    assert "stable: every motion decays" in text
+    assert 0 < number(text, "vibration") < 0.01 * number(text, "drift")
+
+
 def test_table_of_another_code(printed):
     text = printed("other_code")
     assert number(text, "the largest force on a disk was") > 100
