@@ -1,12 +1,11 @@
 """A table of disks from another code: columns x, y, radius. The disks come to rest under this law and load."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from faultgouge.analysis import MindlinLaw, spectrum
-from faultgouge.analysis.files.formats import packing_of, read_disks, upper_layer
+from faultgouge import load, spectrum
+from faultgouge.analysis import MindlinLaw
 from faultgouge.pywrap import Engine, bring_to_rest, equilibrate
 
 # a table as another code may write it: three rows of disks on a floor, every second row shifted by a radius
@@ -15,9 +14,8 @@ radius = 0.5 + 0.004 * np.cos(np.arange(18) ** 2)
 table = "x,y,radius\n" + "\n".join(f"{x},{y},{r}" for (x, y), r in zip(rows, radius, strict=True))
 Path("disks.csv").write_text(table)
 
-disks = read_disks(Path("disks.csv"))
 law = MindlinLaw(kn=2e5, kt=2e5 * 2 / 7, mu=1.0)
-loose = packing_of(replace(disks, box_length=6.02), law, upper_layer(disks, 6), fy=3.0)
+loose = load("disks.csv", law=law, fy=3.0, top=6, width=6.02)
 rest, words = bring_to_rest(loose)
 print(words)
 with Engine(rest.packing) as engine:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from .analysis import BadInputError, Configuration, MindlinLaw, Packing, RunFile, read_dump
 from .analysis.files.configuration_file import holds_configuration, read_configuration
-from .analysis.files.formats import is_hdf5
+from .analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
 
 NONE_GIVEN = "none were given"
 """Attribute tangential_forces of a file whose contacts began with slips of zero, as nothing was known of them."""
@@ -20,6 +21,7 @@ def load(
     fy: float | None = None,
     fx: float = 0.0,
     top: str | int | None = None,
+    width: float | None = None,
 ) -> Packing | Configuration:
     """Read a packing of any file.
 
@@ -37,6 +39,8 @@ def load(
     top : str or int, optional
         Their upper layer, where the file does not say which it is: the number of its disks, or as `faultgouge import
         --top` has it.
+    width : float, optional
+        Their period along x, length, where the file does not say it; open sides by default.
 
     Returns
     -------
@@ -62,23 +66,22 @@ def load(
     if path.suffix == ".h5" or (path.is_file() and is_hdf5(path)):
         with RunFile(path) as run:
             return run.packing(frame)
-    return _load_disks(path, frame, law, {"fx": fx} if fy is None else {"fx": fx, "fy": fy}, top)
-
-
-def _load_disks(
-    path: Path, frame: int, law: MindlinLaw | None, given: dict[str, float], top: str | int | None
-) -> Packing:
-    from .analysis.files.formats import packing_of, upper_layer
-    from .pywrap.lammps.restart_file import read_disks
-
-    disks = read_disks(path, None if frame == -1 else frame)
-    missing = [name for name, value in (("law", law), ("fy", given.get("fy"))) if value is None]
-    if law is None or missing:
+    disks = _read_disks(path, frame)
+    if width is not None:
+        disks = replace(disks, box_length=width)
+    missing = [name for name, value in (("law", law), ("fy", fy)) if value is None]
+    if law is None or fy is None:
         raise BadInputError(
             f"{path} does not say {' and '.join(missing)}: load({path.name!r}, law=MindlinLaw(kn, kt, mu), fy=3.0, "
             "top=10) takes the disks as they stand, and `faultgouge import` brings them to rest."
         )
-    return packing_of(disks, law, upper_layer(disks, top), **given)
+    return packing_of(disks, law, upper_layer(disks, top), fx=fx, fy=fy)
+
+
+def _read_disks(path: Path, frame: int) -> Disks:
+    from .pywrap.lammps.restart_file import read_disks
+
+    return read_disks(path, None if frame == -1 else frame)
 
 
 def doubts_about(path: Path) -> list[str]:

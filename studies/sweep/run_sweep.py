@@ -44,7 +44,13 @@ class FailedSweepError(FaultgougeError):
     one_rank = True
 
 
-def sweep(request: str | Path | Mapping[str, Any], output: str | Path, workers: int | None = 1) -> list[Row]:
+def sweep(
+    request: str | Path | Mapping[str, Any],
+    output: str | Path,
+    workers: int | None = 1,
+    executor: Executor | None = None,
+    say: Say = print,
+) -> list[Row]:
     """Run a sweep, or continue one: what the command `faultgouge sweep` does.
 
     Parameters
@@ -53,11 +59,11 @@ def sweep(request: str | Path | Mapping[str, Any], output: str | Path, workers: 
         SWEEP.toml, or what it would hold.
     output : str or Path
         The folder of the rows, and of their table.
-    workers : int, optional
+    workers, executor, say
         As of :func:`run_sweep`, which also says what is returned and raised.
     """
     wanted = Sweep.from_mapping(request, TASKS) if isinstance(request, Mapping) else Sweep.from_toml(request, TASKS)
-    return run_sweep(wanted, Path(output), workers=workers)
+    return run_sweep(wanted, Path(output), workers=workers, executor=executor, say=say)
 
 
 def run_sweep(
