@@ -30,7 +30,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig, qr
-from scipy.sparse import csr_array
+from scipy.sparse import bsr_array, csr_array
 from scipy.sparse.linalg import eigs
 
 from ..arrays import Complexes, Floats
@@ -39,7 +39,9 @@ from ..progress import report_progress
 from .block_arnoldi import DEPENDENT, Krylov
 
 BLOCK = 4
-"""Vectors that are multiplied at a time: each takes half of the time of one by itself."""
+"""Vectors of a start for two motions, and half of those for many. What grows alike, as in a crystal, needs several."""
+
+Sparse = csr_array | bsr_array
 
 BLOCKS = 30
 """Blocks of a space at the most."""
@@ -99,18 +101,18 @@ class FastestGrowth:
 
 
 def fastest_growing(
-    matrix: csr_array, damping: csr_array | None = None, count: int = 8, periods: tuple[float, float] = (30.0, 1000.0)
+    matrix: Sparse, damping: Sparse | None = None, count: int = 8, periods: tuple[float, float] = (30.0, 1000.0)
 ) -> FastestGrowth:
     """Find the fastest growing motions.
 
     Parameters
     ----------
-    matrix : scipy.sparse.csr_array, shape (n, n)
+    matrix : scipy.sparse.csr_array or bsr_array, shape (n, n)
         A = M^(-1/2) K M^(-1/2), 1 / time^2, of the coordinates that feel a force.
-    damping : scipy.sparse.csr_array, shape (n, n), optional
+    damping : scipy.sparse.csr_array or bsr_array, shape (n, n), optional
         G = M^(-1/2) C M^(-1/2), 1 / time.
     count : int
-        Motions that are wanted.
+        Motions that are wanted. A space of one vector serves if it is one, in an eighth of the time.
     periods : tuple of (float, float)
         The first and the longest time that is looked at, in periods of the fastest motion. What grows more slowly than
         about 3 over the longest time is not looked for.
@@ -134,7 +136,8 @@ def fastest_growing(
             f"An operator of {size} coordinates is for `spectrum`: products serve more than {2 * BLOCK}."
         )
     motion = _Undamped.of(matrix) if damping is None else _Damped.of(matrix, damping)
-    start = np.random.default_rng(0).standard_normal((max(BLOCK, min(2 * count, 8)), motion.size))
+    block = 1 if count == 1 else min(2 * count, 2 * BLOCK)
+    start = np.random.default_rng(0).standard_normal((block, motion.size))
     length, products = periods[0], 0
     while True:
         step = motion.propagator(2 * np.pi * length / motion.frequency)
@@ -160,11 +163,11 @@ class Step:
 class _Undamped:
     """x'' = -A x."""
 
-    matrix: csr_array
+    matrix: Sparse
     frequency: float
 
     @classmethod
-    def of(cls, matrix: csr_array) -> "_Undamped":
+    def of(cls, matrix: Sparse) -> "_Undamped":
         return cls(matrix, np.sqrt(MARGIN * _largest(matrix)))
 
     @property
@@ -183,7 +186,7 @@ class _Undamped:
         degree = int(argument / 2 + 6 * (argument / 2) ** (1 / 3) + 20)
         weight = 2 * jv(2 * np.arange(degree + 1), argument)
         weight[0] /= 2
-        scaled = csr_array(self.matrix * (-2 / self.frequency**2))
+        scaled = self.matrix * (-2 / self.frequency**2)
         return Step(lambda x: _chebyshev(lambda y: y + scaled @ y, weight, -1, x), time, degree)
 
     def growth(self, values: Complexes) -> Floats:
@@ -207,13 +210,13 @@ class _Undamped:
 class _Damped:
     """The state (sqrt(L) x, v) of x'' = -A x - G x'."""
 
-    matrix: csr_array
-    damping: csr_array
+    matrix: Sparse
+    damping: Sparse
     frequency: float
     loss: float
 
     @classmethod
-    def of(cls, matrix: csr_array, damping: csr_array) -> "_Damped":
+    def of(cls, matrix: Sparse, damping: Sparse) -> "_Damped":
         frequency = np.sqrt(MARGIN * _largest(matrix))
         # no motion loses more than the largest sum of a row
         return cls(matrix, damping, frequency, float(abs(damping).sum(axis=1).max()) / frequency)
@@ -372,7 +375,7 @@ def _real_basis(vectors: Complexes) -> Floats:
     return np.asarray(basis[:, np.abs(np.diag(triangle)) > DEPENDENT * abs(triangle[0, 0])])
 
 
-def _largest(matrix: csr_array) -> float:
+def _largest(matrix: Sparse) -> float:
     """The largest eigenvalue of A, to a hundredth."""
     start = np.random.default_rng(0).standard_normal(matrix.shape[0])
     return float(abs(eigs(matrix, 1, which="LM", v0=start, tol=1e-2, ncv=24, return_eigenvectors=False)[0]))
