@@ -62,7 +62,11 @@ APPEARS = 1e-2
 """Error with which a motion appears in a space."""
 
 CONVERGED = 1e-5
-"""Relative residual of an eigenvalue that counts as found."""
+"""Relative residual of eigenvalues with which the search ends."""
+
+CERTAIN = 10.0
+"""Growth over what the residual may change, from which an eigenvalue is a growing one when the search ends otherwise.
+Many motions that grow nearly alike converge slowly."""
 
 CANCELLATION = 12.0
 """Logarithm of the largest term of the exponential over the sum: five digits are lost."""
@@ -70,7 +74,7 @@ CANCELLATION = 12.0
 
 @dataclass(frozen=True, eq=False)
 class FastestGrowth:
-    """The fastest growing motions that were found, and what may grow besides.
+    """The fastest growing motions that were found, each for certain, and what may grow besides.
 
     Attributes
     ----------
@@ -193,6 +197,10 @@ class _Undamped:
         """Rate of eigenvalues of A."""
         return np.asarray(2 * np.abs(np.sqrt(values.astype(complex)).imag))
 
+    def uncertainty(self, values: Complexes, residuals: Floats) -> Floats:
+        """What residuals may change the rates of eigenvalues by, if these are well conditioned."""
+        return residuals * np.sqrt(np.abs(values))
+
     def outstanding(self, chance: float) -> float:
         """Modulus of f beyond which an eigenvalue stands out, where the logarithm of its share grows so in a block."""
         return float(np.cosh(chance))
@@ -263,6 +271,10 @@ class _Damped:
         """Rate of eigenvalues of Z."""
         return np.asarray(2 * values.real)
 
+    def uncertainty(self, values: Complexes, residuals: Floats) -> Floats:
+        """As without dissipation."""
+        return 2 * residuals * np.abs(values)
+
     def outstanding(self, chance: float) -> float:
         """As without dissipation."""
         return float(np.exp(chance))
@@ -318,10 +330,11 @@ class _Space:
         return fresh
 
     def result(self, count: int, products: int) -> FastestGrowth:
-        """The fastest motions that have converged."""
-        kept = slice(0, min(count, self.found))
-        moved = self.motion.displacement(self.vectors[:, kept])
+        """The fastest motions whose growth is certain."""
         rates = self.motion.growth(self.values)
+        uncertain = rates < CERTAIN * self.motion.uncertainty(self.values, self.residuals)
+        kept = slice(0, min(count, int(np.argmax([*uncertain, True]))))
+        moved = self.motion.displacement(self.vectors[:, kept])
         others = rates[kept.stop :].max(initial=0.0)
         return FastestGrowth(
             rates[kept],

@@ -39,6 +39,7 @@ from .eigenvalues import (
     operator_rounding,
     zero_uncertainty,
 )
+from .fastest_growing import CERTAIN as SURE
 from .fastest_growing import fastest_growing
 from .slowest_decay import slowest_decay
 from .state_space import StateSpace
@@ -197,7 +198,12 @@ class Motion:
         partly = np.isfinite(slow.covered)
         periods = PERIODS if partly else float(np.clip(SEEN * frequency / (4 * np.pi * slow.width), *TIMES))
         fast = fastest_growing(self.stiffness, self.damping, periods=(min(TIMES[0], periods), periods))
-        new = [value for value in fast.values if np.abs(slow.values - value).min(initial=np.inf) > CERTAIN * frequency]
+        apart = np.maximum(CERTAIN * frequency, SURE * fast.residuals * np.abs(fast.values))
+        new = [
+            value
+            for value, far in zip(fast.values, apart, strict=True)
+            if np.abs(slow.values - value).min(initial=np.inf) > far
+        ]
         values = np.concatenate([slow.values, np.array(new, complex)])
         values = values[np.argsort(-values.real, kind="stable")]
         searched = 0.0 if not partly and fast.limit <= 2 * slow.width else fast.limit

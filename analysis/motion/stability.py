@@ -23,7 +23,7 @@ from ..operators.sliders import with_sticking_contacts
 from .eigenvalues import in_balance
 from .motion import Motion, Rates
 from .one_sided import OneSidedSystem
-from .one_sided_outcome import PUSHES, STEP, follow_load, follow_pushes
+from .one_sided_outcome import PUSHES, STEP, STEP_OF_LARGE, follow_load, follow_pushes
 from .spectrum import Spectrum, spectrum
 
 LARGE = 6000
@@ -38,10 +38,23 @@ class LinearNeighbour:
     Attributes
     ----------
     growth_rate : float
-        Largest 2 Re s, 1 / time.
+        Largest 2 Re s, 1 / time; zero if none was found in a large packing.
+    searched : float
+        Growth rate of D, 1 / time, below which growth was not looked for; 0 if all eigenvalues are known.
     """
 
     growth_rate: float
+    searched: float = 0.0
+
+    @classmethod
+    def of(cls, rates: Rates) -> "LinearNeighbour":
+        """The fastest motion."""
+        return cls(rates.growth_rate, rates.searched)
+
+    def __str__(self) -> str:
+        if self.searched and self.growth_rate <= 0:
+            return f"no growth of D faster than exp({self.searched:.2g} t)"
+        return f"D as exp({self.growth_rate:.4g} t)"
 
 
 @dataclass(frozen=True)
@@ -78,7 +91,8 @@ class Stability:
         Contacts at Coulomb's bound.
     one_sided : dict or None
         grows (True, False, None), growth_rate and its error, amplification (largest D over the mean square velocity of
-        the push along an axis, time^2), time (how long); None without contacts that slide on one side.
+        the push along an axis, time^2), time (how long), pushes (how many), searched (slower growth of D might not have
+        been seen in this motion, 1 / time); None without contacts that slide on one side.
     rising : dict or None
         drift and vibration over the rate of loading, time, steady; None unless asked.
     sticking, sliding : LinearNeighbour
@@ -177,8 +191,8 @@ class Stability:
         )
         if self._has_two_neighbours:
             yield (
-                f"neither of two linear motions decides: if all of them stuck, D as exp({self.sticking.growth_rate:.4g}"
-                f" t); if all slid on, as exp({self.sliding.growth_rate:.4g} t)"
+                f"neither of two linear motions decides: if all of them stuck, {self.sticking}; if all slid on, "
+                f"{self.sliding}"
             )
 
     @property
@@ -244,19 +258,20 @@ def stability(
         spectrum_of_stiffness = None  # of contacts that slide
     direction = None if rise is None else _direction(configuration, rise)
     large = configuration.coordinates > LARGE
+    share = STEP_OF_LARGE if large else STEP
     found = spectrum(configuration) if spectrum_of_stiffness is None and not large else spectrum_of_stiffness
     contacts, damped = configuration.contacts, configuration.damped
     undamped, own = _without_dissipation(configuration, found)
     if damped:
         own = Motion.of(configuration).rates
-    sticking, grows = LinearNeighbour(own.growth_rate), bool(own.grows.any())
+    sticking, grows = LinearNeighbour.of(own), bool(own.grows.any())
     why = [*reasons, *_what_is_wrong(configuration)]
     small_motion = not why
     sliding, one_sided, rising = sticking, None, None
     if contacts.one_sided.any():
-        sliding = LinearNeighbour(Motion.of(configuration, sliding=True).rates.growth_rate)
+        sliding = LinearNeighbour.of(Motion.of(configuration, sliding=True).rates)
         if small_motion:
-            system = OneSidedSystem.of(configuration, (2 if large else 1) * STEP)
+            system = OneSidedSystem.of(configuration, share)
             one_sided = follow_pushes(system, sticking.growth_rate, grows, time, 1 if large else PUSHES)
             if one_sided["grows"] is None:
                 why.append(
@@ -265,7 +280,10 @@ def stability(
                 )
             grows = one_sided["grows"]
     if direction is not None and small_motion:
-        rising = follow_load(OneSidedSystem.of(configuration, STEP), direction, time)
+        rising = follow_load(OneSidedSystem.of(configuration, share), direction, time)
+    searched = own.searched
+    if one_sided is not None and one_sided["grows"] is False:
+        searched = min(searched, one_sided["searched"])
     given = configuration.stiffness is not None  # and contacts, as far as they are known, have no derivatives
     shares = {} if given else asymmetry(configuration)
     touching = max(len(contacts), len(configuration) - len(configuration.rattlers)) if given else len(contacts)
@@ -273,7 +291,7 @@ def stability(
     return Stability(
         stable=None if why or not touching else not grows, growth_rate=rate, undamped=undamped,
         at_bound=int(contacts.at_bound.sum()), one_sided=one_sided, rising=rising, sticking=sticking, sliding=sliding,
-        asymmetry=shares, dissipative=damped, free=own.free, searched=own.searched,
+        asymmetry=shares, dissipative=damped, free=own.free, searched=searched,
         contacts=touching, reasons=tuple(why),
     )  # fmt: skip
 
