@@ -64,7 +64,7 @@ class Axis:
     def of_loads(cls, packings: Sequence[HasConfiguration]) -> "Axis":
         """The shear force of a ramp; a load parameter of other codes."""
         values = np.array([packing.fx for packing in packings])
-        layer = isinstance(packings[0], Packing)
+        layer = packings[0].top.any()
         return cls("Fₓ", "force on each disk of the upper layer" if layer else "the load", values)
 
 
@@ -187,7 +187,7 @@ def _frame(packing: HasConfiguration, axis: Axis, images: Images, followed: Ramp
     faces = PackingArtist.faces(packing)
     return {
         "value": float(axis.values[k]),
-        "force": packing.fx if isinstance(packing, Packing) else None,
+        "force": packing.fx if packing.top.any() else None,
         "stable": verdict.stable,
         "sentences": sentences_of(verdict),
         "pairs": verdict.undamped.pairs,
@@ -285,7 +285,7 @@ def _legend(packing: HasConfiguration) -> str:
     """What the colours of the particles are."""
     kinds = ["White: rattlers, which touch nothing."] if len(packing.rattlers) else []
     configuration = packing.configuration
-    if isinstance(packing, Packing):
+    if packing.top.any():
         kinds.insert(0, "Yellow: upper layer.")
     elif configuration.contacts.wall.any() or not configuration.free.all():
         kinds.insert(0, "Red: walls, and particles that are held.")

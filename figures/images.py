@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis import Configuration, Packing
+from faultgouge.analysis import Configuration
 from faultgouge.analysis.arrays import Floats, Indices
 from faultgouge.analysis.configuration import HasConfiguration
 
@@ -60,7 +60,7 @@ class Images:
             return cls._of_spheres(packing.configuration)
         view = View.of(packing, margin=MARGIN * packing.radius.max())
         top = float((packing.position[:, 1] + packing.radius).max())
-        room = 1.1 if isinstance(packing, Packing) else 0.3  # for the arrow of the load
+        room = 1.1 if packing.top.any() else 0.3  # for the arrow of the load
         return cls(
             2,
             _flat(view.place),

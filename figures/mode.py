@@ -19,7 +19,6 @@ from faultgouge.analysis import (
     BadInputError,
     Configuration,
     Eigenpairs,
-    Packing,
     closest_to_meeting,
     normal_modes,
     spectrum,
@@ -164,7 +163,7 @@ def unstable_pair(packing: HasConfiguration, modes: Eigenpairs, believed: Sequen
         raise ModeError(
             f"at F_x = {packing.fx:g} all modes are orthogonal to {SYMMETRIC:g}, so that no two of them are about to "
             "meet: take a later --frame, or a mode by its number"
-            if isinstance(packing, Packing)
+            if packing.top.any()
             else f"all modes are orthogonal to {SYMMETRIC:g}, so that no two of them are about to meet: take a mode by "
             "its number"
         )
@@ -340,7 +339,7 @@ def side_by_side(packing: HasConfiguration, count: int) -> tuple[Figure, list[Ax
 
 def finish(figure: Figure, axes: Sequence[Axes], packing: HasConfiguration, words: str) -> None:
     """The line above and the scale of rotation below."""
-    load = f"$F_x = {packing.fx:.6g}$: " if isinstance(packing, Packing) else ""
+    load = f"$F_x = {packing.fx:.6g}$: " if packing.top.any() else ""
     figure.suptitle(f"{load}{words}", fontsize=8)
     scale = ScalarMappable(Normalize(-1, 1), "RdBu_r")
     bar = figure.colorbar(scale, ax=list(axes), location="bottom", aspect=50, shrink=0.6, pad=0.02)

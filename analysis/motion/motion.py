@@ -45,7 +45,9 @@ from .slowest_decay import slowest_decay
 from .state_space import StateSpace
 
 SLICED = 2000
-"""Coordinates beyond which eigenvalues without dissipation are taken in slices, for which `spectrum` is."""
+"""Coordinates beyond which `spectrum` takes the eigenvalues of K in slices, and beyond which `Motion` has the fastest
+growing motions alone. Of 870 coordinates of disks LAPACK takes 0.4 of the time of slices, of 900 of spheres 0.3, and
+with the growth of both the times are the same at 2,000 and at 2,900."""
 
 DENSE = 1000
 """Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, some seconds; of more those next

@@ -49,6 +49,7 @@ from ..counted import counted
 from ..errors import BadInputError
 from ..operators.stiffness import Form, stiffness_matrix
 from ..packing.packing import Floats, Indices
+from ..progress import report_progress
 from ..table_display import TableDisplay
 from .all_eigenvalues import all_eigenvalues
 from .block_arnoldi import Marked, SpectrumError
@@ -61,14 +62,13 @@ from .eigenvalues import (
     operator_rounding,
     zero_uncertainty,
 )
-from .motion import Motion, Rates
+from .motion import SLICED, Motion, Rates
 
 DENSE = 900
 """Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
 
-SLICED = 2000
-"""Coordinates from which on the spectrum is taken in slices. Of 870 coordinates of disks LAPACK takes 0.4 of the time
-of slices, of 900 of spheres 0.3, and with the growth of both the times are the same at 2,000 and at 2,900."""
+LAPACK_UP_TO = 20_000
+"""Coordinates up to which LAPACK takes over where slices are incomplete: two hours, and 13 GB."""
 
 LIMIT = 1e-4
 """Relative error of the largest eigenvalue of more coordinates. It bounds time steps, that are far below the bound; to
@@ -327,7 +327,8 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     """Compute every eigenvalue, and left and right vectors of those that are complex or negative.
 
     LAPACK's dense solver serves up to `SLICED` coordinates. Beyond, :mod:`~faultgouge.analysis.motion.all_eigenvalues`
-    takes one slice of the spectrum after the other, and LAPACK serves if these are found to be incomplete.
+    takes one slice of the spectrum after the other. If these are found to be incomplete, LAPACK serves up to
+    `LAPACK_UP_TO` coordinates, and `show_progress` is told.
 
     Parameters
     ----------
@@ -339,6 +340,11 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     Returns
     -------
     Spectrum
+
+    Raises
+    ------
+    SpectrumError
+        If the slices are incomplete, and the packing is too large for LAPACK.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         matrix, active = dynamical_matrix(packing, form)
@@ -381,8 +387,10 @@ def _values_and_vectors(matrix: csr_array, uncertainty: float) -> tuple[Complexe
     if matrix.shape[0] > SLICED:
         try:
             found = all_eigenvalues(matrix)
-        except SpectrumError:
-            pass  # LAPACK is slow, and certain
+        except SpectrumError as error:
+            if matrix.shape[0] > LAPACK_UP_TO:
+                raise
+            report_progress(f"{error} LAPACK takes over, which needs {32e-9 * matrix.shape[0] ** 2:.2g} GB")
         else:
             return found.values, found.marked
     dense = matrix.toarray()

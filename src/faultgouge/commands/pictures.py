@@ -100,7 +100,6 @@ def draw(
         series, cycle = stored_series(file), [] if driven else _cycle(file)
     if not is_root():
         return
-    from faultgouge.analysis import Packing
     from faultgouge.figures import draw_cycle, draw_packing
     from faultgouge.figures.drive import draw_drive
     from faultgouge.figures.mode import draw_modes
@@ -121,7 +120,7 @@ def draw(
         figure = draw_packing(packing, color=color.value, caption=True)
     else:
         modes, what = modes_of(packing, mode)
-        load = f"F_x = {packing.fx:g}: " if isinstance(packing, Packing) else ""
+        load = f"F_x = {packing.fx:g}: " if packing.top.any() else ""
         print_line("\n".join([f"{load}{what}", *(each.plain for each in modes)]))
         figure = draw_modes(packing, modes, what)
     save_as(figure, output)

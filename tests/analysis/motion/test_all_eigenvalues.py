@@ -15,6 +15,7 @@ from faultgouge.analysis import spectrum
 from faultgouge.analysis.motion import spectrum as spectrum_module
 from faultgouge.analysis.motion.all_eigenvalues import SliceSizes, all_eigenvalues
 from faultgouge.analysis.motion.block_arnoldi import ShiftedDisc, SpectrumError
+from faultgouge.analysis.progress import show_progress
 
 SMALL = SliceSizes(own=24, block=4)
 
@@ -137,6 +138,25 @@ def same_spectrum(found, expected):
         assert one.overlap == pytest.approx(other.overlap, rel=1e-4)
         assert one.participation == pytest.approx(other.participation, rel=1e-6)
         assert one.rotation == pytest.approx(other.rotation, rel=1e-6)
+
+
+def test_lapack_takes_over_from_incomplete_slices_and_this_is_told(reference_packing, monkeypatch):
+    packing = reference_packing(1.0)
+    expected = spectrum(packing)
+
+    def incomplete(matrix):
+        raise SpectrumError("All eigenvalues: one was not found.")
+
+    monkeypatch.setattr(spectrum_module, "SLICED", 0)
+    monkeypatch.setattr(spectrum_module, "all_eigenvalues", incomplete)
+    told = []
+    with show_progress(told.append):
+        found = spectrum(packing)
+    assert told == ["All eigenvalues: one was not found. LAPACK takes over, which needs 0.0026 GB"]
+    assert nearest(found.eigenvalues, expected.eigenvalues).max() < 50 * expected.rounding
+    monkeypatch.setattr(spectrum_module, "LAPACK_UP_TO", 100)
+    with pytest.raises(SpectrumError, match="one was not found"):
+        spectrum(packing)
 
 
 @pytest.mark.slow

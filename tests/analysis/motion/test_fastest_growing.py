@@ -69,6 +69,16 @@ def test_nothing_grows(damped):
     assert 1 / found.time < found.limit < 4 / found.time
 
 
+def test_many_that_grow_alike_are_seen_to_grow():
+    """Their space does not converge; still the growth of one is certain, to the residual that is told."""
+    growing = [complex_block(30.0 + 0.003 * k, 5.0) for k in range(80)]
+    found = fastest_growing(operator(7, growing), count=1, periods=(10.0, 10.0))
+    assert len(found.rates) == 1
+    rate = 2 * abs(np.sqrt(30.0 + 5j).imag)
+    assert found.rates[0] == pytest.approx(rate, rel=0.01)
+    assert found.residuals[0] < 0.1 * rate / abs(np.sqrt(found.values[0]))
+
+
 def test_what_is_slower_than_the_limit_is_not_claimed():
     matrix = operator(6, [complex_block(40.0, 1.5), complex_block(50.0, 1e-4)])
     found = fastest_growing(matrix, count=2, periods=(10.0, 30.0))

@@ -11,6 +11,8 @@ from scipy.linalg import expm
 
 from faultgouge.analysis import Contacts, MindlinLaw, Motion, Packing, one_sided_motion, stability, stiffness_matrix
 from faultgouge.analysis.arrays import derive_frozen
+from faultgouge.analysis.motion import motion as motion_module
+from faultgouge.analysis.motion import stability as stability_module
 from faultgouge.analysis.motion.eigenvalues import mass_weighted
 from faultgouge.analysis.motion.one_sided import OneSidedSystem
 from faultgouge.analysis.operators.sliders import sliders_of
@@ -188,6 +190,23 @@ def test_the_verdict_says_what_contacts_of_a_smoothed_law_do_at_the_bound(count,
     found = stability(_three())
     found = replace(found, contacts=3, at_bound=count, one_sided=None, sliding=found.sticking)
     assert found.sentences[-1].endswith(says)
+
+
+def test_large_packings_have_the_verdict_of_small_ones(monkeypatch):
+    """By searches and one push in longer steps; and what these have not looked for is said."""
+    at_rest = _three().configuration
+    at_rest = derive_frozen(at_rest, load=-at_rest.contact_force)
+    expected = stability(at_rest)
+    monkeypatch.setattr(stability_module, "LARGE", 0)
+    for name in ("SLICED", "DENSE", "DISCS_UP_TO"):
+        monkeypatch.setattr(motion_module, name, 0)
+    found = stability(at_rest)
+    assert found.stable is True
+    assert found.one_sided["pushes"] == 2
+    assert 0 < found.one_sided["amplification"] < 1.1 * expected.one_sided["amplification"]  # half of the pushes
+    assert found.searched == min(found.one_sided["searched"], found.sticking.searched) > 0
+    assert "if all slid on, no growth of D faster than" in str(found)
+    assert expected.searched == 0.0
 
 
 def test_what_follows_a_load_that_rises_does_not_vibrate():
