@@ -8,7 +8,8 @@ matrix), `onset` (where eigenvalues become complex), `growth` (growth in a run).
 write packings.
 """
 
-from .configuration import Configuration, LinearisedContacts
+from .configuration import Configuration
+from .contacts import LinearisedContacts
 from .damped_onset.windows import DampedOnsetError, DampedWindow, damped_windows
 from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
 from .files.dumps import read_dump

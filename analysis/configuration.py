@@ -1,17 +1,13 @@
 r"""A packing of another code, in two or three dimensions, with its contacts to first order.
 
 Any contact law enters the operators through a few numbers at each contact: the normal, the distance and the lever arms;
-the normal and the tangential force; and the derivatives of both. `LinearisedContacts` has them, `Configuration` adds
-the particles, and :mod:`~faultgouge.analysis.operators.linearised_contacts` assembles the operators.
+the normal and the tangential force; and the derivatives of both.
+:class:`~faultgouge.analysis.contacts.LinearisedContacts` has them, `Configuration` adds the particles, and
+:mod:`~faultgouge.analysis.operators.linearised_contacts` assembles the operators.
 
 **Coordinates** are translations and rotations as lengths, :math:`R\theta`, axis by axis:
 (x.., y.., R theta..) of disks and (x.., y.., z.., R theta_x.., R theta_y.., R theta_z..) of spheres. Vectors always
 have three components; those of disks lie in the plane, and disks turn about z.
-
-**Two derivatives.** For some laws (LAMMPS's mindlin_rescale) the derivative :math:`b = \partial \mathbf f_t / \partial
-\delta` differs between a growing and a falling overlap; every operator takes the weight of opening contacts
-(:mod:`~faultgouge.analysis.packing.law`). A contact at Coulomb's bound sticks if the motion reverses, and slides if the
-motion continues: `sliding` chooses.
 
 **Operators that are given.** A Configuration whose `stiffness` is given has K and C as they were measured, by
 differences of forces, and its contacts have places and forces alone, as far as these are known: their derivatives are
@@ -41,167 +37,11 @@ from .arrays import (
     integers,
     number,
     positive_each,
-    real,
     same_bits,
     set_frozen,
     square,
 )
-
-WALL = -1
-"""The index that stands for a wall as the second partner of a contact."""
-
-AT_COULOMBS_BOUND = 1 - 1e-6
-"""Share of mu f_n from which on a contact counts as one at the bound. A packing at rest has a residual of 1e-6 of its
-forces or less, and a dashpot has carried that much of the tangential force."""
-
-UNIT = 1e-6
-"""Error of a unit vector, and of a direction in the plane, that text of seven digits has."""
-
-PERPENDICULAR = 1e-2
-"""Share of a tangential force that may be along the normal: LAMMPS turns histories a step behind their contacts."""
-
-PER_CONTACT = {
-    "i": (), "j": (), "normal": (3,), "distance": (), "overlap": (), "slip_arm": (2,), "lever_arm": (2,),
-    "lever_slope": (), "normal_force": (), "tangential_force": (3,), "normal_stiffness": (), "tangential_stiffness": (),
-    "closing": (3,), "parting": (3,), "friction": (), "sliding": (), "normal_dashpot": (), "tangential_dashpot": (),
-    "slider": (), "viscous_slider": (),
-}  # fmt: skip
-"""Fields of `LinearisedContacts`, with the shape of each for one contact."""
-
-BOOLEAN = {"sliding": False, "slider": True, "viscous_slider": True}
-"""Fields that are true or false, with the values of contacts that do not say."""
-
-
-@dataclass(frozen=True, init=False, eq=False)
-class LinearisedContacts:
-    """The contacts of a packing to first order: forces and derivatives. Arrays are copied and made read-only.
-
-    Parameters
-    ----------
-    i : array_like of int, shape (C,)
-        First partner.
-    j : array_like of int, shape (C,)
-        Second partner; -1 is a wall, which neither moves nor rotates.
-    normal : array_like, shape (C, 3)
-        Unit vector n towards i.
-    distance : array_like, shape (C,)
-        Length r of the branch vector between two centres; infinite for a wall, whose normal does not rotate.
-    overlap : array_like, shape (C,)
-        delta, length.
-    slip_arm : array_like, shape (C, 2)
-        Arms s_i, s_j of the slip: the rolling s_i d theta_i + s_j d theta_j slides the contact; length.
-    lever_arm : array_like, shape (C, 2)
-        Arms l_i, l_j of the torques -l n x f_t; length.
-    lever_slope : array_like, shape (C,)
-        -d l / d delta: 0 if the arm is a radius, 1/2 if it ends in the middle of the overlap.
-    normal_force : array_like, shape (C,)
-        f_n, force, positive for a repulsion.
-    tangential_force : array_like, shape (C, 3)
-        f_t, force on i.
-    normal_stiffness, tangential_stiffness : array_like, shape (C,)
-        d f_n / d delta and -d f_t / d s, force / length.
-    closing, parting : array_like, shape (C, 3)
-        b = d f_t / d delta at constant slip while the overlap grows, and while the overlap falls; force / length.
-    friction : array_like, shape (C,)
-        mu f_n, Coulomb's bound, force; infinite without such a bound.
-    sliding : array_like of bool, shape (C,)
-        Contacts that slide: they have no stiffness along f_t, and b is that of f_t = mu f_n.
-    normal_dashpot, tangential_dashpot : array_like, shape (C,)
-        Force time / length.
-    slider : array_like of bool, shape (C,)
-        Contacts whose tangential force is that of a spring in series with Coulomb's slider, so that its derivative
-        jumps at the bound; the default. The force of a smoothed law has one derivative there.
-    viscous_slider : array_like of bool, shape (C,)
-        Contacts whose slip at Coulomb's bound yields to the elastic and the viscous force together, with the bound mu
-        times the normal force of spring and dashpot: LAMMPS's slider, and the default. The slip of other contacts
-        yields to the elastic force alone, and the sum of both forces is cut at mu times the elastic normal force.
-
-    Raises
-    ------
-    ValueError
-        If a shape does not fit, a number is not finite, or a value is none that a contact can have: a normal that is
-        no unit vector, a tangential force along the normal, a distance that is not positive, or a negative arm, bound
-        or index.
-    """
-
-    i: Indices
-    j: Indices
-    normal: Floats
-    distance: Floats
-    overlap: Floats
-    slip_arm: Floats
-    lever_arm: Floats
-    lever_slope: Floats
-    normal_force: Floats
-    tangential_force: Floats
-    normal_stiffness: Floats
-    tangential_stiffness: Floats
-    closing: Floats
-    parting: Floats
-    friction: Floats
-    sliding: NDArray[np.bool_]
-    normal_dashpot: Floats
-    tangential_dashpot: Floats
-    slider: NDArray[np.bool_]
-    viscous_slider: NDArray[np.bool_]
-
-    def __init__(self, **given: ArrayLike) -> None:
-        given = {name: np.full(np.shape(given.get("i", ())), value) for name, value in BOOLEAN.items()} | given
-        if given.keys() != PER_CONTACT.keys():
-            raise ValueError(f"Contacts need {', '.join(PER_CONTACT)}; these are {', '.join(given)}.")
-        values: dict[str, NDArray] = {name: integers(name, given[name]) for name in ("i", "j")}
-        count = len(values["i"])
-        values |= {name: booleans(name, given[name], count) for name in BOOLEAN}
-        for name in ("distance", "friction"):  # may be infinite
-            values[name] = real(name, given[name])
-            floats(name, np.where(values[name] == np.inf, 0.0, values[name]), (count,))
-        for name in PER_CONTACT.keys() - values.keys():
-            values[name] = floats(name, given[name], (count, *PER_CONTACT[name]))
-        if len(values["i"]) != len(values["j"]) or np.any(values["i"] == values["j"]):
-            raise ValueError("Every contact has two different partners, i and j.")
-        _check_contacts(values)
-        set_frozen(self, **{name: values[name] for name in PER_CONTACT})
-
-    def __len__(self) -> int:
-        return len(self.i)
-
-    def __eq__(self, other: object) -> bool:
-        """Whether every array is the same to the bit."""
-        return same_bits(self, other) if isinstance(other, LinearisedContacts) else NotImplemented
-
-    def __hash__(self) -> int:
-        return hash((len(self), self.overlap.tobytes()))
-
-    @property
-    def wall(self) -> NDArray[np.bool_]:
-        """Which contacts are with a wall, shape (C,)."""
-        return self.j == WALL
-
-    @property
-    def at_bound(self) -> NDArray[np.bool_]:
-        """Which contacts are at Coulomb's bound, shape (C,)."""
-        tangential = np.linalg.norm(self.tangential_force, axis=1)
-        return (tangential > 0) & (tangential >= AT_COULOMBS_BOUND * self.friction)
-
-    @property
-    def one_sided(self) -> NDArray[np.bool_]:
-        """Which contacts slide on ahead and stick on the way back, shape (C,): sliders at Coulomb's bound."""
-        return self.at_bound & self.slider
-
-    def overlap_derivative(self, parting: ArrayLike = 0.5) -> Floats:
-        """b of each contact, shape (C, 3), with the weight of opening, shape () or (C,)."""
-        share = np.broadcast_to(np.asarray(parting, dtype=np.float64), (len(self),))[:, None]
-        stick = (1 - share) * self.closing + share * self.parting
-        # a sliding contact keeps |f_t| = mu f_n, in the direction in which it slides
-        slide = np.divide(
-            self.tangential_force * self.normal_stiffness[:, None], self.normal_force[:, None],
-            out=np.zeros_like(stick), where=self.normal_force[:, None] != 0,
-        )  # fmt: skip
-        return np.where(self.sliding[:, None], slide, stick)
-
-    def chosen(self, which: NDArray) -> "LinearisedContacts":
-        """Some of the contacts, selected by a mask or by numbers."""
-        return derive_frozen(self, **{name: np.array(getattr(self, name)[which]) for name in PER_CONTACT})
+from .contacts import UNIT, LinearisedContacts, refuse_first
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -518,21 +358,6 @@ class Configuration:
         return np.concatenate([translation[:, :d].T.ravel(), rotation[:, d - self.axes :].T.ravel()])
 
 
-def _check_contacts(values: dict[str, NDArray]) -> None:
-    """Refuse values that no contact can have; a ValueError names the first contact that has one."""
-    normal, tangential, force = values["normal"], values["tangential_force"], values["normal_force"]
-    along = np.abs(np.einsum("ca,ca->c", normal, tangential))
-    tilted = along > PERPENDICULAR * np.linalg.norm(tangential, axis=1) + UNIT * np.abs(force)
-    _refuse_first(values["i"] < 0, "i = {} is no particle", values["i"])
-    _refuse_first(values["j"] < WALL, "j = {} is no particle; -1 is a wall", values["j"])
-    _refuse_first(np.abs(np.linalg.norm(normal, axis=1) - 1) > UNIT, "the normal {} is no unit vector", normal)
-    _refuse_first(tilted, "the tangential force {} has a part along the normal", tangential)
-    _refuse_first(values["distance"] <= 0, "the distance {} is not positive", values["distance"])
-    _refuse_first(values["friction"] < 0, "friction = {} is negative", values["friction"])
-    for name in ("slip_arm", "lever_arm"):
-        _refuse_first(np.any(values[name] < 0, axis=1), f"{name} = {{}} is negative", values[name])
-
-
 def _check_particles(made: Configuration) -> None:
     """Refuse contacts of disks that leave the plane, and IDs and types that do not fit."""
     n, c = len(made), made.contacts
@@ -543,15 +368,9 @@ def _check_particles(made: Configuration) -> None:
         raise ValueError(f"Two particles have the ID {unique[count > 1][0]}: give each its own.")
     if made.dimension == 2:
         scale = np.abs(c.normal_force) + np.linalg.norm(c.tangential_force, axis=1)
-        _refuse_first(np.abs(c.normal[:, 2]) > UNIT, "the normal {} of disks is not in the plane", c.normal)
+        refuse_first(np.abs(c.normal[:, 2]) > UNIT, "the normal {} of disks is not in the plane", c.normal)
         outside = np.abs(c.tangential_force[:, 2]) > UNIT * scale
-        _refuse_first(outside, "the tangential force {} on a disk is not in the plane", c.tangential_force)
-
-
-def _refuse_first(wrong: NDArray[np.bool_], says: str, values: NDArray) -> None:
-    if wrong.any():
-        k = int(np.argmax(wrong))
-        raise ValueError(f"Contact {k}: {says.format(values[k])}.")
+        refuse_first(outside, "the tangential force {} on a disk is not in the plane", c.tangential_force)
 
 
 class HasConfiguration(Protocol):

@@ -24,7 +24,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from faultgouge.analysis import Configuration, LinearisedContacts, Stability, stability
-from faultgouge.analysis.configuration import PER_CONTACT
+from faultgouge.analysis.contacts import PER_CONTACT
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 from research.lammps_laws.compute import pour, rest

@@ -33,6 +33,7 @@ FLOORS = {
     "faultgouge.analysis": (
         ("counted", "uncertain_digits", "errors", "progress", "table_display"),
         ("arrays",),
+        ("contacts",),
         ("configuration",),
         ("packing",),
         ("operators",),

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..configuration import PER_CONTACT, Configuration, LinearisedContacts
+from ..configuration import Configuration
+from ..contacts import PER_CONTACT, LinearisedContacts
 from ..errors import PackingFileError
 from .atomic_write import BEGINNINGS, has_checksum
 from .checksummed_file import new_file, open_checksummed, write

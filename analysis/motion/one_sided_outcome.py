@@ -13,6 +13,7 @@ next to nothing, so that no packing is said to follow the load before the whole 
 steady for four chunks and then to grow to another one; so half of the time at least is followed.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,10 @@ time it is 0.71."""
 
 SETTLED = 1e-3
 """Change of p in a quarter of the time, as a share of the largest p, below which sliders may be at rest."""
+
+LATE = 12
+"""Chunks after which the slip of all contacts together decides. A motion that grows as exp(t) gains 15 decades in a
+packing of spheres."""
 
 SAMPLES = 400
 """Velocities that a window of a load that rises has."""
@@ -149,7 +154,8 @@ def _mean_square(system: OneSidedSystem, state: OneSidedState) -> Floats:
 def _outcome(time: Floats, size: Floats, slid: list[Floats], sticking_grows: bool) -> bool | None:
     """Whether the motion grows, rests (False), or has not settled.
 
-    Sliders rest if they moved little in the third quarter of the time, and less by half, or not at all, in the fourth.
+    Sliders rest if they moved little in the third quarter of the time, and less by half, or not at all, in the fourth:
+    each of them, or late all of them together, as of thousands one or the other slips a last time.
     """
     largest = size.max(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -158,13 +164,17 @@ def _outcome(time: Floats, size: Floats, slid: list[Floats], sticking_grows: boo
         return True
     if sticking_grows or len(slid) <= 2 * LOOKS:
         return None
-    largest_slip = np.abs(slid[-1]).max(axis=0)
-    before, after = (
-        np.abs(slid[end] - slid[begin]).max(axis=0)
-        for begin, end in ((len(slid) // 2, 3 * len(slid) // 4), (3 * len(slid) // 4, -1))
-    )
-    dies = (after <= 0.5 * before) | (after <= np.finfo(float).eps * largest_slip)
-    return False if np.all(dies & (before <= SETTLED * largest_slip)) else None
+    half, three = len(slid) // 2, 3 * len(slid) // 4
+    of_any = _slip_dies(slid[half], slid[three], slid[-1], np.max)
+    of_all = _slip_dies(slid[half], slid[three], slid[-1], np.sum) & (len(slid) > LATE * LOOKS)
+    return False if np.all(of_any | of_all) else None
+
+
+def _slip_dies(half: Floats, three: Floats, end: Floats, over: Callable[..., Floats]) -> NDArray[np.bool_]:
+    """Whether the largest slip of a contact, or that of all contacts, dies away, of each push; p at three times."""
+    whole, before, after = (over(np.abs(slip), axis=0) for slip in (end, three - half, end - three))
+    falls = (after <= 0.5 * before) | (after <= np.finfo(float).eps * whole)
+    return np.asarray(falls & (before <= SETTLED * whole))
 
 
 def _still_grows(time: Floats, gained: Floats) -> bool:

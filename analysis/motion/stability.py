@@ -150,11 +150,7 @@ class Stability:
                 f"stable: each of {self.one_sided['pushes']} pushes comes to rest{free}; D reaches "
                 f"{self.one_sided['amplification']:.3g} times the mean square velocity of the push (followed for t = "
                 f"{self.one_sided['time']:.4g})"
-                + (
-                    f"; linear growth of D slower than exp({self.searched:.2g} t) was not sought"
-                    if self.searched
-                    else ""
-                )
+                + (f"; growth of D slower than exp({self.searched:.2g} t) was not sought" if self.searched else "")
             )
         slowest = f"the slowest with D as exp({self.growth_rate:.6g} t){free}"
         if self.searched:

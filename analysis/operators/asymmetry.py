@@ -11,7 +11,8 @@ import numpy as np
 from scipy.sparse import diags_array
 
 from ..arrays import derive_frozen
-from ..configuration import Configuration, LinearisedContacts
+from ..configuration import Configuration
+from ..contacts import LinearisedContacts
 from .stiffness import stiffness_matrix
 
 SYMMETRIC = 1e-12

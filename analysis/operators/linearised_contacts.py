@@ -36,7 +36,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array, diags_array
 
 from ..arrays import Floats, Indices, derive_frozen
-from ..configuration import Configuration, LinearisedContacts
+from ..configuration import Configuration
+from ..contacts import LinearisedContacts
 
 
 def contact_derivatives(contacts: LinearisedContacts, parting: ArrayLike = 0.5) -> tuple[Floats, Floats, Floats]:

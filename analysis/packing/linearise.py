@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
-from ..configuration import LinearisedContacts
+from ..contacts import LinearisedContacts
 from .law import MindlinLaw
 
 

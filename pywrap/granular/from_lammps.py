@@ -40,7 +40,7 @@ from scipy.sparse import csr_array, diags_array
 
 from ...analysis import BadInputError, Configuration, LinearisedContacts, MindlinLaw
 from ...analysis.arrays import Floats, Indices, derive_frozen
-from ...analysis.configuration import BOOLEAN, PER_CONTACT, WALL
+from ...analysis.contacts import BOOLEAN, PER_CONTACT, WALL
 from ...analysis.packing.linearise import linearise_contacts
 from .acting_fixes import check_holding
 from .contact_law_measurement import MeasuredLaw, State, measure_law

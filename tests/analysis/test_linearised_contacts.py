@@ -25,7 +25,7 @@ from faultgouge.analysis import (
     transient_gain,
 )
 from faultgouge.analysis.arrays import derive_frozen
-from faultgouge.analysis.configuration import PER_CONTACT
+from faultgouge.analysis.contacts import PER_CONTACT
 from faultgouge.analysis.operators.linearised_contacts import rescaling_operators
 
 STEP = np.longdouble(1e-8)
