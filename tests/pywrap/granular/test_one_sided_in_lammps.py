@@ -205,6 +205,30 @@ def test_what_grows_out_of_rounding_noise_is_never_called_stable(poured, law):
     np.testing.assert_allclose(pushed(lmp, here, push[:, :1], times, 5e-4, 1e-9)[:, 0], expected, rtol=AGREES)
 
 
+@pytest.mark.slow
+def test_the_rate_without_contacts_at_the_bound_is_that_of_lammps_over_ten_decades(tmp_path):
+    """Spheres grow in spite of dashpots out of a push of 1e-13, hardly more than rounding.
+
+    With steps of 1e-3 and 2e-4 the rate was found to 0.3 %, and to 3 % where rounding still pushes at first.
+    """
+    from faultgouge.pywrap import from_lammps
+    from research.lammps_laws.compute import pour, rest
+
+    lmp = pour("gran/hertz/history", 3, 50, 0.5, 12, tmp_path / "log.lammps", 4.0)
+    lmp.command("variable slope equal 0.25")
+    assert rest(lmp) is not None
+    lmp.command("run 20000 post no")
+    here = from_lammps(lmp)
+    told = stability(here)
+    assert told.stable is False
+    assert told.at_bound == 0
+    times = np.arange(6.0, 15.0, 0.5)
+    found = pushed(lmp, here, random_pushes(here, 1)[:, :1], times, 1e-3, 1e-13)[:, 0]
+    lmp.close()
+    assert found[-1] > 1e10 * found[0]
+    assert np.polyfit(times, np.log(found), 1)[0] == pytest.approx(told.growth_rate, rel=0.03)
+
+
 @pytest.fixture(scope="module")
 def layer():
     """The layer of README with Coulomb's slider, at 0.2 F_y of its own ramp, with dashpots of the restitution 0.9."""
