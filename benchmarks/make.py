@@ -43,6 +43,7 @@ BENCHMARKS = {
     "increment": Benchmark("python benchmarks/increment.py", "python benchmarks/increment.py"),
     "size": Benchmark("python benchmarks/scale.py", None),
     "spectra": Benchmark("python benchmarks/spectra.py", None),
+    "verdict": Benchmark("python benchmarks/verdict.py", None),
 }
 """Commands by their names in the template."""
 

@@ -28,6 +28,9 @@ INACCURATE = 1e-9
 """Relative residual of solutions without pivoting from which on pivots are chosen; usually it is some 1e-13."""
 
 
+ROOM = 1.06
+"""Vectors of the next space, in units of those that would have been enough for the last one."""
+
 DEPENDENT = 1e-10
 """Length of a new vector, beside the longest of its block, below which its direction is rounding."""
 
@@ -227,8 +230,8 @@ class ShiftedDisc:
             first = int(krylov.used * min(1.5, max(1.05, reach.radius(shift, values[:count]) / max(radius, 1e-300))))
 
     def enough(self, reach: Reach) -> int:
-        """Vectors that would have been enough for what a disc has to hold, or a few less."""
-        return int(self.krylov.used * min(1.0, reach.radius(self.shift, self.values) / self.radius))
+        """Vectors that would have been enough for what a disc has to hold, and a few more: looks cost more than these."""
+        return int(ROOM * self.krylov.used * min(1.0, reach.radius(self.shift, self.values) / self.radius))
 
     def marked(self, chosen: NDArray[np.bool_], accuracy: float) -> Marked:
         """Some of the eigenvalues, closed under conjugation, with right and left vectors.
