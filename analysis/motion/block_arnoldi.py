@@ -230,7 +230,7 @@ class ShiftedDisc:
             first = int(krylov.used * min(1.5, max(1.05, reach.radius(shift, values[:count]) / max(radius, 1e-300))))
 
     def enough(self, reach: Reach) -> int:
-        """Vectors that would have been enough for what a disc has to hold, and a few more: looks cost more than these."""
+        """Vectors that would have been enough for what a disc has to hold, and a few more, as looks cost more."""
         return int(ROOM * self.krylov.used * min(1.0, reach.radius(self.shift, self.values) / self.radius))
 
     def marked(self, chosen: NDArray[np.bool_], accuracy: float) -> Marked:

@@ -41,8 +41,6 @@ from .block_arnoldi import DEPENDENT, Krylov
 BLOCK = 4
 """Vectors of a start for two motions, and half of those for many. What grows alike, as in a crystal, needs several."""
 
-Sparse = csr_array | bsr_array
-
 BLOCKS = 30
 """Blocks of a space at the most."""
 
@@ -105,7 +103,10 @@ class FastestGrowth:
 
 
 def fastest_growing(
-    matrix: Sparse, damping: Sparse | None = None, count: int = 8, periods: tuple[float, float] = (30.0, 1000.0)
+    matrix: csr_array | bsr_array,
+    damping: csr_array | bsr_array | None = None,
+    count: int = 8,
+    periods: tuple[float, float] = (30.0, 1000.0),
 ) -> FastestGrowth:
     """Find the fastest growing motions.
 
@@ -167,11 +168,11 @@ class Step:
 class _Undamped:
     """x'' = -A x."""
 
-    matrix: Sparse
+    matrix: csr_array | bsr_array
     frequency: float
 
     @classmethod
-    def of(cls, matrix: Sparse) -> "_Undamped":
+    def of(cls, matrix: csr_array | bsr_array) -> "_Undamped":
         return cls(matrix, np.sqrt(MARGIN * _largest(matrix)))
 
     @property
@@ -218,13 +219,13 @@ class _Undamped:
 class _Damped:
     """The state (sqrt(L) x, v) of x'' = -A x - G x'."""
 
-    matrix: Sparse
-    damping: Sparse
+    matrix: csr_array | bsr_array
+    damping: csr_array | bsr_array
     frequency: float
     loss: float
 
     @classmethod
-    def of(cls, matrix: Sparse, damping: Sparse) -> "_Damped":
+    def of(cls, matrix: csr_array | bsr_array, damping: csr_array | bsr_array) -> "_Damped":
         frequency = np.sqrt(MARGIN * _largest(matrix))
         # no motion loses more than the largest sum of a row
         return cls(matrix, damping, frequency, float(abs(damping).sum(axis=1).max()) / frequency)
@@ -388,7 +389,7 @@ def _real_basis(vectors: Complexes) -> Floats:
     return np.asarray(basis[:, np.abs(np.diag(triangle)) > DEPENDENT * abs(triangle[0, 0])])
 
 
-def _largest(matrix: Sparse) -> float:
+def _largest(matrix: csr_array | bsr_array) -> float:
     """The largest eigenvalue of A, to a hundredth."""
     start = np.random.default_rng(0).standard_normal(matrix.shape[0])
     return float(abs(eigs(matrix, 1, which="LM", v0=start, tol=1e-2, ncv=24, return_eigenvectors=False)[0]))

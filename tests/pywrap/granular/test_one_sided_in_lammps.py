@@ -229,6 +229,69 @@ def test_the_rate_without_contacts_at_the_bound_is_that_of_lammps_over_ten_decad
     assert np.polyfit(times, np.log(found), 1)[0] == pytest.approx(told.growth_rate, rel=0.03)
 
 
+def spheres_under_a_rising_load(lmp, here, slope, rate, chunk, count):
+    """Drift and vibration over the rate of the slope, of the last two of `count` chunks; a drag fades out in four."""
+    from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of
+    from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy, quieten
+
+    looks, dt = 400, 5e-4
+    look = round(chunk / looks / dt)
+    length = looks * look * dt
+    low, high, *_ = lmp.extract_box()
+
+    def moved(start):
+        away = owned_array(lmp, "x")[rows_of(lmp, here)] - start
+        away[:, :2] -= np.subtract(high, low)[:2] * np.round(away[:, :2] / np.subtract(high, low)[:2])
+        return away
+
+    def follow():
+        command(lmp, f"log none\ntimestep {dt}")
+        quieten(lmp, drag=True)
+        begin = lmp.extract_global("ntimestep")
+        lmp.command(f"variable slope equal {slope}+{rate}*(step-{begin})*dt")
+        for stage in range(20):
+            lmp.command(f"fix fade all viscous {8 / length * (1 - (stage + 0.5) / 20) ** 2}")
+            lmp.command(f"run {looks * look // 5} post no")
+        lmp.command("unfix fade")
+        lmp.command(f"run {(count - 6) * looks * look} post no")
+        found = []
+        for _ in range(2):
+            start, squares = moved(0.0), 0.0
+            for _ in range(looks):
+                lmp.command(f"run {look} post no")
+                squares = squares + owned_array(lmp, "v")[rows_of(lmp, here)] ** 2 / looks
+            mean = moved(start) / length
+            found.append((np.mean(mean**2), np.mean(np.maximum(squares - mean**2, 0.0))))
+        return np.sqrt(np.mean(found, axis=0)) / rate
+
+    return in_a_copy(follow)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("seed", "slope", "dashpot"), [(12, 0.3, 40.0), (21, 0.25, 4.0)])
+def test_spheres_under_a_load_that_rises(tmp_path, seed, slope, dashpot):
+    """They vibrate for ever in proportion to the rate; windows of LAMMPS differ by a tenth among themselves."""
+    from faultgouge.analysis.motion.stable_timestep import stable_timestep
+    from faultgouge.pywrap import from_lammps
+    from research.lammps_laws.compute import pour, rest
+
+    lmp = pour("granular hertz, mindlin/force", 3, 50, 0.5, seed, tmp_path / "log.lammps", dashpot)
+    lmp.command(f"variable slope equal {slope}")
+    assert rest(lmp) is not None
+    lmp.command("run 40000 post no")
+    here = from_lammps(lmp)
+    # the direction of gravity turns with the slope
+    turns = here.mass[:, None] * np.array([1.0, 0.0, slope]) / (1 + slope**2) ** 1.5
+    told = stability(here, rise=turns).rising
+    assert told["steady"]
+    chunk = 300 * float(stable_timestep(here))
+    for rate in (1e-6, 1e-7):
+        drift, vibration = spheres_under_a_rising_load(lmp, here, slope, rate, chunk, round(told["time"] / chunk))
+        assert vibration == pytest.approx(told["vibration"], rel=0.2)
+        assert drift == pytest.approx(told["drift"], rel=0.15)
+    lmp.close()
+
+
 @pytest.fixture(scope="module")
 def layer():
     """The layer of README with Coulomb's slider, at 0.2 F_y of its own ramp, with dashpots of the restitution 0.9."""
