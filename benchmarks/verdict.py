@@ -35,8 +35,8 @@ BEDS = {
 }
 """Law, slope and dashpots of the fifty spheres."""
 
-POURED = ("gran/hertz/history", 0.1, 4.0)
-"""Those of a bed that is poured as a whole. On steeper slopes a sphere rolls on for ever."""
+POURED = ("gran/hertz/history", 0.0, 4.0)
+"""Those of a bed that is poured as a whole: on a slope one or the other of thousands of spheres rolls on for ever."""
 
 
 def bed(law: str, count: int, slope: float, dashpot: float) -> Configuration:

@@ -268,14 +268,21 @@ def spheres_under_a_rising_load(lmp, here, slope, rate, chunk, count):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("seed", "slope", "dashpot"), [(12, 0.3, 40.0), (21, 0.25, 4.0)])
-def test_spheres_under_a_load_that_rises(tmp_path, seed, slope, dashpot):
-    """They vibrate for ever in proportion to the rate; windows of LAMMPS differ by a tenth among themselves."""
+@pytest.mark.parametrize(
+    ("law", "seed", "slope"),
+    [("granular hertz, mindlin/force", 12, 0.3), ("granular hertz, mindlin_rescale/force", 21, 0.15)],
+)
+def test_spheres_under_a_load_that_rises(tmp_path, law, seed, slope):
+    """They vibrate for ever in proportion to the rate.
+
+    Drifts were off by 1 to 8 %, vibrations by 1 to 9 %, of two windows. Where the vibration is four times the drift and
+    irregular, LAMMPS's own windows differ by a quarter, so that such a packing is none for this test.
+    """
     from faultgouge.analysis.motion.stable_timestep import stable_timestep
     from faultgouge.pywrap import from_lammps
     from research.lammps_laws.compute import pour, rest
 
-    lmp = pour("granular hertz, mindlin/force", 3, 50, 0.5, seed, tmp_path / "log.lammps", dashpot)
+    lmp = pour(law, 3, 50, 0.5, seed, tmp_path / "log.lammps", 40.0)
     lmp.command(f"variable slope equal {slope}")
     assert rest(lmp) is not None
     lmp.command("run 40000 post no")
