@@ -34,7 +34,7 @@ from .block_arnoldi import Marked, Reach, ShiftedDisc, SpectrumError
 class SliceSizes:
     """Sizes and tolerances of slices, with their reasons."""
 
-    own: int = 60
+    own: int = 45
     """Eigenvalues of a slice. More cost more orthogonalisation, fewer cost more factors."""
     block: int = 6
     """Vectors that are solved for at a time: each takes half of the time of one by itself."""

@@ -59,9 +59,10 @@ DISCS_UP_TO = 6000
 PERIODS = 100.0
 """Periods of the fastest motion in which growth is looked for, where the slowest decay is not known for certain."""
 
-PERIODS_OF_LARGE = (30.0, 30.0)
-"""The same of packings of more coordinates than that, with spaces of one vector: of 72,000 coordinates three seconds
-without dissipation, fourteen with it, and 35 where so many motions grow alike that none converges."""
+PERIODS_OF_LARGE = 4e6
+"""The same of packings of more coordinates than that, times the number of coordinates, with spaces of one vector. It
+takes six seconds without dissipation, half a minute with it, and a minute where so many motions grow alike that none
+converges."""
 
 TIMES = (10.0, 300.0)
 """The fewest and the most of them, where discs cover the imaginary axis."""
@@ -188,7 +189,8 @@ class Motion:
     def _fastest(self) -> Rates:
         """Of motions that surely grow; the others are not known."""
         damping = self.in_blocks(self.damping) if self.dissipative else None
-        found = fastest_growing(self.in_blocks(self.stiffness), damping, count=1, periods=PERIODS_OF_LARGE)
+        length = min(TIMES[1], PERIODS_OF_LARGE / len(self.active))
+        found = fastest_growing(self.in_blocks(self.stiffness), damping, count=1, periods=(min(30.0, length), length))
         values = found.values if self.dissipative else 1j * np.sqrt(found.values.astype(complex))
         values = np.where(values.real < 0, -values, values)
         return Rates(values, np.ones(len(values), bool), 0, found.limit)

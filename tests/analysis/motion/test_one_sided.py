@@ -198,8 +198,8 @@ def test_large_packings_have_the_verdict_of_small_ones(monkeypatch):
     at_rest = derive_frozen(at_rest, load=-at_rest.contact_force)
     expected = stability(at_rest)
     monkeypatch.setattr(stability_module, "LARGE", 0)
-    for name in ("SLICED", "DENSE", "DISCS_UP_TO"):
-        monkeypatch.setattr(motion_module, name, 0)
+    for name, value in {"SLICED": 0, "DENSE": 0, "DISCS_UP_TO": 0, "PERIODS_OF_LARGE": 9 * 30.0}.items():
+        monkeypatch.setattr(motion_module, name, value)
     found = stability(at_rest)
     assert found.stable is True
     assert found.one_sided["pushes"] == 2
