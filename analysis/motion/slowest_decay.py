@@ -24,7 +24,7 @@ NEAREST = 60
 """Eigenvalues of a disc."""
 
 DISCS = 40
-"""Discs at the most: about a minute for 1,000 spheres."""
+"""Discs at the most: of 1,000 spheres they took 60 s of one core."""
 
 FIRST = 0.02
 """Middle of the first disc, as a share of the largest frequency; not zero, where motions without a force are."""
