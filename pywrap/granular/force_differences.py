@@ -208,14 +208,11 @@ MOVES = ("nve", "rigid", "move", "overdamped", "nvt", "nph", "npt")
 HOLDS = ("freeze", "setforce", "aveforce", "lineforce", "planeforce", "momentum", "recenter", "temp/")
 """Fixes that change forces or velocities of coordinates that are held, or that move as one."""
 
-INSERTS = ("pour", "deposit", "evaporate")
-
-
 def hold_still(lmp: Any) -> None:
     """Leave what exerts forces in a copy alone: no output, no drag, and nothing that moves or holds particles."""
     quieten(lmp, drag=True)
     for name, style in styles_of(lmp).fixes.items():
-        if style.startswith((*MOVES, *HOLDS, *INSERTS)):
+        if style.startswith((*MOVES, *HOLDS)):
             lmp.command(f"unfix {name}")
 
 
