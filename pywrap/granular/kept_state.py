@@ -36,9 +36,10 @@ def take_or_keep(
         kept = None if keep is None else _keep(lmp, keep.with_suffix(".restart"))
         if kept is None:
             raise
+        longer = "" if isinstance(error, NoEquilibriumError) else ", and with a longer run"
         raise SnapshotError(
             f"{str(error).rstrip('.')}. The state is kept in {kept}: go on by a deck of read_restart {kept} and the "
-            "lines of this deck from pair_style on, without those that make particles, and with a longer run."
+            f"lines of this deck from pair_style on, without those that make particles{longer}."
         ) from error
 
 

@@ -38,11 +38,13 @@ from ...analysis.arrays import derive_frozen
 from ...analysis.errors import FaultgougeError, place_in_user_code
 from ...analysis.factors.sparse_lu import general_lu
 from ...parent_death import end_with
-from .from_lammps import KnownLaws, check_balance, take_snapshot
+from .balance import check_balance
+from .configuration_by_laws import KnownLaws
+from .from_lammps import take_snapshot
 from .granular_commands import INTEGRATORS, SnapshotError, read_commands, without_suffix
 from .instance_queries import OpenFile, explain_error, log_file, log_of, open_files
 from .lammps_arrays import owned_array, rows_of, set_velocity
-from .look_in_a_copy import can_copy, in_a_copy, quieten, silent_copy
+from .look_in_a_copy import can_copy, in_a_copy, interrupts_wait, quieten, silent_copy
 from .relax import RATE, REST, bring_to_rest
 
 ITERATIONS = 10

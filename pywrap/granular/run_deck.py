@@ -16,11 +16,12 @@ from mpi4py import MPI
 
 from ...analysis import BadInputError, Configuration
 from ..lammps.instance import lammps_instance
-from .from_lammps import BALANCE, check_balance, check_instance
+from .balance import BALANCE, check_balance
 from .granular_commands import NotLinearisedError, SnapshotError, commands_in, logged_text, read_commands
 from .instance_queries import communicator, explain_error, name_of, styles_of
 from .kept_state import take_or_keep
 from .look_in_a_copy import can_copy
+from .looks import check_instance
 
 MARK = "faultgouge_rest_of_the_deck"
 """Label of the first line of the second part of a deck."""

@@ -115,8 +115,7 @@ def import_(
         given = [top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame]
         if floor or any(each is not None for each in given):
             raise typer.BadParameter(
-                f"{file} is a deck, which says all by itself: leave all options but -o, --relax, --slides and "
-                "--balance"
+                f"{file} is a deck, which says all by itself: leave all options but -o, --relax, --slides and --balance"
             )
         _import_deck(file, output, slides, balance, relax)
         return
@@ -147,7 +146,7 @@ def import_(
 def _import_deck(file: Path, output: Path, slides: bool, balance: float | None, relaxes: bool) -> None:
     """Run a deck and keep its last state."""
     from faultgouge.analysis.files.configuration_file import write_configuration
-    from faultgouge.pywrap.granular.from_lammps import BALANCE
+    from faultgouge.pywrap.granular.balance import BALANCE
     from faultgouge.pywrap.granular.run_deck import run_deck
 
     keeps(f"nothing has been written to {output} yet")
