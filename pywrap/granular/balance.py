@@ -41,8 +41,8 @@ def refuse_motion(snapshot: Configuration, balance: float, commands: Commands, a
     others = int(np.sum(size > balance * force)) - 1
     also = f", and {others} more {'are' if others > 1 else 'is'} out of balance" if others else ""
     advice = known_cause(commands, snapshot.contacts) or (
-        "bring it to rest by faultgouge.relax(lmp) or a longer run with drag (fix viscous, and fix viscous/sphere for "
-        "rotation), or allow more by from_lammps(lmp, balance=...), in a command --balance"
+        "bring it to rest by faultgouge.relax(lmp), in a command --relax, or a longer run with drag (fix viscous, and "
+        "fix viscous/sphere for rotation), or allow more by from_lammps(lmp, balance=...), in a command --balance"
     )
     raise SnapshotError(
         f"The packing moves: the residual of particle {snapshot.ids[worst]} at ({place}) is {size[worst] / force:.3g} "

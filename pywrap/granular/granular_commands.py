@@ -168,8 +168,9 @@ def _check_model(words: list[str], line: str) -> None:
 
 
 MOVING = {
+    "rigid/small": "holds particles together in bodies, whose rotation is not linearised here: use single particles",
     "rigid": "holds particles together in a body: for a lid that does not rotate use fix nve and fix aveforce 0 0 0",
-    "poems": "holds particles together in bodies: leave it out",
+    "poems": "holds particles together in bodies, whose rotation is not linearised here: use single particles",
     "move": "moves particles: unfix it, and let the packing come to rest",
     "deform": "moves the box: unfix it, and let the packing come to rest",
     "press/berendsen": "moves the box: unfix it, and let the packing come to rest",

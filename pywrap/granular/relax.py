@@ -158,8 +158,8 @@ def bring_to_rest(
             if name in lmp.available_ids("fix"):
                 lmp.command(f"unfix {name}")
     raise NoEquilibriumError(
-        f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of "
-        "balance; give more steps, or the packing creeps."
+        f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of balance; it creeps, and "
+        "more steps may do, or the time step is too long for its dashpots: `stable_timestep` of the configuration tells."
     )
 
 

@@ -168,7 +168,8 @@ def _verdict(configuration: Configuration, output: Path) -> str:
     from faultgouge.analysis.motion.stability import LARGE
     from faultgouge.analysis.progress import show_progress
 
-    if not is_root() or configuration.coordinates > LARGE // 4:
+    moves = len(configuration.rattlers) < len(configuration)
+    if not is_root() or (moves and configuration.coordinates > LARGE // 4):
         return f"whether the packing is stable says `faultgouge spectrum {output}`"
     with status("stability") as show, show_progress(show):
         return str(stability(configuration))

@@ -252,7 +252,7 @@ def test_branch_vectors_that_point_to_either_partner(beds, monkeypatch):
     of the forces on particles.
     """
     from faultgouge.pywrap import from_lammps
-    from faultgouge.pywrap.granular import from_lammps as module
+    from faultgouge.pywrap.granular import looks as module
 
     lmp = beds("gran/hertz/history", 3, True)
     found, look = from_lammps(lmp), module.arrays_at_rest
