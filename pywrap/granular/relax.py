@@ -163,8 +163,8 @@ def bring_to_rest(
             if name in lmp.available_ids("fix"):
                 lmp.command(f"unfix {name}")
     raise NoEquilibriumError(
-        f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of balance; give more steps, "
-        "or the packing creeps."
+        f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of balance; give more "
+        "steps, or the packing creeps."
     )
 
 
@@ -173,8 +173,8 @@ def _refuse_long_steps(found: Configuration, timestep: float, where: str) -> Non
     limit = float(stable_timestep(found))
     if timestep > limit:
         raise NoEquilibriumError(
-            f"The packing vibrates{where} and cannot come to rest: its time step {timestep:.4g} is longer than the largest "
-            f"stable one, {limit:.4g}, of its contacts with their dashpots; take a shorter one."
+            f"The packing vibrates{where} and cannot come to rest: its time step {timestep:.4g} is longer than the "
+            f"largest stable one, {limit:.4g}, of its contacts with their dashpots; take a shorter one."
         )
 
 
@@ -187,8 +187,8 @@ def _run(lmp: Any, count: int, where: str) -> None:
     lost = count - lmp.extract_setting("nlocal")
     if lost:
         raise NoEquilibriumError(
-            f"{lost} particles left the box while the packing came to rest{where}: delete those that fall outside of the "
-            "walls, or take a box with walls or periodic edges."
+            f"{lost} particles left the box while the packing came to rest{where}: delete those that fall outside of "
+            "the walls, or take a box with walls or periodic edges."
         )
 
 
