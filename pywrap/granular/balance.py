@@ -33,7 +33,7 @@ def force_scale(snapshot: Configuration, at_walls: Floats = NONE) -> float:
 def refuse_motion(snapshot: Configuration, balance: float, commands: Commands, at_walls: Floats = NONE) -> None:
     """Refuse a packing that moves, with the particle that is farthest from rest."""
     force = force_scale(snapshot, at_walls)
-    if snapshot.residual <= balance * force:
+    if not snapshot.residual > balance * force:  # an infinite balance allows no number where nothing touches
         return
     size = snapshot.particle_residual
     worst = int(np.argmax(size))

@@ -91,17 +91,18 @@ def configuration_by_laws(lmp: Any, commands: Commands, found: Arrays, laws: Kno
     return derive_frozen(made, load=load)
 
 
-def check_friction(contacts: LinearisedContacts) -> None:
+def check_friction(contacts: LinearisedContacts, *, rests: bool) -> None:
     """Refuse tangential forces beyond Coulomb's bound, which is that of the commands."""
     size = np.linalg.norm(contacts.tangential_force, axis=1)
     beyond = size > contacts.friction + AGREES * (contacts.friction + contacts.normal_force)
     if np.any(beyond):
         most = np.max(size[beyond] / contacts.normal_force[beyond])
         mu = np.min(contacts.friction[beyond] / contacts.normal_force[beyond])
+        moves = "" if rests else "the packing moves: bring it to rest by faultgouge.relax(lmp); or "
         raise SnapshotError(
             f"{np.count_nonzero(beyond)} contacts carry more than Coulomb's bound of the commands, up to |f_t| = "
-            f"{most:.3g} f_n with mu = {mu:.3g}: the commands are not those of the instance; {GIVE_LINES}, as they "
-            "hold now."
+            f"{most:.3g} f_n with mu = {mu:.3g}: {moves}the commands are not those of the instance; {GIVE_LINES}, as "
+            "they hold now."
         )
 
 

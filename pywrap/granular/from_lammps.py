@@ -116,12 +116,16 @@ def _by_laws(
     """A Configuration whose contacts have the laws that LAMMPS shows; a NotLinearisedError if something else acts."""
     look = partial(look_at_contacts, lmp, given, open_files())
     deck, fixes, found = in_a_copy(look) if can_copy(lmp) else look()
-    snapshot = configuration_by_laws(lmp, deck, found, laws)
+    try:
+        snapshot = configuration_by_laws(lmp, deck, found, laws)
+    except ValueError as error:  # of what no contact at rest has
+        raise SnapshotError(f"The packing moves: {error}; bring it to rest by faultgouge.relax(lmp).") from error
     contacts = snapshot.contacts
-    proves = prove and can_copy(lmp) and snapshot.residual <= BALANCE * force_scale(snapshot)
+    rests = not snapshot.residual > BALANCE * force_scale(snapshot)
+    proves = prove and can_copy(lmp) and rests
     if not proves:
         check_holding(fixes)
-    check_friction(contacts)
+    check_friction(contacts, rests=rests)
     refuse_motion(snapshot, balance, deck)
     if proves:
         snapshot = _proved(lmp, snapshot, deck, fixes)

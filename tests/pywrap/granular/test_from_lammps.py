@@ -161,7 +161,7 @@ HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
     [
         (HERTZ, "* *", "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL shear x 1 contacts" + MOVES,
          "without shear"),
-        (HERTZ, "* *", "fix r all rigid/small molecule", "together in a body"),
+        (HERTZ, "* *", "fix r all rigid/small molecule", "together in bodies"),
         (HERTZ, "* *", "fix m all move linear 0 0 0", "unfix it, and let the packing come to rest"),
         (HERTZ, "* *", "fix s all setforce 0 1 NULL" + MOVES, "drives particles"),
         (HERTZ, "* *", "", "Nothing moves"),
@@ -585,3 +585,19 @@ def test_ctrl_c_ends_the_copy(tmp_path, at_the_fork):
     words = [sys.executable, "-c", INTERRUPTED.format(tests=str(Path(__file__).parent), at_the_fork=at_the_fork)]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60, start_new_session=True)
     assert done.stdout.split("\n")[-2:] == ["no copy is left", ""], done.stderr
+
+
+def test_what_moves_may_be_looked_at(tmp_path):
+    """Two spheres that graze each other, and that have parted: whatever is out of balance is allowed."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp, told = two(HERTZ, "* *", MOVES.strip())
+    lmp.numpy.extract_atom("v")[1] = [0.0, 100.0, 0.0]
+    lmp.command("timestep 1e-4")
+    touching = []
+    for _ in range(3):
+        touching.append(len(from_lammps(lmp, told, balance=np.inf).contacts))
+        lmp.command("run 40 post no")
+    assert touching[0] == 1
+    assert touching[-1] == 0
+    lmp.close()
