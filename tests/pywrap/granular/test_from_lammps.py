@@ -161,7 +161,7 @@ HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
     [
         (HERTZ, "* *", "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL shear x 1 contacts" + MOVES,
          "without shear"),
-        (HERTZ, "* *", "fix r all rigid/small molecule", "together in bodies"),
+        (HERTZ, "* *", "fix r all rigid/small molecule", "together in a body"),
         (HERTZ, "* *", "fix m all move linear 0 0 0", "unfix it, and let the packing come to rest"),
         (HERTZ, "* *", "fix s all setforce 0 1 NULL" + MOVES, "drives particles"),
         (HERTZ, "* *", "", "Nothing moves"),
