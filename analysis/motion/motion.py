@@ -148,9 +148,7 @@ class Motion:
         a, g = (mass_weighted(matrix, configuration) for matrix in (k, c))
         active = active_coordinates(a)
         root = np.sqrt(configuration.coordinate_mass[active])
-        if len(active) < a.shape[0]:  # slices of large matrices take as long as their assembly
-            a, g = a[active][:, active], g[active][:, active]
-        return cls(configuration, active, root, a, g)
+        return cls(configuration, active, root, a[active][:, active], g[active][:, active])
 
     @property
     def dissipative(self) -> bool:

@@ -29,7 +29,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import block_array, csr_array, eye_array, hstack
+from scipy.sparse import block_array, csr_array, eye_array, hstack, vstack
 from scipy.sparse.linalg import expm_multiply
 
 from ..arrays import Floats, floats
@@ -133,6 +133,17 @@ class OneSidedSystem:
         select = csr_array((np.ones(here.sum()), (np.flatnonzero(here), place[here])), shape=(len(bound), len(two)))
         return csr_array(rates[two] @ self._weight), csr_array(self._weight.T @ forces[:, two]), select
 
+    @cached_property
+    def _products(self) -> csr_array:
+        """What multiplies (z, v) in each step, in one matrix: -A beside -G; the excess; that of springs alone, if some
+        slider remembers no more."""
+        m, (_, excess, _, viscous) = self.motion, self.sliders
+        rows = [hstack([-m.stiffness, -m.damping]), excess]
+        if m.dissipative and not np.all(viscous):
+            size = len(m.active)
+            rows.append(hstack([excess[:, :size], csr_array((excess.shape[0], size))]))
+        return csr_array(vstack(rows))
+
     def start(self, velocity: Floats) -> OneSidedState:
         """At rest in the equilibrium, but for velocities of all coordinates, shape (coordinates, P)."""
         v = self.motion.root_mass[:, None] * velocity[self.motion.active]
@@ -219,15 +230,15 @@ class OneSidedSystem:
     def _force(self, state: OneSidedState, velocity: Floats, load: Floats | None) -> Floats:
         """Mass-weighted forces; sliders give way."""
         size, count = len(state.z), len(state.p)
-        force = -(self.motion.stiffness @ state.z) - self.motion.damping @ velocity
+        products = self._products @ np.concatenate([state.z, velocity])
+        force = products[:size]
         if load is not None:
             force += state.time * load
         if len(state.r):
             force += self.rescaled[1] @ state.r
         if count:
-            grip, excess, rectified, viscous = self.sliders
-            whole = excess @ np.concatenate([state.z, velocity])
-            springs = whole if np.all(viscous) else excess[:, :size] @ state.z
+            grip, _, rectified, viscous = self.sliders
+            whole, springs = products[size : size + count], products[-count:]
             if len(state.r):
                 turned = rectified * (self.rescaled[2] @ state.r)
                 whole, springs = whole + turned, springs + turned
