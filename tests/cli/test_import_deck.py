@@ -526,7 +526,7 @@ def test_laws_that_are_others_than_their_lines_say(faultgouge_here, tmp_path):
 
     deck = DECK.format(**FLAT, word="contacts")
     hooke = deck.replace("wall/gran hertz/history ${kn}", "wall/gran hooke/history 1e3")
-    smooth = deck.replace("NULL 0.9 1 yplane", "NULL 0 1 yplane").replace("run 6000", "run 0")
+    smooth = deck.replace("NULL 0.9 1 yplane 0", "NULL 0 1 yplane 0.01").replace("run 6000", "run 0")
     (tmp_path / "smooth.in").write_text(smooth)  # a wall without friction has no tangential stiffness, whatever it says
     assert "LAMMPS has" not in faultgouge_here("import", "smooth.in", "-o", "smooth.h5", "--balance", "1e9").stdout
     for name, text in (("hertz", deck), ("hooke", hooke)):
