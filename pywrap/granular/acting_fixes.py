@@ -5,10 +5,10 @@ only explain.
 """
 
 from .granular_commands import INTEGRATORS, WALLS, NotLinearisedError, without_suffix
-from .look_in_a_copy import DRAG, PER_STEP
+from .look_in_a_copy import DRAG, INSERTS, PER_STEP
 
 PASSIVE = (
-    *WALLS, *INTEGRATORS, *PER_STEP, *DRAG, "freeze", "gravity", "enforce2d", "NEIGH_HISTORY", "slip/history",
+    *WALLS, *INTEGRATORS, *PER_STEP, *DRAG, *INSERTS, "freeze", "gravity", "enforce2d", "NEIGH_HISTORY", "slip/history",
     "low/parts", "dashpot/velocities", "keep/histories", "store", "STORE", "DUMMY", "property/atom",
 )  # fmt: skip
 """Fixes, by the beginnings of their styles, whose action is in K, or constant, or none."""

@@ -37,6 +37,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
+from scipy.spatial import cKDTree
 
 from ...analysis.arrays import Floats, Indices
 from .granular_commands import SnapshotError
@@ -58,6 +59,9 @@ its difference has 1e-7."""
 TURNS = 3e-4
 """Smallest displacement as a share of the median overlap: `granular` does not turn a history that has left its plane by
 less than 1e-10 of Coulomb's bound, which is 2e-6 of mu of the difference."""
+
+NEAR = 1e-3
+"""Gap between particles, as a share of a radius, up to which they are looked for: far beyond all displacements."""
 
 ALONE = 1e-7
 """A displacement as a share of a radius where no particles overlap."""
@@ -168,15 +172,27 @@ def _measure(lmp: Any, particles: Particles, force: float | None) -> ForceDiffer
         force = step * float(np.abs(stiffness.data).max(initial=0.0)) / SHARE
     speed = _speed(by_velocity, step / timestep, PUSH * force)
     if speed == 0.0:
-        return ForceDifferences(stiffness, csr_array(stiffness.shape), error, jump)
+        _refuse_errors(particles, error)
+        return ForceDifferences(stiffness, csr_array(stiffness.shape), float(error.max()), jump)
     damping, jump_of_c, error_of_c = _derivative(by_velocity, colours, speed)
-    if max(error, error_of_c) > TOO_LARGE:
-        raise SnapshotError(
-            f"K and C by differences of forces are {max(error, error_of_c):.2g} of their largest entry from the forces "
-            "of a displacement of all particles: many contacts are about to open or to slide, or something couples "
-            "particles that are no neighbours."
-        )
-    return ForceDifferences(stiffness, damping, max(error, error_of_c), np.maximum(jump, jump_of_c))
+    error = np.maximum(error, error_of_c)
+    _refuse_errors(particles, error)
+    return ForceDifferences(stiffness, damping, float(error.max()), np.maximum(jump, jump_of_c))
+
+
+def _refuse_errors(particles: Particles, error: Floats) -> None:
+    """Refuse operators that describe nothing, with the particle where the error, shape (N,), is largest."""
+    worst = int(np.argmax(error))
+    if error[worst] <= TOO_LARGE:
+        return
+    place = ", ".join(f"{x:.6g}" for x in particles.position[worst, : particles.dimension])
+    others = int(np.sum(error > TOO_LARGE)) - 1
+    raise SnapshotError(
+        f"K and C by differences of forces are {error[worst]:.2g} of their largest entry from the forces of a "
+        f"displacement of all particles at particle {particles.ids[worst]} at ({place})"
+        f"{f', and at {others} more' if others else ''}: contacts there are about to open, to close or to slide, or "
+        "something couples particles that are no neighbours; run on with drag under a load that presses them together."
+    )
 
 
 def displacement(particles: Particles, pairs: Pairs) -> float:
@@ -208,14 +224,12 @@ MOVES = ("nve", "rigid", "move", "overdamped", "nvt", "nph", "npt")
 HOLDS = ("freeze", "setforce", "aveforce", "lineforce", "planeforce", "momentum", "recenter", "temp/")
 """Fixes that change forces or velocities of coordinates that are held, or that move as one."""
 
-INSERTS = ("pour", "deposit", "evaporate")
-
 
 def hold_still(lmp: Any) -> None:
     """Leave what exerts forces in a copy alone: no output, no drag, and nothing that moves or holds particles."""
     quieten(lmp, drag=True)
     for name, style in styles_of(lmp).fixes.items():
-        if style.startswith((*MOVES, *HOLDS, *INSERTS)):
+        if style.startswith((*MOVES, *HOLDS)):
             lmp.command(f"unfix {name}")
 
 
@@ -244,7 +258,7 @@ def _forces(lmp: Any, particles: Particles) -> Floats:
 
 
 def neighbouring_pairs(lmp: Any, particles: Particles) -> Pairs:
-    """Pairs within LAMMPS's cutoff, and those of bonds and angles; in a copy, where it runs zero steps."""
+    """Pairs that touch or nearly do, and those of bonds and angles; in a copy, where it runs zero steps."""
     lmp.command("compute faultgouge_i all property/local patom1 patom2")
     try:
         lmp.command("compute faultgouge_c all pair/local dist force")
@@ -259,13 +273,26 @@ def neighbouring_pairs(lmp: Any, particles: Particles) -> Pairs:
         gap, acts = np.full(len(i), np.inf), np.ones(len(i), np.bool_)
     else:
         gap, acts = distance - particles.radius[i] - particles.radius[j], force != 0
-    bonded = _bonded(lmp, particles.ids)
+    bonded, near = _bonded(lmp, particles.ids), _nearly_touching(lmp, particles)
     return Pairs(
-        np.concatenate([i, bonded[0]]),
-        np.concatenate([j, bonded[1]]),
-        np.concatenate([gap, np.full(len(bonded[0]), np.inf)]),
-        np.concatenate([acts, np.ones(len(bonded[0]), np.bool_)]),
+        np.concatenate([i, bonded[0], near.i]),
+        np.concatenate([j, bonded[1], near.j]),
+        np.concatenate([gap, np.full(len(bonded[0]), np.inf), near.gap]),
+        np.concatenate([acts, np.ones(len(bonded[0]), np.bool_), near.acts]),
     )
+
+
+def _nearly_touching(lmp: Any, particles: Particles) -> Pairs:
+    """Pairs a little apart: compute pair/local hands none of them out. LAMMPS has ghosts of particles across a periodic
+    boundary."""
+    every = [np.array(lmp.numpy.extract_atom(name)) for name in ("id", "x", "radius")]
+    count = lmp.extract_setting("nlocal") + lmp.extract_setting("nghost")
+    ids, x, radius = (values[:count] for values in every)
+    i, j = cKDTree(x).query_pairs(2 * float(radius.max()) * (1 + NEAR), output_type="ndarray").T
+    gap = np.linalg.norm(x[i] - x[j], axis=1) - radius[i] - radius[j]
+    near = (gap >= 0) & (gap < NEAR * radius[i])
+    i, j = (np.searchsorted(particles.ids, ids[each[near]]) for each in (i, j))
+    return Pairs(i, j, gap[near], np.zeros(len(i), np.bool_))
 
 
 def _local(lmp: Any, name: str, columns: int) -> Floats:
@@ -399,8 +426,8 @@ class _Probe:
         owned_array(self.lmp, "x")[_rows(self.lmp, self.particles)] = place
 
 
-def _derivative(probe: _Probe, colours: _Colours, step: float) -> tuple[csr_array, Floats, float]:
-    """-dF/dQ by steps of this size, jumps of it by particle, and the error."""
+def _derivative(probe: _Probe, colours: _Colours, step: float) -> tuple[csr_array, Floats, Floats]:
+    """-dF/dQ by steps of this size, and jumps of it and the error by particle, shape (N,)."""
     size, count = probe.particles.constraint.shape[0], len(probe.particles.ids)
     axis = count * np.arange(size // count)
     directions = []
@@ -426,8 +453,8 @@ def _derivative(probe: _Probe, colours: _Colours, step: float) -> tuple[csr_arra
     matrix.eliminate_zeros()
     forces = moved @ _slope_and_jump(last, probe.sizes, step)[0]
     largest, felt = np.abs(matrix.data).max(initial=0.0), np.abs(forces).max(initial=0.0)
-    error = np.abs(forces + matrix @ random / step).max(initial=0.0) / felt if felt else 0.0
-    return matrix, np.where(jump > SIDES * largest, jump, 0.0) / (largest or 1.0), float(error)
+    error = np.abs(forces + matrix @ random / step).reshape(-1, count).max(axis=0) / (felt or 1.0)
+    return matrix, np.where(jump > SIDES * largest, jump, 0.0) / (largest or 1.0), error
 
 
 def _slope_and_jump(found: Sides, sizes: tuple[float, ...], step: float) -> tuple[Floats, Floats]:

@@ -6,7 +6,7 @@ variables filled in: a command with a $ stands there twice, as it was written an
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from ...analysis import FaultgougeError
@@ -44,11 +44,12 @@ class NotLinearisedError(SnapshotError):
 
 @dataclass(frozen=True)
 class Commands:
-    """What a deck says of contacts and of motion: pair_style with the pair_coeff that hold, and fixes by their IDs; and
-    the write_restart that comes after the last run."""
+    """What a deck says of contacts and of motion: pair_style with the pair_coeff that hold, fixes and regions by their
+    IDs; and the write_restart that comes after the last run."""
 
     pair: tuple[str, ...]
     fixes: dict[str, str]
+    regions: dict[str, str] = field(default_factory=dict)
     write_restart: str = ""
 
     @property
@@ -73,18 +74,19 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
     style = restart = ""
     coefficients: list[str] = []
     fixes: dict[str, str] = {}
+    regions: dict[str, str] = {}
     whole = re.sub(r"&[ \t]*\n", " ", lines if isinstance(lines, str) else "\n".join(lines))
     for line in whole.splitlines():
         text = line.split("#")[0]
         words = text.split()
         if not words:
             continue
-        if "$" in text and words[0] in ("pair_style", "pair_coeff", "fix"):
+        if "$" in text and words[0] in ("pair_style", "pair_coeff", "fix", "region"):
             if log:
                 continue  # the line that follows has numbers
             raise SnapshotError(f"{line.strip()!r} has a variable: write its number, as a log of LAMMPS has it.")
         if words[0] == "clear":
-            style, coefficients, fixes = "", [], {}
+            style, coefficients, fixes, regions = "", [], {}, {}
         elif words[0] == "pair_style" and len(words) > 1:
             if not style or style.split()[1] != words[1]:
                 coefficients = []
@@ -95,12 +97,14 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
             fixes[words[1]] = " ".join(words)
         elif words[0] == "unfix" and len(words) == 2:
             fixes.pop(words[1], None)
+        elif words[0] == "region" and len(words) > 2:
+            regions[words[1]] = " ".join(words)
         elif words[0] in ("run", "minimize", "write_restart"):
             restart = text.strip() if words[0] == "write_restart" else ""
     if not style:
         where = "The log of this LAMMPS has" if log else "The commands have"
         raise SnapshotError(f"{where} no pair_style: {GIVE_LINES}.")
-    return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes, restart)
+    return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes, regions, restart)
 
 
 def logged_text(text: str, folder: Path) -> str:
@@ -164,8 +168,9 @@ def _check_model(words: list[str], line: str) -> None:
 
 
 MOVING = {
+    "rigid/small": "holds particles together in bodies, whose rotation is not linearised here: use single particles",
     "rigid": "holds particles together in a body: for a lid that does not rotate use fix nve and fix aveforce 0 0 0",
-    "poems": "holds particles together in bodies: leave it out",
+    "poems": "holds particles together in bodies, whose rotation is not linearised here: use single particles",
     "move": "moves particles: unfix it, and let the packing come to rest",
     "deform": "moves the box: unfix it, and let the packing come to rest",
     "press/berendsen": "moves the box: unfix it, and let the packing come to rest",

@@ -9,31 +9,46 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ...analysis import Configuration
+from ...analysis import Configuration, NoEquilibriumError
 from .from_lammps import from_lammps
 from .granular_commands import SnapshotError
+from .instance_queries import styles_of
+from .look_in_a_copy import INSERTS
+from .relax import relax
 
 
 def take_or_keep(
-    lmp: Any, commands: Iterable[str], keep: Path | None, *, slides: bool, balance: float
+    lmp: Any, commands: Iterable[str], keep: Path | None, *, slides: bool, balance: float, relaxes: bool
 ) -> Configuration:
-    """What `from_lammps` takes; an error of it says where the state is kept, in a file beside `keep`, if that is given.
+    """What `from_lammps` takes, after `relax` if that is asked for; an error says where the state is kept, in a file
+    beside `keep`, if that is given.
 
     Raises
     ------
     SnapshotError
-        If the packing cannot be taken.
+        If the packing cannot be taken, or flows.
     """
     try:
+        if relaxes:
+            _relax(lmp, commands)
         return from_lammps(lmp, commands, slides=slides, balance=balance)
-    except SnapshotError as error:
+    except (SnapshotError, NoEquilibriumError) as error:
         kept = None if keep is None else _keep(lmp, keep.with_suffix(".restart"))
         if kept is None:
             raise
+        longer = "" if isinstance(error, NoEquilibriumError) else ", and with a longer run"
         raise SnapshotError(
             f"{str(error).rstrip('.')}. The state is kept in {kept}: go on by a deck of read_restart {kept} and the "
-            "lines of this deck from pair_style on, without those that make particles, and with a longer run."
+            f"lines of this deck from pair_style on, without those that make particles{longer}."
         ) from error
+
+
+def _relax(lmp: Any, commands: Iterable[str]) -> None:
+    """Bring the particles that there are to rest."""
+    for name, style in styles_of(lmp).fixes.items():
+        if style.startswith(INSERTS):
+            lmp.command(f"unfix {name}")
+    relax(lmp, commands)
 
 
 def _keep(lmp: Any, file: Path) -> Path | None:

@@ -18,6 +18,7 @@ creeps or a loose sphere rolls away.
 
 import os
 import shutil
+import signal
 import weakref
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -37,11 +38,13 @@ from ...analysis.arrays import derive_frozen
 from ...analysis.errors import FaultgougeError, place_in_user_code
 from ...analysis.factors.sparse_lu import general_lu
 from ...parent_death import end_with
-from .from_lammps import KnownLaws, check_balance, take_snapshot
+from .balance import check_balance
+from .configuration_by_laws import KnownLaws
+from .from_lammps import take_snapshot
 from .granular_commands import INTEGRATORS, SnapshotError, read_commands, without_suffix
 from .instance_queries import OpenFile, explain_error, log_file, log_of, open_files
 from .lammps_arrays import owned_array, rows_of, set_velocity
-from .look_in_a_copy import can_copy, in_a_copy, quieten, silent_copy
+from .look_in_a_copy import can_copy, in_a_copy, interrupts_wait, quieten, silent_copy
 from .relax import RATE, REST, bring_to_rest
 
 ITERATIONS = 10
@@ -107,13 +110,14 @@ class LammpsPath:
         folder = TemporaryDirectory(prefix="faultgouge")
         here, there = Pipe()
         files = open_files()
-        first = silent_copy()
-        if first == 0:
-            here.close()
-            _wait_for_loads(relaxation, there, Path(folder.name), files)
-        there.close()
         self._kept: list[Kept] = [(-np.inf, here, None)]
-        self._end = weakref.finalize(self, _end, self._kept, first, os.getpid(), folder)
+        with interrupts_wait():
+            first = silent_copy()
+            if first == 0:
+                here.close()
+                _wait_for_loads(relaxation, there, Path(folder.name), files)
+            self._end = weakref.finalize(self, _end, self._kept, first, os.getpid(), folder)
+        there.close()
 
     def __call__(self, value: float) -> Configuration:
         """The packing in equilibrium at a value."""
@@ -153,11 +157,18 @@ class LammpsPath:
 def _ask(there: Connection, value: float, *, relaxes: bool) -> tuple[Connection, Any]:
     """Have a copy of the process copy itself and go to a load; the new copy, and what it finds."""
     here, end = Pipe()
-    there.send((value, relaxes))
-    send_handle(there, end.fileno(), 0)
-    end.close()
+    copy = 0
     try:
+        with interrupts_wait():
+            there.send((value, relaxes))
+            send_handle(there, end.fileno(), 0)
+            end.close()
+            copy = here.recv()
         return here, here.recv()
+    except KeyboardInterrupt:
+        if copy:
+            os.kill(copy, signal.SIGKILL)
+        raise
     except EOFError:
         return here, SnapshotError(f"LAMMPS ended without a word while it relaxed at {value:g}.")
 
@@ -186,6 +197,7 @@ def _wait_for_loads(relaxation: "_Relaxation", there: Connection, folder: Path, 
                 end_with(this)  # which ends with the path, also while this copy relaxes
                 there.close()
                 there = end
+                there.send(os.getpid())
                 _own_log(relaxation.lmp, folder, files)
                 there.send(relaxation.result(*load))
             else:

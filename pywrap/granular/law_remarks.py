@@ -28,6 +28,8 @@ def remark_on(law: MeasuredLaw, commands: Commands, name: tuple[int, int] | str,
     radius, overlap = np.array(state.radius), np.array(state.overlap)
     says = []
     for what, said in _said(line).items():
+        if what == "tangential" and law.mu == 0:
+            continue  # without friction there is no tangential force
         measured = law.mu if isinstance(said, float) else float(getattr(law, what).at(radius, overlap))
         given = said if isinstance(said, float) else float(said.at(radius, overlap))
         if given > 0 and abs(measured / given - 1) > DIFFERENT:

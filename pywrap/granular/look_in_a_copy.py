@@ -31,6 +31,9 @@ Found = TypeVar("Found")
 PER_STEP = ("ave/", "print", "vector", "halt", "balance", "adapt", "dt/reset", "record")
 """Fixes that write or change something in a run of zero steps, by the beginnings of their styles."""
 
+INSERTS = ("pour", "deposit", "evaporate")
+"""Fixes that put particles in or take them out, with which no time step may be changed."""
+
 DRAG = ("viscous", "langevin", "overdamped")
 """Fixes that take energy away."""
 
@@ -42,10 +45,15 @@ def can_copy(lmp: Any) -> bool:
 
 
 def silent_copy(*keep: int) -> int:
-    """Copy this process; its ID, or in the copy, which writes to no open file but the descriptors to keep, 0."""
+    """Copy this process; its ID, or in the copy, which writes to no open file but the descriptors to keep, 0.
+
+    The process decides what Ctrl-C ends: call this where :func:`interrupts_wait`.
+    """
     ctypes.CDLL(None).fflush(None)  # what is buffered would be written twice
     child = os.fork()
     if child == 0:
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
         _silence(keep)
     return child
 
@@ -75,7 +83,7 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
     here, there = Pipe(duplex=False)
     this, child = os.getpid(), 0
     try:
-        with _interrupts_wait():
+        with interrupts_wait():
             child = silent_copy(there.fileno())
             if child == 0:
                 _send_and_end(work, there, this)
@@ -97,7 +105,6 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
 def _send_and_end(work: Callable[[], Found], there: Connection, parent: int) -> NoReturn:
     """The life of a copy: its work, and what it has found for the parent."""
     try:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process decides what Ctrl-C ends
         end_with(parent)
         there.send(work())
     except Exception as error:  # whatever it is, the parent says it
@@ -107,7 +114,7 @@ def _send_and_end(work: Callable[[], Found], there: Connection, parent: int) -> 
 
 
 @contextmanager
-def _interrupts_wait() -> Iterator[None]:
+def interrupts_wait() -> Iterator[None]:
     """Let Ctrl-C wait: at a fork it would leave a copy that nobody ends, or let the copy go on as the program."""
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or before is None:
@@ -124,11 +131,11 @@ def _interrupts_wait() -> Iterator[None]:
 
 
 def quieten(lmp: Any, *, drag: bool = False) -> None:
-    """Close dumps, averages and restarts of a copy; drag too, if asked."""
+    """Close dumps, averages and restarts of a copy, and let it have the particles that it has; drag too, if asked."""
     lmp.command("restart 0")
     lmp.command("timer timeout unlimited")  # fix halt, too, has runs skipped
     for name in lmp.available_ids("dump"):
         lmp.command(f"undump {name}")
     for name, style in styles_of(lmp).fixes.items():
-        if style.startswith(PER_STEP) or (drag and style.startswith(DRAG)):
+        if style.startswith((*PER_STEP, *INSERTS)) or (drag and style.startswith(DRAG)):
             lmp.command(f"unfix {name}")

@@ -12,10 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import Configuration, NoEquilibriumError
+from ...analysis import Configuration, NoEquilibriumError, stable_timestep
 from ...analysis.arrays import Floats
-from .from_lammps import force_scale, particles_at_rest, take_snapshot
+from .balance import force_scale
+from .configuration_by_differences import still_particles
+from .from_lammps import take_snapshot
 from .granular_commands import SnapshotError, read_commands
+from .instance_queries import explain_error
 from .lammps_arrays import owned_array, rows_of, set_velocity
 from .look_in_a_copy import can_copy
 
@@ -29,8 +32,14 @@ CHUNK = 2000
 RATE = 0.01
 """Rate of the drag at the beginning, per time step: critical for a mode of 1000 steps."""
 
+PATIENCE = 50 * CHUNK
+"""Steps after which the time step is looked at: a packing that rests has come near to it by then."""
+
+FAR = 10.0
+"""Diameters that particles move in the mean before a packing is said to flow: what has been poured first falls."""
+
 SLOWEST, FASTEST = 1e-4, 0.2
-"""Rates of the drag, per time step; explicit drag alternates from 1 on."""
+"""Rates of the drag, per time step, on the mean mass, and on the smallest one; explicit drag alternates from 1 on."""
 
 
 def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = REST, steps: int = 1_000_000) -> float:
@@ -57,15 +66,25 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
     SnapshotError
         If the instance cannot be taken, as by `from_lammps`.
     NoEquilibriumError
-        If the packing flows: its particles have moved by their diameter in the mean, or do not come to rest.
+        If the packing flows: its particles have moved by ten diameters in the mean, or do not come to rest.
     """
     if not can_copy(lmp):
         raise SnapshotError("relax looks at copies of the process: use one rank and one thread.")
     given = None if commands is None else list(commands)
-    start = particles_at_rest(lmp, None if given is None else read_commands(given))
+    lines = None if given is None else read_commands(given)
+
+    def scale(found: Configuration) -> float:
+        """A force that is at rest what the mean contact force is."""
+        return (
+            force_scale(found)
+            if found.operators == "laws"
+            else force_scale(found, still_particles(lmp, lines).at_walls)
+        )
+
+    start = still_particles(lmp, lines).configuration
     look = partial(take_snapshot, lmp, given, {}, slides=False, balance=np.inf, prove=False)
-    found, _ = bring_to_rest(lmp, look, start, balance, steps, RATE, "")
-    return found.residual / (force_scale(found) or 1.0)
+    found, _ = bring_to_rest(lmp, look, start, balance, steps, RATE, "", far=FAR, scale=scale)
+    return found.residual / (scale(found) or 1.0)
 
 
 def bring_to_rest(
@@ -76,6 +95,9 @@ def bring_to_rest(
     steps: int,
     rate: float,
     where: str,
+    *,
+    far: float = 1.0,
+    scale: Callable[[Configuration], float] = force_scale,
 ) -> tuple[Configuration, float]:
     """Run with drag until the packing rests.
 
@@ -93,6 +115,10 @@ def bring_to_rest(
         Of the drag at the beginning, per time step.
     where : str
         What errors say of the load.
+    far : float
+        Diameters by which particles move in the mean, and then are said to flow.
+    scale : callable
+        The mean contact force of a configuration.
 
     Returns
     -------
@@ -103,15 +129,19 @@ def bring_to_rest(
     """
     dt, turning = float(lmp.extract_global("dt")), lmp.has_style("fix", "viscous/sphere")  # else dashpots alone
     drags = {"faultgouge_drag": "viscous"} | ({"faultgouge_spin": "viscous/sphere"} if turning else {})
-    way, residual, force = 0.0, np.inf, force_scale(start)
-    mass, squared_radius = float(start.mass[start.free].mean()), float(np.mean(start.radius**2))
+    way, residual, force = 0.0, np.inf, scale(start)
+    mass, squared_radius = float(start.mass[start.free].mean()), float(np.min(start.radius**2))
+    fastest = FASTEST * float(start.mass[start.free].min()) / mass
     try:
-        for _ in range(0, steps, CHUNK):
+        for done in range(0, steps, CHUNK):
+            if done == PATIENCE:
+                _refuse_long_steps(look(), dt, where)
+            rate = float(np.clip(rate, min(SLOWEST, fastest), fastest))
             drag = mass * rate / dt
             spin = drag * squared_radius if turning else 0.0
             for (name, style), strength in zip(drags.items(), (drag, spin), strict=False):
                 lmp.command(f"fix {name} all {style} {strength:.17g}")
-            lmp.command(f"run {CHUNK} post no")
+            _run(lmp, len(start), where)
             forces = _on_bodies(lmp, start, ("f", "torque"), (1.0, 1.0))
             drag_forces = _on_bodies(lmp, start, ("v", "omega"), (drag, spin))
             residual = float(np.linalg.norm(np.vstack([forces, drag_forces]), axis=0).max())
@@ -119,23 +149,47 @@ def bring_to_rest(
             way += CHUNK * dt * float(speed.mean())
             if force == 0.0 or residual <= balance * force:
                 found = look()
-                force = force_scale(found)
+                force = scale(found)
                 if found.residual <= balance * force:
                     set_velocity(lmp, found, np.zeros(found.coordinates))
                     return found, rate
-            if way > 2 * start.radius.mean():
-                raise NoEquilibriumError(f"The packing flows{where}: its particles have moved by a diameter.")
+            if way > far * 2 * start.radius.mean():
+                moved = f"{far:g} diameters" if far > 1 else "a diameter"
+                raise NoEquilibriumError(f"The packing flows{where}: its particles have moved by {moved}.")
             ratio = np.linalg.norm(forces) / max(np.linalg.norm(drag_forces), np.finfo(float).tiny)
             rate *= 2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0
-            rate = float(np.clip(rate, SLOWEST, FASTEST))
     finally:
         for name in drags:
             if name in lmp.available_ids("fix"):
                 lmp.command(f"unfix {name}")
     raise NoEquilibriumError(
-        f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of "
-        "balance; give more steps, or the packing creeps."
+        f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of balance; give more "
+        "steps, or the packing creeps."
     )
+
+
+def _refuse_long_steps(found: Configuration, timestep: float, where: str) -> None:
+    """Refuse to wait for a packing that vibrates because its time step is not stable."""
+    limit = float(stable_timestep(found))
+    if timestep > limit:
+        raise NoEquilibriumError(
+            f"The packing vibrates{where} and cannot come to rest: its time step {timestep:.4g} is longer than the "
+            f"largest stable one, {limit:.4g}, of its contacts with their dashpots; take a shorter one."
+        )
+
+
+def _run(lmp: Any, count: int, where: str) -> None:
+    """Some steps, at the end of which there are as many particles."""
+    try:
+        lmp.command(f"run {CHUNK} post no")
+    except Exception as error:  # LAMMPS raises what its bindings choose
+        raise SnapshotError(f"While the packing came to rest{where}, {explain_error(error)}") from error
+    lost = count - lmp.extract_setting("nlocal")
+    if lost:
+        raise NoEquilibriumError(
+            f"{lost} particles left the box while the packing came to rest{where}: delete those that fall outside of "
+            "the walls, or take a box with walls or periodic edges."
+        )
 
 
 def _on_bodies(lmp: Any, start: Configuration, names: tuple[str, str], weight: tuple[float, float]) -> Floats:

@@ -16,11 +16,12 @@ from mpi4py import MPI
 
 from ...analysis import BadInputError, Configuration
 from ..lammps.instance import lammps_instance
-from .from_lammps import BALANCE, check_balance, check_instance
+from .balance import BALANCE, check_balance
 from .granular_commands import NotLinearisedError, SnapshotError, commands_in, logged_text, read_commands
 from .instance_queries import communicator, explain_error, name_of, styles_of
 from .kept_state import take_or_keep
 from .look_in_a_copy import can_copy
+from .looks import check_instance
 
 MARK = "faultgouge_rest_of_the_deck"
 """Label of the first line of the second part of a deck."""
@@ -55,10 +56,13 @@ class Deck(NamedTuple):
         return f"jump SELF {MARK}\n{self.head}label {MARK}\n{self.rest}"
 
 
-def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE, keep: Path | None = None) -> Configuration:
+def run_deck(
+    path: Path, *, slides: bool = False, balance: float = BALANCE, relaxes: bool = False, keep: Path | None = None
+) -> Configuration:
     """Run a deck in its own folder, as `lmp -in` there, and take its last state as `from_lammps` does.
 
-    A state that cannot be taken is kept in a restart file beside `keep`.
+    If `relaxes`, the last state comes to rest first, by :func:`~faultgouge.pywrap.granular.relax.relax`. A state that
+    cannot be taken is kept in a restart file beside `keep`.
 
     Raises
     ------
@@ -83,7 +87,7 @@ def run_deck(path: Path, *, slides: bool = False, balance: float = BALANCE, keep
             _refuse_what_stays(lmp, path, _text_of_logs(lmp, log, path), deck.ahead)
             _carry_out_text(lmp, path, deck.second_part)
         commands = commands_in(_text_of_logs(lmp, log, path))
-        found = take_or_keep(lmp, commands, keep, slides=slides, balance=balance)
+        found = take_or_keep(lmp, commands, keep, slides=slides, balance=balance, relaxes=relaxes)
         lmp.close()
     return found
 

@@ -163,8 +163,10 @@ def read_results(*paths: Path) -> dict[str, Row]:
     rows: dict[str, Row] = {}
     places: dict[str, Path] = {}
     for path in paths:
-        for row in result_rows.read_keyed_rows(path, "key", "a sweep"):
+        for number, row in enumerate(result_rows.read_keyed_rows(path, "key", "a sweep"), 1):
             key = row["key"]
+            if not (isinstance(key, str) and {"values", "says", "final", "result"} <= row.keys()):
+                raise SceneError(f"{path}: line {number} is no result of a sweep: take it out, or give another folder")
             if key in rows and rows[key]["says"] is None:
                 if row["says"] is None and _as_text(row["result"]) != _as_text(rows[key]["result"]):
                     values = ", ".join(f"{name} = {value}" for name, value in row["values"].items())

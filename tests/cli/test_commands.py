@@ -49,6 +49,18 @@ def whole(tmp_path_factory, faultgouge_here_in):
     return folder, json.loads(faultgouge_here_in(folder, "ramp", "scene.toml", "--json").stdout)
 
 
+def test_ramp_to_a_load_that_the_file_went_beyond(faultgouge_here, tmp_path):
+    """Nothing is computed, and the load is not the last one of the file."""
+    scene = SMALL | {"ramp": {"step": 6e-3, "until": [0.012, 0.0]}}
+    (tmp_path / "scene.toml").write_text(toml(scene))
+    assert "F_x = 0 reached" in faultgouge_here("ramp", "scene.toml").stdout
+    before = (tmp_path / "run.h5").read_bytes()
+    (tmp_path / "scene.toml").write_text(toml(scene | {"ramp": {"step": 6e-3, "until": 6e-3}}))
+    said = faultgouge_here("ramp", "scene.toml").stdout
+    assert said == "run.h5 goes on from F_x = 0.006, where ramp.until ends, to F_x = 0: nothing is left to compute\n"
+    assert (tmp_path / "run.h5").read_bytes() == before
+
+
 @pytest.mark.slow
 def test_ramp_as_json(whole):
     folder, printed = whole

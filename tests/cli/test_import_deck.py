@@ -110,21 +110,89 @@ def test_refused_before_the_run(faultgouge_here, tmp_path):
     assert not (tmp_path / "packing.h5").exists()
 
 
-def test_walls_that_hand_out_no_contacts(faultgouge_here, tmp_path):
-    """The word `contacts` changes no motion, and the contacts are found without it."""
-    from faultgouge.analysis.files.configuration_file import read_configuration
+SIDE = "fix side all wall/gran hertz/history ${{kn}} NULL 10 NULL 0.9 1 xplane -0.94 NULL {word}\nfix move"
 
+
+@pytest.mark.parametrize("walls", [1, 2])
+def test_walls_that_hand_out_no_contacts(faultgouge_here, tmp_path, walls):
+    """The word `contacts` changes no motion, and the contacts are found without it, in a corner of two walls, too."""
     found = {}
     for word in ("contacts", ""):
-        (tmp_path / f"pile{word}.in").write_text(DECK.format(**ROUND, word=word))
+        deck = DECK if walls == 1 else DECK.replace("fix move", SIDE)
+        shape = ROUND if walls == 1 else ROUND | {"down": "-0.3 0 -1"}
+        (tmp_path / f"pile{word}.in").write_text(deck.format(**shape, word=word))
         faultgouge_here("import", f"pile{word}.in", "-o", f"pile{word}.h5")
         found[word] = read_configuration(tmp_path / f"pile{word}.h5")
     one, other = (found[word].contacts for word in ("contacts", ""))
     assert found[""].operators == "laws"
     assert np.array_equal(one.i, other.i)
-    assert one.wall.sum() == 3
+    assert np.array_equal(np.unique(one.i[one.wall], return_counts=True)[1], [1, 1, 1] if walls == 1 else [2, 1, 1])
     for name in ("normal", "overlap", "normal_force", "tangential_force", "tangential_stiffness"):
         assert getattr(other, name) == pytest.approx(getattr(one, name), abs=1e-12 * one.normal_stiffness.max())
+
+
+POUR = """
+units lj
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -2 2 -2 2 -1 9 units box
+create_box 1 box
+neigh_modify delay 0
+pair_style granular
+pair_coeff * * {law}
+variable rise equal {rise}
+region floor plane 0 0 0 0 0 1 side in move NULL NULL v_rise units box
+region tube cylinder z 0 0 1.3 -1 9 side in units box
+region bin intersect 2 floor tube
+fix bin all wall/gran/region granular {law} region bin
+fix load all gravity 1.0 vector 0 0 -1
+fix move all nve/sphere
+region slab cylinder z 0 0 1.2 4 8 units box
+fix ins all pour 5 1 4711 region slab diam range 0.8 1.0 dens 1.0 1.0
+timestep 0.002
+thermo 100000
+thermo_modify lost warn
+run {steps}
+"""
+LAW = "hertz 2e3 10 tangential mindlin 1.5e3 1 0.5 rolling sds 100 {g} 0.2"
+
+
+def test_what_has_been_poured_comes_to_rest(faultgouge_here, tmp_path):
+    """A deck that ends while its particles move, with fix pour, which lets no time step be changed; and with a region
+    that may move, but stays."""
+    deck = POUR.format(law=LAW.format(g=1), rise=0.0, steps=6000)
+    (tmp_path / "pour.in").write_text(deck)
+    said = faultgouge_here("import", "pour.in", "-o", "pour.h5", code=1).stderr
+    assert "The packing moves: the residual of particle" in said
+    assert "bring it to rest by faultgouge.relax(lmp), in a command --relax, or" in said
+    faultgouge_here("import", "pour.in", "-o", "pour.h5", "--relax")
+    found = read_configuration(tmp_path / "pour.h5")
+    assert len(found) == 5
+    assert found.operators == "differences"
+    weight = float(found.mass.mean())
+    assert found.residual < 1e-7 * weight
+    assert found.proof < 1e-5
+
+
+def test_regions_that_move(faultgouge_here, tmp_path):
+    """A part of an intersection that rises with the time: its place is another one in each run."""
+    (tmp_path / "pour.in").write_text(POUR.format(law=LAW.format(g=1), rise="1e-6*elapsed", steps=2000))
+    for more in ((), ("--relax",)):
+        said = faultgouge_here("import", "pour.in", *more, code=1).stderr
+        assert "Region floor of fix bin moves with v_rise: give this variable a constant before the last run" in said
+        (tmp_path / "packing.restart").unlink()
+
+
+def test_time_step_with_which_nothing_rests(faultgouge_here, tmp_path):
+    """Rolling dashpots stronger than the time step allows: spheres vibrate for ever, as their friction bounds it."""
+    deck = POUR.format(law=LAW.format(g=500), rise=0.0, steps=6000)
+    (tmp_path / "pour.in").write_text(deck.replace("pour 5", "pour 8"))
+    said = faultgouge_here("import", "pour.in", "--relax", code=1).stderr
+    found = re.search(r"its time step 0.002 is longer than the largest stable one, (\S+), of its contacts", said)
+    assert 1e-5 < float(found[1]) < 0.002
+    assert "and with a longer run" not in said
 
 
 COHESIVE = "jkr 1e3 0.05 0.3 10 tangential mindlin 800 1 0.5 rolling sds 100 1 0.2"
@@ -329,9 +397,11 @@ EARLY = {
 }
 
 
+ON_TWO_RANKS = [pytest.param(way, 2, marks=() if way in ("if", "error") else pytest.mark.long) for way in EARLY]
+
+
 @pytest.mark.ranks
-@pytest.mark.parametrize("ranks", [None, 2])
-@pytest.mark.parametrize("way", EARLY)
+@pytest.mark.parametrize(("way", "ranks"), [*((way, None) for way in EARLY), *ON_TWO_RANKS])
 def test_decks_that_end_early(faultgouge, tmp_path, monkeypatch, way, ranks):
     """One sentence, no file of results, no temporary file."""
     temporary = tmp_path / "temporary"
@@ -367,7 +437,9 @@ def test_packing_in_which_nothing_touches(faultgouge_here, tmp_path):
     assert "no frame 3: leave --frame out" in faultgouge_here("draw", "far.h5", "--frame", "3", code=2).stderr
 
 
-@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize(
+    "closed", ["2>&-", "<&- >&- 2>&-", *(pytest.param(each, marks=pytest.mark.long) for each in ("<&-", ">&-"))]
+)
 def test_closed_streams(tmp_path, closed):
     """No file of results is taken for a stream that was closed."""
     (tmp_path / "pile.in").write_text(DECK.format(**FLAT, word="contacts"))
@@ -454,6 +526,9 @@ def test_laws_that_are_others_than_their_lines_say(faultgouge_here, tmp_path):
 
     deck = DECK.format(**FLAT, word="contacts")
     hooke = deck.replace("wall/gran hertz/history ${kn}", "wall/gran hooke/history 1e3")
+    smooth = deck.replace("NULL 0.9 1 yplane 0", "NULL 0 1 yplane 0.01").replace("run 6000", "run 0")
+    (tmp_path / "smooth.in").write_text(smooth)  # a wall without friction has no tangential stiffness, whatever it says
+    assert "LAMMPS has" not in faultgouge_here("import", "smooth.in", "-o", "smooth.h5", "--balance", "1e9").stdout
     for name, text in (("hertz", deck), ("hooke", hooke)):
         (tmp_path / f"{name}.in").write_text(text)
         said = faultgouge_here("import", f"{name}.in", "-o", f"{name}.h5").stdout

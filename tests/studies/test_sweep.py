@@ -204,9 +204,10 @@ def test_a_cut_line_is_computed_again_and_a_longer_sweep_goes_on(tmp_path):
     assert said == [f"1 of 2 points are in {lines} already"]
     assert lines.read_text().startswith(first)
     assert [row["values"]["packing.seed"] for row in read_results(lines).values()] == [1, 2]  # nothing of the cut line
-    lines.write_text("no result\n")
-    with pytest.raises(SceneError, match="line 1"):
-        read_results(lines)
+    for strange in ("no result", '{"key": "0"}', '{"key": 1, "values": {}, "says": null, "final": true, "result": {}}'):
+        lines.write_text(f"{first}{strange}\n")
+        with pytest.raises(SceneError, match="line 2 is no result of a sweep: take it out"):
+            read_results(lines)
 
 
 def test_failures_are_rows_and_merge_refuses_what_does_not_belong_together(tmp_path):

@@ -105,18 +105,19 @@ def import_(
     friction. The command prints how far the disks moved.
 
     A LAMMPS deck (NAME.in, in.NAME) is run in its own folder, and its last state is
-    stored unchanged, with LAMMPS's own granular styles, disks or spheres.
+    stored unchanged, with LAMMPS's own granular styles, disks or spheres. With --relax
+    LAMMPS first runs on with drag until the packing rests.
     """
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
     lock_output(context, output)
     if file.suffix == ".in" or file.name.startswith("in."):
-        given = [top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame, relax or None]
+        given = [top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame]
         if floor or any(each is not None for each in given):
             raise typer.BadParameter(
-                f"{file} is a deck, which says all by itself: leave all options but -o, --slides and --balance"
+                f"{file} is a deck, which says all by itself: leave all options but -o, --relax, --slides and --balance"
             )
-        _import_deck(file, output, slides, balance)
+        _import_deck(file, output, slides, balance, relax)
         return
     if slides or balance is not None:
         raise typer.BadParameter("--slides and --balance are for a LAMMPS deck (.in): leave them out")
@@ -142,15 +143,16 @@ def import_(
     )
 
 
-def _import_deck(file: Path, output: Path, slides: bool, balance: float | None) -> None:
+def _import_deck(file: Path, output: Path, slides: bool, balance: float | None, relaxes: bool) -> None:
     """Run a deck and keep its last state."""
     from faultgouge.analysis.files.configuration_file import write_configuration
-    from faultgouge.pywrap.granular.from_lammps import BALANCE
+    from faultgouge.pywrap.granular.balance import BALANCE
     from faultgouge.pywrap.granular.run_deck import run_deck
 
     keeps(f"nothing has been written to {output} yet")
     with status(f"{file}: LAMMPS runs"):
-        configuration = run_deck(file, slides=slides, balance=BALANCE if balance is None else balance, keep=output)
+        allowed = BALANCE if balance is None else balance
+        configuration = run_deck(file, slides=slides, balance=allowed, relaxes=relaxes, keep=output)
     if is_root():
         write_configuration(output, configuration, {"deck": file.read_text(errors="replace")})
     for remark in configuration.remarks:
@@ -166,7 +168,8 @@ def _verdict(configuration: Configuration, output: Path) -> str:
     from faultgouge.analysis.motion.stability import LARGE
     from faultgouge.analysis.progress import show_progress
 
-    if not is_root() or configuration.coordinates > LARGE // 4:
+    moves = len(configuration.rattlers) < len(configuration)
+    if not is_root() or (moves and configuration.coordinates > LARGE // 4):
         return f"whether the packing is stable says `faultgouge spectrum {output}`"
     with status("stability") as show, show_progress(show):
         return str(stability(configuration))

@@ -90,7 +90,8 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     settings = require_section(wanted.ramp, "ramp")
     with Record(output, wanted, saved=keeps) as record:
         start = _settle_or_read(wanted, record)
-        total, done = len(all_loads(settings)), count_behind(settings, record.forces)
+        loads = all_loads(settings)
+        total, done = len(loads), count_behind(settings, record.forces)
         dumps = output.with_suffix("") if wanted.output is not None and wanted.output.dumps else None
         for equilibrium in progress(ramp_up(wanted, start, dumps=dumps, behind=done), "equilibria", total, done):
             report_fallback(equilibrium)
@@ -102,6 +103,10 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     left = _hysteresis(output, settings)
     if as_json:
         print_json({"equilibria": _equilibria(output), "hysteresis": None if left is None else asdict(left)})
+        return
+    if record.last.fx != loads[-1]:
+        beyond = f"{output} goes on from F_x = {loads[-1]:g}, where ramp.until ends, to F_x = {record.last.fx:g}"
+        print_line(f"{beyond}: nothing is left to compute")
         return
     print_line(f"F_x = {record.last.fx:g} reached; residual force {record.last.residual:.2g}; written to {output}")
     if left is not None:

@@ -252,7 +252,7 @@ def test_branch_vectors_that_point_to_either_partner(beds, monkeypatch):
     of the forces on particles.
     """
     from faultgouge.pywrap import from_lammps
-    from faultgouge.pywrap.granular import from_lammps as module
+    from faultgouge.pywrap.granular import looks as module
 
     lmp = beds("gran/hertz/history", 3, True)
     found, look = from_lammps(lmp), module.arrays_at_rest
@@ -585,3 +585,19 @@ def test_ctrl_c_ends_the_copy(tmp_path, at_the_fork):
     words = [sys.executable, "-c", INTERRUPTED.format(tests=str(Path(__file__).parent), at_the_fork=at_the_fork)]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60, start_new_session=True)
     assert done.stdout.split("\n")[-2:] == ["no copy is left", ""], done.stderr
+
+
+def test_what_moves_may_be_looked_at(tmp_path):
+    """Two spheres that graze each other, and that have parted: whatever is out of balance is allowed."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp, told = two(HERTZ, "* *", MOVES.strip())
+    lmp.numpy.extract_atom("v")[1] = [0.0, 100.0, 0.0]
+    lmp.command("timestep 1e-4")
+    touching = []
+    for _ in range(3):
+        touching.append(len(from_lammps(lmp, told, balance=np.inf).contacts))
+        lmp.command("run 40 post no")
+    assert touching[0] == 1
+    assert touching[-1] == 0
+    lmp.close()

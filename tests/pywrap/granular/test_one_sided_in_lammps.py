@@ -352,7 +352,7 @@ def test_the_standard_law_after_a_push(layer):
         np.testing.assert_allclose(pushed_layer(layer, column, times), expected.mean_square_displacement, rtol=0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_standard_law_under_a_load_that_rises(layer):
     """The layer vibrates for ever in proportion to the rate: as one-sided motion says, and not with more friction."""
     from research.rising.compute import rise_in_lammps

@@ -1,0 +1,80 @@
+"""Is a packing at rest? What is out of balance, and why forces may be though nothing moves."""
+
+import numpy as np
+
+from ...analysis import BadInputError, Configuration, LinearisedContacts
+from ...analysis.arrays import Floats
+from .granular_commands import OWN, Commands, SnapshotError
+
+BALANCE = 1e-4
+"""Share of the mean contact force that may be out of balance: then the motion is that of a packing which comes to rest
+elsewhere, and K says nothing of it."""
+
+NONE: Floats = np.zeros(0)
+
+
+def check_balance(balance: float) -> None:
+    """Refuse a residual that is no number from 0 on: every packing would be at rest, or none."""
+    if not balance >= 0:
+        raise BadInputError(f"balance = {balance:g} is refused: give a share of the mean contact force, from 0 on.")
+
+
+def force_scale(snapshot: Configuration, at_walls: Floats = NONE) -> float:
+    """The mean normal force of contacts, and of walls whose contacts are not known, by particle; where nothing is
+    known, the force of an overlap of 1e-4 of a radius."""
+    forces = np.concatenate([np.abs(snapshot.contacts.normal_force), at_walls[at_walls > 0]])
+    if len(forces):
+        return float(forces.mean())
+    if snapshot.stiffness is None:
+        return 0.0
+    return 1e-4 * float(np.abs(snapshot.stiffness.data).max(initial=0.0) * snapshot.radius.mean())
+
+
+def refuse_motion(snapshot: Configuration, balance: float, commands: Commands, at_walls: Floats = NONE) -> None:
+    """Refuse a packing that moves, with the particle that is farthest from rest."""
+    force = force_scale(snapshot, at_walls)
+    if not snapshot.residual > balance * force:  # an infinite balance allows no number where nothing touches
+        return
+    size = snapshot.particle_residual
+    worst = int(np.argmax(size))
+    place = ", ".join(f"{x:.6g}" for x in snapshot.position[worst])
+    others = int(np.sum(size > balance * force)) - 1
+    also = f", and {others} more {'are' if others > 1 else 'is'} out of balance" if others else ""
+    advice = known_cause(commands, snapshot.contacts) or (
+        "bring it to rest by faultgouge.relax(lmp), in a command --relax, or a longer run with drag (fix viscous, and "
+        "fix viscous/sphere for rotation), or allow more by from_lammps(lmp, balance=...), in a command --balance"
+    )
+    raise SnapshotError(
+        f"The packing moves: the residual of particle {snapshot.ids[worst]} at ({place}) is {size[worst] / force:.3g} "
+        f"of the mean contact force, and {balance:g} is allowed{also}; {advice}."
+    )
+
+
+LOST = (
+    "have no tangential force, as where histories are lost: LAMMPS reads none from a restart file if another instance "
+    "of a granular style was there before in the process, and not all across a periodic boundary or with newton off; "
+    "read the file in a process of its own, and run on with drag (fix viscous) until the packing rests"
+)
+
+TWICE = "particles touch each other twice, of which LAMMPS mixes the histories: take a box that is wider"
+
+
+def _touch_twice(contacts: LinearisedContacts) -> bool:
+    """Whether two particles touch each other through two periodic images."""
+    pairs = np.sort(np.column_stack([contacts.i, contacts.j])[~contacts.wall], axis=1)
+    return len(np.unique(pairs, axis=0)) < len(pairs)
+
+
+def known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
+    """Why forces are out of balance though the packing may be at rest; empty if no cause is known."""
+    if _touch_twice(contacts):
+        return TWICE
+    if commands.write_restart and commands.style != OWN:
+        return (
+            f"{commands.write_restart!r} stands after the last run, where LAMMPS forgets tangential histories if "
+            "its lists of neighbours have changed since: have the run itself write the restart, by `restart N FILE` "
+            "before it"
+        )
+    has_friction = (contacts.friction > 0) & np.isfinite(contacts.friction)  # infinite where no law is known
+    lost = np.count_nonzero(has_friction & ~contacts.tangential_force.any(axis=1))
+    return f"{lost} of {len(contacts)} contacts {LOST}" if lost else ""

@@ -1,0 +1,117 @@
+"""A Configuration whose K and C are differences of LAMMPS's own forces, whatever exerts them."""
+
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array
+
+from ...analysis import Configuration, LinearisedContacts
+from ...analysis.arrays import Floats, derive_frozen
+from .balance import force_scale
+from .contact_geometry import OneLaw, contacts_of_pairs
+from .force_differences import Particles, measure_operators
+from .granular_commands import OWN, Commands, SnapshotError
+from .instance_queries import open_files
+from .lammps_arrays import Arrays
+from .look_in_a_copy import in_a_copy
+from .looks import box_of, look_at_forces
+from .mobility import mobility
+
+
+class Still(NamedTuple):
+    """Particles as they stand, without K and C: both are empty.
+
+    `constraint` is P of q = P Q, which the configuration has only where P says more than which particles are free.
+    `commands` and `fixes` are those of the instance. `at_walls` has the size of the force of walls on each particle,
+    shape (N,).
+    """
+
+    configuration: Configuration
+    constraint: csr_array
+    commands: Commands
+    fixes: dict[str, str]
+    at_walls: Floats
+
+
+def configuration_by_differences(lmp: Any, still: Still) -> Configuration:
+    """The configuration with K and C, of an instance on one rank.
+
+    Its contacts are those of pairs that touch, with their forces as far as LAMMPS hands them out.
+    """
+    made = still.configuration
+    place = np.zeros((len(made), 3))
+    place[:, : made.dimension] = made.position
+    particles = Particles(made.dimension, made.ids, place, made.radius, still.constraint)
+    measured = measure_operators(lmp, particles, force_scale(made, still.at_walls) or None)
+    return derive_frozen(
+        made,
+        stiffness=measured.stiffness,
+        damping=measured.damping,
+        operator_error=measured.error,
+        jump=measured.jump,
+    )
+
+
+def still_particles(lmp: Any, given: Commands | None) -> Still:
+    """The particles of an instance, and what moves or holds them."""
+    files = open_files()
+    columns = ["dx dy dz force p1 p2 p3", "dx dy dz force", "dx dy dz"]
+    while True:  # not every pair style hands all of these out
+        try:
+            look = partial(look_at_forces, lmp, given, files, columns[0])
+            commands, fixes, found, members = in_a_copy(look)
+            break
+        except SnapshotError:
+            columns.pop(0)
+            if not columns:
+                raise
+    count, dimension = len(found["id"]), lmp.extract_setting("dimension")
+    if count == 0:
+        raise SnapshotError("This LAMMPS has no particles.")
+    lines = {name: line for name, line in commands.fixes.items() if name in members}
+    constraint, factor = mobility(lines, members, found["rmass"], dimension)
+    axes = 6 if dimension == 3 else 3
+    free = np.diff(constraint.indptr).reshape(axes, count).any(axis=0)
+    alone = diags_array(np.tile(free, axes).astype(np.float64))
+    box, origin, periodic = box_of(lmp)
+    empty = csr_array(constraint.shape)
+    made = Configuration(
+        dimension=dimension,
+        position=found["x"][:, :dimension],
+        radius=found["radius"],
+        mass=found["rmass"],
+        inertia=factor * found["rmass"] * found["radius"] ** 2,
+        contacts=_forces_of_pairs(found, box, commands.style),
+        box=box,
+        origin=origin,
+        periodic=periodic,
+        load=np.zeros((count, 2, 3)),
+        free=free,
+        ids=found["id"].astype(np.int64),
+        kind=found["type"].astype(np.int64),
+        stiffness=empty,
+        damping=empty,
+        constraint=constraint if abs(constraint - alone).nnz else None,
+    )
+    total = np.stack([found["f"], found["torque"]], axis=1)
+    load = np.where(free[:, None, None], total, 0.0) - made.contact_force
+    return Still(derive_frozen(made, load=load), constraint, commands, fixes, found["at walls"])
+
+
+def _forces_of_pairs(found: Arrays, box: Floats, style: str) -> LinearisedContacts:
+    """Pairs that touch, with their forces alone: derivatives are zero, and no bound is known."""
+    pairs = contacts_of_pairs(found, box)
+    count, columns = pairs.forces.shape
+    if columns == 0:
+        pairs = OneLaw(pairs.who, {name: values[:0] for name, values in pairs.geometry.items()}, np.zeros((0, 4)))
+        count = 0
+    none, still = np.zeros(count), np.zeros((count, 3))
+    tangential = pairs.forces[:, 1:4] if columns >= 4 else still
+    made = LinearisedContacts(
+        **pairs.geometry, lever_arm=pairs.geometry["slip_arm"], lever_slope=none, normal_force=pairs.forces[:, 0],
+        tangential_force=tangential, normal_stiffness=none, tangential_stiffness=none, closing=still, parting=still,
+        friction=np.full(count, np.inf), sliding=np.zeros(count, bool), normal_dashpot=none, tangential_dashpot=none,
+        viscous_slider=np.full(count, style != OWN),
+    )  # fmt: skip
+    return made.chosen(made.normal_force != 0)

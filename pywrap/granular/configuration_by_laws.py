@@ -1,0 +1,251 @@
+r"""A Configuration whose contacts have the laws that LAMMPS shows.
+
+What LAMMPS says of each contact (compute pair/local, fix wall/gran ... contacts) is its normal, its overlap and both
+forces, without dashpots, since the look is taken at rest (:mod:`~faultgouge.pywrap.granular.lammps_arrays`). The laws
+are measured (:mod:`~faultgouge.pywrap.granular.contact_law_measurement`), with which
+
+.. math::
+
+    f_n' = p\, f_n/\delta, \qquad k_t' = k_t (R\delta)^q, \qquad \mathbf b = \beta\, \mathbf f_t/\delta,
+
+so that the slip itself is not needed. What the styles have was found to be
+
+=====================================  =====  =====  =============  =============
+style                                  p      q      beta, closing  beta, parting
+=====================================  =====  =====  =============  =============
+gran/hooke/history; linear_history     1      0      0              0
+gran/hertz/history; mindlin            3/2    1/2    1/2            1/2
+linear_history_classic                 1      1/2    1/2            1/2
+mindlin/force                          3/2    1/2    0              0
+mindlin_rescale                        3/2    1/2    1/2            1
+mindlin_rescale/force                  3/2    1/2    0              1/2
+=====================================  =====  =====  =============  =============
+
+and hooke with a mindlin model, or hertz with linear_history, are as their parts; the wall of fix wall/gran
+hooke/history is as linear_history_classic in the release of 22 Jul 2025. A small vibration shakes a contact at
+Coulomb's bound down to elastic, so that it sticks by default.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis import Configuration, LinearisedContacts, MindlinLaw
+from ...analysis.arrays import Floats, derive_frozen
+from ...analysis.contacts import BOOLEAN, PER_CONTACT, WALL
+from ...analysis.packing.linearise import linearise_contacts
+from .balance import known_cause
+from .contact_geometry import (
+    OneLaw,
+    by_types,
+    contacts_of_floor,
+    contacts_of_pairs,
+    contacts_of_wall,
+    median_state,
+)
+from .contact_law_measurement import MeasuredLaw, measure_law
+from .granular_commands import GIVE_LINES, OWN, Commands, NotLinearisedError, SnapshotError, without_suffix
+from .lammps_arrays import Arrays
+from .law_remarks import remark_on
+from .looks import box_of
+
+AGREES = 1e-6
+"""Relative difference of the normal forces of LAMMPS from those of its commands, besides that of roundings."""
+
+ROUNDING = 1e-14
+"""Rounding of an overlap, as a share of the distance of two centres: some units in the last place of coordinates that
+may be ten times as large."""
+
+KnownLaws = dict[tuple[Any, ...], MeasuredLaw]
+"""By their commands, and the two types or the ID of a wall's fix."""
+
+
+def configuration_by_laws(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> Configuration:
+    """The configuration of the arrays of a look; laws that are known are not measured, and new ones are added."""
+    count, dimension = len(found["id"]), lmp.extract_setting("dimension")
+    if count == 0:
+        raise SnapshotError("This LAMMPS has no particles.")
+    free, frozen, factor = _free_particles(commands, found)
+    box, origin, periodic = box_of(lmp)
+    contacts, remarks = _linearised_contacts(lmp, commands, found, frozen, laws, box)
+    made = Configuration(
+        dimension=dimension,
+        position=found["x"][:, :dimension],
+        radius=found["radius"],
+        mass=found["rmass"],
+        inertia=factor * found["rmass"] * found["radius"] ** 2,
+        contacts=contacts,
+        box=box,
+        origin=origin,
+        periodic=periodic,
+        load=np.zeros((count, 2, 3)),
+        free=free,
+        ids=found["id"].astype(np.int64),
+        kind=found["type"].astype(np.int64),
+        remarks=remarks,
+    )
+    total = np.stack([found["f"], found["torque"]], axis=1)
+    load = np.where(free[:, None, None], total - made.contact_force, -made.contact_force)
+    _check_torques(load[free, 1] / made.radius[free, None], commands, made.contacts)
+    return derive_frozen(made, load=load)
+
+
+def check_friction(contacts: LinearisedContacts, *, rests: bool) -> None:
+    """Refuse tangential forces beyond Coulomb's bound, which is that of the commands."""
+    size = np.linalg.norm(contacts.tangential_force, axis=1)
+    beyond = size > contacts.friction + AGREES * (contacts.friction + contacts.normal_force)
+    if np.any(beyond):
+        most = np.max(size[beyond] / contacts.normal_force[beyond])
+        mu = np.min(contacts.friction[beyond] / contacts.normal_force[beyond])
+        moves = "" if rests else "the packing moves: bring it to rest by faultgouge.relax(lmp); or "
+        raise SnapshotError(
+            f"{np.count_nonzero(beyond)} contacts carry more than Coulomb's bound of the commands, up to |f_t| = "
+            f"{most:.3g} f_n with mu = {mu:.3g}: {moves}the commands are not those of the instance; {GIVE_LINES}, as "
+            "they hold now."
+        )
+
+
+def _check_torques(others: Floats, commands: Commands, contacts: LinearisedContacts) -> None:
+    """Refuse torques besides those of the contacts: in all that is taken here contacts alone turn particles."""
+    forces = (
+        AGREES * np.abs(contacts.tangential_force).max(initial=0.0),
+        ROUNDING * contacts.normal_force.max(initial=0.0),
+    )
+    if np.abs(others).max() > sum(forces):
+        known = known_cause(commands, contacts)
+        reason = known or (
+            "either something else turns them, which is not linearised here, or this release of LAMMPS hands out "
+            "contacts in a way that is not known here; releases of 29 Aug 2024 to 22 Jul 2025 are"
+        )
+        raise (SnapshotError if known else NotLinearisedError)(
+            f"The torques on particles are not those of their contacts: {reason}."
+        )
+
+
+def _free_particles(commands: Commands, found: Arrays) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
+    """Which particles are free, which are frozen, and I/(m R^2) of each."""
+    count = len(found["id"])
+    frozen, free, factor = np.zeros(count, bool), np.zeros(count, bool), np.full(count, 0.4)
+    for name, line in commands.fixes.items():
+        if f"group {name}" not in found:
+            continue
+        members, words = found[f"group {name}"], line.split()
+        style = without_suffix(words[3])
+        if style == "freeze":
+            frozen |= members
+        elif style == "nve/sphere":
+            factor[members] = 0.5 if "disc" in words else 0.4
+        else:
+            factor[members] = float(words[4 if style == "nve/disc" else 5])
+        free |= members
+    free &= ~frozen
+    if not free.any():
+        raise SnapshotError(
+            "Nothing moves the particles: give the line of fix nve/sphere, or set it up, so that it is known which of "
+            "them are free and what their moments of inertia are."
+        )
+    return free, frozen, factor
+
+
+def _linearised_contacts(
+    lmp: Any, commands: Commands, found: Arrays, frozen: NDArray[np.bool_], laws: KnownLaws, box: Floats
+) -> tuple[LinearisedContacts, tuple[str, ...]]:
+    """Contacts between particles, then those with each wall; and remarks on their laws."""
+    pairs, walls = (
+        contacts_of_pairs(found, box),
+        [name.removeprefix("wall ") for name in found if name.startswith("wall ")],
+    )
+    parts, remarks = [], []
+    if commands.style == OWN:
+        parts.append(_linearise_smooth(_smooth_law(commands.pair[0].split()[2:]), pairs))
+        for name in walls:
+            words = commands.fixes[name].split()
+            law = _smooth_law(words[4:7] + words[9:])
+            parts.append(_linearise_smooth(law, contacts_of_floor(found, name, float(words[8]))))
+    else:
+        groups: dict[Any, OneLaw] = by_types(pairs, found["type"]) | {
+            name: contacts_of_wall(found, name) for name in walls
+        }
+        for name, group in groups.items():
+            if len(group.forces) == 0:
+                continue
+            # a law is that of its commands, which a user may change
+            key = (*commands.pair, commands.fixes.get(name), name)
+            state = median_state(group, found)
+            if key not in laws:
+                laws[key] = measure_law(lmp, commands, name, state, group.who)
+            remarks.append(remark_on(laws[key], commands, name, state))
+            parts.append(_linearise_measured(laws[key], group, found, frozen))
+    values = {name: [getattr(each, name) for each in parts] for name in PER_CONTACT}
+    if not parts:
+        values = {
+            name: [np.zeros((0, *shape), bool if name in BOOLEAN else float)] for name, shape in PER_CONTACT.items()
+        }
+    contacts = LinearisedContacts(**{name: np.concatenate(each) for name, each in values.items()})
+    return contacts, tuple(remark for remark in remarks if remark)
+
+
+def _smooth_law(words: list[str]) -> MindlinLaw:
+    """The smooth law of a line, whose first three words are kn, kt and mu."""
+    kn, kt, mu = map(float, words[:3])
+    rest = words[3:]
+    at = rest.index("damping") if "damping" in rest else None
+    cn, ct = (0.0, 0.0) if at is None else (float(word) for word in rest[at + 1 : at + 3])
+    exponent = float(rest[rest.index("exponent") + 1]) if "exponent" in rest else 1.5
+    history = rest[rest.index("history") + 1] if "history" in rest else "total"
+    return MindlinLaw(
+        kn, kt, mu, exponent=exponent, cn=cn, ct=ct, rescaled=history == "rescaled", coulomb=history == "coulomb"
+    )
+
+
+def _linearise_smooth(law: MindlinLaw, contacts: OneLaw) -> LinearisedContacts:
+    """Contacts of mindlin/smooth, along z x n."""
+    normal, arms = contacts.geometry["normal"], contacts.geometry["slip_arm"]
+    tangent = np.column_stack([-normal[:, 1], normal[:, 0], np.zeros(len(normal))])
+    slip = contacts.forces[:, -1]
+    made = linearise_contacts(law, slip=slip, tangent=tangent, lever_arm=arms, **contacts.geometry)
+    _agree(made.normal_force, made.normal_stiffness, contacts)
+    return made
+
+
+def _linearise_measured(
+    law: MeasuredLaw, contacts: OneLaw, found: Arrays, frozen: NDArray[np.bool_]
+) -> LinearisedContacts:
+    """Contacts of a law that has been measured."""
+    i, j, overlap, arms = (contacts.geometry[name] for name in ("i", "j", "overlap", "slip_arm"))
+    normal_force, tangential_force = contacts.forces[:, 0], contacts.forces[:, 1:]
+    wall, radius, mass = j == WALL, found["radius"], found["rmass"]
+    stiffness = (1 + law.stiffness.overlap) * normal_force / overlap
+    reduced_radius = np.where(wall, radius[i], radius[i] * radius[j] / (radius[i] + radius[j]))
+    # frozen particles weigh infinitely much in LAMMPS's dashpots, but not at walls; two frozen ones matter to nobody
+    inverse = np.where(frozen, 0.0, 1 / mass)
+    inverse_mass = inverse[i] + inverse[j]
+    reduced_mass = np.divide(1.0, inverse_mass, out=np.zeros(len(i)), where=inverse_mass > 0)
+    reduced_mass = np.where(wall, mass[i], reduced_mass)
+    _agree(law.stiffness.at(reduced_radius, overlap) * overlap, stiffness, contacts)
+    per_overlap = tangential_force / overlap[:, None]
+    return LinearisedContacts(
+        **contacts.geometry,
+        lever_arm=np.where(arms > 0, arms - law.lever * overlap[:, None], 0.0),
+        lever_slope=np.full(len(i), law.lever),
+        normal_force=normal_force,
+        tangential_force=tangential_force,
+        normal_stiffness=stiffness,
+        tangential_stiffness=law.tangential.at(reduced_radius, overlap),
+        closing=law.closing * per_overlap,
+        parting=law.parting * per_overlap,
+        friction=law.mu * normal_force,
+        sliding=np.zeros(len(i), dtype=bool),
+        normal_dashpot=law.normal_dashpot.at(reduced_radius, overlap, reduced_mass),
+        tangential_dashpot=law.tangential_dashpot.at(reduced_radius, overlap, reduced_mass),
+    )
+
+
+def _agree(computed: Floats, stiffness: Floats, contacts: OneLaw) -> None:
+    """Refuse normal forces that are not those of the commands."""
+    said, rounding = contacts.forces[:, 0], ROUNDING * stiffness * contacts.geometry["slip_arm"].sum(axis=1)
+    if len(said) and np.any(np.abs(computed - said) > AGREES * np.max(np.abs(said)) + rounding):
+        raise SnapshotError(
+            f"The normal forces of the {contacts.who} are not those of the commands: {GIVE_LINES}, as they hold now."
+        )

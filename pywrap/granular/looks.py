@@ -1,0 +1,159 @@
+"""What a LAMMPS instance says of its particles, contacts and fixes, in a copy of the process if there can be one."""
+
+from contextlib import nullcontext, suppress
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis.arrays import Floats
+from .force_differences import HOLDS, MOVES
+from .granular_commands import (
+    GIVE_LINES,
+    INTEGRATORS,
+    OWN,
+    WALLS,
+    Commands,
+    NotLinearisedError,
+    SnapshotError,
+    check_fixes,
+    check_pair,
+    check_rest,
+    read_commands,
+    without_suffix,
+)
+from .instance_queries import OpenFile, Styles, communicator, log_of, only_log, styles_of
+from .lammps_arrays import Arrays, arrays_at_rest, contacts_of_plane, forces_in_order, given_back
+from .look_in_a_copy import can_copy, quieten
+from .mobility import MOBILE
+from .moving_regions import refuse_moving_regions
+
+BY_CONTACT = ("contacts", "partners")
+"""Arrays with a row for each contact; all others have one for each particle."""
+
+
+def look_at_contacts(
+    lmp: Any, given: Commands | None, files: dict[int, OpenFile]
+) -> tuple[Commands, dict[str, str], Arrays]:
+    """The commands, the styles of fixes, and the arrays of all ranks in the order of the particles' IDs; in a copy if
+    there can be one."""
+    world, copied = communicator(lmp), can_copy(lmp)
+    if given is None:
+        lines = log_of(lmp, files) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
+        if lines is None:
+            raise SnapshotError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
+        given = read_commands(lines, log=True)
+    elif copied:
+        lmp.command("log none")
+    styles = styles_of(lmp)
+    check_instance(lmp, styles, given)
+    plain = {name: without_suffix(style) for name, style in styles.fixes.items()}
+    groups = {name: given.fixes[name].split()[2] for name in plain if plain[name] in (*INTEGRATORS, "freeze")}
+    walls = [name for name in plain if plain[name] in WALLS]
+    columns = "dx dy dz force p3" if given.style == OWN else "dx dy dz force p1 p2 p3"
+    if copied:
+        quieten(lmp)
+    silent = _silent_walls(styles, given)
+    with nullcontext() if copied else given_back(lmp):
+        mine = arrays_at_rest(lmp, groups, [name for name in walls if name not in silent], columns)
+    forces = mine["f"]
+    for name in silent:
+        mine[f"wall {name}"], forces = contacts_of_plane(lmp, name, given.fixes[name], mine, forces)
+    every = world.allgather(mine)
+    found = {name: _join_ranks([each[name] for each in every]) for name in mine}
+    order = np.argsort(found["id"], kind="stable")
+    return given, styles.fixes, {name: rows if name in BY_CONTACT else rows[order] for name, rows in found.items()}
+
+
+def _join_ranks(parts: list[Floats]) -> Floats:
+    """Rows of all ranks; those of a rank that has none may have another number of columns."""
+    return np.concatenate([part for part in parts if len(part)] or parts[:1])
+
+
+def look_at_forces(
+    lmp: Any, given: Commands | None, files: dict[int, OpenFile], columns: str
+) -> tuple[Commands, dict[str, str], Arrays, dict[str, NDArray[np.bool_]]]:
+    """The commands, the styles of fixes, the particles, and who is in the groups of the fixes that move or hold them;
+    in a copy."""
+    if given is None:
+        lines = log_of(lmp, files)
+        if lines is None:
+            raise SnapshotError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
+        given = read_commands(lines, log=True)
+    lmp.command("log none")
+    styles = styles_of(lmp)
+    with suppress(NotLinearisedError):
+        check_instance(lmp, styles, given)
+    moving = {name for name, style in styles.fixes.items() if style.startswith((*MOVES, *HOLDS))}
+    for name in moving:
+        style = styles.fixes[name]
+        if without_suffix(style) not in MOBILE:
+            raise SnapshotError(
+                f"fix {name} {style} moves or holds particles in a way that is not known here: unfix it."
+            )
+        if name not in given.fixes or without_suffix(given.fixes[name].split()[3]) != without_suffix(style):
+            raise SnapshotError(
+                f"The commands have no line of fix {name} {style}: give the line that the deck has among commands."
+            )
+    refuse_moving_regions(lmp, given)
+    groups = {name: line.split()[2] for name, line in given.fixes.items() if name in moving}
+    quieten(lmp)
+    found = arrays_at_rest(lmp, groups, [], columns)
+    found["at walls"] = _forces_of_walls(lmp, styles, given, found)
+    order = np.argsort(found["id"], kind="stable")
+    members = {name: found.pop(f"group {name}")[order] for name in groups}
+    found = {name: rows if name in BY_CONTACT else rows[order] for name, rows in found.items()}
+    return given, styles.fixes, found, members
+
+
+def _forces_of_walls(lmp: Any, styles: Styles, commands: Commands, found: Arrays) -> Floats:
+    """Sizes of the forces of all walls on each particle, shape (N,), in a copy, which loses walls."""
+    walls = {name for name, style in styles.fixes.items() if style.startswith("wall/gran")}
+    says = {name for name in walls if "contacts" in commands.fixes.get(name, "").split()}
+    total = np.zeros((len(found["id"]), 3))
+    for name in says:
+        total += np.array(lmp.numpy.extract_fix(name, 1, 2))[: len(total), 1:4]
+    for name in walls - says:  # no compute of the deck needs them
+        lmp.command(f"unfix {name}")
+    if walls - says:
+        lmp.command("run 0 post no")
+        total += found["f"] - forces_in_order(lmp, found["id"])
+    return np.asarray(np.linalg.norm(total, axis=1))
+
+
+def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
+    """Refuse what an instance has that is not linearised here, whatever its particles do."""
+    if without_suffix(styles.pair) != commands.style:
+        raise SnapshotError(
+            f"The commands have pair_style {commands.style}, and the instance has {styles.pair}: {GIVE_LINES}."
+        )
+    if not lmp.extract_setting("radius_flag") or any(word in styles.atom for word in ("body", "ellipsoid", "bpm")):
+        raise SnapshotError(f"atom_style {styles.atom} has no disks and spheres alone: use atom_style sphere.")
+    if lmp.extract_global("ftm2v") != 1.0:
+        units = lmp.extract_global("units")
+        raise SnapshotError(f"In units {units} force is not mass times acceleration: use lj, si, cgs, micro or nano.")
+    check_rest(styles.fixes, commands)
+    if lmp.extract_setting("molecule_flag") and lmp.extract_global("nbonds"):
+        raise NotLinearisedError("Bonds hold particles together: take them out.")
+    check_pair(commands, lmp.available_styles("pair"))
+    check_fixes(styles.fixes, commands)
+    silent = _silent_walls(styles, commands)
+    if silent and not can_copy(lmp):
+        raise SnapshotError(
+            f"fix {silent[0]} wall/gran does not hand out its contacts, and on several ranks or with threads they are "
+            "not found without it: write contacts at its end."
+        )
+
+
+def _silent_walls(styles: Styles, commands: Commands) -> list[str]:
+    """IDs of walls that hand out no contacts."""
+    walls = [name for name, style in styles.fixes.items() if without_suffix(style) == "wall/gran"]
+    return [name for name in walls if "contacts" not in commands.fixes[name].split()]
+
+
+def box_of(lmp: Any) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Edges of the box in rows, its lower corner, and along which edges it is periodic."""
+    low, high, xy, yz, xz, periodic, _ = lmp.extract_box()
+    size = np.subtract(high, low)
+    edges = np.array([[size[0], 0, 0], [xy, size[1], 0], [xz, yz, size[2]]])
+    return edges, np.array(low), np.array(periodic, dtype=np.bool_)
