@@ -200,7 +200,8 @@ class Motion:
         frequency = np.sqrt(abs(self.stiffness).sum(axis=1).max())
         # growth is looked for from where the discs end
         partly = np.isfinite(slow.covered)
-        periods = PERIODS if partly else float(np.clip(SEEN * frequency / (4 * np.pi * slow.width), *TIMES))
+        width = max(slow.width, np.finfo(float).tiny)  # discs of a packing that collapses may only just touch
+        periods = PERIODS if partly else float(np.clip(SEEN * frequency / (4 * np.pi * width), *TIMES))
         fast = fastest_growing(self.stiffness, self.damping, periods=(min(TIMES[0], periods), periods))
         apart = np.maximum(CERTAIN * frequency, SURE * fast.residuals * np.abs(fast.values))
         new = [

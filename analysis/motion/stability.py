@@ -152,15 +152,8 @@ class Stability:
                 f"{self.one_sided['time']:.4g})"
                 + (f"; growth of D slower than exp({self.searched:.2g} t) was not sought" if self.searched else "")
             )
-        slowest = f"the slowest with D as exp({self.growth_rate:.6g} t){free}"
-        if self.searched:
-            decay = f"of the motions that were found all decay, {slowest}; " if self.growth_rate < 0 else ""
-            return (
-                f"stable: no motion was found to grow; {decay}growth of D below exp({self.searched:.2g} t) was not "
-                "looked for everywhere"
-            )
         if self.dissipative and self.growth_rate < 0:
-            return f"stable: every motion decays, {slowest}"
+            return f"stable: every motion decays, the slowest with D as exp({self.growth_rate:.6g} t){free}"
         return f"stable: no motion grows{free}"
 
     @property
@@ -275,6 +268,11 @@ def stability(
                     f"where D is {one_sided['amplification']:.3g} times the mean square velocity of the push"
                 )
             grows = one_sided["grows"]
+    elif small_motion and not grows and own.searched:
+        why.append(
+            f"no motion was found to grow, and D that grows more slowly than exp({own.searched:.2g} t) was not looked "
+            "for everywhere"
+        )
     if direction is not None and small_motion:
         rising = follow_load(OneSidedSystem.of(configuration, share), direction, time)
     searched = own.searched

@@ -210,6 +210,19 @@ def test_large_packings_have_the_verdict_of_small_ones(monkeypatch):
     assert expected.searched == 0.0
 
 
+def test_a_search_that_finds_no_growth_is_no_proof_that_a_packing_is_stable(monkeypatch):
+    stuck = derive_frozen(replace(_three(), law=replace(_three().law, mu=50.0, cn=0.02)).configuration)
+    at_rest = derive_frozen(stuck, load=-stuck.contact_force)
+    assert stability(at_rest).stable is True
+    monkeypatch.setattr(stability_module, "LARGE", 0)
+    for name, value in {"SLICED": 0, "DENSE": 0, "DISCS_UP_TO": 0, "PERIODS_OF_LARGE": 9 * 30.0}.items():
+        monkeypatch.setattr(motion_module, name, value)
+    found = stability(at_rest)
+    assert found.stable is None
+    assert found.searched > 0
+    assert "D that grows more slowly than exp(" in str(found)
+
+
 def test_what_follows_a_load_that_rises_does_not_vibrate():
     """With dashpots that take hundreds of units of time to stop what the beginning of the rise has set going."""
     lossy = replace(_three(), law=replace(_three().law, mu=50.0, cn=0.02, ct=0.01)).configuration
