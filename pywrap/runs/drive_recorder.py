@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from mpi4py import MPI
@@ -171,10 +171,15 @@ def clock_advance(path: Path, other: Path) -> float | None:
     with RunFile(path) as with_signal, RunFile(other) as without:
         settings = drive_of(with_signal)
         assert settings is not None
-        after = [[slip for slip in slips_in(run) if slip.ends > (settings.at or 0.0)] for run in (with_signal, without)]
-    if not after[1]:
+        return advance_of(slips_in(with_signal), slips_in(without), settings.at or 0.0)
+
+
+def advance_of(slips: Sequence[Slip], without: Sequence[Slip], at: float) -> float | None:
+    """The same of the slips of two runs, with a signal that begins at a time, and without."""
+    due = next((slip for slip in without if slip.ends > at), None)
+    if due is None:
         return None
-    due = after[1][0]
-    begins = (slip.begins for slip in after[0] if abs(slip.force_drop) >= COMPARABLE * abs(due.force_drop))
+    after = (slip for slip in slips if slip.ends > at)
+    begins = (slip.begins for slip in after if abs(slip.force_drop) >= COMPARABLE * abs(due.force_drop))
     first = next(begins, None)
     return None if first is None else due.begins - first
