@@ -93,8 +93,8 @@ class UndampedRun:
     packing : Packing
         Where it starts.
     motion : dict
-        What `Engine.undamped` is given beside the time step: perturbation, signal, weakening; or `Engine.driven`: spring,
-        stages, signal.
+        What `Engine.undamped` is given beside the time step: perturbation, signal, weakening; or `Engine.driven`:
+        spring, stages, signal.
     floor : bool
         Whether the floor is there.
     contacts : Path or None
