@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +26,8 @@ VIBRATES = 0.05
 STAYS = 0.1
 """Share of the length of a slip by which a layer that comes to rest may move and be said to stay."""
 
-TOO_EARLY = 1.0
-"""Time, in units of the scene, by which a slip is moved beyond what noise does: noise moves most slips by less."""
+ROW = 0.1
+"""Time between two rows of a series, which no clock advance is better than; rounded up."""
 
 Row = dict[str, Any]
 
@@ -91,16 +92,22 @@ def verdicts(rows: Sequence[Row], spring: float) -> list[Row]:
 
 
 def advances(rows: Sequence[Row]) -> Row:
-    """Clock advances of pulses over phase, height and frequency, and of noise."""
-    pulses = [row for row in rows if row["kind"] == "pulse"]
+    """Clock advances of pulses over phase, height and frequency, and of noise.
+
+    The noise floor of a slip is the largest advance or delay by one of its pulses of noise.
+    """
     noise = [row for row in rows if row["kind"] == "noise"]
-    known = np.abs([row["advance"] for row in noise if row["advance"] is not None])
+    floor: dict[tuple[int, int], float] = {}
+    for row in noise:
+        key = row["seed"], row["slip"]
+        moved_by = np.inf if row["advance"] is None else abs(row["advance"])
+        floor[key] = max(floor.get(key, ROW), moved_by)
+    pulses = [row | {"floor": floor[row["seed"], row["slip"]]} for row in rows if row["kind"] == "pulse"]
+    groups = {"height": HEIGHTS, "omega": FREQUENCIES, "phase": PHASES}
     cells = [
         {"phase": phase, "height": height, "omega": omega}
         | moved([r for r in pulses if (r["phase"], r["height"], r["omega"]) == (phase, height, omega)])
-        for phase in PHASES
-        for height in HEIGHTS
-        for omega in FREQUENCIES
+        for phase, height, omega in product(PHASES, HEIGHTS, FREQUENCIES)
     ]
     return {
         "slips": sum(row["kind"] == "slip" for row in rows),
@@ -108,27 +115,23 @@ def advances(rows: Sequence[Row]) -> Row:
         "too_short": sum(row["kind"] == "too short" for row in rows),
         "noise": {
             "runs": len(noise),
-            "median": float(np.median(known)),
-            "largest": float(known.max()),
-            "beyond": share(int((known > TOO_EARLY).sum()), len(noise)),
-            "none": len(noise) - len(known),
+            "median": float(np.median([abs(row["advance"]) for row in noise if row["advance"] is not None])),
+            "floors": sorted(round(each, 2) for each in floor.values()),
         },
         "cells": cells,
-        "heights": [{"height": h} | moved([r for r in pulses if r["height"] == h]) for h in HEIGHTS],
-        "omegas": [{"omega": w} | moved([r for r in pulses if r["omega"] == w]) for w in FREQUENCIES],
-        "phases": [{"phase": p} | moved([r for r in pulses if r["phase"] == p]) for p in PHASES],
+        "by": [{"name": n, "value": v} | moved([r for r in pulses if r[n] == v]) for n in groups for v in groups[n]],
     }
 
 
 def moved(rows: Sequence[Row]) -> Row:
-    """Of how many pulses the next slip comes earlier or later than noise makes it, or not at all; median of all."""
-    values = np.array([row["advance"] for row in rows if row["advance"] is not None])
+    """By how many pulses the next slip comes earlier or later than by any noise, or not at all; the median of all."""
+    known = [(row["advance"], row["floor"]) for row in rows if row["advance"] is not None]
     return {
         "pulses": len(rows),
-        "earlier": share(int((values > TOO_EARLY).sum()), len(rows)),
-        "later": share(int((values < -TOO_EARLY).sum()), len(rows)),
-        "none": len(rows) - len(values),
-        "median": middle(values),
+        "earlier": share(sum(advance > floor for advance, floor in known), len(rows)),
+        "later": share(sum(advance < -floor for advance, floor in known), len(rows)),
+        "none": len(rows) - len(known),
+        "median": middle([advance for advance, _ in known]),
     }
 
 
@@ -140,7 +143,6 @@ def numbers(folder: Path = HERE) -> Row:
         "seeds": sorted({row["seed"] for row in springs}),
         "verdicts": {spring: verdicts(springs, spring) for spring in SPRINGS},
         "clock": advances(read_rows(folder / "tables" / CLOCK_TABLE)),
-        "early": TOO_EARLY,
         "stays": STAYS,
     }
 

@@ -1,0 +1,40 @@
+"""The page about a shear cell: its script runs, and what stability says is what LAMMPS does."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from docs.run_page import files
+
+PAGE = Path(__file__).parents[2] / "docs" / "howto_shear_cell.md"
+
+
+@pytest.mark.long
+def test_script_of_the_page(tmp_path):
+    """Other builds pour another bed: what agrees in one agrees in another."""
+    for name, text in files(PAGE).items():
+        (tmp_path / name).write_text(text)
+    done = subprocess.run([sys.executable, "cycle.py"], cwd=tmp_path, capture_output=True, text=True, timeout=1800)
+    assert done.returncode == 0, done.stderr
+    shown = re.findall(r"^```text\n(?!# )(.*?)^```$", PAGE.read_text(), re.MULTILINE | re.DOTALL)[0]
+    for text in (done.stdout, shown):
+        first, *_, last = (float(each) for each in re.findall(r"^path: .* force (\S+)$", text, re.MULTILINE))
+        assert 0 < last - first < 5.0 * 0.04  # the lid gives way a little
+        ours, theirs = (float(each) for each in re.findall(r"^drift (\S+); of LAMMPS (\S+)$", text, re.MULTILINE)[0])
+        assert ours == pytest.approx(theirs, rel=0.02)  # from rest: the first period is not yet steady
+        stops = re.findall(r"^LAMMPS: far end.*\n +(stable|unstable|not known)", text, re.MULTILINE)
+        assert len(stops) == 4
+        assert stops.count("not known") < 2
+        moved = [tuple(map(float, each)) for each in re.findall(r"D of LAMMPS (\S+), of one-sided motion (\S+)", text)]
+        assert len(moved) == 8
+        for lammps, predicted in moved:
+            assert predicted == pytest.approx(lammps, rel=0.1, abs=2e-3)
+
+
+def test_the_deck_is_short():
+    lengths = {name: len(text.splitlines()) for name, text in files(PAGE).items()}
+    assert lengths.keys() == {"shear.in", "cycle.py"}
+    assert max(lengths.values()) < 70
