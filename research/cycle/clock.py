@@ -28,9 +28,10 @@ from faultgouge.pywrap import Scene
 from faultgouge.pywrap.runs.drive import DriveSample, drive, settle_for_drive
 from faultgouge.pywrap.runs.drive_recorder import COMPARABLE, advance_of
 from faultgouge.pywrap.runs.undamped import Checkpoint
-from faultgouge.pywrap.scenes.drive_section import NOISE
-from faultgouge.studies.result_rows import append_row, read_rows
+from faultgouge.pywrap.scenes.drive_section import PROBE_SCALE
+from faultgouge.studies.result_rows import append_row
 from research.cycle.compute import UNTIL, scene
+from research.tables import read_rows
 
 LAW, PART = "coulomb", 4.0
 """Law, and time of a part of a run."""
@@ -93,7 +94,7 @@ def rows_of(seed: int) -> Iterator[dict[str, Any]]:
             signal = {"signal": "pulse", "at": moment.time, "omega": omega, "scale": height}
             found = next_slip(driven(seed, **signal), start, known, moment, due, wait)
             yield key | {
-                "kind": "noise" if height == NOISE else "pulse",
+                "kind": "noise" if height == PROBE_SCALE else "pulse",
                 "phase": phase,
                 "at": moment.time,
                 "height": height,
@@ -108,7 +109,7 @@ def pulses() -> Iterator[tuple[float, float, float]]:
     """Phase, height and frequency of each pulse."""
     for phase in PHASES:
         yield from ((phase, height, omega) for height in HEIGHTS for omega in FREQUENCIES)
-        yield from ((phase, NOISE, omega) for omega in NOISES)
+        yield from ((phase, PROBE_SCALE, omega) for omega in NOISES)
 
 
 def next_slip(

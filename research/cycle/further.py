@@ -11,11 +11,12 @@ import numpy as np
 
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.figures.pages import render
-from faultgouge.studies.result_rows import read_rows
-from faultgouge.studies.statistics import interval, median, share
+from faultgouge.studies.statistics import median, share
 from research.cycle.clock import FREQUENCIES, HEIGHTS, PHASES
 from research.cycle.compute import LAWS
 from research.cycle.springs import SHARES, SPRINGS
+from research.statistics import interval
+from research.tables import read_rows
 
 HERE = Path(__file__).parent
 SPRINGS_TABLE, CLOCK_TABLE = "springs.jsonl", "clock.jsonl"

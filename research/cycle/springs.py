@@ -30,8 +30,9 @@ from faultgouge.analysis.motion.slips import Slip
 from faultgouge.pywrap.runs.drive_recorder import slips_in
 from faultgouge.pywrap.settling.relax import bring_to_rest
 from faultgouge.studies.cycle.compute import cycle_state, drawn
-from faultgouge.studies.result_rows import append_row, read_rows
+from faultgouge.studies.result_rows import append_row
 from research.cycle.compute import LAWS, run, scene, sizes_of, where
+from research.tables import read_rows
 
 SPRINGS = (3.0, 10.0, 30.0)
 

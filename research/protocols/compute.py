@@ -33,7 +33,8 @@ from faultgouge.analysis import Packing
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.runs.drive import DriveSample, drive, settle_for_drive
 from faultgouge.pywrap.runs.undamped import Checkpoint
-from faultgouge.studies.result_rows import append_row, read_rows
+from faultgouge.studies.result_rows import append_row
+from research.tables import read_rows
 
 FY = 3.0
 VELOCITY = 1e-3

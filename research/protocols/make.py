@@ -21,9 +21,9 @@ from scipy.stats import t as student
 
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.figures.pages import render
-from faultgouge.studies.result_rows import read_rows
-from faultgouge.studies.statistics import interval
 from research.protocols.compute import EDGES, ENDS, FACTORS, HOLDS, LAST, VELOCITY, compute, rows_of
+from research.statistics import interval
+from research.tables import read_rows
 
 HERE = Path(__file__).parent
 TABLE = "protocols.jsonl"

@@ -6,11 +6,11 @@ from itertools import product
 import numpy as np
 import pytest
 
-from faultgouge.studies.result_rows import read_rows
 from research.cycle.clock import NOISES, SLIPS, pulses
 from research.cycle.compute import LAWS
 from research.cycle.further import CLOCK_TABLE, HERE, SPRINGS_TABLE, advances, numbers, write_further
 from research.cycle.springs import LOOKED_AT, SHARES, SPRINGS, chosen
+from research.tables import read_rows
 
 CLOCK = read_rows(HERE / "tables" / CLOCK_TABLE)
 DRIVEN = read_rows(HERE / "tables" / SPRINGS_TABLE)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from faultgouge.pywrap.runs.drive import DriveSample
-from faultgouge.studies.result_rows import read_rows
-from faultgouge.studies.statistics import interval
 from research.protocols.compute import EDGES, FACTORS, FY, HOLDS, in_bins
 from research.protocols.make import HERE, TABLE, check, holds, mean, numbers, write_page
+from research.statistics import interval
+from research.tables import read_rows
 
 ROWS = read_rows(HERE / "tables" / TABLE)
 FOUND = numbers(ROWS)
