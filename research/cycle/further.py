@@ -62,14 +62,14 @@ def middle(values: Any) -> list[float] | None:
     return median(np.asarray(values)) if len(values) > 1 else None
 
 
-def verdicts(rows: Sequence[Row], spring: float) -> list[Row]:
-    """What the states of a spring do at rest, by their place in the wait."""
+def verdicts(rows: Sequence[Row], springs: Sequence[float]) -> list[Row]:
+    """What the states of some springs do at rest, by their place in the wait."""
     found = []
     for kind in SHARES:
         states = [
             (state, row["slips"][state["slip"]]["slip"])
             for row in rows
-            if row["spring"] == spring
+            if row["spring"] in springs
             for state in row["states"]
             if state["kind"] == kind
         ]
@@ -142,7 +142,8 @@ def numbers(folder: Path = HERE) -> Row:
     return {
         "sizes": sizes(springs),
         "seeds": sorted({row["seed"] for row in springs}),
-        "verdicts": {spring: verdicts(springs, spring) for spring in SPRINGS},
+        "verdicts": {spring: verdicts(springs, [spring]) for spring in SPRINGS},
+        "all": verdicts(springs, SPRINGS),
         "clock": advances(read_rows(folder / "tables" / CLOCK_TABLE)),
         "stays": STAYS,
     }
