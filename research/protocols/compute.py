@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -51,6 +52,9 @@ LATER = 1e-3
 """By this share of an edge a row may lie beyond it."""
 
 ENDS = {"control": 0.5, 10.0: 0.5, 3.0: 0.5, 1 / 3: 0.1, "hold": 0.1}
+
+WEAKER = 4.0
+"""By this factor all dashpots are weaker in the step by the first of `FACTORS` that is done once more."""
 
 PART = 4.0
 """Time of a part of a run; the run divides at the end of a part."""
@@ -89,11 +93,13 @@ class Divided:
         del self.known[rows:]
         self.time = self.known[-1].time
 
-    def go_on(self, stages: list[tuple[float, float]]) -> list[DriveSample]:
-        """Rows of the series after the run has divided."""
+    def go_on(self, stages: list[tuple[float, float]], weaker: float = 1.0) -> list[DriveSample]:
+        """Rows of the series after the run has divided, from then on with weaker dashpots."""
         (fast, first), _ = self.before
         wanted = scene(self.seed, [(fast, first), (VELOCITY, self.time - first), *stages])
-        steps = drive(wanted, self.start, self.known, self.checkpoint, communicator=MPI.COMM_SELF)
+        law = self.start.law
+        start = replace(self.start, law=replace(law, cn=law.cn / weaker, ct=law.ct / weaker))
+        steps = drive(wanted, start, self.known, self.checkpoint, communicator=MPI.COMM_SELF)
         return [step.sample for step in steps]
 
 
@@ -143,6 +149,24 @@ def rows_of(seed: int) -> Iterator[dict[str, Any]]:
             "compaction": base["thickness"] - held[-1].thickness,
         }
         yield {"seed": seed, "kind": "hold", "hold": hold} | stood | in_bins(after, origin)
+
+
+def weak_rows_of(seed: int) -> Iterator[dict[str, Any]]:
+    """The first bin of the control and of the largest step, with weaker dashpots after the run has divided."""
+    run = Divided(seed)
+    origin = run.known[-1].displacement
+    for kind, velocity in (("control", VELOCITY), ("step", FACTORS[0] * VELOCITY)):
+        rows = run.go_on([(velocity, EDGES[1] / velocity)], WEAKER)
+        yield {"seed": seed, "kind": f"weak {kind}"} | in_bins(rows, origin)
+
+
+def compute_weak(table: Path, seeds: range) -> None:
+    """Add the seeds that a table of weaker dashpots lacks, in their order."""
+    known = {row["seed"] for row in read_rows(table)} if table.exists() else set()
+    for seed in seeds:
+        if seed not in known:
+            for row in list(weak_rows_of(seed)):
+                append_row(table, row)
 
 
 def compute(table: Path, seeds: range, watch: Any = print) -> None:

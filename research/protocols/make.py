@@ -21,12 +21,23 @@ from scipy.stats import t as student
 
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.figures.pages import render
-from research.protocols.compute import EDGES, ENDS, FACTORS, HOLDS, LAST, VELOCITY, compute, rows_of
+from research.protocols.compute import (
+    EDGES,
+    ENDS,
+    FACTORS,
+    HOLDS,
+    LAST,
+    VELOCITY,
+    WEAKER,
+    compute,
+    compute_weak,
+    rows_of,
+)
 from research.statistics import interval
 from research.tables import read_rows
 
 HERE = Path(__file__).parent
-TABLE = "protocols.jsonl"
+TABLE, WEAK = "protocols.jsonl", "dashpots.jsonl"
 
 AGREES = 1e-6
 """Relative difference of numbers that are computed again on the same machine."""
@@ -86,7 +97,13 @@ def by_decade(values: Sequence[Sequence[float]]) -> list[float]:
     return mean(np.polyfit(np.log10(HOLDS), np.array(values), 1)[0])
 
 
-def numbers(rows: Sequence[Row]) -> Row:
+def weak_dashpots(rows: Sequence[Row]) -> list[float]:
+    """Change of friction in the first bin after the largest step, beside the control, with weaker dashpots in both."""
+    control, stepped = of_kind(rows, "weak control"), of_kind(rows, "weak step")
+    return mean([stepped[seed]["mean"][0] - control[seed]["mean"][0] for seed in control])
+
+
+def numbers(rows: Sequence[Row], weak: Sequence[Row]) -> Row:
     """All numbers of the page."""
     held, stepped = holds(rows), steps(rows)
     names = ("peak", "relaxed", "sunk")
@@ -98,6 +115,8 @@ def numbers(rows: Sequence[Row]) -> Row:
         "steps": stepped,
         "holds": [{"hold": each["hold"]} | {name: mean(each[name]) for name in names} for each in held],
         "slope": {name: by_decade([each[name] for each in held]) for name in names},
+        "weak": weak_dashpots(weak),
+        "weaker": WEAKER,
         "velocity": VELOCITY,
         "reslide": ENDS["hold"],
         "last": LAST,
@@ -106,7 +125,7 @@ def numbers(rows: Sequence[Row]) -> Row:
 
 def write_page(folder: Path = HERE) -> Path:
     """Write README.md of a folder from its table."""
-    found = numbers(read_rows(folder / "tables" / TABLE))
+    found = numbers(*(read_rows(folder / "tables" / name) for name in (TABLE, WEAK)))
     write_text(folder / "README.md", render("research.protocols", "README.md.j2", **found, interval=interval))
     return folder / "README.md"
 
@@ -126,6 +145,7 @@ if __name__ == "__main__":
     match sys.argv[1:]:
         case ["compute", seeds]:
             compute(HERE / "tables" / TABLE, range(1, int(seeds) + 1))
+            compute_weak(HERE / "tables" / WEAK, range(1, int(seeds) + 1))
         case ["page"]:
             print(write_page())
         case ["check"]:

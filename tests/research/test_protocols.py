@@ -7,12 +7,13 @@ import pytest
 
 from faultgouge.pywrap.runs.drive import DriveSample
 from research.protocols.compute import EDGES, FACTORS, FY, HOLDS, in_bins
-from research.protocols.make import HERE, TABLE, check, holds, mean, numbers, write_page
+from research.protocols.make import HERE, TABLE, WEAK, check, holds, mean, numbers, write_page
 from research.statistics import interval
 from research.tables import read_rows
 
 ROWS = read_rows(HERE / "tables" / TABLE)
-FOUND = numbers(ROWS)
+WEAK_ROWS = read_rows(HERE / "tables" / WEAK)
+FOUND = numbers(ROWS, WEAK_ROWS)
 
 
 def test_the_page_is_that_of_its_table(tmp_path):
@@ -26,6 +27,7 @@ def test_no_seed_and_no_run_is_left_out():
     seeds = list(range(1, len(FOUND["seeds"]) + 1))
     assert found == kinds * len(seeds)
     assert [row["seed"] for row in ROWS] == np.repeat(seeds, len(kinds)).tolist()
+    assert [row["seed"] for row in WEAK_ROWS] == np.repeat(seeds, 2).tolist()
 
 
 def test_what_the_pages_say_is_shown():
@@ -34,6 +36,7 @@ def test_what_the_pages_say_is_shown():
     assert ten["direct"][1] > 0 > three["direct"][1]
     assert FOUND["slope"]["sunk"][1] > 0 > FOUND["slope"]["relaxed"][2]
     assert FOUND["slope"]["peak"][1] < 0
+    assert FOUND["weak"][1] > 0  # not that of the dashpots
     said = " ".join((HERE.parents[1] / "docs" / "stick_slip.md").read_text().split())
     assert f"with {len(FOUND['seeds'])} packings beside" in said
     assert f"by {interval(ten['change'][0], '.3f')} of $F_y$" in said
