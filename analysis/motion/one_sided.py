@@ -245,7 +245,8 @@ class OneSidedSystem:
     def displacement(self, z: Floats) -> Floats:
         """Displacements of the particles, shape (N, d, P), of mass-weighted coordinates."""
         c = self.motion.configuration
-        q = (self._weight @ z).reshape(c.axes, len(c), -1)[: c.dimension]
+        q = self._weight @ z if c.constraint is None else c.constraint @ (self._weight @ z)
+        q = q.reshape(c.axes, len(c), -1)[: c.dimension]
         return np.asarray(np.moveaxis(q, 0, 1))
 
 
@@ -291,7 +292,7 @@ def one_sided_motion(
         raise ValueError("The times of a motion are finite, not negative, and in increasing order.")
     system = OneSidedSystem.of(configuration)
     state = system.start(_of_all_coordinates(configuration, "velocity", velocity))
-    load = None if rise is None else _of_all_coordinates(configuration, "rise", rise)
+    load = None if rise is None else forces_on_coordinates(configuration, rise)
     seen = []
     advance = system.advance_exactly if system.remembers_nothing else system.advance
     for each in time:
@@ -299,6 +300,18 @@ def one_sided_motion(
         seen.append((system.displacement(state.z)[..., 0], system.displacement(state.v)[..., 0], state.p[:, 0].copy()))
     displacement, speed, slid = (np.array(each) for each in zip(*seen, strict=True))
     return OneSidedMotion(time, displacement, speed, slid)
+
+
+def forces_on_coordinates(configuration: Configuration, forces: ArrayLike) -> Floats:
+    """Forces on particles, shape (N, d), on all coordinates, shape (coordinates, 1): a sum where several move as one.
+
+    Raises
+    ------
+    ValueError
+        If the shape does not fit.
+    """
+    whole = _of_all_coordinates(configuration, "rise", forces)
+    return whole if configuration.constraint is None else np.asarray((configuration.constraint != 0).T @ whole)
 
 
 def _of_all_coordinates(configuration: Configuration, name: str, values: ArrayLike | None) -> Floats:

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, floats
+from ..arrays import Floats
 from ..configuration import Configuration, HasConfiguration
 from ..operators.asymmetry import asymmetry
 from ..operators.sliders import with_sticking_contacts
 from .eigenvalues import in_balance
 from .motion import Motion, Rates
-from .one_sided import OneSidedSystem
+from .one_sided import OneSidedSystem, forces_on_coordinates
 from .one_sided_outcome import PUSHES, STEP, STEP_OF_LARGE, follow_load, follow_pushes
 from .spectrum import Spectrum, spectrum
 
@@ -319,15 +319,13 @@ def _without_dissipation(configuration: Configuration, found: Spectrum | None) -
 
 def _direction(configuration: Configuration, rise: str | ArrayLike) -> Floats:
     """Forces per unit of time on all coordinates, shape (coordinates, 1)."""
-    n, d = len(configuration), configuration.dimension
-    if isinstance(rise, str):
-        if rise != "fx" or not configuration.top.any():
-            raise ValueError('rise is "fx" of a packing with an upper layer, or an array of forces, shape (N, d).')
-        forces = np.zeros((n, d))
-        forces[:, 0] = configuration.top
-    else:
-        forces = floats("rise", rise, (n, d))
-    return np.concatenate([forces.T.ravel(), np.zeros((configuration.axes - d) * n)])[:, None]
+    if not isinstance(rise, str):
+        return forces_on_coordinates(configuration, rise)
+    if rise != "fx" or not configuration.top.any():
+        raise ValueError('rise is "fx" of a packing with an upper layer, or an array of forces, shape (N, d).')
+    forces = np.zeros((len(configuration), configuration.dimension))
+    forces[:, 0] = configuration.top
+    return forces_on_coordinates(configuration, forces)
 
 
 def _number(count: int, name: str) -> str:

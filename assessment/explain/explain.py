@@ -240,8 +240,12 @@ def _affordable(scene: Scene) -> tuple[Scene, str]:
 
 
 def _run_of(scene: Scene, packing: Packing) -> UndampedRun:
-    """The scene's undamped run; friction that weakens does so beyond a threshold that is never reached."""
+    """The scene's undamped or driven run; friction that weakens does so beyond a threshold that is never reached."""
     perturb, motion = scene.perturb, dict[str, Any]()
+    if scene.drive and not perturb:
+        motion |= {"spring": scene.drive.spring, "stages": scene.drive.stages}
+        signal = scene.drive.forcing()
+        return UndampedRun(packing, motion | ({"signal": signal, "on": scene.drive.on} if signal else {}))
     if perturb:
         (amplitude, omega), signal = perturb.cosine, perturb.forcing()
         if amplitude > 0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -93,7 +93,8 @@ class UndampedRun:
     packing : Packing
         Where it starts.
     motion : dict
-        What `Engine.undamped` is given beside the time step: perturbation, signal, weakening.
+        What `Engine.undamped` is given beside the time step: perturbation, signal, weakening; or `Engine.driven`:
+        spring, stages, signal.
     floor : bool
         Whether the floor is there.
     contacts : Path or None
@@ -111,10 +112,7 @@ class UndampedRun:
         # the decks' step: a tenth of the limit of a disk whose contacts carry ten times F_y, see undamped.in
         stiffness = self.packing.law.stiffness_scale(10 * self.packing.fy)
         step = QUIET_SHARE * 0.2 / np.sqrt(12 * stiffness)
-        with (
-            Engine(self.packing, communicator, log) as engine,
-            engine.undamped(step, **self.motion) as dynamics,
-        ):
+        with Engine(self.packing, communicator, log) as engine, self._dynamics(engine, step) as dynamics:
             if not self.floor:
                 engine.lammps.command("unfix floor")
             if self.contacts:
@@ -123,6 +121,11 @@ class UndampedRun:
             if self.contacts or not self.floor:
                 engine.lammps.command("run 0 post no")
             yield engine, dynamics
+
+    def _dynamics(self, engine: Engine, step: float) -> AbstractContextManager[Dynamics]:
+        if "spring" in self.motion:
+            return engine.driven(time_step=step, **self.motion)
+        return engine.undamped(step, **self.motion)
 
     def of(self, **changes: Any) -> UndampedRun:
         """The run of a packing that differs in these arguments."""
@@ -210,7 +213,7 @@ def _of_damping(bare: UndampedRun) -> Iterator[Feature]:
 
 
 def _of_motion(run: UndampedRun, bare: UndampedRun) -> Iterator[Feature]:
-    """The forces that push the disks."""
+    """The forces that push the disks, and the spring that draws the layer."""
     push, pushed = run.moved_by("amplitude", "omega", otherwise={"amplitude": 1e-9, "omega": 0.01})
     reason = f"amplitude {push['amplitude']:g}" if "amplitude" in run.motion else "no amplitude in [perturb]"
     yield Feature("perturbation", reason, bare, replace(bare, motion=push), pushed)
@@ -219,6 +222,10 @@ def _of_motion(run: UndampedRun, bare: UndampedRun) -> Iterator[Feature]:
     reason = f"{len(sent['signal'])} rows, on the {sent['on']}" if "signal" in run.motion else "no signal in [perturb]"
     everything = np.arange(len(run.packing))
     yield Feature("signal", reason, bare, replace(bare, motion=sent), everything if sent["on"] == "floor" else moved)
+    soft = {"spring": float(run.packing.fy / run.packing.radius.mean()), "stages": ((1e-9, np.inf),)}
+    drawn, layer = run.moved_by("spring", "stages", otherwise=soft)
+    reason = f"stiffness {drawn['spring']}" if "spring" in run.motion else "no section [drive]"
+    yield Feature("spring", reason, bare, replace(bare, motion=drawn), layer)
 
 
 def _arrays(instance: Any, fixes: tuple[str, ...]) -> Iterator[str]:

@@ -296,10 +296,9 @@ class Engine:
         stages: Sequence[tuple[float, float]],
         signal: Signal | None = None,
         on: Literal["layer", "floor"] = "layer",
+        time_step: float | None = None,
     ) -> Iterator[Dynamics]:
         """Run dynamics from rest in which a spring draws the upper layer, with the damping of the packing.
-
-        The time step is that of the deck part undamped.in.
 
         Parameters
         ----------
@@ -309,6 +308,8 @@ class Engine:
             Velocities of the far end, each with its time; the last one goes on.
         signal, on : optional
             A further force along x, as of `undamped`.
+        time_step : float, optional
+            That of the deck part undamped.in by default.
 
         Yields
         ------
@@ -319,7 +320,7 @@ class Engine:
         self._state.end_displacements()
         dynamics = Dynamics(self._decks, self._state, packing, None)
         with (
-            dynamics.integrate(None, packing.drag_time, rattlers=True),
+            dynamics.integrate(time_step, packing.drag_time, rattlers=True),
             dynamics.draw(spring, stages),
             ExitStack() as forces,
         ):

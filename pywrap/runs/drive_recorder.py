@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from mpi4py import MPI
 
 from ...analysis import RunFile
+from ...analysis.files.atomic_write import lock_output
 from ...analysis.motion.slips import Slip, find_slips
 from ..equilibria.quasistatic import Equilibrium
 from ..scenes.drive_section import Drive
@@ -39,6 +41,8 @@ class DriveRecord(Record):
         saved: Callable[[str, Path], object] = lambda words, path: None,
     ) -> None:
         super().__init__(path, scene, communicator, "drive", saved)
+        self._others: Mapping[Path, Scene] = {}
+        self._step = 0
 
     def _stored_equilibrium(self, file: RunFile) -> Equilibrium:
         return Equilibrium.of(file.packing(0))
@@ -54,8 +58,15 @@ class DriveRecord(Record):
             self._file.save()
         self.last = equilibrium
 
-    def drive(self) -> Iterator[DriveStep]:
+    def drive(self, others: Mapping[Path, Scene] | None = None) -> Iterator[DriveStep]:
         """Run the scene's drive and write its rows and states; an interrupted run continues.
+
+        Parameters
+        ----------
+        others : mapping of Path to Scene, optional
+            Files of scenes that differ from this one in the signal alone, and have none or one that begins at the same
+            time. A file that does not exist is made when this run comes to that time, so that the run of the other
+            scene goes on from there, bitwise the same as from its beginning.
 
         Yields
         ------
@@ -66,6 +77,7 @@ class DriveRecord(Record):
         if self.complete:
             return
         known, checkpoint = raise_on_all_ranks(self.communicator, lambda: self._known(SERIES, DriveSample))
+        self._others, self._step = others or {}, 0 if checkpoint is None else checkpoint.step
         steps: list[DriveStep] = []
         run = drive(
             self.scene,
@@ -85,7 +97,26 @@ class DriveRecord(Record):
             with self._file.change():
                 self._append_states([state for step in steps for state in step.states])
                 self._keep(SERIES, [step.sample for step in steps], [], reached)
+            if reached is not None and self._others:
+                self._divide(steps[-1].sample.time, reached.step)
         steps.clear()
+
+    def _divide(self, time: float, step: int) -> None:
+        """Make the files of the other scenes at the end of a part, if the signal begins in the next one."""
+        assert self._file is not None
+        assert self.scene.drive is not None
+        part, self._step = time * (step - self._step) / step, step
+        if not time <= (self.scene.drive.at or 0.0) < time + part:
+            return
+        self._file.save()
+        for path, scene in self._others.items():
+            with lock_output(path):
+                if not path.exists():
+                    copy = path.with_name(f".{path.name}.copy")
+                    shutil.copyfile(self.path, copy)
+                    with RunFile(copy, "a") as file:
+                        file.put_attribute("scene", json.dumps(scene.resolved()))
+                    copy.replace(path)
 
     def _append_states(self, states: list[DriveState]) -> None:
         assert self._file is not None
@@ -140,10 +171,15 @@ def clock_advance(path: Path, other: Path) -> float | None:
     with RunFile(path) as with_signal, RunFile(other) as without:
         settings = drive_of(with_signal)
         assert settings is not None
-        after = [[slip for slip in slips_in(run) if slip.ends > (settings.at or 0.0)] for run in (with_signal, without)]
-    if not after[1]:
+        return advance_of(slips_in(with_signal), slips_in(without), settings.at or 0.0)
+
+
+def advance_of(slips: Sequence[Slip], without: Sequence[Slip], at: float) -> float | None:
+    """The same of the slips of two runs, with a signal that begins at a time, and without."""
+    due = next((slip for slip in without if slip.ends > at), None)
+    if due is None:
         return None
-    due = after[1][0]
-    begins = (slip.begins for slip in after[0] if abs(slip.force_drop) >= COMPARABLE * abs(due.force_drop))
+    after = (slip for slip in slips if slip.ends > at)
+    begins = (slip.begins for slip in after if abs(slip.force_drop) >= COMPARABLE * abs(due.force_drop))
     first = next(begins, None)
     return None if first is None else due.begins - first

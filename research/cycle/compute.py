@@ -33,13 +33,16 @@ from research.tables import read_rows
 
 LAWS = ("total", "coulomb")
 SPRING = 10.0
+LOADING = 1e-2
+"""Rate of the force on each disk while the layer sticks, force / time: the far end is slower with a stiffer spring."""
+
 UNTIL = 480.0
 
 EVERY = 24.0
 """Time between the even states."""
 
 
-def scene(seed: int, law: str) -> Scene:
+def scene(seed: int, law: str, spring: float = SPRING) -> Scene:
     """The scene of one run."""
     return Scene.from_mapping(
         {
@@ -47,7 +50,7 @@ def scene(seed: int, law: str) -> Scene:
             "law": {"kn": 2e5, "mu": 1.0, "history": law},
             "load": {"fy": 3.0},
             "damping": {"cn": 60.0, "ct": 17.0},
-            "drive": {"spring": SPRING, "velocity": 1e-3, "until": UNTIL},
+            "drive": {"spring": spring, "velocity": LOADING / spring, "until": UNTIL},
         }
     )
 
@@ -78,13 +81,22 @@ def numbers(path: Path) -> dict[str, Any]:
     with RunFile(path) as file:
         times, slips = file.observable("time"), slips_in(file)
         states = [
-            {"kind": kind, "slip": slip, "time": float(times[frame]), "force": float(file.fx[frame])}
-            | since_and_until(float(times[frame]), slips)
+            where(kind, slip, float(times[frame]), float(file.fx[frame]), slips)
             | cycle_state(file.packing(frame), SPRING)
             for kind, slip, frame in chosen(times, slips)
         ]
+    return {"slips": [sizes_of(slip) for slip in slips], "states": states}
+
+
+def where(kind: str, slip: int | None, time: float, force: float, slips: list[Slip]) -> dict[str, Any]:
+    """Which state of a run a row is of."""
+    return {"kind": kind, "slip": slip, "time": time, "force": force} | since_and_until(time, slips)
+
+
+def sizes_of(slip: Slip) -> dict[str, float]:
+    """What is kept of a slip."""
     columns = ("begins", "ends", "force_before", "force_after", "slip", "kinetic_energy")
-    return {"slips": [{name: getattr(slip, name) for name in columns} for slip in slips], "states": states}
+    return {name: getattr(slip, name) for name in columns}
 
 
 def chosen(times: Floats, slips: list[Slip]) -> Iterator[tuple[str, int | None, int]]:

@@ -1,8 +1,10 @@
-"""The table of the page on cycles computed, the page made from the table, or a run computed again and compared.
+"""The tables of the pages on cycles computed, the pages made from the tables, or a run computed again and compared.
 
 python -m research.cycle.make compute RUNS SEEDS   the runs of the seeds 1 to SEEDS that the table lacks; their files
                                                    go to the folder RUNS; half a minute a run
-python -m research.cycle.make page                 README.md from the table
+python -m research.cycle.make springs SEEDS        what the table of three springs lacks; four minutes a seed
+python -m research.cycle.make clock SEEDS          what the table of clock advances lacks; a minute a seed
+python -m research.cycle.make page                 README.md and further.md from the tables
 python -m research.cycle.make check                the first run computed again, and compared
 
 From the folder of the repository.
@@ -22,6 +24,7 @@ from scipy.stats import binomtest
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.figures.pages import render
 from faultgouge.studies.statistics import share
+from research.cycle import clock, further, springs
 from research.cycle.compute import LAWS, UNTIL, compute
 from research.statistics import interval
 from research.tables import read_rows
@@ -219,8 +222,12 @@ if __name__ == "__main__":
     match sys.argv[1:]:
         case ["compute", runs, seeds]:
             compute(HERE / "tables" / TABLE, Path(runs), range(1, int(seeds) + 1))
+        case ["springs", seeds]:
+            springs.compute(HERE / "tables" / further.SPRINGS_TABLE, range(1, int(seeds) + 1))
+        case ["clock", seeds]:
+            clock.compute(HERE / "tables" / further.CLOCK_TABLE, range(1, int(seeds) + 1))
         case ["page"]:
-            print(write_page())
+            print(write_page(), further.write_further())
         case ["check"]:
             print(check() or "the same")
         case _:

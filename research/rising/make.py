@@ -40,6 +40,9 @@ LAYERS, POURED = (HERE / "tables" / f"{name}.jsonl" for name in ("layers", "pour
 VIBRATES = 0.05
 """Vibration over drift of a layer that is said to vibrate; what a start leaves is a hundredth at the most."""
 
+NEAR = 1.25
+"""Ratio of two vibrations that are said to be the same: both are measured over two windows of an uneven motion."""
+
 GROWS = 1e-4
 """Growth rate of D, 1 / time, from which linear motion is said to grow: fifty times the rounding of eigenvalues."""
 
@@ -87,12 +90,15 @@ def beside_lammps(rows: list[Row]) -> dict[str, Any]:
     both = [row for row in shown if row["rising"]["steady"] and row["ratio"] > VIBRATES]
     vibrates = [row["lammps"][slow]["vibration"] > VIBRATES * row["lammps"][slow]["drift"] for row in shown]
     near = [row["lammps"][slow]["vibration"] / row["rising"]["vibration"] for row in both]
+    apart = [(row["seed"], ratio) for row, ratio in zip(both, near, strict=True) if not 1 / NEAR < ratio < NEAR]
     return {
         "rows": shown,
         "compared": len(shown),
         "vibrate": sum(vibrates),
         "control": sum(row["control"]["vibration"] > VIBRATES * row["control"]["drift"] for row in shown),
         "near": [float(np.median(near)), min(near), max(near)] if near else None,
+        "both": len(both),
+        "apart": apart,
     }
 
 

@@ -238,6 +238,32 @@ def test_signal_changes_nothing_until_it_comes(scene, tmp_path):
     assert apart > 1e-4
 
 
+def test_runs_that_differ_in_the_signal_share_what_is_before_it(scene, tmp_path):
+    """Each goes on from a file of the run with the signal, and ends as one that has run from the beginning."""
+    wanted = scene(**THROWN, **SIGNAL)
+    drives = {"without": wanted.drive.without_signal(), "noise": wanted.drive.with_noise()}
+    scenes = {name: wanted.model_copy(update={"drive": drive}) for name, drive in drives.items()}
+    others = {tmp_path / f"{name}.h5": each for name, each in scenes.items()}
+    with DriveRecord(tmp_path / "with.h5", wanted) as record:
+        record.append(Equilibrium.of(settle_for_drive(wanted)))
+        for _ in record.drive(others):
+            pass
+        record.finish()
+    for path, each in others.items():
+        with RunFile(path) as file:
+            reached = file.series("drive")["time"][-1]
+            assert not file.complete
+        assert 0.04 < reached <= 0.06
+        run_to_end(each, path)
+        run_to_end(each, tmp_path / "alone.h5")
+        with RunFile(path) as file, RunFile(tmp_path / "alone.h5") as alone:
+            assert file.attributes["scene"] == alone.attributes["scene"]
+        here, there = datasets(path), datasets(tmp_path / "alone.h5")
+        assert here.keys() == there.keys()
+        assert all(np.array_equal(here[name], there[name], equal_nan=True) for name in here)
+        (tmp_path / "alone.h5").unlink()
+
+
 def test_clock_advance_is_the_time_between_comparable_slips(scene, tmp_path):
     """Of series that are made: a small slip with the signal does not count."""
     wanted = scene(spring=10.0, velocity=1e-3, until=200.0, signal="pulse", at=60.0, omega=2.0, scale=0.1)

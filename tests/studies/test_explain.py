@@ -11,7 +11,7 @@ from mpi4py import MPI
 from reference_layer import SMALL
 
 from faultgouge.assessment.explain.cost_comparison import Cost, Part
-from faultgouge.assessment.explain.explain import _affordable, _run_feature, explain
+from faultgouge.assessment.explain.explain import _affordable, _run_feature, _run_of, explain
 from faultgouge.assessment.explain.explanation_table import in_words, units_in_words
 from faultgouge.assessment.explain.switches import Feature, InstanceContents, UndampedRun, features
 from faultgouge.pywrap import Scene, settle
@@ -35,6 +35,7 @@ BROUGHT = {
     "drag": {"part drag.in"},
     "perturbation": {"part push.in", "fix push"},
     "signal": {"part signal.in", "fix force"},
+    "spring": {"part spring.in", "fix drive"},
     "compensated coordinates": {"fix low", "array f_floor (8 columns)", "array f_low (5 columns)"},
     "dumps": {"part write.in", "file run.1.contacts", "file run.1.disks", "file run.1.params"},
     "per-contact output": {"compute contact", "dump contact"},
@@ -141,6 +142,25 @@ def test_a_wrong_claim_is_found_out(run, tmp_path):
         assert not part.included
     honest = _run_feature(Feature("push", "", run, pushed, top), loaded, 50, tmp_path)
     assert honest.identical is True
+
+
+def test_spring_of_a_driven_scene_is_told_with_its_share(tmp_path):
+    """Of a scene that draws the layer its own run has the spring; the cost is that of one fix beside the contacts."""
+    scene = Scene.from_toml(SCENES / "drive.toml")
+    own = _run_of(scene, settle(scene, communicator=MPI.COMM_SELF).packing)
+    with own.start(MPI.COMM_SELF, tmp_path / "log") as (engine, dynamics):
+        loaded = InstanceContents.of(engine, tmp_path / "log")
+        still = dynamics.advance(1).position
+    np.testing.assert_allclose(still, own.packing.position, atol=1e-9)  # in small steps, from rest
+    spring = {feature.name: feature for feature in features(own)}["spring"]
+    part = _run_feature(spring, loaded, 300, tmp_path)
+    assert part.included
+    assert part.identical
+    assert set(part.adds) == BROUGHT["spring"]
+    assert part.reason == "stiffness 10.0"
+    assert part.cost.ratio[1] < 1.5  # 1.04 to 1.05, of processor time
+    other = {feature.name: feature for feature in features(replace(own, motion={}))}["spring"]
+    assert other.reason == "no section [drive]"
 
 
 def test_open_scene_has_no_period(run):

@@ -48,10 +48,11 @@ def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = Fa
     check_output(output, scene, *stored_files(wanted))
     check_output(table, scene, output)
     settings = require_section(wanted.drive, "drive")
-    start = _run(output, wanted, "driving")
     others = _others(output, wanted)
-    for name, (path, scene_of_other) in others.items():
+    for path, _ in others.values():
         check_output(path, scene, output)
+    start = _run(output, wanted, "driving", others=dict(others.values()))
+    for name, (path, scene_of_other) in others.items():
         _run(path, scene_of_other, f"driving {name}", start)
     if not is_root():
         return
@@ -71,8 +72,13 @@ def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = Fa
     print_line(f"written to {', '.join(map(str, [output, *(path for path, _ in others.values())]))} and {table}")
 
 
-def _run(output: Path, scene: Scene, what: str, start: Packing | None = None) -> Packing:
-    """Run a drive to its end, from a packing or from the one that the scene settles to, which is returned."""
+def _run(
+    output: Path, scene: Scene, what: str, start: Packing | None = None, others: dict[Path, Scene] | None = None
+) -> Packing:
+    """Run a drive to its end, from a packing or from the one that the scene settles to, which is returned.
+
+    The files of other scenes, which differ in the signal, begin where the signal does.
+    """
     from faultgouge.pywrap import Equilibrium
     from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
     from faultgouge.pywrap.runs.drive_recorder import DriveRecord
@@ -88,7 +94,7 @@ def _run(output: Path, scene: Scene, what: str, start: Packing | None = None) ->
         assert record.last is not None
         with status(what) as show:
             slips = 0
-            for step in record.drive():
+            for step in record.drive(others):
                 slips += step.slip is not None
                 sample = step.sample
                 show(f"{what}: t = {sample.time:.4g}, F = {sample.force:.3g}, {slips} slips")

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from linearised import motion_matrix
 from scipy.linalg import expm
+from scipy.sparse import csr_array
 
 from faultgouge.analysis import Contacts, MindlinLaw, Motion, Packing, one_sided_motion, stability, stiffness_matrix
 from faultgouge.analysis.arrays import derive_frozen
@@ -238,3 +239,31 @@ def test_a_rising_load_is_followed_where_pushes_have_not_settled():
     found = stability(at_rest, rise=np.tile([1.0, 0.0], (3, 1)), time=0.05)
     assert found.stable is None
     assert found.rising["drift"] > 0
+
+
+def test_a_body_moves_as_one(bound):
+    """Two disks that move as one along x on a spring: forces add up, both have the displacement, masses add up."""
+    configuration, n = bound.configuration, len(bound)
+    size, k, rate = configuration.coordinates, 3.0, 0.5
+    lead = np.zeros((size, size))
+    lead[0, 0] = lead[1, 0] = 1.0  # x of the first two disks
+    held = np.zeros((size, size))
+    held[0, 0] = k
+    body = derive_frozen(
+        configuration,
+        contacts=configuration.contacts.chosen(np.zeros(len(configuration.contacts), bool)),
+        stiffness=csr_array(held),
+        damping=csr_array((size, size)),
+        constraint=csr_array(lead),
+    )
+    rise = np.zeros((n, 2))
+    rise[:2, 0] = rate / 2
+    times = np.array([0.7, 3.0])
+    found = one_sided_motion(body, rise=rise, times=times)
+    omega = np.sqrt(k / configuration.mass[:2].sum())
+    wanted = rate / k * (times - np.sin(omega * times) / omega)
+    for disk in (0, 1):
+        np.testing.assert_allclose(found.displacement[:, disk, 0], wanted, rtol=1e-6)
+    assert not found.displacement[:, 2:].any()
+    moving = stability(body, rise=rise).rising
+    assert moving["drift"] == pytest.approx(rate / k * np.sqrt(2 / (2 * n)), rel=1e-6)

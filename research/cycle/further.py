@@ -1,0 +1,165 @@
+"""Numbers of the page on other springs, verdicts at rest, and clock advances, from their tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from faultgouge.analysis.files.atomic_write import write_text
+from faultgouge.figures.pages import render
+from faultgouge.studies.statistics import median, share
+from research.cycle.clock import FREQUENCIES, HEIGHTS, PHASES
+from research.cycle.compute import LAWS
+from research.cycle.springs import SHARES, SPRINGS
+from research.statistics import interval
+from research.tables import read_rows
+
+HERE = Path(__file__).parent
+SPRINGS_TABLE, CLOCK_TABLE = "springs.jsonl", "clock.jsonl"
+
+VIBRATES = 0.05
+"""Vibration over drift of a layer that is said to vibrate under a load that rises, as in research/rising."""
+
+STAYS = 0.1
+"""Share of the length of a slip by which a layer that comes to rest may move and be said to stay."""
+
+ROW = 0.1
+"""Time between two rows of a series, which no clock advance is better than; rounded up."""
+
+Row = dict[str, Any]
+
+
+def sizes(rows: Sequence[Row]) -> list[Row]:
+    """Slips of each spring and law: how many, and medians of force drop, slip and time between two beginnings."""
+    found = []
+    for spring in SPRINGS:
+        for law in LAWS:
+            own = [row for row in rows if (row["spring"], row["law"]) == (spring, law)]
+            slips = [slip for row in own for slip in row["slips"]]
+            begins = [[slip["begins"] for slip in row["slips"]] for row in own]
+            apart = np.concatenate([np.diff(each) for each in begins]) if begins else np.zeros(0)
+            found.append(
+                {
+                    "spring": spring,
+                    "law": law,
+                    "runs": len(own),
+                    "slips": len(slips),
+                    "without": sum(not row["slips"] for row in own),
+                    "drop": middle([slip["force_before"] - slip["force_after"] for slip in slips]),
+                    "slip": middle([slip["slip"] for slip in slips]),
+                    "apart": middle(apart),
+                }
+            )
+    return found
+
+
+def middle(values: Any) -> list[float] | None:
+    """Median with its 95 % interval, from resampling; None of nothing."""
+    return median(np.asarray(values)) if len(values) > 1 else None
+
+
+def verdicts(rows: Sequence[Row], springs: Sequence[float]) -> list[Row]:
+    """What the states of some springs do at rest, by their place in the wait."""
+    found = []
+    for kind in SHARES:
+        states = [
+            (state, row["slips"][state["slip"]]["slip"])
+            for row in rows
+            if row["spring"] in springs
+            for state in row["states"]
+            if state["kind"] == kind
+        ]
+        rest = [(state["rest"], slip) for state, slip in states if state["rest"]["found"]]
+        stays = [each for each, slip in rest if abs(each["moved"]) <= STAYS * abs(slip)]
+        rising = [each["rising"] for each in stays if each["rising"]]
+        steady = [each["vibration"] > VIBRATES * each["drift"] for each in rising if each["steady"]]
+        found.append(
+            {
+                "kind": kind,
+                "states": len(states),
+                "stays": share(len(stays), len(states)),
+                "grows": share(sum(each["stable"] is False for each in stays), len(stays)),
+                "unknown": sum(each["stable"] is None for each in stays),
+                "bound": share(sum(each["at_bound"] > 0 for each in stays), len(stays)),
+                "vibrates": share(sum(steady), len(rising)),
+                "open": len(rising) - len(steady),
+            }
+        )
+    return found
+
+
+def advances(rows: Sequence[Row]) -> Row:
+    """Clock advances of pulses over phase, height and frequency, and of noise.
+
+    The noise floor of a slip is the largest advance or delay by one of its pulses of noise.
+    """
+    noise = [row for row in rows if row["kind"] == "noise"]
+    floor: dict[tuple[int, int], float] = {}
+    for row in noise:
+        key = row["seed"], row["slip"]
+        moved_by = np.inf if row["advance"] is None else abs(row["advance"])
+        floor[key] = max(floor.get(key, ROW), moved_by)
+    pulses = [row | {"floor": floor[row["seed"], row["slip"]]} for row in rows if row["kind"] == "pulse"]
+    groups = {"height": HEIGHTS, "omega": FREQUENCIES, "phase": PHASES}
+    cells = [
+        {"phase": phase, "height": height, "omega": omega}
+        | moved([r for r in pulses if (r["phase"], r["height"], r["omega"]) == (phase, height, omega)])
+        for phase, height, omega in product(PHASES, HEIGHTS, FREQUENCIES)
+    ]
+    return {
+        "slips": sum(row["kind"] == "slip" for row in rows),
+        "seeds": sorted({row["seed"] for row in rows}),
+        "too_short": sum(row["kind"] == "too short" for row in rows),
+        "noise": {
+            "runs": len(noise),
+            "median": float(np.median([abs(row["advance"]) for row in noise if row["advance"] is not None])),
+            "floors": sorted(round(each, 2) for each in floor.values()),
+        },
+        "cells": cells,
+        "by": [{"name": n, "value": v} | moved([r for r in pulses if r[n] == v]) for n in groups for v in groups[n]],
+    }
+
+
+def moved(rows: Sequence[Row]) -> Row:
+    """By how many pulses the next slip comes earlier or later than by any noise, or not at all; the median of all."""
+    known = [(row["advance"], row["floor"]) for row in rows if row["advance"] is not None]
+    return {
+        "pulses": len(rows),
+        "earlier": share(sum(advance > floor for advance, floor in known), len(rows)),
+        "later": share(sum(advance < -floor for advance, floor in known), len(rows)),
+        "none": len(rows) - len(known),
+        "median": middle([advance for advance, _ in known]),
+    }
+
+
+def numbers(folder: Path = HERE) -> Row:
+    """All numbers of the page."""
+    springs = read_rows(folder / "tables" / SPRINGS_TABLE)
+    return {
+        "sizes": sizes(springs),
+        "seeds": sorted({row["seed"] for row in springs}),
+        "verdicts": {spring: verdicts(springs, [spring]) for spring in SPRINGS},
+        "all": verdicts(springs, SPRINGS),
+        "clock": advances(read_rows(folder / "tables" / CLOCK_TABLE)),
+        "stays": STAYS,
+    }
+
+
+def count(value: Row) -> str:
+    """A count of so many with the interval of the share."""
+    if value["share"] is None:
+        return "-"
+    return f"{value['count']} of {value['of']} ({100 * value['low']:.0f} to {100 * value['high']:.0f} %)"
+
+
+def write_further(folder: Path = HERE) -> Path:
+    """Write further.md of a folder from its tables."""
+    found = numbers(folder)
+    write_text(
+        folder / "further.md", render("research.cycle", "further.md.j2", **found, count=count, interval=interval)
+    )
+    return folder / "further.md"

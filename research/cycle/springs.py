@@ -1,0 +1,99 @@
+"""Driven runs with three springs, and what `stability` says of their states once they have come to rest.
+
+**The rule.** The scene is that of :mod:`research.cycle.compute` with the springs `SPRINGS`; the far end is slower with
+a stiffer spring, so that the force on a layer that sticks rises at the same rate. Seeds 1, 2, 3, ... in this order, all
+that is asked of one seed before the next, none left out; the number of seeds is what the time allowed. All slips of
+both laws count. Of the first `LOOKED_AT` slips of the standard law three states are looked at, those nearest to the
+shares `SHARES` of the wait for the slip: from the end of the last slip, or from the beginning, to the beginning of the
+slip.
+
+A state of a driven run moves a little, and a verdict is of an equilibrium. Each state is therefore first brought to
+rest under its own force on each disk of the layer (:func:`faultgouge.pywrap.settling.relax.bring_to_rest`): whether an
+equilibrium is found near by, by how much the mean position of the layer moves on the way, and the one-sided verdict
+with the dashpots, the spring and contacts at the bound as they are, under a load that is held and one that rises.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from faultgouge.analysis import NoEquilibriumError, Packing, RunFile, stability
+from faultgouge.analysis.arrays import Floats
+from faultgouge.analysis.motion.slips import Slip
+from faultgouge.pywrap.runs.drive_recorder import slips_in
+from faultgouge.pywrap.settling.relax import bring_to_rest
+from faultgouge.studies.cycle.compute import cycle_state, drawn
+from faultgouge.studies.result_rows import append_row
+from research.cycle.compute import LAWS, run, scene, sizes_of, where
+from research.tables import read_rows
+
+SPRINGS = (3.0, 10.0, 30.0)
+
+LOOKED_AT = 3
+SHARES = {"control": 1 / 3, "late": 0.9, "before": 1.0}
+"""`before` is the last stored state until the slip begins, at the largest force."""
+
+
+def compute(table: Path, seeds: range, watch: Any = print) -> None:
+    """Add the seeds that a table lacks, in their order; what is written is of whole seeds."""
+    known = {row["seed"] for row in read_rows(table)} if table.exists() else set()
+    for seed in seeds:
+        if seed in known:
+            continue
+        rows = [row_of(seed, law, spring) for spring, law in product(SPRINGS, LAWS)]
+        for row in rows:
+            append_row(table, row)
+        watch(f"seed {seed}", flush=True)
+
+
+def row_of(seed: int, law: str, spring: float) -> dict[str, Any]:
+    """The row of one run."""
+    begin = time.process_time()
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "drive.h5"
+        run(path, scene(seed, law, spring))
+        with RunFile(path) as file:
+            times, slips = file.observable("time"), slips_in(file)
+            states = [
+                where(kind, number, float(times[frame]), float(file.fx[frame]), slips)
+                | cycle_state(file.packing(frame), spring)
+                | {"rest": at_rest(file.packing(frame), spring)}
+                for kind, number, frame in chosen(times, slips if law == "coulomb" else [])
+            ]
+    key = {"seed": seed, "law": law, "spring": spring}
+    found = {"slips": [sizes_of(slip) for slip in slips], "states": states}
+    return key | found | {"cpu_seconds": time.process_time() - begin}
+
+
+def chosen(times: Floats, slips: list[Slip]) -> Iterator[tuple[str, int, int]]:
+    """Kind, number of the slip that follows, and frame of each state that is looked at."""
+    last = 0.0
+    for number, slip in enumerate(slips[:LOOKED_AT]):
+        for kind, part in SHARES.items():
+            time = last + part * (slip.begins - last)
+            before = int(np.searchsorted(times, slip.begins, side="right") - 1)
+            yield kind, number, before if kind == "before" else int(np.argmin(np.abs(times - time)))
+        last = slip.ends
+
+
+def at_rest(packing: Packing, spring: float) -> dict[str, Any]:
+    """The verdict on a state once it has come to rest under its force."""
+    try:
+        rest, _ = bring_to_rest(packing)
+    except NoEquilibriumError:
+        return {"found": False}
+    told = stability(drawn(rest.packing, spring), rise="fx").as_dict()
+    before, after = (each.position[packing.top, 0] for each in (packing, rest.packing))
+    away = after - before
+    if packing.box_length is not None:
+        away = away - packing.box_length * (away / packing.box_length).round()
+    names = ("stable", "growth_rate", "at_bound", "one_sided", "rising", "reasons")
+    rates = {name: told[name]["growth_rate"] for name in ("sticking", "sliding")}
+    return {"found": True, "moved": float(away.mean())} | {name: told[name] for name in names} | rates

@@ -1,0 +1,69 @@
+"""The page on velocity steps and holds comes out of its table, and what it says is in the table."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from faultgouge.pywrap.runs.drive import DriveSample
+from research.protocols.compute import EDGES, FACTORS, FY, HOLDS, in_bins
+from research.protocols.make import HERE, TABLE, WEAK, check, holds, mean, numbers, write_page
+from research.statistics import interval
+from research.tables import read_rows
+
+ROWS = read_rows(HERE / "tables" / TABLE)
+WEAK_ROWS = read_rows(HERE / "tables" / WEAK)
+FOUND = numbers(ROWS, WEAK_ROWS)
+
+
+def test_the_page_is_that_of_its_table(tmp_path):
+    shutil.copytree(HERE / "tables", tmp_path / "tables")
+    assert (HERE / "README.md").read_text() == write_page(tmp_path).read_text()
+
+
+def test_no_seed_and_no_run_is_left_out():
+    kinds = ["before", "control", *(f"step {each}" for each in FACTORS), *(f"hold {each}" for each in HOLDS)]
+    found = [f"{row['kind']} {row.get('factor', row.get('hold', ''))}".strip() for row in ROWS]
+    seeds = list(range(1, len(FOUND["seeds"]) + 1))
+    assert found == kinds * len(seeds)
+    assert [row["seed"] for row in ROWS] == np.repeat(seeds, len(kinds)).tolist()
+    assert [row["seed"] for row in WEAK_ROWS] == np.repeat(seeds, 2).tolist()
+
+
+def test_what_the_pages_say_is_shown():
+    """The direct effect of the larger step alone, a layer that sinks and relaxes by each decade, and no healing."""
+    ten, three, _ = FOUND["steps"]
+    assert ten["direct"][1] > 0 > three["direct"][1]
+    assert FOUND["slope"]["sunk"][1] > 0 > FOUND["slope"]["relaxed"][2]
+    assert FOUND["slope"]["peak"][1] < 0
+    assert FOUND["weak"][1] > 0  # not that of the dashpots
+    said = " ".join((HERE.parents[1] / "docs" / "stick_slip.md").read_text().split())
+    assert f"with {len(FOUND['seeds'])} packings beside" in said
+    assert f"by {interval(ten['change'][0], '.3f')} of $F_y$" in said
+
+
+def test_each_longer_hold_sinks_the_layer_further():
+    sunk = np.array([each["sunk"] for each in holds(ROWS)])
+    assert (np.diff(sunk, axis=0) > 0).all()
+
+
+def test_bins_are_means_over_displacements():
+    moved = np.linspace(0.0, 0.02, 21)
+    rows = [DriveSample(x, FY * x, 1.0 + x, 10.0 - x, 0.0, 0) for x in moved]
+    found = in_bins(rows, 1.0)
+    assert len(found["mean"]) == 2
+    inside = (moved > EDGES[0]) & (moved < EDGES[1] + 1e-6)
+    assert found["mean"][0] == pytest.approx(moved[inside].mean())
+    assert found["largest"] == pytest.approx([0.01, 0.02])
+    assert found["thickness"][0] == pytest.approx(10 - moved[inside].mean())
+
+
+def test_an_interval_over_seeds_is_that_of_student():
+    middle, low, high = mean([1.0, 2.0, 3.0])
+    assert (middle, high - middle) == (2.0, pytest.approx(4.3027 / np.sqrt(3), rel=1e-4))
+    assert middle - low == pytest.approx(high - middle)
+
+
+@pytest.mark.long
+def test_the_first_seed_comes_out_again():
+    assert check() == []
