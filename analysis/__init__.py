@@ -10,7 +10,6 @@ write packings.
 
 from .configuration import Configuration
 from .contacts import LinearisedContacts
-from .damped_onset.windows import DampedOnsetError, DampedWindow, damped_windows
 from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
 from .files.dumps import read_dump
 from .files.json_packing import read_packing
@@ -35,8 +34,6 @@ from .motion.spectrum import (
 from .motion.stability import Stability, stability
 from .motion.stable_timestep import rayleigh_timestep, stable_timestep
 from .motion.transient import NoGainError, TransientGain, transient_gain
-from .onset import Onset, OnsetError, Window, complex_windows, find_onset
-from .onset.pair_form import pair_eigenvalues
 from .operators.damping import damping_matrix, largest_damping_rate
 from .operators.stiffness import stiffness_matrix
 from .packing.contacts import FLOOR, Contacts
@@ -44,6 +41,8 @@ from .packing.geometry import ContactGeometry, nearest_image, touching
 from .packing.law import MindlinLaw
 from .packing.packing import Packing
 from .packing.solid_fraction import solid_fraction
+from .windows import Onset, OnsetError, Window, complex_windows, find_onset
+from .windows.pair_form import pair_eigenvalues
 
 Snapshot = Configuration
 """The name of `Configuration` until version 1."""
@@ -55,8 +54,6 @@ __all__ = [
     "Configuration",
     "ContactGeometry",
     "Contacts",
-    "DampedOnsetError",
-    "DampedWindow",
     "Eigenpairs",
     "FastestGrowth",
     "FaultgougeError",
@@ -80,7 +77,6 @@ __all__ = [
     "Window",
     "closest_to_meeting",
     "complex_windows",
-    "damped_windows",
     "damping_matrix",
     "discrete_frequency",
     "dynamical_matrix",

@@ -35,22 +35,21 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import count
 from pathlib import Path
 
 import numpy as np
 from scipy.linalg import eigvals
 
-from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
-from faultgouge.analysis.damped_onset.all_windows import AllGrowth
-from faultgouge.analysis.damped_onset.first_window import first_growing
-from faultgouge.analysis.damped_onset.modes import Pencil
-from faultgouge.analysis.damped_onset.window_edges import DampedWindow
-from faultgouge.analysis.damped_onset.windows import damped_windows, march_along_ramp, without_dissipation
-from faultgouge.analysis.onset.limits import LIMITS
-from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset.damped import RampPath, loads_inside, ramp_scene
+from faultgouge.analysis import NoEquilibriumError, OnsetError, Window, find_onset
+from faultgouge.analysis.motion.state_space import StateSpace
+from faultgouge.analysis.windows import LIMITS, System, find_windows
+from faultgouge.analysis.windows.search import windows_along
+from faultgouge.analysis.windows.slices.first_window import first_window
+from faultgouge.pywrap import Scene, settle
+from faultgouge.pywrap.lammps.engine import Engine
+from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath, loads
 
 KINDS = ({"cn": 1.0}, {"cn": 10.0, "ct": 5.0}, {"ct": 0.1}, {"cn": 0.1, "drag_time": 300.0})
 """Dissipation, in turn."""
@@ -76,25 +75,30 @@ Row = dict[str, object]
 
 Kinds = Sequence[dict[str, float]]
 
-Case = tuple[int, RampPath, dict[str, float]]
-"""The seed, the ramp and the dissipation of a packing."""
+Case = tuple[int, EquilibriumPath, np.ndarray, dict[str, float]]
+"""The seed, the path, its loads and the dissipation of a packing."""
 
 
-def compare_searches(ramp: RampPath, kind: dict[str, float]) -> tuple[Row, bool]:
+def damped(path: EquilibriumPath, kind: dict[str, float]) -> Callable[[float], System]:
+    """The systems along a path with some dissipation."""
+    return lambda fx: System.of(path(fx).with_dissipation(**kind), dissipation=True)
+
+
+def compare_searches(path: EquilibriumPath, forces: np.ndarray, kind: dict[str, float]) -> tuple[Row, bool]:
     """Both searches on a ramp, and whether they agree."""
     times = [time.process_time()]
     try:
-        complex_pairs = find_onset(without_dissipation(ramp.path), ramp.forces).windows
+        complex_pairs = find_onset(path, forces).windows
     except OnsetError:
         complex_pairs = ()
-    look = loads_inside(complex_pairs)
+    ends = [0.5 * (each.fx_onset + each.fx_end) for each in complex_pairs if each.fx_end is not None]
+    inside = [*(each.fx_onset for each in complex_pairs), *ends]
     times.append(time.process_time())
-    path = without_dissipation(ramp.path, **kind)
-    few = damped_windows(path, ramp.forces, look=look)
+    few = find_windows(damped(path, kind), forces, look=lambda a, b: [fx for fx in inside if a < fx < b])
     times.append(time.process_time())
-    loads = np.unique(np.concatenate([ramp.forces, [fx for fx in look if fx < ramp.forces[-1]]]))
-    narrowest = LIMITS.narrowest * float(ramp.forces[-1])
-    every = march_along_ramp(AllGrowth(lambda fx: Pencil.of(path(fx)), narrowest, None), loads)
+    all_loads = np.unique(np.concatenate([forces, [fx for fx in inside if fx < forces[-1]]]))
+    narrowest = LIMITS.narrowest * float(forces[-1])
+    *_, (_, every) = windows_along(damped(path, kind), all_loads, narrowest)
     times.append(time.process_time())
     undamped, seconds, whole = np.diff(times)
     differences, stated = edges(few, every)
@@ -105,7 +109,7 @@ def compare_searches(ramp: RampPath, kind: dict[str, float]) -> tuple[Row, bool]
     return row, same
 
 
-def edges(few: tuple[DampedWindow, ...], every: tuple[DampedWindow, ...]) -> tuple[list[float], list[float]]:
+def edges(few: tuple[Window, ...], every: tuple[Window, ...]) -> tuple[list[float], list[float]]:
     """Differences of onsets and ends, with the errors stated of both; inf where one window ends and the other not."""
     differences, stated = [], []
     for one, other in zip(few, every, strict=False):
@@ -117,18 +121,23 @@ def edges(few: tuple[DampedWindow, ...], every: tuple[DampedWindow, ...]) -> tup
     return differences, stated
 
 
-def against_all_eigenvalues(ramp: RampPath, kind: dict[str, float]) -> tuple[Row, bool]:
+def against_all_eigenvalues(path: EquilibriumPath, forces: np.ndarray, kind: dict[str, float]) -> tuple[Row, bool]:
     """The first window from slices, and whether all eigenvalues of the companion matrix agree with it."""
-    path = without_dissipation(ramp.path, **kind)
+    system = damped(path, kind)
     begin = time.process_time()
-    window, doubtful = first_growing(lambda fx: Pencil.of(path(fx)), ramp.forces)
+    window, doubtful = first_window(system, forces)
     row: Row = {"seconds": f"{time.process_time() - begin:.2f}"}
     onset = np.inf if window is None else window.fx_onset
 
-    def largest(loads: Iterable[float]) -> float:
-        return max((float(eigvals(Pencil.of(path(fx)).system.matrix).real.max()) for fx in loads), default=-np.inf)
+    def fastest(fx: float) -> float:
+        place = system(fx)
+        first_order = StateSpace.of_matrices(place.stiffness, place.damping, np.ones(place.stiffness.shape[0]))
+        return float(eigvals(first_order.matrix).real.max())
 
-    before = largest(float(fx) for fx in ramp.forces[ramp.forces < onset][-BEFORE:])
+    def largest(loads: Iterable[float]) -> float:
+        return max(map(fastest, loads), default=-np.inf)
+
+    before = largest(float(fx) for fx in forces[forces < onset][-BEFORE:])
     row |= {"before": f"{before:.1e}"}
     if window is None:
         return row, before < SILENT and not doubtful
@@ -138,19 +147,24 @@ def against_all_eigenvalues(ramp: RampPath, kind: dict[str, float]) -> tuple[Row
     return row, before < SILENT and below < SILENT < above and not doubtful
 
 
-def cases(disks: int, seeds: Iterator[int], packings: int, until: float, kinds: Kinds) -> Iterator[Case]:
-    """So many packings that bear the first increment, each with a kind of dissipation."""
+def cases(disks: int, seeds: Iterator[int], packings: int, until: float, kinds: Kinds, whole: bool) -> Iterator[Case]:
+    """So many packings that bear the first increment, each with a kind of dissipation; with their `whole` ramps, or
+    equilibria as they are asked for."""
     done = 0
     while done < packings:
         seed = next(seeds)
         packing = {"disks": disks, "width": round(1.192 * disks**0.5, 1), "seed": seed}
         steps = {"step": until / 20, "until": until}
-        scene = {"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": steps}
+        scene = Scene.from_mapping({"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": steps})
+        wanted = loads(scene.ramp)
         try:
-            with ramp_scene(Scene.from_mapping(scene)) as ramp:
-                if not ramp.whole:  # the ramp of a large packing goes no farther than the onset
-                    ramp.path(float(ramp.forces[1]))
-                yield seed, ramp, kinds[seed % len(kinds)]
+            start = settle(scene)
+            with Engine(start.packing) as engine:
+                path = EquilibriumPath(engine, start, scene, onward=True)
+                for _ in path.climb(wanted[1:] if whole else wanted[1:2]):
+                    pass
+                forces = np.array([each.fx for each in path.equilibria]) if whole else wanted
+                yield seed, path, forces, kinds[seed % len(kinds)]
                 done += 1
         except NoEquilibriumError as error:
             print(f"seed {seed} left out: {error}", flush=True)
@@ -198,8 +212,11 @@ def main() -> None:
         table = csv.DictWriter(file, FIRST_COLUMNS if options.first else COLUMNS, lineterminator="\n")
         table.writeheader()
         for disks in options.disks:
-            for seed, ramp, kind in cases(disks, count(options.seed), options.packings, options.until, kinds):
-                found, same = compare(ramp, kind)
+            seeds = count(options.seed)
+            for seed, path, forces, kind in cases(
+                disks, seeds, options.packings, options.until, kinds, not options.first
+            ):
+                found, same = compare(path, forces, kind)
                 words = " ".join(f"{key}={value:g}" for key, value in kind.items())
                 row = {"disks": disks, "seed": seed, "dissipation": words} | found
                 table.writerow(row)

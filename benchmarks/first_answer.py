@@ -32,7 +32,7 @@ from pathlib import Path
 import scipy.optimize, scipy.spatial
 import faultgouge.commands.eigenvalues
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset.undamped import onset_run
+from faultgouge.pywrap.onset import onset_run
 from faultgouge.pywrap.settling.settle import settle_bed
 
 imports = time.time()

@@ -27,13 +27,12 @@ import json
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset.undamped import onset_run
+from faultgouge.pywrap.onset import onset_run
 
 HERE = Path(__file__).parent
 GROUPS = ("reference", "paper", "small", "large")
@@ -78,13 +77,13 @@ def search_windows(scene: Scene, mu: float, first: bool) -> Row:
     begin = time.process_time()
     row: Row = {"ends": "onset", "windows": [], "doubtful": []}
     try:
-        onset = onset_run(scene, mu, first=first).onset
+        onset = onset_run(scene, mu, first=first)
     except OnsetError:
         row["ends"] = "none"
     except NoEquilibriumError:
         row["ends"] = "flows"
     else:
-        row["windows"] = [asdict(window) for window in onset.windows]
+        row["windows"] = [window.as_dict() | {"end_error": window.end_error} for window in onset.windows]
         row["doubtful"] = [list(each) for each in onset.doubtful]
     row["seconds"] = round(time.process_time() - begin, 2)
     return row

@@ -1,7 +1,7 @@
 """The pairs of eigenvalues of a ramp, each followed through the loads, and the verdict at each load.
 
 A pair is followed from the load at which it is complex first. Its image at another load is the pair of modes that lies
-closest to its planes (:meth:`~faultgouge.analysis.onset.Modes.nearest`). If the planes of the image are not those of
+closest to its planes (:meth:`~faultgouge.analysis.windows.Modes.nearest`). If the planes of the image are not those of
 the pair, the pair is unknown at that load, and it may be found again at a later one. If no pair of the ramp is complex,
 the two real modes of the last load that are closest to merging are followed.
 """
@@ -20,9 +20,8 @@ from faultgouge.analysis import (
     stability,
 )
 from faultgouge.analysis.configuration import HasConfiguration
-from faultgouge.analysis.motion.eigenvalues import is_negative, unit_rounding, zero_uncertainty
-from faultgouge.analysis.onset import Modes, Pair, force_bearing, full_operator
-from faultgouge.analysis.onset.eigenvalue_pair import continue_pair
+from faultgouge.analysis.motion.eigenvalues import is_negative, zero_uncertainty
+from faultgouge.analysis.windows import Modes, Space, System, force_bearing
 
 from .mode import Complexes, displacement
 
@@ -96,7 +95,7 @@ def follow_eigenvalues(
     followed = _Followed(packings)
     values, verdicts = [], []
     for k, packing in enumerate(progress(packings)):
-        modes = Modes.of(packing.fx, full_operator(packing))
+        modes = Modes.of(System.of(packing))
         values.append(modes.values)
         verdicts.append(_verdict_on(force_bearing(packing), modes, reasons, alone=len(packings) == 1))
         followed.add(k, modes)
@@ -115,7 +114,7 @@ class _Followed:
 
     def __init__(self, packings: Sequence[HasConfiguration]) -> None:
         self.packings = packings
-        self.pairs: list[dict[int, Pair]] = []
+        self.pairs: list[dict[int, Space]] = []
         self._modes: dict[int, Modes] = {}
         self._last: Modes | None = None
 
@@ -128,10 +127,10 @@ class _Followed:
         for known in self.pairs:
             members = self._members(known, k, modes)
             if members is not None and members not in taken:
-                known[k] = modes.pair(members)
+                known[k] = modes.space(members)
                 if modes.conjugate(members):
                     taken.add(members)
-        self.pairs += [{k: modes.pair(members)} for members in modes.complex_pairs if members not in taken]
+        self.pairs += [{k: modes.space(members)} for members in modes.complex_pairs if members not in taken]
 
     def close(self) -> None:
         """Follow all pairs back, to loads at which they are not yet known."""
@@ -142,22 +141,22 @@ class _Followed:
                 if k not in known and (image := self._image(known[min(n for n in known if n > k)], k)) is not None:
                     known[k] = image
 
-    def _members(self, known: dict[int, Pair], k: int, modes: Modes) -> tuple[int, int] | None:
+    def _members(self, known: dict[int, Space], k: int, modes: Modes) -> tuple[int, int] | None:
         """The members of a pair at this load, from its last load, or from the one with the closest load."""
         closest = min(known, key=lambda n: abs(self.packings[n].fx - self.packings[k].fx))
         for pair in (known[max(known)], known[closest]):
             members = modes.nearest(pair)
-            if modes.pair(members).same_planes(pair):
+            if modes.space(members).like(pair):
                 return members
         return None
 
-    def _image(self, pair: Pair, k: int) -> Pair | None:
+    def _image(self, pair: Space, k: int) -> Space | None:
         if k in self._modes:
             modes = self._modes[k]
-            image: Pair | None = modes.pair(modes.nearest(pair))
+            image: Space | None = modes.space(modes.nearest(pair))
         else:
-            image = continue_pair(pair, self.packings[k].fx, full_operator(self.packings[k]))
-        return image if image is not None and image.same_planes(pair) else None
+            image = pair.at(System.of(self.packings[k]))
+        return image if image is not None and image.like(pair) else None
 
 
 def _verdict_on(packing: HasConfiguration, modes: Modes, reasons: Sequence[str], alone: bool) -> Stability:
@@ -173,7 +172,7 @@ def _verdict_on(packing: HasConfiguration, modes: Modes, reasons: Sequence[str],
 def _spectrum_of(packing: HasConfiguration, modes: Modes) -> Spectrum:
     """The spectrum of a packing whose modes are known, fastest growing pair first."""
     found = Eigenpairs(modes.values, modes.right, modes.left, 0, packing.axes)
-    rounding = unit_rounding(modes.matrix.data)
+    rounding = modes.system.rounding
     zero = zero_uncertainty(packing, rounding)
     numbers = zip(modes.values, found.overlap, found.participation, found.rotation, strict=True)
     pairs = [ComplexPair(complex(value), *map(float, rest)) for value, *rest in numbers if value.imag > 0]
@@ -189,21 +188,21 @@ def _spectrum_of(packing: HasConfiguration, modes: Modes) -> Spectrum:
     )
 
 
-def _about_to_meet(modes: Modes) -> list[Pair]:
+def _about_to_meet(modes: Modes) -> list[Space]:
     """The two real modes that are closest to meeting; none of a packing with fewer than two."""
     try:
         first, second, _ = closest_to_meeting(Eigenpairs(modes.values, modes.right, modes.left, 0))
     except ValueError:
         return []
-    return [modes.pair((first, second))]
+    return [modes.space((first, second))]
 
 
-def _along(packings: Sequence[HasConfiguration], known: dict[int, Pair]) -> FollowedPair:
+def _along(packings: Sequence[HasConfiguration], known: dict[int, Space]) -> FollowedPair:
     """Eigenvalues and displacements of a pair."""
     found = np.full((len(packings), 2), complex(np.nan, np.nan))
     modes = np.zeros((len(packings), 2, packings[0].axes, len(packings[0])), dtype=np.complex128)
     for k, pair in known.items():
-        own, vectors = np.linalg.eig(pair.entries)
+        own, vectors = np.linalg.eig(pair.block)
         order = np.lexsort((-own.imag, own.real))
         found[k] = own[order]
         for member, number in enumerate(order):

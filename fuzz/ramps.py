@@ -34,7 +34,7 @@ from faultgouge.analysis import NoEquilibriumError, Packing, nearest_image
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.figures.style import INK, STYLE, save
 from faultgouge.pywrap import Equilibrium, Scene, ramp, settle
-from faultgouge.pywrap.onset.path_error import bearing_contacts
+from faultgouge.pywrap.runs.path_error import bearing_contacts
 from faultgouge.pywrap.scenes.validation import require_section
 from faultgouge.studies.result_rows import append_row, read_keyed_rows
 

@@ -40,8 +40,7 @@ FLOORS = {
         ("factors",),
         ("motion",),
         ("files",),
-        ("onset",),
-        ("damped_onset",),
+        ("windows",),
     ),
     "faultgouge.pywrap": (
         ("lammps",),
@@ -172,7 +171,7 @@ def test_analysis_loads_numpy_and_scipy_alone():
     """H5py comes with the first file, and what else of SciPy is slow with the function that needs it."""
     assert loaded_by("import faultgouge.analysis") & (HEAVY | SLOW_OF_SCIPY) == {"numpy", "scipy"}
     others = {"rich", "typer", "jinja2", "PIL", "threadpoolctl"}
-    assert loaded_by("import faultgouge.analysis.onset, faultgouge.analysis.motion.response") & others == set()
+    assert loaded_by("import faultgouge.analysis.windows, faultgouge.analysis.motion.response") & others == set()
     assert loaded_by("import faultgouge.analysis, faultgouge.pywrap") & SLOW_OF_SCIPY == set()
 
 

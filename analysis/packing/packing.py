@@ -335,6 +335,18 @@ class Packing:
             fx=self.fx if fx is None else number("fx", fx),
         )
 
+    def with_dissipation(self, cn: float = 0.0, ct: float = 0.0, drag_time: float | None = None) -> "Packing":
+        """The same equilibrium with dashpots and drag, by default none: they have no part in where a packing rests.
+
+        Parameters
+        ----------
+        cn, ct : float
+            Dashpots of every contact, as of :class:`~faultgouge.analysis.MindlinLaw`.
+        drag_time : float, optional
+            tau of the drag, time; none by default.
+        """
+        return replace(self, law=replace(self.law, cn=cn, ct=ct), drag_time=drag_time)
+
     def loaded(self, least: float) -> "Packing":
         """The packing without the contacts whose normal force does not exceed a given force.
 

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from faultgouge.analysis import complex_windows
-from faultgouge.analysis.onset import Modes
-from faultgouge.analysis.onset.eigenvalue_pair import dip_between
+from faultgouge.analysis.windows import Modes, Space
+from faultgouge.analysis.windows.between import stretch
 from faultgouge.figures.style import INK, STYLE
 
 Operator = Callable[[float], np.ndarray]
@@ -39,8 +39,13 @@ def turning(fx: float) -> np.ndarray:
 
 def discriminant(operator: Operator, fx: float) -> float:
     """D of the two modes next to 10."""
-    modes = Modes.of(fx, operator(fx))
-    return modes.pair(modes.about(10.0)).discriminant
+    return pair_at(operator, fx).discriminant
+
+
+def pair_at(operator: Operator, fx: float) -> Space:
+    """The two modes next to 10."""
+    modes = Modes.of_operator(fx, operator(fx))
+    return modes.space(modes.about(10.0))
 
 
 def draw(axes: Axes, operator: Operator, title: str, says: str) -> None:
@@ -52,14 +57,14 @@ def draw(axes: Axes, operator: Operator, title: str, says: str) -> None:
         axes.plot(part, d, color="C0")
     axes.axhline(0, color=INK, linewidth=0.5)
     axes.fill_between(loads, 0, values, where=values < 0, color="C3", alpha=0.3, linewidth=0)
-    ends = [modes.pair(modes.about(10.0)) for modes in (Modes.of(fx, operator(fx)) for fx in (0.0, 1.0))]
-    change = ends[1].matrix - ends[0].matrix
-    for pair in ends:
+    ends = [pair_at(operator, fx) for fx in (0.0, 1.0)]
+    slopes = -ends[0].slope(ends[1].system), ends[1].slope(ends[0].system)
+    for pair, slope in zip(ends, slopes, strict=True):
         reach = np.array([-0.09, 0.09])
-        axes.plot(pair.fx + reach, pair.discriminant + pair.slope(change) * reach, color="C1", linewidth=1.6)
+        axes.plot(pair.fx + reach, pair.discriminant + slope * reach, color="C1", linewidth=1.6)
         axes.plot(pair.fx, pair.discriminant, "o", color="C1")
     if ends[0].discriminant * ends[1].discriminant > 0:
-        width, middle = dip_between(*ends)
+        width, middle = stretch(ends[:1], ends[1:])
         if width > 0:
             axes.plot([middle - width / 2, middle + width / 2], [-0.16, -0.16], color="C1", linewidth=2.5)
     for window in complex_windows(operator, [0.0, 1.0]):

@@ -241,7 +241,7 @@ class Perturb(SignalKeys, Inertia):
     Attributes
     ----------
     fx : float or None
-        F_x of the equilibrium. None: chosen by the onset (:mod:`~faultgouge.pywrap.onset.load_at_onset`).
+        F_x of the equilibrium. None: chosen by the onset (:func:`~faultgouge.pywrap.onset.load_at_onset`).
     target : {"top", "all"} or tuple of int
         The forced disks: the upper layer, all, or those of the list, counted from 0. The paper does not say
         which.

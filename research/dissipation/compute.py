@@ -11,15 +11,20 @@ Every function yields its records one by one, so that a long study is kept as it
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from faultgouge.analysis import OnsetError, Packing, Window
-from faultgouge.analysis.damped_onset.windows import damped_windows, without_dissipation
+from faultgouge.analysis import OnsetError, Packing, Window, find_onset
+from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.motion.transient import NoGainError, transient_gain
-from faultgouge.pywrap.onset.damped import RampPath
+from faultgouge.analysis.windows import System, find_windows
+from faultgouge.pywrap import Scene, settle
+from faultgouge.pywrap.lammps.engine import Engine
+from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath, loads
+from faultgouge.pywrap.scenes.validation import require_section
 from research.dissipation.weak_limit import drag_onset, weak_limit
 
 Row = dict[str, Any]
@@ -31,7 +36,53 @@ WEAK = 1e-4
 """C_N and C_T of dashpots that count as weak, times their shares: the onset differs from its limit by their square."""
 
 
-def weak_cases(ramp: RampPath, ratios: Iterable[tuple[float, float]] = RATIOS) -> Iterator[Row]:
+FEW = 3
+"""Increments that are searched at once for the first window."""
+
+
+@contextmanager
+def ramped(scene: Scene) -> Iterator[EquilibriumPath]:
+    """The path of a scene, climbed to the end of its ramp, or to where the packing flows."""
+    wanted = loads(require_section(scene.ramp, "ramp"))
+    start = settle(scene)
+    with Engine(start.packing) as engine:
+        path = EquilibriumPath(engine, start, scene, onward=True)
+        for _ in path.climb(wanted[1:]):
+            pass
+        yield path
+
+
+def loads_of(path: EquilibriumPath) -> Floats:
+    """The loads of the ramp that have an equilibrium, force per top disk."""
+    return np.array([each.fx for each in path.equilibria])
+
+
+def first_undamped_window(path: EquilibriumPath) -> Window | None:
+    """The first window without dissipation, as far as a few increments show it; None if there is none."""
+    forces = loads_of(path)
+    for k in range(0, len(forces) - 1, FEW):
+        try:
+            return find_onset(path, forces[k : k + FEW + 1]).windows[0]
+        except OnsetError:
+            continue
+    return None
+
+
+def windows_with(
+    path: EquilibriumPath, forces: ArrayLike, look: float | None = None, **dissipation: float | None
+) -> tuple[Window, ...]:
+    """The first windows with dashpots or drag, as of `Packing.with_dissipation`; `look` is a load to be looked at."""
+
+    def system(fx: float) -> System:
+        return System.of(path(fx).with_dissipation(**dissipation), dissipation=True)  # type: ignore[arg-type]
+
+    def between(below: float, above: float) -> list[float]:
+        return [look] if look is not None and below < look < above else []
+
+    return find_windows(system, forces, look=between, first=look is not None)
+
+
+def weak_cases(path: EquilibriumPath, ratios: Iterable[tuple[float, float]] = RATIOS) -> Iterator[Row]:
     """The limit of weak dashpots for the first undamped pair of a ramp, for several ratios C_N : C_T.
 
     The damped onset is solved for among all modes, from the ramp's last load below the prediction to a little beyond
@@ -45,15 +96,14 @@ def weak_cases(ramp: RampPath, ratios: Iterable[tuple[float, float]] = RATIOS) -
         limit from the undamped pair; measured : damped onset, among all modes, with dashpots of `WEAK` times these
         shares, None if nothing grows up to a little beyond the undamped onset.
     """
-    window = ramp.first_window()
+    window, forces = first_undamped_window(path), loads_of(path)
     if window is None:
         return
     for cn, ct in ratios:
-        predicted = weak_limit(without_dissipation(ramp.path, cn, ct), ramp.forces, window)
+        predicted = weak_limit(path, forces, window, cn, ct)
         if predicted is None:
             continue
-        weak = without_dissipation(ramp.path, WEAK * cn, WEAK * ct)
-        found = damped_windows(weak, _around(ramp.forces, predicted.fx, window))
+        found = windows_with(path, _around(forces, predicted.fx, window), cn=WEAK * cn, ct=WEAK * ct)
         onsets = {"undamped": window.fx_onset, "predicted": predicted.fx}
         yield {"cn": cn, "ct": ct, **onsets, "measured": found[0].fx_onset if found else None}
 
@@ -67,13 +117,13 @@ def _around(forces: ArrayLike, predicted: float, window: Window) -> list[float]:
     return [*below, window.fx_onset + 1e-3 * width]
 
 
-def over_strength(ramp: RampPath, kind: str, strengths: Iterable[float], start: float = 0.0) -> Iterator[Row]:
+def over_strength(path: EquilibriumPath, kind: str, strengths: Iterable[float], start: float = 0.0) -> Iterator[Row]:
     """The damped onset over the strength of normal dashpots, or of drag.
 
     Parameters
     ----------
-    ramp : RampPath
-        The packing along its loads.
+    path : EquilibriumPath
+        The packing along its loads, climbed.
     kind : {"cn", "drag"}
         Which dissipation.
     strengths : iterable of float
@@ -88,23 +138,22 @@ def over_strength(ramp: RampPath, kind: str, strengths: Iterable[float], start: 
         the loads; frequency : Im s there, radian / time; predicted : from the first undamped pair, the limit of weak
         dashpots, or drag's crossover, None where the drag holds the pair down; undamped : onset without dissipation.
     """
-    window = _first_window(ramp)
-    forces = ramp.forces[ramp.forces >= start]
-    limit = weak_limit(without_dissipation(ramp.path, cn=1.0), ramp.forces, window) if kind == "cn" else None
+    window, all_forces = _first_window(path), loads_of(path)
+    forces = all_forces[all_forces >= start]
+    limit = weak_limit(path, all_forces, window, cn=1.0) if kind == "cn" else None
     for strength in strengths:
-        if kind == "cn":
-            path, predicted = without_dissipation(ramp.path, cn=strength), None if limit is None else limit.fx
-        else:
-            path = without_dissipation(ramp.path, drag_time=1 / strength)
-            predicted = drag_onset(without_dissipation(ramp.path), ramp.forces, window, 1 / strength)
-        found = damped_windows(path, forces, look=[window.fx_onset], first=True)
+        dissipation = {"cn": strength} if kind == "cn" else {"drag_time": 1 / strength}
+        predicted = None if limit is None else limit.fx
+        if kind == "drag":
+            predicted = drag_onset(path, all_forces, window, 1 / strength)
+        found = windows_with(path, forces, window.fx_onset, **dissipation)
         onset, frequency = (found[0].fx_onset, found[0].frequency) if found else (None, None)
         row = {"kind": kind, "strength": strength, "onset": onset, "frequency": frequency}
         yield row | {"predicted": predicted, "undamped": window.fx_onset}
 
 
 def over_distance(
-    ramp: RampPath, distances: Iterable[float], dissipations: Iterable[tuple[float, float]]
+    path: EquilibriumPath, distances: Iterable[float], dissipations: Iterable[tuple[float, float]]
 ) -> Iterator[Row]:
     """The transient gain over the distance from the first undamped onset, for several (C_N, 1/tau).
 
@@ -114,24 +163,24 @@ def over_distance(
         distance : (F_x^c - F_x) / F_x^c of the undamped onset; cn, drag : C_N, and 1/tau; gain : of abs(q)^2 from rest,
         None if some motion grows for ever; time : when; bound : no later time has more.
     """
-    onset, kinds = _first_window(ramp).fx_onset, tuple(dissipations)
+    onset, kinds = _first_window(path).fx_onset, tuple(dissipations)
     for distance in distances:
-        packing = ramp.path(onset * (1 - distance))
+        packing = path(onset * (1 - distance))
         for cn, drag in kinds:
             yield {"distance": distance, "cn": cn, "drag": drag} | _gain(packing, cn, drag)
 
 
 def _gain(packing: Packing, cn: float, drag: float) -> Row:
-    damped = without_dissipation(lambda fx: packing, cn=cn, drag_time=1 / drag if drag else None)
     try:
-        found = transient_gain(damped(packing.fx))
+        found = transient_gain(packing.with_dissipation(cn, drag_time=1 / drag if drag else None))
     except NoGainError:
         return {"gain": None, "time": None, "bound": None}
     return {"gain": found.gain, "time": found.time, "bound": found.bound if np.isfinite(found.bound) else None}
 
 
-def _first_window(ramp: RampPath) -> Window:
-    window = ramp.first_window()
+def _first_window(path: EquilibriumPath) -> Window:
+    window = first_undamped_window(path)
     if window is None:
-        raise OnsetError(f"No pair of eigenvalues is complex up to F_x = {ramp.forces[-1]:.10g}: raise ramp.until.")
+        last = path.equilibria[-1].fx
+        raise OnsetError(f"No pair of eigenvalues is complex up to F_x = {last:.10g}: raise ramp.until.")
     return window

@@ -12,9 +12,8 @@ import numpy as np
 
 from faultgouge.analysis import NoEquilibriumError
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset.damped import ramp_scene
 from faultgouge.studies.result_rows import keep_rows
-from research.dissipation.compute import RATIOS, over_distance, over_strength, weak_cases
+from research.dissipation.compute import RATIOS, over_distance, over_strength, ramped, weak_cases
 from research.packing_tools import with_seed
 from research.tables import read_rows
 
@@ -50,9 +49,9 @@ def weak(done: list[dict[str, Any]], only: list[int]) -> Iterator[dict[str, Any]
         if (None, None) in known or len(known) == len(RATIOS):
             continue
         try:
-            with ramp_scene(with_seed(SCENE, seed)) as ramp:
+            with ramped(with_seed(SCENE, seed)) as path:
                 seeds[seed] = len(known)
-                for case in weak_cases(ramp, [ratio for ratio in RATIOS if ratio not in known]):
+                for case in weak_cases(path, [ratio for ratio in RATIOS if ratio not in known]):
                     seeds[seed] += 1
                     yield {"seed": seed} | case
                 if seeds[seed] == 0:
@@ -64,18 +63,18 @@ def weak(done: list[dict[str, Any]], only: list[int]) -> Iterator[dict[str, Any]
 def strength(kind: str, done: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     """One packing."""
     known = [each["strength"] for each in done]
-    with ramp_scene(SCENE) as ramp:
+    with ramped(SCENE) as path:
         wanted = [float(each) for each in STRENGTHS[kind] if not np.any(np.isclose(each, known, atol=0))]
-        yield from over_strength(ramp, kind, wanted, START)
+        yield from over_strength(path, kind, wanted, START)
 
 
 def gain(done: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     """One packing, a kind of dissipation after the other."""
-    with ramp_scene(SCENE) as ramp:
+    with ramped(SCENE) as path:
         for kind in DISSIPATIONS:
             known = [each["distance"] for each in done if (each["cn"], each["drag"]) == kind]
             wanted = [float(each) for each in DISTANCES if not np.any(np.isclose(each, known, atol=0))]
-            yield from over_distance(ramp, wanted, [kind])
+            yield from over_distance(path, wanted, [kind])
 
 
 def main(what: str, seeds: list[int]) -> None:

@@ -5,7 +5,7 @@ Weak damping moves the eigenvalue :math:`s = i\sqrt\lambda` of an undamped motio
 motion is damped, G being positive. Where two eigenvalues are about to coalesce, :math:`y^H x \to 0` with opposite
 signs of the two: one of them is damped more and more, and the other one begins to grow *before* they meet. With the 2 x
 2 block :math:`B = m + N` of the pair (tr N = 0, :math:`D = (\lambda_1 - \lambda_2)^2 = 2\,\mathrm{tr} N^2`) and with
-:math:`G_B = (U^T V)^{-1} U^T G V` on the same bases (:mod:`~faultgouge.analysis.onset.eigenvalue_pair`) the two rates
+:math:`G_B = (U^T V)^{-1} U^T G V` on the same bases (:mod:`~faultgouge.analysis.windows.space`) the two rates
 are
 
 .. math:: \mathrm{Re}\,s_\pm = -\tfrac14 \left[ \mathrm{tr}\, G_B \pm \frac{2\,\mathrm{tr}(N G_B)}{\sqrt D} \right],
@@ -36,7 +36,8 @@ from numpy.typing import ArrayLike
 from faultgouge.analysis import NoEquilibriumError, Packing, Window, damping_matrix
 from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.motion.eigenvalues import mass_weighted
-from faultgouge.analysis.onset import Family, LostPairError, Pair, force_bearing, full_operator
+from faultgouge.analysis.windows import LostPairError, Modes, Space, System, force_bearing
+from faultgouge.analysis.windows.edges import follow_to, track
 
 DIGITS = 1e-12
 """Width to which the limit is bracketed, in units of the load."""
@@ -58,23 +59,27 @@ class WeakLimit:
     frequency: float
 
 
-def damping_block(packing: Packing, pair: Pair) -> Floats:
+def damping_block(packing: Packing, pair: Space) -> Floats:
     """G_B of a packing's damping on the bases of a pair, shape (2, 2), 1 / time."""
-    return pair.block(mass_weighted(damping_matrix(force_bearing(packing)), packing))
+    damping = mass_weighted(damping_matrix(force_bearing(packing)), packing)
+    return np.asarray(pair.block_of(damping @ pair.right))
 
 
-def weak_limit(equilibrium: Callable[[float], Packing], forces: ArrayLike, window: Window) -> WeakLimit | None:
+def weak_limit(
+    equilibrium: Callable[[float], Packing], forces: ArrayLike, window: Window, cn: float = 0.0, ct: float = 0.0
+) -> WeakLimit | None:
     """The limit of the damped onset as the dissipation tends to zero, from one undamped pair.
 
     Parameters
     ----------
     equilibrium : callable
-        fx -> Packing in equilibrium, as in :func:`~faultgouge.analysis.find_onset`. Of its dashpots the ratio C_N : C_T
-        alone counts.
+        fx -> Packing in equilibrium, as in :func:`~faultgouge.analysis.find_onset`.
     forces : array_like, shape (S,)
         The increasing loads of the ramp.
     window : Window
         The undamped window of the pair, as of :func:`~faultgouge.analysis.find_onset`.
+    cn, ct : float
+        Dashpots, of which the ratio alone counts.
 
     Returns
     -------
@@ -89,7 +94,7 @@ def weak_limit(equilibrium: Callable[[float], Packing], forces: ArrayLike, windo
     def h(fx: float) -> float:
         """Positive as long as weak damping damps both modes of the pair."""
         pair = pair_at(fx)
-        g, n = damping_block(equilibrium(fx), pair), pair.traceless
+        g, n = damping_block(equilibrium(fx).with_dissipation(cn, ct), pair), pair.traceless
         return float(np.trace(g) ** 2 * pair.discriminant - 4 * np.trace(n @ g) ** 2)
 
     try:
@@ -104,7 +109,7 @@ def weak_limit(equilibrium: Callable[[float], Packing], forces: ArrayLike, windo
         pair, packing = pair_at(fx), equilibrium(fx)
     except (LostPairError, NoEquilibriumError):
         return None
-    g = damping_block(packing, pair)
+    g = damping_block(packing.with_dissipation(cn, ct), pair)
     sign = -np.sign(np.trace(pair.traceless @ g))  # the mode in which the two terms cancel
     value = pair.mean + sign * 0.5 * np.sqrt(max(0.0, pair.discriminant))
     return WeakLimit(fx, float(np.sqrt(value)))
@@ -172,9 +177,12 @@ def balancing_ratio(packing: Packing, window: Window) -> float:
     return float(-along / across) if across else np.inf
 
 
-def _follow_pair(equilibrium: Callable[[float], Packing], window: Window) -> Callable[[float], Pair]:
+def _follow_pair(equilibrium: Callable[[float], Packing], window: Window) -> Callable[[float], Space]:
     """The undamped pair at any load, from its coalescence: the plane of two parallel vectors, made invariant."""
-    family = Family(lambda fx: full_operator(equilibrium(fx)), 0.0)
-    onset = family.at(window.fx_onset)
-    guess = onset.modes.pair(onset.modes.about(window.eigenvalue))
-    return family.track({onset.fx: family.follow_pair(guess, onset)})
+
+    def system(fx: float) -> System:
+        return System.of(equilibrium(fx))
+
+    onset = system(window.fx_onset)
+    modes = Modes.of(onset)
+    return track(system, {onset.fx: follow_to(modes.space(modes.about(window.eigenvalue)), replace(onset))})

@@ -45,8 +45,8 @@ from scipy.sparse import csr_array
 
 from faultgouge.analysis import spectrum
 from faultgouge.analysis.motion.eigenvalues import active_coordinates
-from faultgouge.analysis.onset import force_bearing, full_operator
 from faultgouge.analysis.packing.packing import Floats, Indices
+from faultgouge.analysis.windows import force_bearing, full_operator
 from faultgouge.pywrap import Equilibrium, Scene
 from faultgouge.pywrap.runs.equilibrium_path import loads
 from faultgouge.pywrap.scenes.validation import require_section

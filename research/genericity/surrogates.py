@@ -29,9 +29,9 @@ from scipy.sparse import coo_array, csr_array
 
 from faultgouge.analysis import NoEquilibriumError, Packing
 from faultgouge.analysis.motion.eigenvalues import mass_weighted
-from faultgouge.analysis.onset import complex_windows, force_bearing
 from faultgouge.analysis.operators.stiffness import stiffness_matrix
 from faultgouge.analysis.packing.packing import Floats
+from faultgouge.analysis.windows import complex_windows, force_bearing
 from faultgouge.pywrap import Equilibrium, Scene
 from faultgouge.pywrap.runs.equilibrium_path import loads
 from faultgouge.studies.packing_tools import path_from

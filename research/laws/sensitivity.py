@@ -15,7 +15,7 @@ import numpy as np
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset.undamped import onset_run
+from faultgouge.pywrap.onset import onset_run
 from faultgouge.studies.result_rows import append_row
 from faultgouge.studies.triggering.compute import sensitivity
 from research.laws.sets import ONSETS, sets
@@ -33,7 +33,7 @@ def rows(seed: int) -> Iterator[dict[str, Any]]:
             run = onset_run(scene, scene.law.mus[0], near_onset=NEAR * scene.load.fy, first=True)
         except (OnsetError, NoEquilibriumError):
             continue  # no window up to the end of the ramp
-        known |= {"fx_c": run.onset.fx_c, "fx_c_error": run.onset.windows[0].error}
+        known |= {"fx_c": run.fx_c, "fx_c_error": run.windows[0].error}
         try:
             found = sensitivity(run)
         except ValueError:  # the onset is not known well enough for three distances

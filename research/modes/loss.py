@@ -24,8 +24,8 @@ from scipy.optimize import brentq
 
 from faultgouge.analysis import Packing, dynamical_matrix, eigenvalues
 from faultgouge.analysis.motion.eigenvalues import mass_weighted
-from faultgouge.analysis.onset import force_bearing
 from faultgouge.analysis.operators.damping import damping_matrix
+from faultgouge.analysis.windows import force_bearing
 from faultgouge.pywrap import Equilibrium, Scene
 from faultgouge.pywrap.scenes.units import dashpot, real_units, restitution
 from faultgouge.studies.modes.count_pairs import along_ramp, count_pairs

@@ -18,7 +18,7 @@ from typing import Any
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError
 from faultgouge.pywrap import Scene, SceneError, reach
-from faultgouge.pywrap.onset.undamped import onset_run
+from faultgouge.pywrap.onset import onset_run
 from faultgouge.pywrap.scenes.validation import require_section
 from faultgouge.studies.triggering.forecast import Forecast, forecast
 from research.packing_tools import with_seed
@@ -62,11 +62,11 @@ def _try_seed(scene: Scene, seed: int) -> dict[str, Any]:
     friction, time = require_section(scene.friction, "friction"), require_section(scene.perturb, "perturb").time
     mu = scene.law.mus[0]
     try:
-        fx = float(f"{(1 - BELOW) * onset_run(scene, mu).onset.fx_c:.5g}")
+        fx = float(f"{(1 - BELOW) * onset_run(scene, mu).fx_c:.5g}")
         *_, start = reach(scene, fx)
         foreseen = forecast(start, mu * friction.mu_ss, time)
         says = _falls_short(foreseen)
-        if not says and onset_run(scene, mu * friction.mu_ss).onset.fx_c >= fx:
+        if not says and onset_run(scene, mu * friction.mu_ss).fx_c >= fx:
             says = "the onset of the weakened friction is not below it"
     except (OnsetError, NoEquilibriumError, SceneError) as error:
         return {"seed": seed, "says": str(error), "fx": None, "forecast": None}

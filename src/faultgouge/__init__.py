@@ -17,7 +17,7 @@ if "IPython" in sys.modules:
 
 OFFERS = {
     "Scene": "pywrap", "settle": "pywrap", "ramp": "pywrap", "perturb": "pywrap", "drive": "pywrap.runs.drive",
-    "onset": "pywrap.onset.first_onset", "from_lammps": "pywrap", "relax": "pywrap", "load": "stored_files",
+    "onset": "pywrap.onset", "from_lammps": "pywrap", "relax": "pywrap", "load": "stored_files",
     "stability": "analysis", "spectrum": "analysis", "draw": "figures:draw_packing", "view": "browser_view",
     "sweep": "studies.sweep.run_sweep",
 }  # fmt: skip

@@ -2,7 +2,7 @@ r"""Count the complex pairs of packings that are too large for all eigenvalues, 
 
 All eigenvalues of E coordinates take some :math:`10 E^3` operations or more: hours for 10,000 disks. Here the
 eigenvectors X of the symmetric part of the operator A are computed in slices
-(:mod:`~faultgouge.analysis.onset.block_lanczos`), and three neighbouring slices span a space, from which inverse
+(:mod:`~faultgouge.analysis.windows.slices.lanczos`), and three neighbouring slices span a space, from which inverse
 iteration finds the corresponding space of A with a shift :math:`\sigma` in the middle slice, on both sides:
 
 .. math:: R \leftarrow (A - \sigma)^{-1} R, \qquad L \leftarrow (A - \sigma)^{-T} L, \qquad R_0 = L_0 = X .
@@ -29,9 +29,9 @@ from scipy.sparse import csc_array, csr_array, eye_array
 from ...analysis import Packing, dynamical_matrix
 from ...analysis.factors.sparse_lu import symmetric_lu
 from ...analysis.motion.eigenvalues import SAFETY, Complexes, unit_rounding
-from ...analysis.onset import LIMITS, Limits
-from ...analysis.onset.block_lanczos import slices
 from ...analysis.packing.packing import Floats
+from ...analysis.windows import LIMITS, Limits
+from ...analysis.windows.slices.lanczos import slices
 
 _Block = tuple[Floats, Floats]
 

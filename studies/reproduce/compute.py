@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import Growth, Packing, RunFile, Spectrum, fit_growth, solid_fraction, spectrum
+from ...analysis import Growth, Onset, Packing, RunFile, Spectrum, fit_growth, solid_fraction, spectrum
 from ...analysis.counted import counted
 from ...analysis.motion.growth import BELOW_TOP, growing_range
-from ...analysis.onset.pair_form import pair_eigenvalues
 from ...analysis.packing.packing import Floats
+from ...analysis.windows.pair_form import pair_eigenvalues
 from ...figures.pair import PairCurve
 from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
-from ...pywrap.onset.undamped import OnsetRun, onset_run
+from ...pywrap.onset import onset_run
 from ...pywrap.runs.undamped import perturb, time_step
 from ...pywrap.scenes.sections import Perturb
 from ...pywrap.scenes.validation import require_section
@@ -75,7 +75,7 @@ class GrowthRun:
     measured: Growth | None
 
 
-def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering | str:
+def triggering_run(scene: Scene, runs: list[Onset], path: Path) -> Triggering | str:
     """A perturbation between the onsets of the weakened and of the static friction, or why there is nothing to trigger.
 
     The series go to run.h5.
@@ -85,9 +85,9 @@ def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering
     assert fx is not None  # the protocol has chosen it
     # exact but for the product's rounding
     weakened = [each for each in runs if np.isclose(each.mu, run.mu * mu_ss, rtol=1e-12)]
-    if weakened and weakened[0].onset.windows[0].kind != "start" and fx <= weakened[0].onset.fx_c:
+    if weakened and weakened[0].windows[0].kind != "start" and fx <= weakened[0].fx_c:
         return (
-            f"F_x = {fx:g} is below the onset {weakened[0].onset.fx_c:g} of the weakened friction, too: no "
+            f"F_x = {fx:g} is below the onset {weakened[0].fx_c:g} of the weakened friction, too: no "
             "window between the two, and nothing to erupt."
         )
     *_, start = reach(scene, fx)  # to the bit the one of `perturb`, and so is v_0
@@ -95,12 +95,12 @@ def triggering_run(scene: Scene, runs: list[OnsetRun], path: Path) -> Triggering
     if not modes.is_stable:
         what = f"{counted(len(modes.pairs), 'complex pair')} and {counted(len(modes.negative), 'negative eigenvalue')}"
         return f"At F_x = {fx:g} the packing has {what} already: nothing is stable there to be triggered."
-    lower = max(0.0, 2 * weakened[0].onset.fx_c - fx) if weakened else None
+    lower = max(0.0, 2 * weakened[0].fx_c - fx) if weakened else None
     control = None if lower is None else equilibrium_at(scene, run.equilibria, lower)
     return trigger(scene, start, control, run, path)
 
 
-def recorded_ramp(scene: Scene, mu: float, path: Path, bed: Packing | None = None) -> OnsetRun:
+def recorded_ramp(scene: Scene, mu: float, path: Path, bed: Packing | None = None) -> Onset:
     """Ramp and onset for one friction coefficient, from a settled bed; every equilibrium goes to the file."""
     one = scene.model_copy(update={"law": scene.law.model_copy(update={"mu": mu})})
     near = NEARBY * require_section(scene.ramp, "ramp").first
@@ -111,14 +111,14 @@ def recorded_ramp(scene: Scene, mu: float, path: Path, bed: Packing | None = Non
     return run
 
 
-def growth_run(scene: Scene, run: OnsetRun, path: Path) -> GrowthRun:
+def growth_run(scene: Scene, run: Onset, path: Path) -> GrowthRun:
     """An undamped run where the ramp shows the fastest growth by one pair."""
-    candidates = [each for each in run.equilibria if each.fx > run.onset.fx_c]
+    candidates = [each for each in run.equilibria if each.fx > run.fx_c]
     spectra = [spectrum(each.packing) for each in candidates]
     best = int(np.argmax([_dominance(each) for each in spectra]))
     start, modes = candidates[best], spectra[best]
     if not _dominance(modes):
-        first = run.onset.windows[0]
+        first = run.windows[0]
         raise SceneError(
             f"no load of the ramp lies in a window of complex eigenvalues, of which the first begins at "
             f"F_x = {first.fx_onset:.6g}: take a smaller ramp.step, so that a run above the onset has where to start"
@@ -154,7 +154,7 @@ def _dominance(modes: Spectrum) -> float:
     return rates[0] - (rates[1] if len(rates) > 1 else 0.0) if rates else 0.0
 
 
-def summary_of(scene: Scene, runs: list[OnsetRun], growth: GrowthRun) -> dict[str, Any]:
+def summary_of(scene: Scene, runs: list[Onset], growth: GrowthRun) -> dict[str, Any]:
     """Numbers for summary.json."""
     return {
         "scene": scene.resolved(),
@@ -169,7 +169,7 @@ def summary_of(scene: Scene, runs: list[OnsetRun], growth: GrowthRun) -> dict[st
                 "rattlers": run.equilibria[0].packing.rattlers.tolist(),
                 "solid_fraction": solid_fraction(run.equilibria[0].packing),
                 "flows_beyond": run.flows_beyond,
-                "onset": run.onset.as_dict(),
+                "onset": run.as_dict(),
             }
             for run in runs
         ],
@@ -183,9 +183,9 @@ def summary_of(scene: Scene, runs: list[OnsetRun], growth: GrowthRun) -> dict[st
     }
 
 
-def pair_curve(run: OnsetRun) -> PairCurve:
+def pair_curve(run: Onset) -> PairCurve:
     """The pair of the first onset up to the end of its window, at the loads of the ramp and at those near the onset."""
-    first = run.onset.windows[0]
+    first = run.windows[0]
     packings = {each.fx: each.packing for each in run.equilibria} | run.between
     last = 2.0 * first.fx_onset if first.fx_end is None else first.fx_end
     fx = np.array(sorted(load for load in packings if load <= last))

@@ -11,7 +11,6 @@ from ...analysis import Onset
 from ...analysis.packing.solid_fraction import solid_fraction, solid_fraction_below_top
 from ...figures.pages import render
 from ...pywrap import Scene
-from ...pywrap.onset.undamped import OnsetRun
 from ...pywrap.runs.undamped import ACCURATE_SHARE
 from ...pywrap.scenes.units import dashpot, quality_factor, real_units
 from ...pywrap.scenes.validation import require_section
@@ -21,10 +20,10 @@ from .compute import GrowthRun
 
 def report(
     scene: Scene,
-    runs: list[OnsetRun],
+    runs: list[Onset],
     growth: GrowthRun,
     found: Triggering | str | None,
-    another: list[OnsetRun] | None,
+    another: list[Onset] | None,
 ) -> str:
     """report.md of ramps for each friction coefficient, the run above the onset, and the triggering below it.
 
@@ -43,7 +42,7 @@ def report(
         runs=runs,
         last=runs[0].equilibria[-1],
         residual=max(each.residual for run in runs for each in run.equilibria),
-        earlier=[_is_earlier(a.onset, b.onset) for a, b in pairwise(order)],
+        earlier=[_is_earlier(a, b) for a, b in pairwise(order)],
         growth=growth,
         triggering=triggering,
         says=found,

@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ...analysis import OnsetError
+from ...analysis import Onset, OnsetError
 from ...analysis.files.atomic_write import make_folder, write_json, write_text
 from ...pywrap import Scene, SceneError
-from ...pywrap.onset.load_at_onset import load_at_onset
-from ...pywrap.onset.undamped import OnsetRun
+from ...pywrap.onset import load_at_onset
 from ...pywrap.scenes.validation import require_section
 from ...pywrap.settling.settle import settle_bed
 from ..executors import Say
@@ -65,7 +64,7 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
             draw_all(triggering_figures(found), output, say)
             summary["triggering"] = triggering_summary(found)
         if another is not None:
-            onsets = [{"mu": run.mu, "onset": run.onset.as_dict()} for run in another]
+            onsets = [{"mu": run.mu, "onset": run.as_dict()} for run in another]
             summary["triggering"] |= {"scene": shaken.resolved(), "onsets": onsets}
     else:
         say("the scene has no sections [perturb] and [friction]: no figures 2, 5 and 6")
@@ -74,13 +73,13 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     return summary
 
 
-def _trigger(scene: Scene, runs: list[OnsetRun], path: Path, say: Say) -> Triggering | str:
+def _trigger(scene: Scene, runs: list[Onset], path: Path, say: Say) -> Triggering | str:
     """The triggering at perturb.fx, or where the onsets say without it; or why there is nothing to trigger."""
     perturb = require_section(scene.perturb, "perturb")
     fx = perturb.fx
     if fx is None:
         try:
-            fx = load_at_onset(scene, {run.mu: run.onset for run in runs})
+            fx = load_at_onset(scene, {run.mu: run for run in runs})
         except (SceneError, OnsetError) as error:
             return str(error)
         scene = scene.model_copy(update={"perturb": perturb.model_copy(update={"fx": fx})})
@@ -88,7 +87,7 @@ def _trigger(scene: Scene, runs: list[OnsetRun], path: Path, say: Say) -> Trigge
     return triggering_run(scene, runs, path)
 
 
-def _ramps(scene: Scene, path: Path, say: Say) -> list[OnsetRun]:
+def _ramps(scene: Scene, path: Path, say: Say) -> list[Onset]:
     """Ramp and onset for each friction coefficient, the first in the file of that name, the others beside it."""
     # a packing that settles with friction is another one for each coefficient
     shared = not getattr(scene.packing, "settle_friction", False)
@@ -99,5 +98,5 @@ def _ramps(scene: Scene, path: Path, say: Say) -> list[OnsetRun]:
         say(f"mu = {mu:g}: {'' if shared else 'settling, '}ramp and onset")
         here = path if number == 0 else path.with_stem(f"{path.stem}-mu{mu:g}")
         runs.append(recorded_ramp(scene, mu, here, bed))
-        say(f"mu = {mu:g}: {runs[-1].onset.describe()}")
+        say(f"mu = {mu:g}: {runs[-1].describe()}")
     return runs

@@ -13,7 +13,7 @@ total number. *ancestors* are the numbers of the two modes at F_x = 0 that span 
 different mu belong to one pair if their ancestors are the same.
 
 **The error** is the total error, as in `faultgouge onset`, and F_x^c is the same: the path is solved again with other
-increments (:mod:`~faultgouge.pywrap.onset.path_error`). *error_of_path* is the part due to the increments. It is None
+increments (:mod:`~faultgouge.pywrap.runs.path_error`). *error_of_path* is the part due to the increments. It is None
 if no equilibrium is found at the onset a second time; the error then is that of rounding alone.
 """
 
@@ -27,11 +27,11 @@ from scipy.linalg import eigh, eigvals
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from ...analysis.motion.eigenpairs import eigenpairs
 from ...analysis.motion.eigenvalues import active_coordinates
-from ...analysis.onset import force_bearing, full_operator, takes_all_modes
 from ...analysis.packing.packing import Floats, Indices
+from ...analysis.windows import force_bearing, full_operator, takes_all_modes
 from ...pywrap import Scene, SceneError
-from ...pywrap.onset.path_error import with_path_error
 from ...pywrap.runs.equilibrium_path import EquilibriumPath, loads
+from ...pywrap.runs.path_error import with_path_error
 from ...pywrap.scenes.validation import require_section
 from ..packing_tools import Start, contact_pairs, path_from
 

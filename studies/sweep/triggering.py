@@ -26,8 +26,8 @@ from mpi4py import MPI
 from ...analysis import FaultgougeError
 from ...pywrap import Engine, Equilibrium, Scene
 from ...pywrap.lammps.dynamics import Weakening
-from ...pywrap.onset.path_error import with_path_error
 from ...pywrap.runs.equilibrium_path import EquilibriumPath
+from ...pywrap.runs.path_error import with_path_error
 from ...pywrap.runs.undamped import perturb
 from ...pywrap.scenes.sections import Friction, Perturb
 from ...pywrap.scenes.validation import require_section

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from ...analysis import Packing
 from ...analysis.uncertain_digits import with_uncertainty
 from ...pywrap import Scene
-from ...pywrap.onset.damped import damped_onset_run
-from ...pywrap.onset.undamped import onset_run
+from ...pywrap.onset import onset_run
 from ...pywrap.scenes.units import real_units
 from ...pywrap.scenes.validation import require_section
 from ..packing_tools import Start
@@ -85,10 +84,10 @@ def _onset(scene: Scene, work: Work) -> Row:
     work.say("onset")
     mu, undamped = scene.law.mus[0], None
     if scene.damping is None:
-        found = onset_run(scene, mu).onset
+        found = onset_run(scene, mu)
         fx_c, error, says = found.fx_c, found.error, found.describe()
     else:
-        run = damped_onset_run(scene, mu)
+        run = onset_run(scene, mu, dissipation=True)
         fx_c, error, undamped = run.fx_c, run.error, None if run.undamped is None else run.undamped.fx_c
         says = f"F_x^c = {with_uncertainty(fx_c, error)}"
     work.say(says)

@@ -30,15 +30,14 @@ from typing import Any, Literal
 import numpy as np
 from mpi4py import MPI
 
-from ...analysis import Growth, Packing, RunFile, fit_growth, spectrum
+from ...analysis import Growth, Onset, Packing, RunFile, fit_growth, spectrum
 from ...analysis.motion.normal_form import LEAST_CROSSOVER
 from ...analysis.motion.power_law import PowerLaw, fit_power_law
 from ...analysis.motion.response import Response, layer_force, linear_response
-from ...analysis.onset.pair_form import PairForm, pair_forms
 from ...analysis.packing.packing import Floats
+from ...analysis.windows.pair_form import PairForm, pair_forms
 from ...pywrap import Engine, Equilibrium, Sample, Scene
 from ...pywrap.lammps.dynamics import Weakening
-from ...pywrap.onset.undamped import OnsetRun
 from ...pywrap.runs.equilibrium_path import next_equilibrium
 from ...pywrap.runs.undamped import perturb, time_step, weakening_of
 from ...pywrap.scenes.sections import Friction
@@ -258,7 +257,7 @@ def foresee(start: Equilibrium, mu: float, run: Series, v0: float) -> Forecast:
     return forecast(start, mu, max(left, JUMP_SHARE * length), JUMP_SHARE * length)
 
 
-def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: OnsetRun, path: Path) -> Triggering:
+def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: Onset, path: Path) -> Triggering:
     """The runs, written to run.h5 as they end, and the linear response beside the last.
 
     Parameters
@@ -269,7 +268,7 @@ def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: O
         At perturb.fx.
     below : Equilibrium or None
         Where the control starts.
-    ramp : OnsetRun
+    ramp : Onset
         Of the packing, with its first onset.
     path : Path
         run.h5 of the ramp; gets the series unperturbed, perturbed, erupting, control and strong.
@@ -329,9 +328,9 @@ def equilibrium_at(
         return below if below.fx == fx else next_equilibrium(engine, below, fx, scene)
 
 
-def sensitivity(run: OnsetRun) -> Sensitivity:
+def sensitivity(run: Onset) -> Sensitivity:
     """The pair of the first onset, at the equilibria that the run has just below it."""
-    first = run.onset.windows[0]
+    first = run.windows[0]
     below = sorted((fx for fx in run.between if fx < first.fx_onset), reverse=True)
     # nearer than a hundred times the onset's own error, the distance is not known
     nearest, furthest = 100 * first.error, SENSITIVE * first.fx_onset

@@ -21,9 +21,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import ArrayLike
 
-from ...analysis.onset.pair_form import PairForm
 from ...analysis.packing.packing import Floats
 from ...analysis.uncertain_digits import with_uncertainty
+from ...analysis.windows.pair_form import PairForm
 from ...figures.series import draw_series, few_decades, positive, scientific
 from ...figures.style import INK, styled
 from ...pywrap.lammps.dynamics import Weakening

@@ -12,7 +12,7 @@ import pytest
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, touching
 
 sys.path.insert(0, str(Path(__file__).parent))
-sys.path.insert(0, str(Path(__file__).parent / "onset"))
+sys.path.insert(0, str(Path(__file__).parent / "windows"))
 
 import quasistatic
 

@@ -9,7 +9,7 @@ import pytest
 from faultgouge.analysis.motion.normal_form import ORTHOGONAL, NormalForm
 from faultgouge.analysis.motion.power_law import fit_power_law
 from faultgouge.analysis.motion.response import linear_response
-from faultgouge.analysis.onset.pair_form import pair_forms
+from faultgouge.analysis.windows.pair_form import pair_forms
 
 STAR = np.array([1.0, 1.0]) / np.sqrt(2)
 ONSET, DOUBLE_EIGENVALUE = 0.0218330564080, 2058.269

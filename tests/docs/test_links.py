@@ -79,9 +79,8 @@ def test_each_paragraph_on_complex_pairs_names_the_file_that_has_it():
     paragraphs = [each for each in text.split("\n\n") if each.startswith("**") and not each.endswith("pass:")]
     assert (len(rows), len(paragraphs)) == (6, 10)
     for passage in [*rows, text.split("\n\n**")[0], *paragraphs]:
-        ((name, places),) = re.findall(r"`(\w+\.py)`:\s((?:`[\w.]+`(?:, )?)+)", passage)
-        room = "damped_onset" if passage.startswith("**Strong dashpots.**") else "onset"
-        source = (ROOT / "analysis" / room / name).read_text()
+        ((name, places),) = re.findall(r"`([\w/]+\.py)`:\s((?:`[\w.]+`(?:, )?)+)", passage)
+        source = (ROOT / "analysis" / "windows" / name).read_text()
         for place in re.findall(r"[\w.]+", places):
             assert all(re.search(rf"^ *(class|def) {part}\b", source, re.MULTILINE) for part in place.split(".")), place
 

@@ -8,7 +8,7 @@ from faultgouge.figures import PairCurve, draw_pair
 from faultgouge.figures.followed_pairs import follow_eigenvalues
 from faultgouge.figures.pair import curve_through
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset.undamped import onset_run
+from faultgouge.pywrap.onset import onset_run
 
 
 @pytest.mark.slow
@@ -18,7 +18,7 @@ def test_the_drawn_branches_meet_at_the_onset(known):
     with equilibria close to it."""
     changed = {"packing": SMALL["packing"] | {"seed": 3}, "ramp": {"step": 0.01, "until": 0.16}}
     run = onset_run(Scene.from_mapping(SMALL | changed), mu=1.0)
-    first = run.onset.windows[0]
+    first = run.windows[0]
     packings = [each.packing for each in run.equilibria]
     pairs = follow_eigenvalues(packings).pairs
     pair = min(pairs, key=lambda each: np.nanmin(np.abs(each.eigenvalues.real - first.eigenvalue)))

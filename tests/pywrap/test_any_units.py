@@ -12,8 +12,7 @@ from reference_layer import SMALL
 from faultgouge.analysis import MindlinLaw, RunFile
 from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, perturb, ramp, settle
 from faultgouge.pywrap.equilibria.rattlers import middle_of_cage
-from faultgouge.pywrap.onset.damped import damped_onset_run
-from faultgouge.pywrap.onset.undamped import onset_run
+from faultgouge.pywrap.onset import onset_run
 from faultgouge.pywrap.settling.settle import law_of, own_units
 
 UNITS = st.floats(-9, 9).map(lambda power: 10.0**power)
@@ -82,7 +81,7 @@ def test_quartz_in_other_units_has_the_same_onset():
     plain, si = map(quartz, ("quartz", "quartz_si"))
     ratios = []
     for scene in (plain, si):
-        window = onset_run(scene, 0.6, first=True).onset.windows[0]
+        window = onset_run(scene, 0.6, first=True).windows[0]
         ratios.append((window.fx_onset / scene.load.fy, window.error / scene.load.fy))
     # the error states two digits; rounding, amplified by the root of a double eigenvalue, leaves nine digits the same
     assert ratios[0][0] == pytest.approx(ratios[1][0], rel=1e-9)
@@ -156,9 +155,9 @@ def onset_in(length=1.0, force=1.0, mass=1.0, damped=False):
     time = (mass * length / force) ** 0.5
     if damped:
         sections |= {"damping": {"cn": 10.0 * force / length**1.5 * time}}
-        found = damped_onset_run(Scene.from_mapping(sections), 0.5, first=True)
+        found = onset_run(Scene.from_mapping(sections), 0.5, dissipation=True, first=True)
         return found.fx_c / force, found.error / force, found.windows[0].frequency * time
-    run = onset_run(Scene.from_mapping(sections), 0.5, first=True).onset
+    run = onset_run(Scene.from_mapping(sections), 0.5, first=True)
     return run.fx_c / force, run.error / force, run.windows[0].eigenvalue * time**2
 
 

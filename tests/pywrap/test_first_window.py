@@ -6,7 +6,7 @@ from scipy.linalg import eigvals
 
 from faultgouge.analysis import find_onset
 from faultgouge.analysis.motion.eigenvalues import unit_rounding
-from faultgouge.analysis.onset import full_operator
+from faultgouge.analysis.windows import full_operator
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath, loads
 

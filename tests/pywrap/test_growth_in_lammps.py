@@ -11,9 +11,7 @@ from faultgouge.analysis import (
     spectrum,
     transient_gain,
 )
-from faultgouge.analysis.damped_onset.modes import DampedModes, Pencil
-from faultgouge.analysis.damped_onset.windows import without_dissipation
-from faultgouge.analysis.onset import Modes, full_operator
+from faultgouge.analysis.windows import Modes, System
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath
 from faultgouge.pywrap.runs.undamped import time_step
@@ -51,7 +49,7 @@ def test_growth_rate_and_frequency_are_those_of_the_spectrum(loaded):
     pair = max(spectrum(packing).pairs, key=lambda each: each.growth_rate)
     dt = time_step(packing)
     omega = complex(discrete_frequency(pair.eigenvalue, dt))
-    modes = Modes.of(packing.fx, full_operator(packing))
+    modes = Modes.of(System.of(packing))
     mode = modes.right[:, np.argmin(np.abs(modes.values - pair.eigenvalue))].real
     # from far above the noise of 1e-25 to far below the square of the slip limits
     time, msd, velocity = run(displace(packing, mode, 1e-8), packing, 540.0, 12000, dt)
@@ -115,15 +113,13 @@ def path():
 @pytest.mark.parametrize(("fx", "cn", "unstable"), [(0.0155, 3.0, 1), (0.015, 3.0, 0)])
 def test_growth_with_dashpots_is_that_of_the_eigenvalue(path, fx, cn, unstable):
     """Over six decades of D; at 0.015 it is the dashpots that make the packing unstable."""
-    packing = without_dissipation(path, cn=cn)(fx)
+    packing = path(fx).with_dissipation(cn=cn)
     assert len(spectrum(packing).pairs) == unstable
-    modes = DampedModes.of(Pencil.of(packing))
-    (index,) = modes.grows
+    (mode,) = Modes.of(System.of(packing, dissipation=True)).growing
     # 0.15 of the limit: damped runs are of second order in the step, and 3e-4 off there
-    mode, dt = modes.mode(int(index)), 3 * time_step(packing)
-    rate = 2 * mode.rate.real
+    rate, shape, dt = 2 * mode.mean.real, mode.shapes[0][:, 0], 3 * time_step(packing)
     # from rest, displaced along the mode at its largest
-    largest = (mode.right * np.exp(-0.5j * np.angle(np.sum(mode.right**2)))).real
+    largest = (shape * np.exp(-0.5j * np.angle(np.sum(shape**2)))).real
     start = largest / np.sqrt(np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass]))
     # Above the noise of 1e-25. So close to a coalescence the rate depends on the amplitude: by a tenth at D = 1e-12.
     time, msd, _ = run(displace(packing, start, 1e-10), packing, 19.5 / rate, 8000, dt)

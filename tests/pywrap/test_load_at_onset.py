@@ -7,7 +7,7 @@ import pytest
 from reference_layer import toml
 
 from faultgouge.pywrap import Scene, SceneError
-from faultgouge.pywrap.onset.load_at_onset import load_at_onset
+from faultgouge.pywrap.onset import load_at_onset
 
 SECTIONS = {
     "packing": {"seed": 4, "disks": 40, "width": 7.5},

@@ -7,12 +7,20 @@ import numpy as np
 import pytest
 from reference_layer import SMALL, UNITS, toml
 
-from faultgouge.analysis import damped_windows, stiffness_matrix
-from faultgouge.analysis.damped_onset.windows import without_dissipation
+from faultgouge.analysis import stiffness_matrix
 from faultgouge.pywrap import Scene, SceneError
-from faultgouge.pywrap.onset.damped import damped_onset_run, ramp_scene
+from faultgouge.pywrap.onset import onset_run
 from faultgouge.pywrap.scenes.units import real_units
-from research.dissipation.compute import RATIOS, over_distance, over_strength, weak_cases
+from research.dissipation.compute import (
+    RATIOS,
+    first_undamped_window,
+    loads_of,
+    over_distance,
+    over_strength,
+    ramped,
+    weak_cases,
+    windows_with,
+)
 from research.dissipation.weak_limit import balancing_ratio, drag_onset, weak_limit
 from research.packing_tools import with_seed
 
@@ -29,7 +37,7 @@ def table(name):
 
 @pytest.fixture(scope="module")
 def ramp():
-    with ramp_scene(SCENE) as found:
+    with ramped(SCENE) as found:
         yield found
 
 
@@ -59,29 +67,26 @@ def test_the_limit_of_weak_dashpots_is_predicted(ramp):
 @pytest.fixture(scope="module")
 def window(ramp):
     """The first window without dissipation."""
-    return ramp.first_window()
+    return first_undamped_window(ramp)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("cn", "ct"), [(1.0, 0.0), (0.0, 1.0)])
 def test_the_limit_of_weak_dashpots_and_its_frequency(ramp, window, cn, ct):
-    predicted = weak_limit(without_dissipation(ramp.path, cn, ct), ramp.forces, window)
+    predicted = weak_limit(ramp, loads_of(ramp), window, cn, ct)
     assert predicted.fx < window.fx_onset
-    weak = without_dissipation(ramp.path, 1e-4 * cn, 1e-4 * ct)
-    (found, *_) = damped_windows(weak, [0.014, window.fx_onset + 1e-6])
-    # the onset is that of the table within what weak dashpots leave: 1e-12 of 0.0149 there
-    assert predicted.fx == pytest.approx(found.fx_onset, rel=1e-9)
+    (found, *_) = windows_with(ramp, [0.014, window.fx_onset + 1e-6], cn=1e-4 * cn, ct=1e-4 * ct)
+    # Re s of 1e-12 tells loads apart that differ by as much as the rounding of their equilibria leaves
+    assert found.error < 1e-10
+    assert predicted.fx == pytest.approx(found.fx_onset, abs=2 * found.error)
     assert predicted.frequency == pytest.approx(found.frequency, rel=1e-6)
 
 
 @pytest.mark.slow
 def test_balanced_dashpots_leave_the_onset_alone(ramp, window):
-    ratio = balancing_ratio(ramp.path(window.fx_onset), window)
+    ratio = balancing_ratio(ramp(window.fx_onset), window)
     assert ratio == pytest.approx(0.1987, abs=5e-5)
-    limits = {
-        share: weak_limit(without_dissipation(ramp.path, 1.0, share * ratio), ramp.forces, window).fx
-        for share in (0.5, 1.0, 2.0)
-    }
+    limits = {share: weak_limit(ramp, loads_of(ramp), window, 1.0, share * ratio).fx for share in (0.5, 1.0, 2.0)}
     assert limits[1.0] == pytest.approx(window.fx_onset, rel=1e-8)
     assert max(limits[0.5], limits[2.0]) < window.fx_onset - 1e-10
 
@@ -89,12 +94,12 @@ def test_balanced_dashpots_leave_the_onset_alone(ramp, window):
 @pytest.mark.slow
 def test_drag_shifts_the_onset_to_where_the_growth_exceeds_it(ramp, window):
     """The closed form of the pair against all modes; 2 |Im omega| = 1/tau to second order."""
-    tau, path = 100.0, without_dissipation(ramp.path)
-    predicted = drag_onset(path, ramp.forces, window, tau)
+    tau = 100.0
+    predicted = drag_onset(ramp, loads_of(ramp), window, tau)
     assert predicted > window.fx_onset
-    (found, *_) = damped_windows(without_dissipation(ramp.path, drag_time=tau), [0.0149, predicted + 1e-5])
+    (found, *_) = windows_with(ramp, [0.0149, predicted + 1e-5], drag_time=tau)
     assert predicted == pytest.approx(found.fx_onset, rel=1e-9)
-    rates = np.linalg.eigvals(stiffness_matrix(path(predicted)).toarray())
+    rates = np.linalg.eigvals(stiffness_matrix(ramp(predicted)).toarray())
     fastest = np.abs(np.sqrt(rates.astype(complex)).imag).max()
     assert 2 * fastest == pytest.approx(1 / tau, rel=1e-4)
 
@@ -104,7 +109,7 @@ def test_an_onset_just_before_the_last_load_is_found():
     """The last load lies a millionth of F_x beyond the onset, which is less than small pencils know."""
     scene = with_seed(SCENE, 15)
     assert (scene.packing.seed, scene.ramp) == (15, SCENE.ramp)
-    with ramp_scene(scene) as found:
+    with ramped(scene) as found:
         (case,) = weak_cases(found, [(0.0, 1.0)])
     assert case["measured"] == pytest.approx(case["predicted"], rel=1e-9)
 
@@ -131,9 +136,9 @@ def test_the_gain_grows_towards_the_onset_and_drag_limits_it(ramp):
 
 def test_scenes_without_a_section():
     with pytest.raises(SceneError, match=r"no section \[damping\]"):
-        damped_onset_run(SCENE, 1.0)
-    with pytest.raises(SceneError, match=r"no section \[ramp\]"), ramp_scene(SCENE.model_copy(update={"ramp": None})):
-        pass
+        onset_run(SCENE, 1.0, dissipation=True)
+    with pytest.raises(SceneError, match=r"no section \[ramp\]"):
+        onset_run(SCENE.model_copy(update={"ramp": None}), 1.0)
 
 
 @pytest.mark.parametrize("damping", ["", "[damping]\ncn = 1.0\n"])

@@ -9,7 +9,7 @@ import pytest
 from reference_layer import SMALL, toml
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, spectrum, stiffness_matrix
-from faultgouge.analysis.onset import LIMITS
+from faultgouge.analysis.windows import LIMITS
 from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, settle
 from faultgouge.studies.modes.count_in_slices import count_in_slices
 from faultgouge.studies.modes.count_pairs import antisymmetric_norm, count_pairs, count_with_part_of_b, modes

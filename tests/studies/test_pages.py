@@ -40,12 +40,12 @@ def test_the_page_of_the_protocol_counts_no_windows_that_were_not_counted(tmp_pa
     scene = Scene.from_mapping(SMALL | {"ramp": {"step": 5e-3, "until": 0.045}})
     run = recorded_ramp(scene, 1.0, tmp_path / "run.h5")
     growth = growth_run(scene, run, tmp_path / "run.h5")
-    first = replace(run, onset=replace(run.onset, windows=run.onset.windows[:1], complete=False))
-    for each, cell in ((run, f"| {len(run.onset.windows)} |"), (first, "| not counted, as the search ended with the")):
+    first = replace(run, windows=run.windows[:1], complete=False)
+    for each, cell in ((run, f"| {len(run.windows)} |"), (first, "| not counted, as the search ended with the")):
         page = report(scene, [each], growth, None, None)
         (row,) = (line for line in page.splitlines() if line.startswith("| 1 |"))
         assert cell in row
-        assert summary_of(scene, [each], growth)["ramps"][0]["onset"]["complete"] is each.onset.complete
+        assert summary_of(scene, [each], growth)["ramps"][0]["onset"]["complete"] is each.complete
 
 
 def test_prose_and_items_are_folded_where_no_line_begins_a_list():

@@ -12,10 +12,9 @@ from scipy.linalg import LinAlgError
 from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
 from faultgouge.assessment.work_precision.coverage.stated_errors import FINER, draw_scene, read, restate_case
 from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.onset.damped import damped_onset_run
-from faultgouge.pywrap.onset.path_error import OtherPaths, PathError, squared_gap, with_path_error
-from faultgouge.pywrap.onset.undamped import onset_run
+from faultgouge.pywrap.onset import onset_run
 from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath
+from faultgouge.pywrap.runs.path_error import OtherPaths, PathError, squared_gap, with_path_error
 from faultgouge.studies.sweep.onset import onset
 
 PAPER = Scene.from_toml(files("faultgouge") / "scenes/paper.toml").resolved()
@@ -95,7 +94,7 @@ def test_onsets_with_dissipation_state_the_whole_error():
     found = {}
     for precision, increment in (("compensated", 5e-4), ("double", 2e-3), ("double", 1e-3)):
         sections = HUNDRED | {"packing": {"disks": 30, "seed": 4}, "damping": {"cn": 0.5, "ct": 0.2}}
-        run = damped_onset_run(scene_of(sections, precision, increment, 0.012), 1.0)
+        run = onset_run(scene_of(sections, precision, increment, 0.012), 1.0, dissipation=True)
         found[precision, increment] = (run.fx_c, run.error), (run.undamped.fx_c, run.undamped.error)
     truth = found.pop(("compensated", 5e-4))
     assert all(covers(*pair) for onsets in found.values() for pair in zip(onsets, truth, strict=True))
@@ -109,10 +108,10 @@ def test_rows_of_a_sweep_state_the_error_that_onset_states_and_it_covers():
     scene, fine = (Scene.from_mapping(sections | {"ramp": ramp | more}) for more in ({}, {"step": 1e-4}))
     row = onset(scene, partial(settle, scene))
     known, limit = (onset_run(each, 0.15, first=True) for each in (scene, fine))
-    window = known.onset.windows[0]
+    window = known.windows[0]
     assert (row["fx_c"], row["error"], row["error_of_path"]) == (window.fx_onset, window.error, window.path_error)
     assert row["error_of_path"] > 0.5 * row["error"]
-    assert abs(row["fx_c"] - limit.onset.fx_c) <= row["error"] + limit.onset.error < 2e-10
+    assert abs(row["fx_c"] - limit.fx_c) <= row["error"] + limit.error < 2e-10
 
 
 @pytest.mark.slow

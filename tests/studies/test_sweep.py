@@ -18,7 +18,7 @@ import pytest
 from reference_layer import BIN, REFERENCE, SMALL, toml
 
 from faultgouge.pywrap import Scene, SceneError, settle
-from faultgouge.pywrap.onset.undamped import onset_run
+from faultgouge.pywrap.onset import onset_run
 from faultgouge.studies.executors import Processes, open_executor
 from faultgouge.studies.statistics import median_interval
 from faultgouge.studies.sweep import workers
@@ -186,7 +186,7 @@ def test_rows_are_the_onsets_of_their_scenes_and_share_settled_packings(tmp_path
     for row in rows[2:]:
         changes = {"packing": {"seed": int(row["packing.seed"])}, "law": {"mu": float(row["law.mu"])}}
         scene = Scene.from_mapping({name: values | changes.get(name, {}) for name, values in SMALL.items()})
-        window = onset_run(scene, scene.law.mus[0]).onset.windows[0]
+        window = onset_run(scene, scene.law.mus[0]).windows[0]
         # the run extrapolates the path's increments away, and states what that may miss; a row does not
         assert float(row["fx_c"]) == pytest.approx(window.fx_onset, abs=window.error + float(row["error"]))
         assert row["kind"] == window.kind == "coalescence"

@@ -7,7 +7,7 @@ import pytest
 
 from faultgouge.analysis.motion.normal_form import NormalForm
 from faultgouge.analysis.motion.power_law import PowerLaw
-from faultgouge.analysis.onset.pair_form import PairForm
+from faultgouge.analysis.windows.pair_form import PairForm
 from faultgouge.figures.pages import render
 from faultgouge.pywrap.lammps.dynamics import Weakening
 from faultgouge.studies.triggering.compute import Sensitivity, Triggering, judge, summary

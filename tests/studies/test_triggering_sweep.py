@@ -8,7 +8,7 @@ from reference_layer import SMALL, toml
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import NoEquilibriumError, Scene, SceneError, settle
-from faultgouge.pywrap.onset.undamped import onset_run
+from faultgouge.pywrap.onset import onset_run
 from faultgouge.studies.reproduce import reproduce
 from faultgouge.studies.statistics import distribution, median_interval, quartiles, share, sign_test
 from faultgouge.studies.sweep import triggering
@@ -111,7 +111,7 @@ def test_interval_of_a_median_covers_it_as_often_as_it_says():
 def test_first_onset_is_that_of_the_whole_ramp(scene):
     found, path = triggering.first_onset(scene, 1.0, lambda mu: settle(scene, mu))
     whole = onset_run(scene, 1.0)
-    assert (found["ends"], found["reach"]) == ("onset", pytest.approx(whole.onset.fx_c, rel=1e-9))
+    assert (found["ends"], found["reach"]) == ("onset", pytest.approx(whole.fx_c, rel=1e-9))
     assert found["error"] < 1e-9
     assert path[-1].fx - scene.ramp.step <= found["reach"] <= path[-1].fx
 

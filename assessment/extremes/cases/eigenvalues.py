@@ -25,13 +25,12 @@ from pathlib import Path
 
 import numpy as np
 from scipy.linalg import eigvals
-from scipy.sparse import csr_array
 
-from ....analysis import spectrum
+from ....analysis import Onset, spectrum
 from ....analysis.motion.eigenvalues import SAFETY, unit_rounding
-from ....analysis.onset import Modes, full_operator
+from ....analysis.windows import Modes, System
 from ....pywrap import Scene
-from ....pywrap.onset.undamped import OnsetRun, onset_run
+from ....pywrap.onset import onset_run
 from .case import Case, Outcome, failed_outcome, measured_outcome
 from .packings import bed, crystal, law, shear_packing, with_rattlers
 
@@ -60,9 +59,9 @@ def _near_defective(eps: float, sign: int) -> Outcome:
     matrix[:2, :2] = [[1 - SPLIT, coupling], [-coupling, 1 + SPLIT]]
     turn = np.linalg.qr(generator.standard_normal((SIZE, SIZE)))[0]
     matrix = turn @ matrix @ turn.T
-    modes = Modes.of(0.0, csr_array(matrix))
+    modes = Modes.of_operator(0.0, matrix)
     first, second = np.argsort(np.abs(modes.values - 1))[:2]
-    found = modes.pair((int(first), int(second))).discriminant
+    found = modes.space((int(first), int(second))).discriminant
     rounding = unit_rounding(matrix)
     believed = modes.partner[first] >= 0
     if believed and sign < 0:
@@ -78,7 +77,7 @@ def _near_defective(eps: float, sign: int) -> Outcome:
 
 
 @cache
-def _onset() -> OnsetRun:
+def _onset() -> Onset:
     """The reference packing of 100 disks, and its equilibria close to the onset."""
     scene = Scene.from_toml(Path(str(files("faultgouge") / "scenes" / "report.toml")))
     return onset_run(scene, 1.0, near_onset=FX_C * np.outer(DISTANCES, [-1, 1]).ravel())
@@ -86,21 +85,21 @@ def _onset() -> OnsetRun:
 
 def _near_an_onset(distance: float) -> Outcome:
     run = _onset()
-    forces = sorted(run.between, key=lambda fx: abs(abs(fx - run.onset.fx_c) / FX_C - distance))[:2]
+    forces = sorted(run.between, key=lambda fx: abs(abs(fx - run.fx_c) / FX_C - distance))[:2]
     discriminants, split = [], 0.0
     for fx in sorted(forces):
-        modes = Modes.of(fx, full_operator(run.between[fx]))
-        first, second = np.argsort(np.abs(modes.values - run.onset.windows[0].eigenvalue))[:2]
-        if (modes.partner[first] >= 0) != (fx > run.onset.fx_c):
+        modes = Modes.of(System.of(run.between[fx]))
+        first, second = np.argsort(np.abs(modes.values - run.windows[0].eigenvalue))[:2]
+        if (modes.partner[first] >= 0) != (fx > run.fx_c):
             return failed_outcome(f"the pair is real above the onset, or complex below it, at {fx!r}")
-        discriminants.append(modes.pair((int(first), int(second))).discriminant)
+        discriminants.append(modes.space((int(first), int(second))).discriminant)
         split = abs(modes.values[first] - modes.values[second])
     below, above = discriminants
     return measured_outcome(
         abs(below + above) / abs(below - above),
-        CURVATURE * distance + 2 * run.onset.error / (distance * FX_C),
+        CURVATURE * distance + 2 * run.error / (distance * FX_C),
         f"D of 100 disks below and above F_x^c, {below:.3g} and {above:.3g}: difference of their sizes, in units of "
-        f"their sum; the bound is the curvature of D and the error of F_x^c, {run.onset.error:.0e}, over the distance; "
+        f"their sum; the bound is the curvature of D and the error of F_x^c, {run.error:.0e}, over the distance; "
         f"the pair is real below and complex above, with a split of {split:.1e}",
     )
 

@@ -25,14 +25,12 @@ from typing import Literal, get_args
 import numpy as np
 
 from ....analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
-from ....analysis.damped_onset.windows import DampedWindow, damped_windows, with_dissipation
 from ....analysis.files.atomic_write import write_text
-from ....analysis.onset import Window
 from ....analysis.packing.packing import Floats
+from ....analysis.windows import System, Window, find_windows
 from ....pywrap import Engine, Equilibrium, Scene, settle
-from ....pywrap.onset.damped import loads_inside
-from ....pywrap.onset.path_error import OtherPaths, with_damped_path_error, with_path_error
 from ....pywrap.runs.equilibrium_path import EquilibriumPath, loads
+from ....pywrap.runs.path_error import OtherPaths, with_path_error
 from ....pywrap.scenes.validation import require_section
 
 Kind = Literal["undamped", "damped"]
@@ -164,7 +162,7 @@ class FirstOnset:
         self._scene = scene.model_copy(update={"damping": None})
         self._wanted = loads(require_section(scene.ramp, "ramp"))
 
-    def first_window(self, finer: int = 1, beyond: float = 0.0) -> tuple[EquilibriumPath, Window | DampedWindow] | None:
+    def first_window(self, finer: int = 1, beyond: float = 0.0) -> tuple[EquilibriumPath, Window] | None:
         """The ramp with increments so many times smaller, and the first window on it, without the error of the path.
 
         None if there is no window beyond a given load and before the end of the ramp, or of the equilibria.
@@ -183,7 +181,7 @@ class FirstOnset:
                 return path, window
         return None
 
-    def _window(self, path: EquilibriumPath, part: Floats) -> Window | DampedWindow | None:
+    def _window(self, path: EquilibriumPath, part: Floats) -> Window | None:
         """The first window between some loads."""
         try:
             undamped = find_onset(path, part).windows  # which are where damped ones are looked for, too
@@ -191,26 +189,28 @@ class FirstOnset:
             undamped = ()
         if self._damping is None:
             return undamped[0] if undamped else None
-        windows = damped_windows(
-            lambda fx: self._with_dashpots(path(fx)), part, look=loads_inside(undamped), first=True
+        ends = [0.5 * (each.fx_onset + each.fx_end) for each in undamped if each.fx_end is not None]
+        inside = [*(each.fx_onset for each in undamped), *ends]
+        windows = find_windows(
+            lambda fx: System.of(self._with_dashpots(path(fx)), dissipation=True),
+            part,
+            look=lambda below, above: [fx for fx in inside if below < fx < above],
+            first=True,
         )
         return windows[0] if windows else None
 
     def _with_dashpots(self, packing: Packing) -> Packing:
         assert self._damping is not None
-        return with_dissipation(packing, self._damping.cn, self._damping.ct, self._damping.tau)
+        return packing.with_dissipation(self._damping.cn, self._damping.ct, self._damping.tau)
 
     def changes(self, path: EquilibriumPath, fx: float) -> int:
         """Number of the increments before a load in which contacts change."""
         return int(OtherPaths(path).changes(fx).sum())
 
-    def whole(self, path: EquilibriumPath, window: Window | DampedWindow) -> tuple[float, float]:
+    def whole(self, path: EquilibriumPath, window: Window) -> tuple[float, float]:
         """The onset of a window, and the error that is stated: rounding and path together."""
-        if isinstance(window, Window):
-            first, *_ = with_path_error(Onset((window,), complete=False), path).windows
-            return first.fx_onset, first.error
-        damped, *_ = with_damped_path_error([window], self._with_dashpots, path)
-        return damped.fx_onset, damped.error
+        first, *_ = with_path_error(Onset((window,), complete=False), path, self._with_dashpots).windows
+        return first.fx_onset, first.error
 
 
 def compute_cases(number: int) -> list[CoverageCase]:

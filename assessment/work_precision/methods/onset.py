@@ -2,7 +2,7 @@ r"""Error of the onset F_x^c over the time that it takes to find it.
 
 There are three methods. A *scan* computes the spectrum at each increment of a ramp, and takes the middle between the
 last real and the first complex spectrum. A *bisection* divides the increment in which the onset lies. The third method
-solves for the *root of the discriminant* of the two eigenvalues (:mod:`~faultgouge.analysis.onset`). The paper's scan
+solves for the *root of the discriminant* of the two eigenvalues (:mod:`~faultgouge.analysis.windows`). The paper's scan
 waits for overdamped dynamics at each increment; the other methods use Newton's method.
 
 A scan errs by half an increment at the most. A bisection ends where a complex pair can no longer be distinguished from
@@ -20,8 +20,8 @@ import numpy as np
 from ....analysis import Onset, Packing, find_onset, spectrum
 from ....analysis.motion.eigenvalues import SAFETY
 from ....pywrap import Engine, Equilibrium, Scene
-from ....pywrap.onset.path_error import with_path_error
 from ....pywrap.runs.equilibrium_path import EquilibriumPath
+from ....pywrap.runs.path_error import with_path_error
 from ..coverage.stated_errors import read, restate_case
 from .work_precision_study import Run, Settings, StatedError, Study, Theory, compensate, study_of, timed_points
 

@@ -35,10 +35,9 @@ from .terminal import (
 )
 
 if TYPE_CHECKING:
-    from ..analysis import DampedWindow, Packing, Spectrum, Stability, Window
+    from ..analysis import Onset, Packing, Spectrum, Stability, Window
     from ..analysis.configuration import HasConfiguration
     from ..pywrap import Equilibrium, Scene
-    from ..pywrap.onset.damped import DampedOnset
 
 app = typer.Typer()
 
@@ -269,7 +268,7 @@ def onset(
     to the end of the ramp. Of several friction coefficients those without an onset
     are named; the exit code is 1 if none has one.
     """
-    from faultgouge.analysis import DampedOnsetError, NoEquilibriumError, OnsetError
+    from faultgouge.analysis import NoEquilibriumError, OnsetError
     from faultgouge.analysis.progress import show_progress
     from faultgouge.pywrap.settling.settle import shared_bed
 
@@ -292,7 +291,7 @@ def onset(
                 found.append(_damped_onset(wanted, mu, bed, not every, tell, output, folder, found))
             else:
                 found.append(_undamped_onset(part, folder, wanted, mu, bed, not every, tell))
-        except (OnsetError, DampedOnsetError, NoEquilibriumError) as error:
+        except (OnsetError, NoEquilibriumError) as error:
             if len(wanted.law.mus) == 1:
                 raise
             tell(f"mu = {mu:g}: no onset: {error}")
@@ -310,7 +309,7 @@ def onset(
 def _check_all_windows(scene: Scene, modes: tuple[int, int] | None) -> None:
     """Refuse --all where the first window alone is sought."""
     from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.onset import LIMITS
+    from faultgouge.analysis.windows import LIMITS
 
     if modes is not None:
         raise BadInputError("--all goes without --modes: among some modes the first window is sought; leave one out")
@@ -357,12 +356,11 @@ def _undamped_onset(
     tell: Tell,
 ) -> dict[str, Any]:
     """The onset of a scene, as its JSON; and what a user reads of it."""
-    from faultgouge.pywrap.onset.undamped import onset_run
+    from faultgouge.pywrap.onset import onset_run
 
     with status(f"mu = {mu:g}") as show:
         watch = partial(_under_way, show, f"mu = {mu:g}", folder=folder)
-        run = onset_run(scene, mu, modes=modes, first=first, bed=bed, watch=watch, folder=folder)
-    onset = run.onset
+        onset = onset_run(scene, mu, modes=modes, first=first, bed=bed, watch=watch, folder=folder)
     real = _in_si(scene, [(each.fx_onset, abs(each.eigenvalue) ** 0.5) for each in onset.windows])
     si, opening = real.get("si", []), onset.windows[0]
     among = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
@@ -375,8 +373,8 @@ def _undamped_onset(
         _tell_in_si(mu, si, tell)
     if onset.ends is not None and onset.complete:
         tell(f"mu = {mu:g}: the branch of equilibria ends before F_x = {onset.ends:g}, where an eigenvalue is negative")
-    _say_what_is_uncertain(run.equilibria, onset.doubtful, "a pair was expected to become complex", onset.windows)
-    return {"mu": mu} | onset.as_dict() | {"flows_beyond": run.flows_beyond} | real
+    _say_what_is_uncertain(onset.equilibria, onset.doubtful, "a pair was expected to become complex", onset.windows)
+    return {"mu": mu} | onset.as_dict() | {"flows_beyond": onset.flows_beyond} | real
 
 
 def _damped_onset(
@@ -395,9 +393,9 @@ def _damped_onset(
     up to which that is all as the key `searched_to`.
     """
     from faultgouge.analysis.uncertain_digits import with_uncertainty
-    from faultgouge.pywrap.onset.damped import damped_onset_run
+    from faultgouge.pywrap.onset import onset_run
 
-    def report_windows(so_far: DampedOnset, fx: float) -> None:
+    def report_windows(so_far: Onset, fx: float) -> None:
         if output is not None:
             _write_result(output, [*before, {"mu": mu, "searched_to": fx} | so_far.as_dict()])
             keeps(
@@ -407,7 +405,9 @@ def _damped_onset(
 
     with status(f"mu = {mu:g}") as show:
         watch = partial(_under_way, show, f"mu = {mu:g}", folder=folder, tells=output is None)
-        run = damped_onset_run(scene, mu, watch, report_windows, folder, first, bed)
+        run = onset_run(
+            scene, mu, dissipation=True, first=first, known=report_windows, bed=bed, watch=watch, folder=folder
+        )
     opening = run.windows[0]
     if opening.kind == "start":
         tell(
@@ -452,7 +452,7 @@ def _say_what_is_uncertain(
     equilibria: Iterable[Equilibrium],
     doubtful: Iterable[tuple[float, float]],
     expected: str,
-    windows: Sequence[Window] | Sequence[DampedWindow],
+    windows: Sequence[Window],
 ) -> None:
     """How equilibria were reached, where an onset may hide, and where the error of the path is not known."""
     for equilibrium in equilibria:

@@ -130,7 +130,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     """
     from faultgouge.analysis import RunFile
     from faultgouge.pywrap import Record, reach
-    from faultgouge.pywrap.onset.load_at_onset import load_at_onset
+    from faultgouge.pywrap.onset import load_at_onset
     from faultgouge.pywrap.runs.equilibrium_path import step_of
     from faultgouge.pywrap.scenes.validation import require_section
 

@@ -1,0 +1,50 @@
+"""Windows of loads on which motion grows, solved for and not scanned, with dissipation and without: one search.
+
+- `onset`: what a user calls; `limits`: every size and tolerance, with its reason
+- `system`: the matrix of small motion at one load; `space`: the modes that are followed from load to load
+- `edges`: windows, and their edges: where the growth of a motion goes through zero, or jumps
+- `modes`: all modes of one load, and which is which at the next; `between`: where a narrow window may hide
+- `search`: the walk along a ramp
+- `screens`: the few motions that may change, by perturbation theory
+- `slices`: large packings, in slices of the spectrum
+- `pair_form`: where a pair stands in the normal form
+"""
+
+from .edges import Edge, LostPairError, Window
+from .limits import LIMITS, Limits
+from .modes import Modes
+from .onset import (
+    Increments,
+    Onset,
+    OnsetError,
+    complex_windows,
+    find_onset,
+    find_windows,
+    takes_all_modes,
+    windows_up_to,
+)
+from .slices.ranks import Ranks
+from .space import Space
+from .system import System, force_bearing, full_operator
+
+__all__ = [
+    "LIMITS",
+    "Edge",
+    "Increments",
+    "Limits",
+    "LostPairError",
+    "Modes",
+    "Onset",
+    "OnsetError",
+    "Ranks",
+    "Space",
+    "System",
+    "Window",
+    "complex_windows",
+    "find_onset",
+    "find_windows",
+    "force_bearing",
+    "full_operator",
+    "takes_all_modes",
+    "windows_up_to",
+]

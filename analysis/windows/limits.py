@@ -1,0 +1,174 @@
+"""Every size, share and tolerance of the search for complex pairs, with its reason."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the search takes for small, near, many and long; the defaults are meant for packings."""
+
+    # Sizes at which the way changes
+
+    all_windows: int = 300
+    """Disks up to which all windows are sought, from all eigenvalues: a second for a decomposition, which grows with
+    the cube of the number. Beyond, the first window is sought in slices of the spectrum."""
+    dense_factors: int = 600
+    """Coordinates up to which a dense factorisation of A - sigma is faster than a sparse one."""
+    one_basis: int = 1000
+    """Coordinates up to which the basis is one dense decomposition: less than a second. Beyond, it comes in slices."""
+
+    # The operator
+
+    unknown_force: float = 10.0
+    """A contact counts from this times the packing's imbalance: a disk may rest between two contacts without force,
+    whose forces cancel in part."""
+    small_force: float = 1e-6
+    """And in any case from this share of the largest force, so that a packing out of balance keeps its contacts."""
+
+    # Windows between two loads
+
+    narrowest: float = 1e-7
+    """Narrowest window, in units of the largest load: its pair would grow more slowly than any run can show."""
+    bend: float = 0.05
+    """Curvature that two values and slopes of D do not show, as a share of the smaller D: more than enough for loads
+    between which modes are recognised at all."""
+
+    screened: int = 4
+    """How often an increment is divided before all modes are asked: they take as long as ten looks at a few."""
+    changing: int = 1
+    """How often an increment is divided in which a pair changes."""
+    bent: int = 3
+    """The same where contacts open or close: levels then leave the straight line at loads that nobody knows."""
+    share: float = 0.47
+    """Where an increment is divided: not in the middle, as the edges of models lie at round numbers."""
+
+    bending: float = 2.0**-4
+    """Length in increments of the step about a load at which contacts change, in which a window may still hide."""
+
+    # The edge of a window
+
+    root: float = 1e-7
+    """Width to which the root of D is bracketed, in increments: a tenth of the distance of the five points about it."""
+    jump: float = 1e-9
+    """Width to which a jump is bracketed, in increments; its place depends on the path's increment by far more."""
+    shortest: float = 2.0**-6
+    """Shortest steps, in shares of the straight line from one operator to another, in which pairs and modes are
+    followed."""
+
+    # Inverse iteration of a pair
+
+    steps: int = 40
+    """Iterations before a shift is given up: a solution costs a hundredth of a dense decomposition."""
+    steps_on: int = 12
+    """The same with the factors of a neighbour: four solutions a step, against a hundred for a factorisation."""
+    pace: int = 5
+    """Steps by which the pace is judged: the iteration slows down while farther modes go, and then keeps its pace."""
+    offsets: tuple[float, ...] = (0.1, -0.1, 1.0, -1.0)
+    """Distances of the shift from the mean of the pair, in units of its spread, tried in turn. A tenth of the spread
+    costs the second direction no more than a digit, and saves half of the iterations; a third eigenvalue may be
+    close."""
+    shifts: int = 12
+    """Shifts for a single mode, whose s is found better with each: one or two are enough."""
+    slow: float = 0.1
+    """Share of a residual that a step may leave before the shift is renewed: a factorisation costs a few steps."""
+    off_eigenvalue: float = 1e-10
+    """Distance of such a shift from s, as a share: an inverse should exist."""
+    residual: float = 100.0
+    """Residual of an accepted plane, in units of u |A|_F; LAPACK's own are some 10."""
+
+    # Screening by perturbation theory
+
+    slack: float = 0.05
+    """How far levels and couplings may leave the straight line between two loads, in units of their change. In packings
+    of 100 disks and increments of 1e-3 it is 1.3e-3 in the median, and grows with the increment."""
+    few: int = 3
+    """Pairs that are examined one by one; where more are named, a decomposition costs no more."""
+    core: int = 20
+    """Modes that a cluster owns."""
+    margin: int = 20
+    """Further modes of a cluster on either side, coupled to its own in all orders."""
+    beyond: int = 10
+    """Modes of a slice on either side beyond those of its clusters, in second order. What is farther away changes
+    levels by less than (coupling / spacing)^2 / 30 of their spacing."""
+    mixing: float = 0.1
+    """Typical symmetric coupling within clusters, in level spacings, up to which a basis is used: with other modes
+    `margin` spacings away, the second order leaves out (mixing / margin)^2 = 2.5e-5 of the coupling."""
+
+    # Screening of growth with dissipation
+
+    clusters: float = 5e-5
+    """Clusters of an increment, for each coordinate squared, beyond which all modes take less time: four of 100 disks.
+    Half as many in a half, so that dividing costs no more than that at any depth."""
+    cluster: float = 1e-4
+    """Narrowest windows that are looked for in clusters, in increments: where they begin is known to 1e-2 or so."""
+    nearly_growing: float = 0.3
+    """A mode of a cluster whose damping is below this share of the median is looked at with the operator, which
+    decides."""
+    beyond_upper_load: float = 0.05
+    """Share of an increment by which a cluster is followed beyond the upper load: a cluster knows to 1e-2 or so of an
+    increment where modes begin to grow. What grows there is looked at with the operator, too."""
+
+    # Slices of the spectrum
+
+    own: int = 120
+    """Eigenvalues of a slice. Fewer cost more factorisations, more cost more orthogonalisation."""
+    coarse: int = 240
+    """Eigenvalues between two places at which they are counted; shifts are interpolated in between."""
+    block: int = 6
+    """Vectors that are solved for at a time: 0.7 ms each at 30,000 coordinates, against 2.6 ms one by one. Larger
+    blocks need more vectors for the same eigenvalues: 288 for a slice, with blocks of eight 304."""
+    first_look: int = 48
+    """Blocks of a Krylov space before its eigenvalues are looked at: enough for most slices."""
+    looks: int = 6
+    """Blocks between two looks. A look costs as much as two blocks of 30,000 coordinates, or as twenty of 3,000."""
+    last_look: int = 200
+    """Blocks at the most."""
+    together: int = 2
+    """Blocks that are made orthogonal to all before them at a time: three stray too far in most slices."""
+    stray_limit: float = 3e-6
+    """Part of a new vector along the basis, up to which the part is taken away afterwards; some 1e-7 at 29,000
+    coordinates. Its square, 1e-11, is what then remains in lengths and angles of the basis."""
+    accurate: float = 1e-2
+    """Residual of the eigenvectors of a slice, in mean distances of eigenvalues, as of the inverse. It enters an
+    eigenvalue as its square over the distance of modes outside: 4e-6 at the most was measured (29,000 coordinates). An
+    eigenvalue may be off its Rayleigh quotient with S by as much."""
+
+    # The search in slices
+
+    reach: float = 0.1
+    """Share of an increment by which clusters are extrapolated, so that a pair that they have turn complex a little
+    late is found in time. Clusters are trusted as long as they are right to twice that."""
+    finest: float = 1e-3
+    """Narrowest windows of clusters that are looked for, in increments: the clusters' own error is larger."""
+    excess: float = 0.2
+    """What is added to the antisymmetric couplings of a cluster, in units of mixing^2 times the spacing of its levels,
+    so that pairs are announced early, and the operator decides. Modes beyond a slice, and the third order, change the
+    difference of both couplings by a tenth of that unit (360 disks)."""
+    dips: int = 12
+    """Looks at the discriminant of an announced pair before its sign is in doubt; an avoided crossing takes one or
+    two."""
+    parts: int = 4
+    """Parts of a doubtful increment: four cost little more than two while a basis passes by."""
+    depth: int = 2
+    """How often parts are divided again; the finest are a sixteenth."""
+    largest_basis: float = 3e8
+    """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision."""
+    ahead: int = 2
+    """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""
+    lapack: int = 5000
+    """Coordinates up to which all eigenvalues at the first load are asked for: half a minute, and as their cube."""
+    axis: int = 10_000
+    """Coordinates up to which all motions that grow at a load are looked for along the imaginary axis, where clusters
+    miss some: the time grows as their square."""
+    wait: float = 2.0
+    """Seconds between two looks at what other searches have found, where these have taken all that is left."""
+    chunk: int = 1024
+    """Rows of a basis that are multiplied at a time: what comes out stays in the cache."""
+
+    def chunks(self, size: int) -> list[slice]:
+        """The rows of a basis, so many at a time."""
+        return [slice(first, first + self.chunk) for first in range(0, size, self.chunk)]
+
+
+LIMITS = Limits()
+"""The defaults."""

@@ -1,0 +1,209 @@
+r"""All modes at one load, and which of them is which at the next.
+
+Without dissipation these are the eigenvalues of A, with right vectors x and left vectors y; with dissipation the
+eigenvalues s of the first-order matrix with :math:`\mathrm{Im}\, s \ge 0`, from LAPACK in coordinates of the energy
+(:mod:`~faultgouge.analysis.motion.state_space`), with displacements x and y. Modes at neighbouring loads a, b are
+assigned by :math:`|x_a^H x_b|\,|y_a^H y_b|` over unit vectors, so modes that cross do not swap names.
+(:math:`|y_a^H x_b|`, the obvious weight, vanishes at an exceptional point, where it is needed most.) For shapes that
+two overdamped motions share the eigenvalues decide.
+
+A load that changes A and G by dA and dG moves an eigenvalue by
+
+.. math:: \mathrm d\lambda = \frac{y^H\, \mathrm dA\, x}{y^H x}, \qquad
+          \mathrm ds = - \frac{y^H (\mathrm dA + s\, \mathrm dG)\, x}{y^H (2 s + G)\, x} .
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.linalg import eig
+from scipy.sparse import csr_array
+
+from ..motion.eigenvalues import Complexes, all_modes, exceeds_rounding, growing
+from ..motion.state_space import StateSpace
+from ..packing.packing import Floats, Indices
+from .space import Space
+from .system import Operator, System
+
+Members = tuple[int, int]  # the numbers of the two modes of a pair
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """The modes of a system.
+
+    Attributes
+    ----------
+    system : System
+        Whose modes they are, on n coordinates.
+    values : ndarray of complex, shape (E,)
+        Without dissipation eigenvalues of A by real part, then imaginary part, 1 / time^2; complex pairs that are
+        rounding noise have lost their imaginary parts. With it s by imaginary part, then real part, 1 / time.
+    right, left : ndarray of complex, shape (n, E)
+        Unit vectors in columns.
+    partner : ndarray of int, shape (E,)
+        Index of the complex conjugate without dissipation; -1 for a real eigenvalue, and with dissipation.
+    overlap : ndarray, shape (E,)
+        |y^H x| of the vectors; with dissipation of those of the first-order matrix.
+    """
+
+    system: System
+    values: Complexes
+    right: Complexes
+    left: Complexes
+    partner: Indices
+    overlap: Floats
+    _spaces: dict[tuple[int, ...], Space] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, system: System) -> "Modes":
+        """Solve the dense eigenproblem, without the coordinates whose rows are zero."""
+        return _with_dissipation(system) if system.dissipative else _without(system)
+
+    @classmethod
+    def of_operator(cls, fx: float, matrix: Operator) -> "Modes":
+        """The modes of A at a load, shape (n, n), without dissipation."""
+        return cls.of(System(fx, csr_array(matrix)))
+
+    @property
+    def fx(self) -> float:
+        """The load, force per top disk."""
+        return self.system.fx
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def grows(self) -> Indices:
+        """Which of them grow beyond rounding, one of each complex pair."""
+        if not self.system.dissipative:
+            return np.flatnonzero(self.values.imag > 0)
+        return np.flatnonzero(growing(self.values, self.overlap, self.system.rounding))
+
+    @property
+    def growing(self) -> list[Space]:
+        """The subspaces of those that grow."""
+        return [
+            self.space((int(k),) if self.system.dissipative else (int(k), int(self.partner[k]))) for k in self.grows
+        ]
+
+    @property
+    def complex_pairs(self) -> list[Members]:
+        """The members of each complex pair, that with the positive imaginary part first."""
+        return [(int(k), int(self.partner[k])) for k in np.flatnonzero((self.values.imag > 0) & (self.partner >= 0))]
+
+    def conjugate(self, members: Members) -> bool:
+        """Whether two modes are a complex pair."""
+        return bool(self.partner[members[0]] == members[1])
+
+    def together(self, members: Members) -> bool:
+        """Whether two modes are a complex pair, or both are real."""
+        return self.conjugate(members) or bool(self.partner[members[0]] == self.partner[members[1]] == -1)
+
+    def space(self, members: tuple[int, ...]) -> Space:
+        """The subspace of two modes or, with dissipation, of one."""
+        if members not in self._spaces:
+            k = list(members)
+            rate = complex(self.values[k[0]])
+            self._spaces[members] = Space.of(self.system, self.right[:, k], self.left[:, k], rate)
+        return self._spaces[members]
+
+    def nearest(self, pair: Space) -> Members:
+        """The two modes, conjugates or both real, that lie closest to the planes of a pair at a neighbouring load."""
+        weight = np.linalg.norm(pair.right.T @ self.right, axis=0) * np.linalg.norm(pair.left.T @ self.left, axis=0)
+        real = np.flatnonzero(self.partner < 0)
+        candidates = self.complex_pairs
+        if len(real) > 1:
+            first, second = real[np.argsort(weight[real])[-2:]]
+            candidates = [*candidates, (int(first), int(second))]
+        return max(candidates, key=lambda members: float(weight[list(members)].sum()))
+
+    def about(self, eigenvalue: float, among: Sequence[Members] = ()) -> Members:
+        """The pair among some with the closest eigenvalue; without pairs, the two modes closest to a real number."""
+        if among:
+            return min(among, key=lambda members: abs(self.values[members[0]].real - eigenvalue))
+        first, second = np.argsort(np.abs(self.values - eigenvalue))[:2]
+        return int(first), int(second)
+
+    def drifts(self, other: System) -> Complexes:
+        """First-order change of each eigenvalue on the way to another load, shape (E,)."""
+        x, y = self.right, self.left.conj()
+        changes = [there - here for here, there in zip(self.system.matrices, other.matrices, strict=True)]
+        force, slant = changes[0] @ x, x
+        if self.system.damping is not None:
+            force = -(force + (changes[1] @ x) * self.values)
+            slant = 2 * self.values * x + self.system.damping @ x
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.sum(y * force, axis=0) / np.sum(y * slant, axis=0))
+
+
+def _without(system: System) -> Modes:
+    values, right, left = all_modes(csr_array(system.stiffness))
+    partner, overlap = np.full(len(values), -1), np.abs(np.sum(left.conj() * right, axis=0))
+    for k in (int(each) for each in np.flatnonzero(values.imag > 0)):
+        conjugate = int(np.argmin(np.abs(values - values[k].conj())))
+        if exceeds_rounding(values[k], overlap[k], system.rounding):
+            partner[k], partner[conjugate] = conjugate, k
+        else:
+            values[[k, conjugate]] = values[k].real
+    return Modes(system, values, right, left, partner, overlap)
+
+
+def _with_dissipation(system: System) -> Modes:
+    assert system.damping is not None
+    first_order = StateSpace.of_matrices(
+        csr_array(system.stiffness), csr_array(system.damping), np.ones(system.stiffness.shape[0])
+    )
+    active, size = first_order.active, len(first_order.active)
+    values, left, right = eig(first_order.matrix, left=True, check_finite=False)
+    kept = np.flatnonzero(values.imag >= 0)
+    kept = kept[np.lexsort((values[kept].real, values[kept].imag))]
+    overlap = np.abs(np.sum(left[:, kept].conj() * right[:, kept], axis=0))
+    x, y = np.zeros((2, system.stiffness.shape[0], len(kept)), complex)
+    x[active] = _normalise(first_order.unweight @ right[:size, kept])
+    y[active] = _normalise(left[size:, kept])
+    return Modes(system, np.asarray(values[kept], complex), x, y, np.full(len(kept), -1), overlap)
+
+
+def _normalise(vectors: Complexes) -> Complexes:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=0))
+
+
+def assign_modes(here: Modes, there: Modes) -> Indices:
+    """Which mode there each mode here has become, shape (E,); -1 where there are fewer modes there.
+
+    The assignment maximises the sum of |x^H x'| |y^H y'|.
+    """
+    weight = products(here.right, there.right) * products(here.left, there.left)
+    if here.system.dissipative:
+        a, b = here.values[:, None], there.values[None]
+        weight *= 1 - np.abs(a - b) / (np.abs(a) + np.abs(b) + np.finfo(float).tiny)
+    partner = assign_columns(weight)
+    # Members of one pair have the same weights: let the one above the axis stay above.
+    for up, down in here.complex_pairs:
+        if partner[up] >= 0 and there.partner[partner[up]] == partner[down] and there.values[partner[up]].imag < 0:
+            partner[[up, down]] = partner[[down, up]]
+    return partner
+
+
+def assign_columns(weight: Floats) -> Indices:
+    """A column for each row, none twice, with the largest sum of weights; -1 where columns are too few."""
+    from scipy.optimize import linear_sum_assignment
+
+    column = np.full(len(weight), -1)
+    rows, columns = linear_sum_assignment(weight, maximize=True)
+    column[rows] = columns
+    return column
+
+
+def products(a: Complexes, b: Complexes) -> Floats:
+    """|a_j^H b_k| over columns: in real arithmetic, but for the columns that have imaginary parts."""
+    p, q = np.flatnonzero(np.any(a.imag, axis=0)), np.flatnonzero(np.any(b.imag, axis=0))
+    x, y = (np.ascontiguousarray(part) for part in (a.real, b.real))
+    u, v = a.imag[:, p], b.imag[:, q]
+    real, imag = x.T @ y, np.zeros((a.shape[1], b.shape[1]))
+    real[np.ix_(p, q)] += u.T @ v
+    imag[:, q] = x.T @ v
+    imag[p] -= u.T @ y
+    return np.hypot(real, imag)

@@ -1,0 +1,278 @@
+"""What a search finds in the slices of a spectrum, and the folder that keeps it.
+
+A *pass* goes through all slices of the spectrum, for a few neighbouring loads. A slice of 100,000 disks takes 13 s, and
+leaves little: the pairs that may turn complex, and the eigenvalues that neighbouring slices must agree on. So each
+slice has a file, which the rank that has searched the slice writes in one step; and a search that was cut off goes on.
+Several searches may share a folder: each takes what no other has taken.
+
+The folder of a pass is named by a checksum of the loads, of the operators there, of the modes and of the limits, and of
+the version of this program. What was found for another packing, or by another version, is not taken for this one.
+"""
+
+import errno
+import fcntl
+import hashlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from io import BytesIO
+from pathlib import Path
+from typing import Any, NamedTuple
+from uuid import uuid4
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import BadInputError
+from ...files.atomic_write import make_folder, write_whole
+from ...packing.packing import Floats
+from ..limits import Limits
+from ..system import System
+
+Shift = tuple[float, tuple[int, int]]
+"""The shift of a slice, and the numbers of the first eigenvalue that belongs to it and of the first that does not."""
+
+Take = Callable[[tuple[int, int]], bool]
+"""Takes the slice of some modes, and says whether no other search has it."""
+
+SHIFTS = "shifts.npz"
+"""The file of all shifts: to find these, eigenvalues are counted, which takes minutes for 100,000 disks."""
+
+LOCK_FILE = "taken"
+"""The file whose bytes are locked, each by the search that has taken the slice which begins at so many modes."""
+
+
+class DamagedSliceError(BadInputError):
+    """The file of a slice cannot be read: one sentence."""
+
+
+class Border(NamedTuple):
+    """The eigenvalues at the border of a slice, on which neighbouring slices must agree.
+
+    Attributes
+    ----------
+    modes : tuple of (int, int)
+        Numbers in the whole spectrum of the slice's first eigenvalue and of the first one beyond.
+    first, beyond : float
+        These eigenvalues, 1 / time^2; nan beyond the end of the spectrum.
+    spacing : float
+        Mean distance of the slice's eigenvalues and of the next ones on either side, 1 / time^2.
+    """
+
+    modes: tuple[int, int]
+    first: float
+    beyond: float
+    spacing: float
+
+    @property
+    def size(self) -> int:
+        """How many modes the slice has."""
+        return self.modes[1] - self.modes[0]
+
+    @classmethod
+    def of(cls, number: int, values: Floats, own: slice) -> "Border":
+        """Of increasing eigenvalues, the first of which has this number in the spectrum; `own` are the slice's."""
+        near = values[max(0, own.start - 1) : own.stop + 1]
+        beyond = float(values[own.stop]) if own.stop < len(values) else float("nan")
+        modes = number + own.start, number + own.stop
+        return cls(modes, float(values[own.start]), beyond, float(np.ptp(near)) / len(near))
+
+
+@dataclass(frozen=True, eq=False)
+class Slice:
+    """A run of neighbouring eigenvalues.
+
+    Attributes
+    ----------
+    first : int
+        Number in the whole spectrum of the first of `values`.
+    values : ndarray, shape (M,)
+        Eigenvalues, increasing: first those of a margin, then the slice's own ones, then another margin. Those farther
+        out in the margins are not converged.
+    vectors : ndarray, shape (E, M)
+        Orthonormal eigenvectors in columns.
+    own : slice
+        Which of the M belong to this slice and to no other.
+    """
+
+    first: int
+    values: Floats = field(repr=False)
+    vectors: Floats = field(repr=False)
+    own: slice
+
+    @property
+    def border(self) -> Border:
+        """The border, on which its neighbours must agree."""
+        return Border.of(self.first, self.values, self.own)
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A pair that turns complex in its cluster, or a mode that begins to grow.
+
+    Attributes
+    ----------
+    onset, inside : float
+        The load from which on the pair is complex, or the mode grows, and one at which it still does; force per top
+        disk.
+    right, left : ndarray, shape (n, 2)
+        Its planes, in the n coordinates of the operator; real and imaginary parts of the vectors of a mode.
+    """
+
+    onset: float
+    inside: float
+    right: Floats
+    left: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class SliceResult:
+    """The result of the search in a slice.
+
+    Attributes
+    ----------
+    border : Border
+        Which slice it is.
+    candidates : sequence of sequence of Candidate
+        The pairs that turn complex in its clusters, or the modes that begin to grow, increment by increment.
+    bears : float
+        |A - A^T| of the operator up to which dissipation surely holds all modes of the slice, 1 / time^2.
+    crowded : bool
+        Whether dashpots couple more of its modes than a cluster can have.
+    """
+
+    border: Border
+    candidates: Sequence[Sequence[Candidate]]
+    bears: float = 0.0
+    crowded: bool = False
+
+
+@dataclass(frozen=True)
+class SlicePass:
+    """The results of a pass so far, on all ranks, and the folder that stores them; none by default.
+
+    Attributes
+    ----------
+    folder : Path or None
+        Of the files.
+    found : sequence of SliceResult
+        The slices that need not be searched again, by the order of the spectrum.
+    shifts : sequence of Shift
+        Those of all slices; empty where they have to be found.
+    """
+
+    folder: Path | None = None
+    found: Sequence[SliceResult] = ()
+    shifts: Sequence[Shift] = ()
+
+    @classmethod
+    def read(cls, folder: Path) -> "SlicePass":
+        """Read the results in a folder, if it exists; DamagedSliceError if a file has another format."""
+        found = sorted((_read_candidates(path) for path in folder.glob("*-*.npz")), key=lambda each: each.border.modes)
+        shifts = folder / SHIFTS
+        return cls(folder, found, _shifts(shifts) if shifts.exists() else ())
+
+    @property
+    def borders(self) -> list[Border]:
+        """Those of the known slices."""
+        return [each.border for each in self.found]
+
+    @contextmanager
+    def lock_slices(self) -> Iterator[Take]:
+        """What takes a slice if no other search has it; all are given back at the end.
+
+        A taken slice is a byte of a file that is locked. The system unlocks what a process leaves that dies. Where
+        there are no locks, two searches find the same.
+        """
+        folder = self.folder
+        if folder is None:
+            yield lambda modes: True
+            return
+        make_folder(folder)
+        with (folder / LOCK_FILE).open("ab") as taken:
+
+            def take(modes: tuple[int, int]) -> bool:
+                try:
+                    fcntl.lockf(taken, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, modes[0])
+                except OSError as error:
+                    return error.errno not in (errno.EAGAIN, errno.EACCES)
+                return not (folder / _name(modes)).exists()
+
+            yield take
+
+    def keep(self, found: SliceResult) -> None:
+        """Write what has been found in a slice, if there is a folder; an OutputError if that cannot be."""
+        flat = [(k, each) for k, candidates in enumerate(found.candidates) for each in candidates]
+        self._write(
+            _name(found.border.modes),
+            modes=found.border.modes,
+            border=found.border[1:],
+            bears=found.bears,
+            crowded=found.crowded,
+            increments=len(found.candidates),
+            increment=[k for k, _ in flat],
+            loads=[(each.onset, each.inside) for _, each in flat],
+            planes=[(each.right, each.left) for _, each in flat],
+        )
+
+    def keep_shifts(self, shifts: Sequence[Shift]) -> None:
+        """Write the shifts of all slices, if there is a folder; an OutputError if that cannot be."""
+        self._write(SHIFTS, shift=[shift for shift, _ in shifts], modes=[modes for _, modes in shifts])
+
+    def _write(self, name: str, **arrays: Any) -> None:
+        if self.folder is not None:
+            content = BytesIO()
+            np.savez(content, **arrays)
+            make_folder(self.folder)
+            own = self.folder / f"{uuid4().hex}.new"  # another search may write the same file at the same time
+            write_whole(own, content.getvalue())
+            own.replace(self.folder / name)
+
+
+NEW_PASS = SlicePass()
+"""A pass without results and without a folder."""
+
+
+def pass_folder(parent: Path, places: Sequence[System], modes: tuple[int, int], limits: Limits) -> Path:
+    """Where what is found on the increments between some loads is kept."""
+    digest = hashlib.sha256(repr((version("faultgouge"), modes, limits)).encode())
+    for place in places:
+        digest.update(repr(place.fx).encode())
+        for matrix in place.matrices:
+            for array in (matrix.data, matrix.indices, matrix.indptr):
+                digest.update(np.ascontiguousarray(array).data)
+    return parent / digest.hexdigest()[:16]
+
+
+def _name(modes: tuple[int, int]) -> str:
+    """The file of a slice."""
+    return f"{modes[0]}-{modes[1]}.npz"
+
+
+def _read_candidates(path: Path) -> SliceResult:
+    with _open_slice(path) as data:
+        first, stop = (int(number) for number in data["modes"])
+        candidates: list[list[Candidate]] = [[] for _ in range(int(data["increments"]))]
+        for k, loads, planes in zip(data["increment"], data["loads"], data["planes"], strict=True):
+            candidates[int(k)].append(Candidate(float(loads[0]), float(loads[1]), *planes))
+        border = Border((first, stop), *(float(each) for each in data["border"]))
+        return SliceResult(border, candidates, float(data["bears"]), bool(data["crowded"]))
+
+
+def _shifts(path: Path) -> list[Shift]:
+    with _open_slice(path) as data:
+        pairs = zip(data["shift"], data["modes"], strict=True)
+        return [(float(shift), (int(first), int(stop))) for shift, (first, stop) in pairs]
+
+
+@contextmanager
+def _open_slice(path: Path) -> Iterator[Mapping[str, NDArray]]:
+    try:
+        with np.load(path) as data:
+            yield data
+    except (OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, BadZipFile) as error:
+        raise DamagedSliceError(
+            f"{path} is damaged: delete the file, and what it had is searched for again."
+        ) from error

@@ -1,0 +1,294 @@
+"""The onset F_x^c of a scene, with dissipation or without, and the error that its path of equilibria adds.
+
+With dissipation the onset without it is found, too: between the edges of its windows the growth without dissipation is
+largest, and the search looks there.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path as FilePath
+
+import numpy as np
+from mpi4py import MPI
+
+from ..analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
+from ..analysis.arrays import Floats
+from ..analysis.errors import TurningPointError
+from ..analysis.motion.eigenvalues import active_coordinates
+from ..analysis.progress import Watch, report_progress, show_progress
+from ..analysis.windows import Ranks, System, Window, full_operator, takes_all_modes, windows_up_to
+from .equilibria.quasistatic import Equilibrium
+from .lammps.engine import Engine
+from .runs.equilibrium_path import EquilibriumPath, loads
+from .runs.path_error import with_path_error
+from .scenes.scene import Scene
+from .scenes.validation import SceneError, require_section
+from .settling.settle import settle
+
+Known = Callable[[Onset, float], None]
+"""Takes what is known, without the errors of the path, and the load up to which that is all."""
+
+
+def onset(scene: Scene, mu: float | None = None, *, every: bool = False) -> Onset:
+    """Find the onset of a scene; the ramp and the search end there.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a section [ramp]; with a section [damping] the onset is that of growth in spite of the dissipation.
+    mu : float, optional
+        One of its friction coefficients; the first by default.
+    every : bool
+        Whether all windows up to the end of the ramp are wanted.
+
+    Returns
+    -------
+    Onset
+        `fx_c`, `error`, `windows`; it prints as a line.
+
+    Raises
+    ------
+    OnsetError
+        If the ramp shows no onset.
+    NoEquilibriumError
+        If the packing does not settle, or flows at the first load.
+    """
+    friction = scene.law.mus[0] if mu is None else mu
+    return onset_run(scene, friction, dissipation=scene.damping is not None, first=not every)
+
+
+def onset_run(
+    scene: Scene,
+    mu: float,
+    *,
+    dissipation: bool = False,
+    first: bool = False,
+    modes: tuple[int, int] | None = None,
+    reached: Callable[[Equilibrium], None] | None = None,
+    near_onset: Floats | None = None,
+    known: Known = lambda found, fx: None,
+    bed: Packing | None = None,
+    watch: Watch | None = None,
+    folder: FilePath | None = None,
+) -> Onset:
+    """Ramp a scene for one friction coefficient and find the onset.
+
+    The error of each onset is the whole one: that of rounding, and that of the path's increments
+    (:mod:`~faultgouge.pywrap.runs.path_error`). The ramp goes to its end, or to where the packing flows. Where the
+    first window alone is sought, and nobody else wants the equilibria, it ends there.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a section [ramp].
+    mu : float
+        Friction coefficient.
+    dissipation : bool
+        Whether the dashpots and the drag of the section [damping] count; the onset without them is found as well.
+    first : bool
+        Seek the first window alone, as of a large packing.
+    modes : tuple of (int, int), optional
+        Search these modes alone, see :func:`~faultgouge.analysis.find_onset`.
+    reached : callable, optional
+        Called with each equilibrium of the ramp.
+    near_onset : ndarray, optional
+        Distances from F_x^c at which equilibria are wanted besides, force.
+    known : callable, optional
+        Of a search with dissipation: called as soon as there is a window, and after each increment from there on.
+    bed : Packing, optional
+        As of :func:`~faultgouge.pywrap.settle`.
+    watch : callable, optional
+        Told in words what is under way.
+    folder : Path, optional
+        Where the search of a large packing leaves what it finds, and goes on from, see
+        :func:`~faultgouge.analysis.find_onset`.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no section [ramp], or the packing has none of the modes.
+    OnsetError
+        If no motion grows up to the ramp's end.
+    NoEquilibriumError
+        If the packing flows from the first increment on, or before an onset; a TurningPointError if an eigenvalue is
+        negative before any is complex.
+    """
+    wanted = loads(require_section(scene.ramp, "ramp"))
+    damping = require_section(scene.damping, "damping") if dissipation else None
+    scene = scene.model_copy(update={"damping": None})
+    with show_progress(watch, "settling: "):
+        start = settle(scene, mu, bed=bed)
+    _check_modes(start.packing, modes)
+    takes_all = takes_all_modes(start.packing, modes)
+    whole = reached is not None or (takes_all and not first)
+    reached = reached or (lambda _: None)
+    reached(start)
+    with show_progress(watch), Engine(start.packing) as engine:
+        path = EquilibriumPath(engine, start, scene, onward=True)
+        forces = wanted
+        if whole:
+            report_progress(f"ramp up to F_x = {wanted[-1]:g}")
+            for equilibrium in path.climb(wanted[1:]):
+                reached(equilibrium)
+            forces = np.array([each.fx for each in path.equilibria])
+        flows = len(forces) < len(wanted)
+        what = "no pair of eigenvalues becomes complex" if damping is None else "no motion grows"
+
+        def with_dashpots(packing: Packing) -> Packing:
+            assert damping is not None
+            return packing.with_dissipation(damping.cn, damping.ct, damping.tau)
+
+        try:
+            if damping is None:
+                found = find_onset(path, forces, modes=modes, first=first, ranks=search_ranks(), folder=folder)
+            else:
+                found = _with_dissipation(path, forces, with_dashpots, takes_all, first, known, folder)
+        except TurningPointError:
+            raise
+        except (OnsetError, NoEquilibriumError) as error:
+            if not flows and isinstance(error, OnsetError):
+                raise
+            raise NoEquilibriumError(
+                f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond: the packing "
+                "flows before an onset"
+            ) from error
+        last = path.equilibria[-1].fx
+        extra = [] if near_onset is None else [fx for fx in found.fx_c + near_onset if 0 <= fx <= last]
+        between = {float(fx): path(float(fx)) for fx in extra}
+        equilibria = tuple(path.equilibria)
+        report_progress("the path once more, with other increments")
+        found = with_path_error(found, path, with_dashpots)
+    return replace(found, mu=mu, equilibria=equilibria, between=between, flows_beyond=last if flows else None)
+
+
+def _with_dissipation(
+    path: EquilibriumPath,
+    forces: Floats,
+    with_dashpots: Callable[[Packing], Packing],
+    takes_all: bool,
+    first: bool,
+    known: Known,
+    folder: FilePath | None,
+) -> Onset:
+    """The onset with dissipation and without it, without the errors of the path."""
+
+    def damped(fx: float) -> Packing:
+        return with_dashpots(path(fx))
+
+    if not takes_all:
+        with show_progress(what="with dissipation, "):
+            found = find_onset(damped, forces, dissipation=True, ranks=search_ranks(), folder=folder)
+        known(found, found.fx_c)
+        with show_progress(what="without dissipation, "):
+            return replace(found, undamped=_undamped(path, forces, first, folder))
+    report_progress(f"pairs that become complex without dissipation, up to F_x = {forces[-1]:.6g}")
+    undamped = _undamped(path, forces, first)
+
+    def so_far(windows: tuple[Window, ...], fx: float) -> None:
+        if windows and not first:
+            known(Onset(windows, undamped=undamped), fx)
+
+    inside = _Inside(path, forces, undamped)
+    found = find_onset(damped, forces, dissipation=True, first=first, look=inside.look, known=so_far)
+    return replace(found, undamped=undamped)
+
+
+def _undamped(path: EquilibriumPath, forces: Floats, first: bool, folder: FilePath | None = None) -> Onset | None:
+    """All windows without dissipation, or the first one; None if there is none."""
+    try:
+        return find_onset(path, forces, first=first, ranks=search_ranks(), folder=folder)
+    except (OnsetError, NoEquilibriumError):
+        return None
+
+
+class _Inside:
+    """Loads inside the undamped windows of a ramp: growth without dissipation is largest there.
+
+    Where the first window alone is known, the others are sought as far as the ramp is walked.
+    """
+
+    def __init__(self, path: EquilibriumPath, forces: Floats, undamped: Onset | None) -> None:
+        self._windows = () if undamped is None else undamped.windows
+        self._reached = np.inf
+        self._along: Iterator[tuple[float, tuple[Window, ...]]] = iter(())
+        if undamped is not None and not undamped.complete:
+            begin = max(0, int(np.searchsorted(forces, undamped.fx_c, side="right")) - 1)
+            if begin < len(forces) - 1:
+                self._reached = float(forces[begin])
+                self._along = windows_up_to(lambda fx: System.of(path(fx)), forces[begin:])
+
+    def look(self, below: float, above: float) -> list[float]:
+        """Onsets between two neighbouring loads, and of windows that end there the middle of what they have there."""
+        if not self._windows or above <= self._windows[0].fx_onset:
+            return []
+        while self._reached < above:
+            try:
+                self._reached, self._windows = next(self._along)
+            except (StopIteration, NoEquilibriumError):
+                self._reached = np.inf
+        onsets = [each.fx_onset for each in self._windows if below < each.fx_onset < above]
+        ends = [(each.fx_onset, each.fx_end) for each in self._windows if each.fx_end is not None]
+        return onsets + [0.5 * (max(begin, below) + end) for begin, end in ends if below < end < above]
+
+
+def search_ranks() -> Ranks:
+    """All ranks as those of one search; the cores of a machine are shared evenly. Collective."""
+    world = MPI.COMM_WORLD
+    if world.size == 1:
+        return Ranks()
+    own = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
+    mine = MPI.Get_processor_name(), own
+    beside = world.allgather(mine).count(mine)  # a launcher that binds ranks to cores leaves each its own
+    return Ranks(world.rank, world.size, world.allgather, max(1, len(mine[1]) // beside))
+
+
+def _check_modes(packing: Packing, modes: tuple[int, int] | None) -> None:
+    """Refuse modes that a packing does not have."""
+    if modes is None:
+        return
+    count = len(active_coordinates(full_operator(packing)))
+    if modes[0] >= count:
+        raise SceneError(f"modes {modes[0]}:{modes[1]} are no part of the {count} modes of the packing, 0:{count}")
+
+
+def load_at_onset(scene: Scene, known: dict[float, Onset] | None = None) -> float:
+    """F_x for the undamped run of a scene without perturb.fx, force.
+
+    A run that shows growth begins a little beyond the onset: one increment of the ramp, or in the middle of a window
+    that is narrower. With friction that weakens, a run shows triggering between two onsets: the packing is stable with
+    the static friction, and unstable with the weakened one. The run then begins in the middle between the two.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a section [ramp], in whose range onsets are sought.
+    known : dict, optional
+        Onsets of the scene that have been found already, by friction coefficient.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no section [ramp], or the weakened friction has no earlier onset.
+    OnsetError
+        If no pair becomes complex up to the ramp's end.
+    """
+    ramp, mu, found = require_section(scene.ramp, "ramp"), scene.law.mus[0], dict(known or {})
+
+    def onset_for(wanted: float) -> Onset:
+        near = [each for each in found if abs(each - wanted) < 1e-12 * wanted]  # exact but for a product's rounding
+        return found[near[0]] if near else onset_run(scene, wanted, first=True)
+
+    first = onset_for(mu).windows[0]
+    if scene.friction is not None:
+        weakened = onset_for(mu * scene.friction.mu_ss).fx_c
+        if not weakened < first.fx_onset:
+            raise SceneError(
+                f"perturb.fx is missing, and there is no load between two onsets: F_x^c = {weakened:.6g} with the "
+                f"weakened friction does not lie below F_x^c = {first.fx_onset:.6g}. Give perturb.fx"
+            )
+        return 0.5 * (weakened + first.fx_onset)
+    end = ramp.first if first.fx_end is None else first.fx_end
+    return min(first.fx_onset + ramp.step, 0.5 * (first.fx_onset + end))

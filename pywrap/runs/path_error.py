@@ -1,0 +1,311 @@
+r"""The part of an onset's error that comes from the path of equilibria.
+
+Friction remembers the path, and a ramp takes the path in finite increments h. Between two equilibria the slips advance
+along a straight line with the tangent at its middle: an error of order h^3 an increment, and so of h^2 at the onset. A
+contact that closes on the way begins without slip at the end of its increment: what it would have slipped before, up to
+all that it slips in one increment, is lost, and the error is of order h. Where a contact reaches the Coulomb bound or
+leaves it the order is the second, but the coefficient depends on where in an increment that happens.
+
+So the path is solved once more, to the onset F_h found on the ramp, through every second load of the ramp. On this path
+the same pair of eigenvalues coalesces at F_2h. With the increments :math:`h_i` of either path, and no change of the
+contacts on the way, the error that is left out is
+
+.. math:: F_h - F = \frac{F_{2h} - F_h}{S_{2h}/S_h - 1}, \qquad S = \sum_i h_i^3,
+
+Richardson's extrapolation, for increments that need not be equal. The onset is given at F, and twice the largest
+difference that rounding of both onsets allows is its uncertainty. Where contacts change, nothing is extrapolated. The
+loads that are left out are then those after an increment with a change: a contact that closes there loses its slip
+over twice the increment. What is lost depends on where in its increment the contact closes, and so does where a rattler
+lies that two neighbours are about to seize: it is moved, by convention, when it is met. A path through loads that the
+ramp has may meet both as the ramp does, however small its increments are. Two more paths therefore have the increments
+of the ramp, moved up by a third and by two thirds of an increment. If a change at the share :math:`\varphi` of its
+increment makes an error :math:`c \varphi`, on these it makes :math:`c` times :math:`\varphi - 1/3` and
+:math:`\varphi - 2/3`, modulo 1, and the three onsets span :math:`2c/3`. A contact that closes becomes stiff soon: of an
+error that grows as the root of :math:`\varphi` they span :math:`0.42 c` at the least. Twice the span is therefore as
+large as :math:`c`, all that can be lost, or nearly so. Increments in which a contact begins to slide are as long on all
+of these. What they add, of order h^2, is seen on a path through the middles of all increments: three quarters of it.
+What is stated is the largest of :math:`|F_{2h} - F_h|`, twice the span, and :math:`2 |F_h - F_{h/2}|`.
+
+Of a ramp that has fewer than `FEWEST` increments up to the onset the other path goes through the middles of the
+increments, too; its S is then the smaller one, and the same formula holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, eigvals
+from scipy.sparse.linalg import ArpackError
+
+from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, dynamical_matrix, eigenpairs
+from ...analysis.arrays import Floats
+from ...analysis.windows import Space, System, Window, force_bearing
+from ...analysis.windows.nearby import nearest_mode
+from ..equilibria.quasistatic import Equilibrium
+from .equilibrium_path import EquilibriumPath
+from .nearby_root import nearby_root
+
+Vanishes = Callable[[Packing], float]
+
+FEWEST = 4
+"""Increments up to the onset from which on every second load may be left out."""
+
+CARRIES = 1e-9
+"""Normal force, in units of F_y, from which on a contact counts; that of a disk that carries nothing is noise."""
+
+FAILURES = NoEquilibriumError, OnsetError, ArpackError, LinAlgError
+"""What another path may end in: an onset that is known is worth more than the error of its path."""
+
+SHIFTS = 1 / 3, 2 / 3
+"""Shares of an increment by which the loads of two other paths are moved up where contacts change."""
+
+LONGEST_RUN = 2
+"""Loads that may be left out one after the other."""
+
+SMALL = 30
+"""Disks up to which all eigenvalues take no longer than some."""
+
+UNKNOWN = 2.0
+"""Uncertainty of an extrapolated onset, in units of the correction. As a rule a correction is good to a tenth.
+Where its coefficient changes sign along the path, the correction is wrong by more than itself."""
+
+
+@dataclass(frozen=True)
+class PathError:
+    """What the increments do to one onset.
+
+    Attributes
+    ----------
+    shift : float
+        F_2h - F_h, force; nan where the pair is not found on the other path.
+    finer : float
+        F_h/2 - F_h, force, where contacts change and the other path is the coarser one; else 0, or nan as of `shift`.
+    moved : tuple of float
+        Onsets on the paths with moved loads less F_h, force, where contacts change; nan as of `shift`.
+    weight : float
+        S_2h / S_h - 1.
+    changes : bool
+        Whether contacts close, open, or reach or leave the Coulomb bound before the onset.
+    rounding : float
+        Uncertainty of either onset from rounding, force.
+    increment : float
+        Of the ramp at the onset, force.
+    """
+
+    shift: float
+    finer: float
+    moved: tuple[float, ...]
+    weight: float
+    changes: bool
+    rounding: float
+    increment: float
+
+    @property
+    def correction(self) -> float:
+        """What has to be added to F_h, force: 0 where it is no more than rounding, or contacts change."""
+        if self.changes or not abs(self.shift) > 2 * self.rounding:
+            return 0.0
+        return -self.shift / self.weight
+
+    @property
+    def error(self) -> float:
+        """Uncertainty of the onset from its path, force."""
+        hidden = 2 * self.rounding
+        if np.isnan([self.shift, self.finer, *self.moved]).any():
+            return self.increment
+        if not self.changes:
+            return UNKNOWN * (abs(self.shift) + hidden) / abs(self.weight)
+        part = 1.0 if self.weight > 0 else 2.0  # the ramp is the coarser path of the two
+        return max(part * abs(self.shift), 2 * abs(self.finer), 2 * float(np.ptp([0.0, *self.moved]))) + hidden
+
+
+def with_path_error(
+    onset: Onset, path: EquilibriumPath, with_dashpots: Callable[[Packing], Packing] = lambda packing: packing
+) -> Onset:
+    """An onset with the error of its path: extrapolated where that can be done, bounded where not.
+
+    Parameters
+    ----------
+    onset : Onset
+        As found on the path; the errors of its windows are those of rounding.
+    path : EquilibriumPath
+        The ramp, at least up to the last window.
+    with_dashpots : callable, optional
+        A packing of the path -> the same with the dissipation with which the onset was found.
+
+    Returns
+    -------
+    Onset
+        Windows with the onset of the exact path and the whole error, of the onset without dissipation, too. A window
+        keeps its own, and a `path_error` of None, where the ramp has no equilibrium at the onset that the search has
+        found there.
+    """
+    others = OtherPaths(path)
+
+    def whole(window: Window) -> Window:
+        if not window.fx_onset > path.equilibria[0].fx:
+            return window
+        vanishes = (
+            growth_near(window.frequency, with_dashpots) if window.dissipative else squared_gap(window.eigenvalue)
+        )
+        try:
+            part = others.error(window.fx_onset, vanishes, window.rounding_error)
+        except FAILURES:
+            return window
+        edge = replace(window.onset, fx=window.fx_onset + part.correction)
+        return replace(window, onset=edge, path_error=part.error)
+
+    undamped = onset.undamped
+    if undamped is not None:
+        undamped = replace(undamped, windows=tuple(map(whole, undamped.windows)))
+    return replace(onset, windows=tuple(map(whole, onset.windows)), undamped=undamped)
+
+
+class OtherPaths:
+    """Paths of one ramp through other loads, which the onsets of the ramp have in common for the most part.
+
+    Parameters
+    ----------
+    path : EquilibriumPath
+        The ramp, at least up to the last onset.
+    """
+
+    def __init__(self, path: EquilibriumPath) -> None:
+        self.path = path
+        self._states = [bearing_contacts(each.packing) for each in path.equilibria]
+        self._coarser, self._finer, self._moved = (
+            [path.equilibria[0]],
+            [path.equilibria[0]],
+            [[path.equilibria[0]] for _ in SHIFTS],
+        )
+
+    def error(self, fx: float, vanishes: Vanishes, rounding: float) -> PathError:
+        """What the increments do to the onset at fx, whose rounding error is known.
+
+        Parameters
+        ----------
+        fx : float
+            The onset as found on the path, force.
+        vanishes : callable
+            Packing -> what goes through zero at the onset: `squared_gap` or `growth_near`.
+        rounding : float
+            Uncertainty of fx from rounding, force.
+
+        Raises
+        ------
+        NoEquilibriumError
+            If the ramp has no equilibrium at fx.
+        """
+        changed = self.changes(fx)
+        ramp = np.array([*(each.fx for each in self.path.equilibria if each.fx < fx), fx])
+        few = len(changed) < FEWEST
+        other = _halve_loads(ramp) if few else _thin_loads(ramp, changed)
+        increment = float(np.diff(ramp).max())
+
+        slope = None
+
+        def shift_path(through: Floats, known: list[Equilibrium]) -> float:
+            nonlocal slope
+            try:
+                there = self._along(through, known)
+                root, slope = nearby_root(lambda load: vanishes(there(load)), fx, rounding, 0.5 * increment, slope)
+            except FAILURES:
+                return np.nan
+            return root - fx
+
+        shift = shift_path(other, self._coarser)
+        weight = _cubes(other) / _cubes(ramp) - 1
+        if not changed.any():
+            return PathError(shift, 0.0, (), weight, False, rounding, increment)
+        finer = 0.0 if few else shift_path(_halve_loads(ramp), self._finer)
+        moved = (shift_path(_shift_loads(ramp, share), known) for share, known in zip(SHIFTS, self._moved, strict=True))
+        return PathError(shift, finer, tuple(moved), weight, True, rounding, increment)
+
+    def changes(self, fx: float) -> NDArray[np.bool_]:
+        """In which increments of the ramp up to fx contacts close, open, or reach or leave the Coulomb bound.
+
+        Raises
+        ------
+        NoEquilibriumError
+            If the ramp has no equilibrium at fx.
+        """
+        before = self._states[: sum(each.fx < fx for each in self.path.equilibria)]
+        states = [*before, bearing_contacts(self.path(fx))]
+        return np.array([a != b for a, b in pairwise(states)])
+
+    def _along(self, through: Floats, known: list[Equilibrium]) -> EquilibriumPath:
+        """The path through the inner ones of some loads, beginning with what is known of it; what is new is kept."""
+        inner = through[1:-1]
+        common = 0
+        while common < min(len(inner), len(known) - 1) and known[common + 1].fx == inner[common]:
+            common += 1
+        path = EquilibriumPath(self.path.engine, known[0], self.path.scene, known[1 : common + 1])
+        try:
+            for load in inner[common:]:
+                path(float(load))
+        finally:
+            known[:] = path.equilibria
+        return path
+
+
+def bearing_contacts(packing: Packing) -> frozenset[tuple[int, int, bool]]:
+    """The contacts (i, j, whether it slides) that carry a force; j = -1 for the floor."""
+    carrying = packing.loaded(CARRIES * packing.fy)
+    contacts = carrying.contacts
+    return frozenset(zip(contacts.i.tolist(), contacts.j.tolist(), carrying.sliding.tolist(), strict=True))
+
+
+def _thin_loads(loads: Floats, changed: NDArray[np.bool_]) -> Floats:
+    """Every second load; after an increment with a change the load is left out, before one it is kept."""
+    kept, run = [True], 0
+    for k in range(1, len(loads) - 1):
+        leave = bool(changed[k - 1]) or (run == 0 and not changed[k])
+        leave = leave and run < LONGEST_RUN
+        run = run + 1 if leave else 0
+        kept.append(not leave)
+    return loads[[*kept, True]]
+
+
+def _halve_loads(loads: Floats) -> Floats:
+    return np.sort(np.concatenate([loads, 0.5 * (loads[1:] + loads[:-1])]))
+
+
+def _shift_loads(loads: Floats, share: float) -> Floats:
+    """The loads moved up by a share of their increments; the first and the last stay besides."""
+    return np.concatenate([loads[:1], loads[:-1] + share * np.diff(loads), loads[-1:]])
+
+
+def _cubes(loads: Floats) -> float:
+    return float(np.sum(np.diff(loads) ** 3))
+
+
+def squared_gap(eigenvalue: float) -> Vanishes:
+    """(lambda_1 - lambda_2)^2 of the two eigenvalues nearest to one, 1 / time^4, as a function of the packing."""
+
+    def discriminant(packing: Packing) -> float:
+        near = eigenvalue * (1 + 1e-7)  # no eigenvalue to the last digit
+        bare = force_bearing(packing)
+        values = eigvals(dynamical_matrix(bare)[0].toarray()) if len(bare) < SMALL else eigenpairs(bare, near, 4).values
+        one, other = values[np.argsort(np.abs(values - eigenvalue))[:2]]
+        return float(((one - other) ** 2).real)
+
+    return discriminant
+
+
+def growth_near(frequency: float, with_dashpots: Callable[[Packing], Packing]) -> Vanishes:
+    """Re s of the motion nearest to a frequency, 1 / time, as a function of the packing without its dissipation."""
+    known: list[Space] = []
+
+    def growth(packing: Packing) -> float:
+        system = System.of(with_dashpots(packing), dissipation=True)
+        followed = (known[0].at(system) if known else None) or nearest_mode(system, frequency)
+        if followed is None:
+            return np.nan
+        known[:] = [followed]
+        return followed.growth
+
+    return growth

@@ -1,0 +1,153 @@
+"""The onset with dissipation: against LAPACK's companion matrix, families with known windows, and weak damping."""
+
+import numpy as np
+import pytest
+from families import with_dissipation
+from linearised import motion_matrix
+from scipy.linalg import block_diag
+from scipy.sparse import csr_array
+
+from faultgouge.analysis import NoEquilibriumError
+from faultgouge.analysis.windows import System, find_onset, find_windows
+
+RNG = np.random.default_rng(11)
+TURN = np.linalg.qr(RNG.normal(size=(8, 8)))[0]
+
+
+def family(block, damping):
+    """A 2 x 2 block of loads and its damping among six quiet modes, in a turned basis."""
+
+    def pencil(fx):
+        a = block_diag(block(fx), np.diag([30.0, 40, 50, 60, 70, 80]))
+        g = block_diag(np.diag(damping), 0.02 * np.eye(6))
+        return System(fx, *(csr_array(TURN @ each @ TURN.T) for each in (a, g)))
+
+    return pencil
+
+
+def growth(block, damping, fx):
+    """Largest Re s of the 2 x 2 block alone."""
+    companion = np.block([[np.zeros((2, 2)), np.eye(2)], [-block(fx), -np.diag(damping)]])
+    return np.linalg.eigvals(companion).real.max()
+
+
+def crossing(half_width, place=0.4):
+    """Two levels that pass each other, with an undamped window of this half width about the place."""
+
+    def block(fx):
+        return np.array([[10 + fx - place, half_width], [-half_width, 10 - fx + place]])
+
+    return block
+
+
+@pytest.mark.parametrize("damping", [(1e-6, 3e-6), (1e-3, 4e-3), (1e-2, 1e-2)])
+@pytest.mark.parametrize("half_width", [0.2, 1e-2, 1e-3])
+def test_windows_narrower_than_the_increment(half_width, damping):
+    """Both ends of the increment are stable; the edges are those of the block by itself."""
+    from scipy.optimize import brentq  # slow to import
+
+    block = crossing(half_width)
+    found = find_windows(family(block, damping), [-1.0, 0.0, 1.0, 2.0])
+    if growth(block, damping, 0.4) < 0:
+        # a coupling that feeds less than the dashpots take: no window of the pair's
+        assert half_width * 0.2 < max(damping)
+        assert found == ()
+        return
+    (window,) = found
+    reach = 0.4 + 3 * half_width + np.array([0, 10 * half_width])
+    edges = [
+        brentq(lambda fx: growth(block, damping, fx), 0.4, 0.4 + s * (reach[1] - 0.4), xtol=1e-14) for s in (-1, 1)
+    ]
+    # Re s is known to 1e-15; its slope is the damping over the width, or one where the block is nearly defective
+    digits = 1e-10 + 1e-14 * half_width / max(damping)
+    assert [window.fx_onset, window.fx_end] == pytest.approx(edges, abs=digits)
+    assert window.kind == "hopf"
+    assert window.frequency == pytest.approx(np.sqrt(10), rel=0.1)
+    assert window.error < 10 * digits
+
+
+def test_nothing_grows_where_levels_repel():
+    def block(fx):
+        return np.array([[10 + fx - 0.4, 1e-2], [1e-2, 10 - fx + 0.4]])
+
+    assert find_windows(family(block, (1e-3, 1e-4)), [0.0, 1.0]) == ()
+
+
+def test_a_steady_loss_of_stability_is_no_hopf_point():
+    """A restoring force that vanishes: s = 0."""
+
+    def block(fx):
+        return np.diag([10 * (0.3 - fx), 12.0])
+
+    (window,) = find_windows(family(block, (1e-2, 1e-2)), [0.0, 1.0])
+    assert window.kind == "steady"
+    assert window.fx_onset == pytest.approx(0.3, abs=1e-10)
+    assert window.fx_end is None
+
+
+def test_what_is_known_is_told_as_it_comes():
+    told = []
+    pencil = family(crossing(0.2), (1e-3, 1e-3))
+    found = find_windows(pencil, [-1.0, 0.0, 0.4, 1.0, 2.0], known=lambda windows, fx: told.append((windows, fx)))
+    assert [fx for _, fx in told] == [0.0, 0.4, 1.0, 2.0]
+    assert [len(windows) for windows, _ in told] == [0, 1, 1, 1]
+    assert [windows[0].fx_end is None for windows, _ in told[1:]] == [True, False, False]
+    assert told[-1][0] == found
+
+
+def test_a_load_besides_that_has_no_equilibrium_costs_no_window():
+    """Where a ramp goes on beyond a gap; a load of the ramp itself without an equilibrium is an error."""
+    pencil = family(crossing(0.2), (1e-3, 1e-3))
+
+    def with_a_gap(fx):
+        if 1.2 < fx < 1.8:
+            raise NoEquilibriumError("a gap", beyond=1.2)
+        return pencil(fx)
+
+    loads = [-1.0, 0.0, 1.0, 2.0]
+    looks = {0.0: [0.4], 1.0: [1.5]}
+    (window,) = find_windows(with_a_gap, loads, look=lambda below, above: looks.get(below, []))
+    looks.pop(1.0)
+    assert window == find_windows(pencil, loads, look=lambda below, above: looks.get(below, []))[0]
+    with pytest.raises(NoEquilibriumError):
+        find_windows(with_a_gap, [*loads[:3], 1.5, 2.0])
+
+
+def test_what_grows_from_the_beginning_says_so():
+    (window,) = find_windows(family(crossing(0.2, place=0.0), (1e-3, 1e-3)), [0.0, 1.0])
+    assert (window.kind, window.fx_onset) == ("start", 0.0)
+    assert 0.15 < window.fx_end < 0.25
+
+
+@pytest.mark.parametrize(("cn", "onset", "digits"), [(1.0, 0.0218328, 1e-7), (10.0, 0.02235, 1e-5)])
+@pytest.mark.slow
+def test_reference_packing_with_normal_dashpots(path, cn, onset, digits):
+    """The onsets that an independent computation had found, and LAPACK's root of the same to 1e-9."""
+    from scipy.optimize import brentq  # slow to import
+
+    damped = with_dissipation(path, cn=cn)
+    window = find_onset(damped, [0.0218, 0.0224], dissipation=True).windows[0]
+    assert window.fx_onset == pytest.approx(onset, abs=digits)
+    assert window.kind == "hopf"
+    near = 1e-6
+
+    def largest_growth(fx):
+        return np.linalg.eigvals(motion_matrix(damped(fx))).real.max()
+
+    root = brentq(largest_growth, window.fx_onset - near, window.fx_onset + near, xtol=1e-13)
+    assert window.fx_onset == pytest.approx(root, abs=1e-9)
+    assert window.error < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("cn", "loads", "says"),
+    [
+        (1.0, [0.02], "increasing"),
+        (1.0, [0.02, 0.01], "increasing"),
+        (1.0, [0.0, np.nan], "increasing"),
+        (0.0, [0.0, 0.001], "no dissipation"),
+    ],
+)
+def test_impossible_searches(path, cn, loads, says):
+    with pytest.raises(ValueError, match=says):
+        find_onset(with_dissipation(path, cn=cn), loads, dissipation=True)

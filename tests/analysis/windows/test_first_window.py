@@ -1,0 +1,227 @@
+"""The first window of complex eigenvalues in slices of the spectrum, and what is in doubt about it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from families import DIGITS, crossing, normal_form
+from scipy.linalg import eigvals
+from scipy.sparse import csr_array
+from tiling import tile
+
+from faultgouge.analysis import FaultgougeError, NoEquilibriumError, OnsetError, complex_windows, find_onset
+from faultgouge.analysis.windows import LIMITS, Limits, System, full_operator
+from faultgouge.analysis.windows.slices.eigenbasis import Bases
+from faultgouge.analysis.windows.slices.first_window import first_window
+from faultgouge.analysis.windows.slices.ranks import ALONE
+
+
+def searched(operator, loads, limits=LIMITS):
+    return first_window(lambda fx: System(fx, csr_array(operator(fx))), np.array(loads), limits=limits)
+
+
+@pytest.mark.slow
+def test_parts_of_the_spectrum_have_together_the_windows_of_all(path):
+    every = find_onset(path, path.grid[12:])
+    found = []
+    for modes in ((0, 100), (100, 200), (200, 285)):
+        try:
+            onset = find_onset(path, path.grid[12:], modes=modes)
+        except OnsetError as error:
+            assert f"among the modes {modes[0]}:{modes[1]}" in str(error)  # noqa: PT017, some have none
+        else:
+            assert onset.as_dict()["modes"] == list(modes)
+            found.append(onset)
+    first = min(found, key=lambda onset: onset.fx_c)
+    assert abs(first.fx_c - every.fx_c) < first.error + every.error
+    for onset in found:
+        assert min(abs(onset.fx_c - window.fx_onset) for window in every.windows) < onset.error + every.error
+    with pytest.raises(ValueError, match="modes 285:300 is no part of the 285 modes of this packing"):
+        find_onset(path, path.grid[12:], modes=(285, 300))
+
+
+def bent(f):
+    """Levels that cross at 0.906 of an increment, and at 0.5 of the straight line between its ends."""
+    return crossing(0.0, -0.0025)(2 * f**7 - 1)
+
+
+@pytest.mark.parametrize(
+    ("operator", "edges"),
+    [
+        (crossing(0.47, -0.04), (0.27, 0.67)),
+        (crossing(0.47, -0.0009), (0.44, 0.5)),
+        (bent, (0.475 ** (1 / 7), 0.525 ** (1 / 7))),
+    ],
+)
+def test_first_window_that_ends_within_its_increment(operator, edges):
+    window, doubtful = searched(operator, [0.0, 1.0, 2.0])
+    assert window.kind == "coalescence"
+    assert (window.fx_onset, window.fx_end) == pytest.approx(edges, abs=DIGITS)
+    assert doubtful == ()
+
+
+def test_first_window_of_real_eigenvalues_or_from_the_start():
+    assert searched(crossing(0.37, 1e-3), np.linspace(0, 1, 4)) == (None, ())
+    window, _ = searched(normal_form(0.1), [0.2, 0.3])
+    assert (window.kind, window.fx_onset, window.fx_end) == ("start", 0.2, None)
+
+
+@pytest.mark.parametrize("ahead", [1, 2, 3])
+def test_load_without_equilibrium_ends_the_search_for_the_first_window(ahead):
+    """As it does where all eigenvalues are computed, and not before what lies below it has been looked at."""
+
+    def ending(operator):
+        def until(f):
+            if f > 1.5:
+                raise NoEquilibriumError("no equilibrium")
+            return operator(f)
+
+        return until
+
+    limits = Limits(largest_basis=0, ahead=ahead)
+    with pytest.raises(NoEquilibriumError, match="no equilibrium"):
+        complex_windows(ending(crossing(0.37, 1e-3)), [0.0, 1.0, 2.0])
+    with pytest.raises(NoEquilibriumError, match="no equilibrium"):
+        searched(ending(crossing(0.37, 1e-3)), [0.0, 1.0, 2.0], limits)
+    window, _ = searched(ending(crossing(0.5, -0.04)), [0.0, 1.0, 2.0], limits)
+    assert window.fx_onset == pytest.approx(0.3, abs=DIGITS)
+
+
+def test_the_search_ends_with_the_first_window():
+    """Of one in each increment: operators that are asked for ahead are looked at no closer."""
+    asked = []
+
+    def operator(f):
+        asked.append(f)
+        return crossing(0.0, -0.04)(np.cos(np.pi * f))
+
+    window, _ = searched(operator, [0.0, 1.0, 2.0, 3.0], Limits(largest_basis=0, ahead=3))
+    assert window.fx_end == pytest.approx(np.arccos(-0.2) / np.pi, abs=DIGITS)
+    assert {f for f in asked if f > 1.0} == {2.0, 3.0}
+
+
+@pytest.mark.slow
+def test_pair_that_cannot_be_followed_is_not_lost_silently():
+    """A pair whose planes are never good enough: the parts of the increment that its window touches are named."""
+    window, doubtful = searched(crossing(0.47, -0.04), [0.0, 1.0], Limits(residual=0.0))
+    assert window is None
+    assert [below for below, _ in doubtful] == [k / 16 for k in range(4, 11)]
+
+
+def jumping(f):
+    """Two levels that exchange their places at a jump, and are real at all loads: a straight line has them meet."""
+    return crossing(0.0, -0.04)(-1.0 if f < 0.47 else 1.0)
+
+
+def test_pair_that_is_announced_and_not_found_is_told_of():
+    """Clusters that announce a pair of which the operator knows nothing: the shortest increment about it is named."""
+    found = searched(jumping, [0.0, 1.0], Limits(dips=2))
+    assert found == (None, ((7 / 16, 8 / 16),))
+    # with as many looks as it takes D is seen to keep its sign on either side of the jump
+    assert searched(jumping, [0.0, 1.0]) == (None, ())
+
+
+@pytest.mark.long
+def test_doubtful_increments_come_with_the_onset(path):
+    """Couplings so much enlarged that clusters announce pairs that stay real, and nobody looks at these."""
+    limits = Limits(all_windows=50, excess=200.0, dips=0)
+    found = find_onset(path, path.grid[20:], limits=limits)
+    (below, above), *_ = found.as_dict()["doubtful"]
+    assert path.grid[20] <= below < above < found.fx_c
+    with pytest.raises(OnsetError, match=r"expected between 0\.\d+ and 0\.\d+: take smaller increments"):
+        find_onset(path, path.grid[20:22], limits=limits)
+
+
+@pytest.mark.slow
+def test_basis_is_given_up_where_modes_mix_or_disks_move_in(path):
+    matrix = full_operator(path(0.0))
+    noise = np.random.default_rng(1).normal(size=(300, 300)) * 20.0
+    other = matrix + csr_array(
+        noise * (matrix.toarray() != 0).any(axis=1)[:, None] * (matrix.toarray() != 0).any(axis=0)
+    )
+    more = csr_array(matrix + csr_array(([1.0], ([58], [58])), shape=matrix.shape))
+    bases = Bases(None, ALONE)
+
+    def basis(operator):
+        ((part, _),) = bases.at(operator)
+        return part
+
+    first = basis(matrix)
+    assert basis(full_operator(path(0.001))) is first
+    for unlike in (csr_array(other), more):
+        assert basis(unlike) is not first
+        first = basis(matrix)
+
+
+@pytest.mark.parametrize(("mu", "expected", "last"), [(1.0, 0.0218330564080, 22), (0.8, 0.0191432059561, 20)])
+@pytest.mark.slow
+def test_first_window_of_the_reference(ramp, mu, expected, last):
+    path = ramp(mu, 1e-3, 22)
+    found = find_onset(path, path.grid[12 : last + 1], limits=Limits(all_windows=50))
+    assert not found.complete
+    (window,) = found.windows
+    assert window.kind == "coalescence"
+    assert window.fx_onset == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_first_window_of_hundreds_of_disks(path):
+    """Against all eigenvalues by LAPACK, at the loads before it, just below and just above it.
+
+    Masses make the copies of a packing differ.
+    """
+    mass = np.random.default_rng(3).uniform(0.7, 1.3, 300)
+
+    def operator(fx):
+        return full_operator(replace(tile(path(fx), 3), mass=mass))
+
+    window, _ = searched(operator, path.grid)
+    assert window.kind == "coalescence"
+    assert window.error < 1e-9
+    distance = 1e-6
+    before = [fx for fx in path.grid if fx < window.fx_onset][-1:]
+    for fx in [*before, window.fx_onset - distance]:
+        matrix = operator(fx)
+        values = eigvals(matrix.toarray(), check_finite=False)
+        # A double eigenvalue is uncertain by the root of u |A| times its coupling.
+        assert np.abs(values.imag).max() < 1e-4
+    matrix = operator(window.fx_onset + distance)
+    (above,) = (value for value in eigvals(matrix.toarray(), check_finite=False) if value.imag > 1e-4)
+    assert above.real == pytest.approx(window.eigenvalue, abs=1e-2)
+
+
+class LostEngineError(FaultgougeError):
+    """As of an engine that fails: of the same family of errors as those that the search may catch."""
+
+
+class Failing:
+    """An operator that raises an error at its n-th call, and counts its calls."""
+
+    def __init__(self, operator, at=None, error=None):
+        self.operator, self.at, self.error, self.calls = operator, at, error, 0
+
+    def __call__(self, fx):
+        self.calls += 1
+        if self.calls == self.at:
+            raise self.error("at this call")
+        return self.operator(fx)
+
+
+def then_jumping(f):
+    """A window of two levels, and a jump to another one, which takes bisection, and divided increments."""
+    return crossing(0.6, -0.01)(f) if f < 1.1 else crossing(1.2, -0.04)(f)
+
+
+@pytest.mark.parametrize("search", [complex_windows, searched])
+@pytest.mark.parametrize("operator", [crossing(0.62, -1e-4), then_jumping])
+@pytest.mark.slow
+def test_an_error_at_any_call_reaches_the_caller(search, operator):
+    """What a search may catch is a missing equilibrium: the kinds of other errors in turn."""
+    kinds, loads = (LostEngineError, RuntimeError, MemoryError, KeyboardInterrupt), [0.0, 0.5, 1.0, 1.5]
+    counting = Failing(operator)
+    search(counting, loads)
+    assert counting.calls > 8
+    for call in range(1, counting.calls + 1):
+        error = kinds[call % len(kinds)]
+        with pytest.raises(error, match="at this call"):
+            search(Failing(operator, call, error), loads)

@@ -1,0 +1,220 @@
+"""A search that is cut off goes on, to the bit, from what it has left in a folder; two searches may share one."""
+
+import multiprocessing
+import os
+import signal
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_slicing import FEW, on_ranks
+
+from faultgouge.analysis import FaultgougeError
+from faultgouge.analysis.errors import OutputError
+from faultgouge.analysis.progress import show_progress
+from faultgouge.analysis.windows import Ranks, System, full_operator
+from faultgouge.analysis.windows.slices.first_window import first_window
+from faultgouge.analysis.windows.slices.lanczos import SliceError
+from faultgouge.analysis.windows.slices.store import Border, Candidate, DamagedSliceError, SlicePass, SliceResult
+
+PASSING = replace(FEW, largest_basis=0, wait=0.1)
+"""Slices of 24 modes, in bases that are not kept in memory."""
+
+
+class CutOffError(Exception):
+    """The search ends here, as at a kill."""
+
+
+def counting(seen):
+    """A watch that takes down what is said of slices."""
+    return lambda says: seen.append(says) if says.endswith("modes") else None
+
+
+def files(folder):
+    return sorted(folder.glob("*/*-*.npz"))
+
+
+def cut_off(search, slices, folder):
+    """Have a search end, as at a kill, when so many slices are kept in a folder; their files."""
+    seen = []
+
+    def watch(says):
+        counting(seen)(says)
+        if len(seen) > slices:
+            raise CutOffError
+
+    with pytest.raises(CutOffError):
+        search(watch=watch, folder=folder)
+    kept = files(folder)
+    assert len(kept) == slices
+    return kept
+
+
+@pytest.fixture(scope="module")
+def search(ramp):
+    """The search of the reference packing, from a little before its onset on, for some friction coefficient."""
+
+    def make(mu=1.0):
+        path = ramp(mu, 1e-3, 22)
+
+        def system(fx):
+            return System(fx, full_operator(path(fx)))
+
+        def search(watch=None, **how):
+            with show_progress(watch):
+                return first_window(system, np.array(path.grid[18:]), limits=PASSING, **how)
+
+        return search
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def whole(search):
+    """The window of a search in one piece, and what it says of its slices."""
+    seen = []
+    return search()(watch=counting(seen)), seen
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.long), 3])
+def test_a_search_goes_on_to_the_bit(search, whole, tmp_path, ranks):
+    """On any number of ranks; then all is known."""
+    expected, all_said = whole
+    cut_off(search(), 5, tmp_path)
+    said, nothing = [], []
+    for each in on_ranks(ranks, lambda mine: search()(watch=counting(said), ranks=mine, folder=tmp_path)):
+        assert each.result() == expected
+    assert len(said) == len(all_said) - 5
+    assert said == all_said[5:] or ranks > 1
+    assert len(files(tmp_path)) == len(all_said)
+    assert search()(watch=counting(nothing), folder=tmp_path) == expected
+    assert nothing == []
+
+
+def search_that_waits(search, folder, stands, may_go_on, ends):
+    """Search in a folder, stand still when two slices are kept, and a third is found; then tell how many there were."""
+    seen = []
+
+    def watch(says):
+        counting(seen)(says)
+        if len(seen) == 3:
+            stands.set()
+            may_go_on.wait()
+
+    ends.put((search(watch=watch, folder=folder), len(seen)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("killed", [False, True])
+def test_two_searches_share_a_folder(search, whole, tmp_path, killed):
+    """Each slice is searched by one of them; the slices under way in a process that is killed go to the other."""
+    context = multiprocessing.get_context("fork")
+    stands, may_go_on, ends = context.Event(), context.Event(), context.Queue()
+    other = context.Process(target=search_that_waits, args=(search(), tmp_path, stands, may_go_on, ends))
+    other.start()
+    assert stands.wait(60)
+    seen, turns, standing = [], [], [other.pid]
+
+    def watch(says):
+        counting(seen)(says)
+        turns.extend([says] if says.endswith("are known") else [])
+        if says in turns[:-1] and other.pid in standing:  # once more: all is taken, and the other process waited for
+            standing.remove(other.pid)
+            os.kill(other.pid, signal.SIGKILL) if killed else may_go_on.set()
+
+    expected, all_said = whole
+    assert search()(watch=watch, folder=tmp_path) == expected
+    assert not standing
+    found, others = (expected, 2) if killed else ends.get(timeout=60)
+    other.join(60)
+    assert found == expected
+    assert len(seen) + others == len(all_said)
+
+
+@pytest.mark.slow
+def test_what_was_found_for_other_operators_is_left_alone(search, whole, tmp_path):
+    others = cut_off(search(0.8), 3, tmp_path)
+    said = []
+    assert search()(watch=counting(said), folder=tmp_path) == whole[0]
+    assert said == whole[1]
+    assert set(others) < set(files(tmp_path))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", "half"])
+def test_damaged_file_is_named(search, whole, tmp_path, content):
+    kept = cut_off(search(), 3, tmp_path)
+    damaged = kept[1] if content else next(tmp_path.glob("*/shifts.npz"))
+    damaged.write_bytes(damaged.read_bytes()[:200] if content == "half" else content)
+    with pytest.raises(DamagedSliceError, match=rf"{damaged} is damaged: delete the file"):
+        search()(folder=tmp_path)
+    damaged.unlink()
+    assert search()(folder=tmp_path) == whole[0]
+
+
+@pytest.mark.slow
+def test_kept_slices_are_compared_with_the_others(search, tmp_path):
+    kept = cut_off(search(), 3, tmp_path)
+    known = SlicePass.read(kept[0].parent)
+    last = known.found[-1]
+    known.keep(replace(last, border=last.border._replace(beyond=last.border.beyond + last.border.spacing)))
+    with pytest.raises(SliceError, match=rf"number {last.border.modes[1]} .* one is missing in between"):
+        search()(folder=tmp_path)
+
+
+@pytest.mark.slow
+def test_a_folder_that_cannot_be_written_ends_the_search_at_once(search, tmp_path):
+    (tmp_path / "occupied").touch()
+    seen = []
+    with pytest.raises(OutputError, match="cannot be made a folder"):
+        search()(watch=counting(seen), folder=tmp_path / "occupied")
+    assert seen == []
+
+
+def test_an_error_that_ends_all_ranks_does_not_wait_for_them():
+    def work():
+        raise OutputError("a full disk")
+
+    gathered = []
+    with pytest.raises(OutputError, match="a full disk"):
+        Ranks(0, 2, gathered.append).together(work)
+    assert gathered == []
+
+    def raise_error():
+        raise FaultgougeError("of this rank")
+
+    with pytest.raises(FaultgougeError, match="of this rank"):
+        Ranks(0, 2, lambda mine: [mine, (None, None)]).together(raise_error)
+
+
+def numbers(found):
+    """All that is kept of some slices."""
+    candidates = [
+        [(each.onset, each.inside, each.right.tolist(), each.left.tolist()) for each in increment]
+        for increment in found.candidates
+    ]
+    return found.border, candidates
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.data())
+def test_no_flipped_bit_goes_unnoticed(tmp_path_factory, data):
+    """What is read is what was written (some bytes of a zip file mean nothing), or the damage is said."""
+    folder = tmp_path_factory.mktemp("pass")
+    plane = np.arange(6.0).reshape(3, 2)
+    written = SliceResult(Border((3, 9), 1.5, 2.5, 0.1), [[Candidate(0.1, 0.2, plane, -plane)], []])
+    SlicePass(folder).keep(written)
+    (kept,) = SlicePass.read(folder).found
+    assert numbers(kept) == numbers(written)
+    (path,) = folder.iterdir()
+    content = bytearray(path.read_bytes())
+    content[data.draw(st.integers(0, len(content) - 1))] ^= data.draw(st.sampled_from([1, 16, 128]))
+    path.write_bytes(content)
+    try:
+        (back,) = SlicePass.read(folder).found
+    except DamagedSliceError:
+        return
+    assert numbers(back) == numbers(written)

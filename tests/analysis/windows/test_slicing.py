@@ -1,0 +1,204 @@
+"""All eigenvectors of a sparse symmetric matrix, slice by slice, against LAPACK."""
+
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from threading import Barrier
+
+import numpy as np
+import pytest
+from scipy.sparse import csc_array, diags_array
+
+from faultgouge.analysis.factors.inertia import factor_shifted
+from faultgouge.analysis.windows import LIMITS, Limits, Ranks
+from faultgouge.analysis.windows.slices.lanczos import SliceError, slices
+
+FEW = Limits(own=24, coarse=60, first_look=20, one_basis=50)
+
+
+def network(size, seed):
+    """Springs of random stiffness between neighbours on a square lattice of so many points a side."""
+    rng = np.random.default_rng(seed)
+    line, every = np.diff(np.eye(size), axis=0), np.eye(size)
+    stretches = csc_array(np.concatenate([np.kron(every, line), np.kron(line, every)]))
+    stiffness = rng.uniform(0.5, 1.5, stretches.shape[0])
+    return csc_array(stretches.T @ diags_array(stiffness) @ stretches)
+
+
+@pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.long), 2])
+@pytest.mark.slow
+def test_slices_are_the_whole_spectrum(workers):
+    matrix = network(34, 1)
+    expected, basis = np.linalg.eigh(matrix.toarray())
+    values, count = [], 0
+    for part in slices(matrix, 20, ranks=Ranks(workers=workers)):
+        own = part.values[part.own]
+        assert part.first + part.own.start == count
+        count += len(own)
+        values.append(own)
+        assert part.own.start == min(20, part.first + part.own.start)
+        vectors = part.vectors
+        # what blocks stray is taken away but for its square, 1e-11 at the most for one vector
+        np.testing.assert_allclose(vectors.T @ vectors, np.eye(len(part.values)), rtol=0, atol=2e-11)
+        # in mean distances of eigenvalues, 8 / 1156: the residual that is asked for, and its square
+        spacing = np.ptp(own) / len(own)
+        residual = np.linalg.norm(matrix @ vectors - vectors * part.values, axis=0)[part.own]
+        overlap = np.linalg.norm(basis[:, count - len(own) : count].T @ vectors[:, part.own], axis=0)
+        assert residual.max() < 10 * LIMITS.accurate * spacing
+        np.testing.assert_allclose(overlap, 1.0, atol=1e-3)
+    # the residual squared over the distance of the next eigenvalues, which may be a hundredth of the mean one
+    np.testing.assert_allclose(np.concatenate(values), expected, atol=1e-4 * 8 / 1156)
+
+
+@pytest.mark.parametrize("modes", [(0, 100), (500, 760), (1100, 1156), (700, 701)])
+@pytest.mark.slow
+def test_part_of_the_spectrum(modes):
+    """The eigenvalues of these numbers, with shifts about them alone."""
+    shifts = []
+
+    def record_shift(matrix, shift):
+        shifts.append(shift)
+        return factor_shifted(matrix, shift)
+
+    kinds = {"limits": Limits(coarse=60), "factorise": record_shift}
+    matrix = network(34, 4)
+    expected = np.linalg.eigvalsh(matrix.toarray())
+    parts = list(slices(matrix, 20, modes=modes, **kinds))
+    assert parts[0].first + parts[0].own.start == modes[0]
+    values = np.concatenate([part.values[part.own] for part in parts])
+    np.testing.assert_allclose(values, expected[slice(*modes)], rtol=0, atol=1e-4 * 8 / 1156)
+    few = len(shifts)
+    list(slices(matrix, 20, **kinds))
+    assert few < 0.5 * (len(shifts) - few)
+
+
+@pytest.mark.slow
+def test_a_negative_eigenvalue_is_found_with_those_next_to_zero():
+    """As of a symmetric part that is about to lose its stability; the bound of the spectrum is far away."""
+    expected = np.concatenate([[-1.3], np.linspace(1, 2000, 1250), np.geomspace(3e3, 1e5, 50)])
+    found = slices(csc_array(np.diag(expected)), 20, modes=(0, 300))
+    values = np.concatenate([part.values[part.own] for part in found])
+    np.testing.assert_allclose(values, expected[:300], rtol=0, atol=1e-4 * 2000 / 1250)
+
+
+@pytest.mark.slow
+def test_degenerate_eigenvalues_are_all_found():
+    """A square lattice on a torus, stiffer along one side: most eigenvalues are fourfold."""
+    along = 2 * np.eye(34) - np.roll(np.eye(34), 1, axis=0) - np.roll(np.eye(34), -1, axis=0)
+    matrix = csc_array(np.kron(along, np.eye(34)) + np.kron(np.eye(34), 1.3 * along))
+    one = np.linalg.eigvalsh(along)
+    expected = np.sort(np.add.outer(one, 1.3 * one).ravel())
+    values = np.concatenate([part.values[part.own] for part in slices(matrix, 20)])
+    np.testing.assert_allclose(values, expected, rtol=0, atol=1e-6)
+
+
+def overlooking(matrix, shift):
+    """An inertia that is one too high from some shift on, as if an eigenvalue had been overlooked."""
+    solve, below = factor_shifted(matrix, shift)
+    return solve, below + (shift > 4.0)
+
+
+def inaccurate(matrix, shift):
+    """Factors of a matrix that is off by 2e-4: half of a mean distance of eigenvalues at their upper end."""
+    return factor_shifted(csc_array(matrix * (1 + 2e-4)), shift)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("factorise", "says"),
+    [(overlooking, "one is missing in between"), (inaccurate, "the factors are inaccurate")],
+)
+def test_wrong_factors_are_noticed(factorise, says):
+    with pytest.raises(SliceError, match=says):
+        list(slices(network(34, 2), 20, factorise=factorise))
+
+
+def next_to_an_eigenvalue(distance):
+    """Eigenvalues of a diagonal matrix, one of which is this far from a shift."""
+    values = np.linspace(1.0, 2.0, 301)
+    shifts = []
+
+    def record_shift(matrix, shift):
+        shifts.append(shift)
+        return factor_shifted(matrix, shift)
+
+    for _ in range(30):  # the eigenvalue moves the shift a little
+        shifts.clear()
+        list(slices(csc_array(np.diag(values)), 10, limits=FEW, factorise=record_shift))
+        nearest = np.argmin(np.abs(values - shifts[-3]))
+        if abs(values[nearest] - shifts[-3]) < 2 * abs(distance):
+            return values
+        values[nearest] = shifts[-3] + distance
+    raise AssertionError
+
+
+@pytest.mark.parametrize("distance", [1e-6, -1e-8, 1e-10])
+def test_shift_next_to_an_eigenvalue(distance):
+    """Such an eigenvector grows back from rounding at once; blocks that stray with it are made anew."""
+    values = next_to_an_eigenvalue(distance)
+    matrix = csc_array(np.diag(values))
+
+    def found(limits):
+        parts = list(slices(matrix, 10, limits=limits))
+        worst = max(np.abs(each.vectors.T @ each.vectors - np.eye(len(each.values))).max() for each in parts)
+        return worst, np.concatenate([each.values[each.own] for each in parts])
+
+    worst, eigenvalues = found(FEW)
+    assert worst < 1e-10  # ten vectors that stray together, each by 3e-6 at the most
+    np.testing.assert_allclose(eigenvalues, np.sort(values), rtol=0, atol=1e-4 / 300)
+
+
+def on_ranks(size, work):
+    """What work gives on each of several ranks, which are threads here."""
+    barrier, given = Barrier(size, timeout=60), [None] * size
+
+    def rank(number):
+        def gather(mine):
+            given[number] = mine
+            barrier.wait()
+            everyone = list(given)
+            barrier.wait()
+            return everyone
+
+        return work(Ranks(number, size, gather, workers=1))
+
+    with ThreadPoolExecutor(size) as pool:
+        return [pool.submit(rank, number) for number in range(size)]
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_ranks_have_together_the_slices_of_one_to_the_bit(size):
+    matrix = network(20, 5)
+    alone = list(slices(matrix, 10, limits=FEW))
+    shared = [each.result() for each in on_ranks(size, lambda ranks: list(slices(matrix, 10, limits=FEW, ranks=ranks)))]
+    assert min(len(each) for each in shared) >= len(alone) // size > 1
+    for one, other in zip(alone, (part for each in shared for part in each), strict=True):
+        assert (one.first, one.own) == (other.first, other.own)
+        assert np.array_equal(one.values, other.values)
+        assert np.array_equal(one.vectors, other.vectors)
+
+
+def failing(rank, matrix, shift):
+    """An error that the second of two ranks meets."""
+    if shift > 6 and rank == 1:
+        raise SliceError("of one rank")
+    return factor_shifted(matrix, shift)
+
+
+def overlooking_at_the_border(rank, matrix, shift):
+    """Inertias that are too high by one on the second of two ranks."""
+    solve, below = factor_shifted(matrix, shift)
+    return solve, below + rank
+
+
+@pytest.mark.parametrize(
+    ("factorise", "says"), [(failing, "of one rank"), (overlooking_at_the_border, "is missing in between")]
+)
+def test_an_error_of_one_rank_is_that_of_all(factorise, says):
+    matrix = network(20, 5)
+
+    def of(ranks):
+        return list(slices(matrix, 10, limits=FEW, factorise=partial(factorise, ranks.rank), ranks=ranks))
+
+    for each in on_ranks(2, of):
+        with pytest.raises(SliceError, match=says):
+            each.result()

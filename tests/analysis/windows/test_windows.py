@@ -1,0 +1,331 @@
+"""Windows of complex eigenvalues, on families of matrices whose windows are known, and along a ramp."""
+
+from dataclasses import replace
+from io import StringIO
+
+import numpy as np
+import pytest
+from families import DIGITS, OTHERS, crossing, embedded, normal_form
+from rich.console import Console
+from scipy.sparse import csr_array
+
+from faultgouge.analysis import (
+    Contacts,
+    NoEquilibriumError,
+    OnsetError,
+    complex_windows,
+    find_onset,
+)
+from faultgouge.analysis.uncertain_digits import with_uncertainty
+from faultgouge.analysis.windows import Limits, Modes, System, force_bearing, full_operator
+from faultgouge.analysis.windows.between import Few, deepest_dip
+from faultgouge.analysis.windows.modes import assign_modes
+from faultgouge.analysis.windows.screens.pairs import PairScreen
+from faultgouge.analysis.windows.search import windows_along
+
+
+@pytest.mark.parametrize("d", [0.01, 0.3])
+@pytest.mark.parametrize("points", [2, 5, 40])
+def test_normal_form(d, points):
+    (window,) = complex_windows(normal_form(d), np.linspace(0, 2.2 * d, points))
+    assert window.kind == "coalescence"
+    assert window.fx_onset == pytest.approx(d, abs=DIGITS)
+    assert window.fx_end is None
+    assert window.eigenvalue == pytest.approx(1, abs=DIGITS)
+    assert window.error < DIGITS
+    # |y^H x| = (1 - (e/d)^2)^(1/2) in an orthonormal basis, at the closest of the points that were evaluated.
+    assert window.overlap < 1e-2
+
+
+def searched(operator, loads, screen=None):
+    """The windows of a family of matrices; all modes of all loads are looked at unless a screen names a few."""
+    along = windows_along(lambda fx: System(fx, csr_array(operator(fx))), np.array(loads), 1e-7, screen)
+    *_, (_, windows) = along
+    return windows
+
+
+def test_window_behind_a_bend():
+    """Levels that approach, and are bent apart in the last increment: its chord alone shows no window."""
+
+    def bent(f):
+        gap = 1 - f if f < 1.1 else 5 * (f - 1.1) - 0.1
+        return embedded([[10 + gap, 0.05], [-0.05, 10 - gap]])
+
+    first, second = searched(bent, [0.0, 0.5, 0.9, 1.3])
+    assert (first.fx_onset, first.fx_end) == (pytest.approx(0.95, abs=DIGITS), pytest.approx(1.05, abs=DIGITS))
+    assert (second.fx_onset, second.fx_end) == (pytest.approx(1.11, abs=DIGITS), pytest.approx(1.13, abs=DIGITS))
+
+
+@pytest.mark.parametrize("search", [complex_windows, searched])
+@pytest.mark.parametrize(
+    ("speed", "others", "couplings", "last"), [(5, (13.0, 10.7), (1.1, 0.02), 1.0), (2, (11.0, 12.0), (0.1, 0.05), 1.5)]
+)
+def test_partners_may_change(search, speed, others, couplings, last):
+    """One level meets another one, parts, and meets a third: two windows of two pairs within one increment."""
+
+    def three(f):
+        levels = np.diag([10 + speed * f, *others, *OTHERS])
+        levels[0, [1, 2]] = couplings
+        levels[[1, 2], 0] = np.negative(couplings)
+        return levels
+
+    def complex_beside(edge):
+        return [np.count_nonzero(np.linalg.eigvals(three(edge + side)).imag > 1e-9) for side in (-1e-6, 1e-6)]
+
+    first, second = search(three, [0.0, last])
+    assert first.fx_end < second.fx_onset < last
+    for window in (first, second):
+        assert complex_beside(window.fx_onset) == [0, 1]
+        assert window.fx_end is None or complex_beside(window.fx_end) == [1, 0]
+
+
+@pytest.mark.parametrize("half_width", [2e-1, 1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("place", [0.31, 0.5, 0.77])
+def test_window_narrower_than_the_increment(half_width, place):
+    """Of levels that bend, in a basis that turns: nothing that the prediction assumes holds exactly.
+
+    The increment of 1 shows real eigenvalues at either end, and a window of any width inside.
+    """
+
+    def operator(f):
+        turn = np.eye(15)
+        turn[1:3, 1:3] = [[np.cos(f), np.sin(f)], [-np.sin(f), np.cos(f)]]
+        bent = crossing(place, -(half_width**2))(np.sin(f) + place - np.sin(place))
+        return turn.T @ bent @ turn
+
+    (window,) = complex_windows(operator, [-1.0, 0.0, 1.0, 2.0])
+    assert window.kind == "coalescence"
+    # At the edges the slope of D and its noise are both proportional to the coupling, which is half_width.
+    edges = [np.arcsin(np.sin(place) + sign * half_width) for sign in (-1, 1)]
+    assert [window.fx_onset, window.fx_end] == pytest.approx(edges, abs=DIGITS)
+
+
+@pytest.mark.parametrize("product", [0.0, 1e-12, 1e-4, 0.3])
+def test_crossings_are_no_windows(product):
+    assert complex_windows(crossing(0.37, product), np.linspace(0, 1, 4)) == ()
+
+
+def test_gap_inside_a_window_is_seen():
+    """A pair that is complex at both ends of an increment and real in between: two windows."""
+
+    def operator(f):
+        return embedded([[10, f - 0.35], [0.55 - f, 10]])
+
+    first, second = complex_windows(operator, [0.0, 1.0])
+    assert (first.kind, first.fx_onset) == ("start", 0.0)
+    assert first.fx_end == pytest.approx(0.35, abs=DIGITS)
+    assert second.fx_onset == pytest.approx(0.55, abs=DIGITS)
+    assert second.fx_end is None
+
+
+def test_jump_is_no_coalescence():
+    def operator(f):
+        return embedded([[10, 1.0], [-0.3 if f > 0.321 else 0.3, 10]])
+
+    (window,) = complex_windows(operator, [0.0, 1.0])
+    assert window.kind == "contact change"
+    # Bracketed to 1e-9 of the increment; the middle of the bracket is in error by half of it.
+    assert abs(window.fx_onset - 0.321) <= window.error < 1e-9
+
+
+@pytest.mark.parametrize("loads", [[1.0], [0.0, 0.0], [1.0, 0.0], [0.0, np.nan]])
+def test_impossible_loads(loads):
+    with pytest.raises(ValueError, match="increasing"):
+        complex_windows(normal_form(0.1), loads)
+
+
+def test_noise_loses_its_imaginary_part():
+    """A double eigenvalue in Jordan form splits by (u |A|)^(1/2), real or complex as rounding has it."""
+    split = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        basis = np.linalg.qr(rng.normal(size=(12, 12)))[0]
+        inner = np.diag(np.concatenate([[5.0, 5.0], OTHERS]))
+        inner[0, 1] = 1.0
+        matrix = basis @ inner @ basis.T
+        split += np.iscomplex(np.linalg.eigvals(matrix)).any()
+        assert not Modes.of_operator(0.0, matrix).complex_pairs
+        inner[1, 0] = -1e-8  # imaginary parts of 1e-4
+        assert len(Modes.of_operator(0.0, basis @ inner @ basis.T).complex_pairs) == 1
+    assert split > 0
+
+
+def test_deepest_dip_of_parabolas():
+    """(t - 0.3)^2 - w^2 from its ends: the width is 2 w, and what a twentieth of the smaller end adds."""
+    for w in (0.0, 1e-3, 0.1):
+        d0, d1 = 0.09 - w * w, 0.49 - w * w
+        width, at = deepest_dip(*(np.array([v]) for v in (d0, -0.6, d1, 1.4)), 0.05)
+        assert at[0] == pytest.approx(0.3, abs=1e-12)
+        assert width[0] == pytest.approx(2 * np.sqrt(w * w + 0.05 * d0 * 4 * 0.3 * 0.7), rel=1e-9)
+    width, _ = deepest_dip(*(np.array([v]) for v in (1.0, -0.1, 1.0, 0.1)), 0.05)
+    assert width[0] == 0
+
+
+@pytest.mark.parametrize("disks", [300, 50])
+def test_no_onset_is_said_so(path, disks):
+    """By the search of a small packing, and by that of a large one."""
+    with pytest.raises(OnsetError, match=r"up to F_x = 0\.003: raise the largest load"):
+        find_onset(path, path.grid[:4], limits=Limits(all_windows=disks))
+
+
+@pytest.mark.parametrize("mu", [1.0, pytest.param(0.8, marks=pytest.mark.long)])
+@pytest.mark.slow
+def test_what_nothing_happens_on_is_not_decomposed(ramp, mu, monkeypatch):
+    """The same windows as from all modes at every load, which are computed next to the edges alone."""
+    path, decomposed, decompose = ramp(mu, 1e-3, 22), [], Modes.of
+
+    def count_decompositions(system):
+        decomposed.append(system.fx)
+        return decompose(system)
+
+    def operator(fx):
+        return full_operator(path(fx))
+
+    monkeypatch.setattr(Modes, "of", count_decompositions)
+    quick = searched(operator, path.grid, PairScreen())
+    few, decomposed[:] = len(decomposed), []
+    every = searched(operator, path.grid)
+    assert len(decomposed) >= 23
+    assert few <= 4 * len(quick)
+    assert len(quick) == len(every)
+    # what equilibria of a residual of 1e-10 on ten disks can tell of the load
+    for one, other in zip(quick, every, strict=True):
+        assert one.fx_onset == pytest.approx(other.fx_onset, abs=one.error + other.error + 3e-11)
+        assert (one.fx_end, one.kind) == (other.fx_end, other.kind)
+
+
+def family_with_a_long_window(f):
+    """A pair that is complex from 0.35 to 8.6, and one that is so between 5.2 and 5.3, in an orthonormal basis."""
+    matrix = np.diag(np.concatenate([[100.0, 100.0, 200.0, 200.0], 300 + 50 * OTHERS]))
+    matrix[0, 1], matrix[1, 0] = 1.0, (f - 0.35) * (f - 8.6)
+    matrix[2:4, 2:4] += [[f - 5.25, 0.05], [-0.05, 5.25 - f]]
+    return matrix
+
+
+def test_open_windows_keep_their_names_over_increments_that_are_skipped():
+    edges = [(window.fx_onset, window.fx_end) for window in complex_windows(family_with_a_long_window, np.arange(10.0))]
+    np.testing.assert_allclose(edges, [(0.35, 8.6), (5.2, 5.3)], atol=1e-9)
+
+
+def test_what_the_screening_misses_is_walked_again():
+    """A window that opens on increments said to be quiet is found as soon as anything makes us look."""
+
+    screen = PairScreen()
+
+    def blind(here, there, known, depth):
+        return Few([], 0) if there.stiffness[1, 0] > -5.0 else screen(here, there, known, depth)
+
+    first = searched(lambda f: family_with_a_long_window(0.3 * f), np.arange(10.0), blind)[0]
+    assert first.fx_onset == pytest.approx(0.35 / 0.3, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_an_onset_in_words(path):
+    onset = find_onset(path, path.grid[20:])
+    written = with_uncertainty(onset.fx_c, onset.error)
+    assert repr(onset).startswith(f"<Onset: F_x^c = {written}, ")
+    assert f"from {written}</th>" in onset._repr_html_()
+    console = Console(width=100, record=True, file=StringIO())
+    console.print(onset)
+    assert f"from {written}" in console.export_text()
+
+
+def test_a_complex_pair_is_not_torn_by_a_level_beside_it():
+    """A level mixes with one direction of the pair's plane; the nearest two are still conjugates."""
+    operator = np.diag([2.0, 2.0, 2.1, 5.0])
+    operator[0, 1], operator[1, 0] = 1.0, -1.0
+    modes = Modes.of_operator(0.0, operator)
+    pair = modes.space(modes.complex_pairs[0])
+    turn, angle = np.eye(4), np.radians(65)
+    turn[1:3, 1:3] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    turned = Modes.of_operator(1.0, turn @ operator @ turn.T)
+    first, second = turned.nearest(pair)
+    assert turned.partner[first] == second
+
+
+def test_modes_that_cross_keep_their_names():
+    """Coupled so weakly that the levels pass each other within the increment, and strongly enough not to."""
+    for product, exchanged in ((1e-6, True), (-1e-6, True), (4.0, False)):
+        operator = crossing(0.37, product)
+        here, there = Modes.of_operator(0.0, operator(0.0)), Modes.of_operator(1.0, operator(1.0))
+        expected = np.arange(12)
+        if exchanged:
+            expected[:2] = 1, 0
+        np.testing.assert_array_equal(assign_modes(here, there), expected)
+
+
+@pytest.mark.parametrize("noise", [1e-12, 1e-9, 1e-6])
+def test_error_follows_the_noise_of_the_equilibria(noise):
+    """Operators only known to `noise`, as from equilibria of finite balance: the error says what is lost."""
+    clean, d, errors, misses = normal_form(0.3), 0.3, [], []
+    for seed in range(12):
+
+        def operator(e, seed=seed):
+            rng = np.random.default_rng((abs(hash(e)) + seed) % 2**32)
+            matrix = clean(e)
+            return matrix * (1 + noise * rng.uniform(-1, 1, matrix.shape))
+
+        (window,) = complex_windows(operator, [0.0, 0.1, 0.2, 0.4, 0.5])
+        if noise == 1e-6 and window.kind == "contact change":
+            continue  # a sixth of 60 draws: D is nowhere straight and yet above the noise, and its root a bracket
+        assert window.kind == "coalescence"
+        errors.append(window.error)
+        misses.append(abs(window.fx_onset - d) / window.error)
+    assert len(errors) >= 5  # fewer in 7 of 100,000; what is drawn depends on the processor's last digits
+    # Entries of 50 in a basis of condition 10: noise in D some 1e3 times that of an entry, slope 2.4.
+    assert noise < np.median(errors) < 1e4 * noise
+    # Two degrees of freedom make a single error uncertain by a factor of two or three: a median of 60 is 0.3.
+    assert np.median(misses) < 1
+
+
+def test_what_is_out_of_balance_is_part_of_the_error(path):
+    """A load that is off by 1e-4 on each of ten disks shifts the onset by as much, less what their mean averages."""
+    found = find_onset(lambda fx: replace(path(fx), fy=path(fx).fy + 1e-4), path.grid[20:])
+    assert found.fx_c == pytest.approx(0.021833056408, rel=1e-9)
+    assert found.error > 0.99e-4 / np.sqrt(10)
+
+
+def test_contacts_without_force_are_left_out(reference_packing):
+    """A rattler brought to touch by 1e-12 of a length: a stiffness of 0.3 that no force stands for."""
+    packing = reference_packing(1.0)
+    rattler = packing.rattlers[0]
+    apart = packing.position[rattler] - packing.position
+    distance, reach = np.hypot(*apart.T), packing.radius + packing.radius[rattler]
+    gap = distance - reach
+    gap[packing.rattlers] = np.inf
+    neighbour = int(np.argmin(gap))
+    position = packing.position.copy()
+    position[rattler] -= (gap[neighbour] + 1e-12) * apart[neighbour] / distance[neighbour]
+    contacts = packing.contacts
+    more = Contacts(np.append(contacts.i, rattler), np.append(contacts.j, neighbour), np.append(contacts.slip, 0.0))
+    touching = replace(packing, position=position, contacts=more)
+    assert len(touching.rattlers) == len(packing.rattlers) - 1
+    assert touching.residual == packing.residual
+    assert len(force_bearing(touching).contacts) == len(contacts)
+    assert abs(full_operator(touching) - full_operator(packing)).max() == 0
+    # Not so where the balance is bad because the packing is none.
+    assert force_bearing(replace(touching, fx=1.0)).residual > 0.1
+    assert len(force_bearing(replace(touching, fx=1.0)).contacts) >= len(contacts)
+
+
+@pytest.mark.parametrize(("hole", "error"), [((0.49, 0.51), DIGITS), ((0.299, 0.301), 2e-3)])
+def test_loads_without_equilibrium_are_gone_around(hole, error):
+    """Where no edge lies nothing is lost; where one does it is known to about the width of the hole."""
+
+    def operator(f):
+        if hole[0] < f < hole[1]:
+            raise NoEquilibriumError("no equilibrium")
+        return crossing(0.5, -0.04)(f)
+
+    (window,) = complex_windows(operator, [0.0, 1.0])
+    assert abs(window.fx_onset - 0.3) <= window.error + DIGITS
+    assert window.error <= error
+    assert window.fx_end == pytest.approx(0.7, abs=DIGITS)
+
+
+def test_the_first_window_alone_is_that_of_all_and_nothing_beyond_it_is_asked_for(path):
+    every, asked = find_onset(path, path.grid[18:]), []
+    first = find_onset(lambda fx: asked.append(fx) or path(fx), path.grid[18:], first=True)
+    assert first.fx_c == pytest.approx(every.fx_c, abs=first.error + every.error)
+    assert len(first.windows) == 1
+    assert max(asked) == min(fx for fx in path.grid if fx > first.fx_c)
