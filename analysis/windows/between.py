@@ -209,7 +209,7 @@ def stretch(below: Sequence[Space], above: Sequence[Space], limits: Limits = LIM
     """
     (here, *_), (there, *_) = below, above
     span = there.fx - here.fx
-    if here.system.dissipative:
+    if len(below) == 2:
         rates = [np.array([mode.mean for mode in modes]) for modes in (below, above)]
         slopes = (
             np.array([mode.drift(there.system)[0, 0] for mode in below]),

@@ -25,10 +25,6 @@ from .system import System, entries
 Kind = Literal["coalescence", "hopf", "steady", "contact change", "start"]
 
 
-STEADY = 1e-9
-"""|Im s| below this share of the largest |s| counts as zero."""
-
-
 class LostPairError(FaultgougeError):
     """A motion that can be followed no further: one sentence."""
 
@@ -101,7 +97,7 @@ class Edge:
         mean, kind = np.mean([each.mean for each in spaces]), "coalescence"
         if middle.system.dissipative:
             size = float(np.sqrt(np.abs(entries(middle.system.stiffness)).max()))
-            kind = "steady" if middle.mean.imag <= STEADY * size else "hopf"
+            kind = "steady" if middle.mean.imag <= LIMITS.steady * size else "hopf"
         overlap = min(each.overlap for each in spaces)
         return cls(fx, error + middle.system.balance, mean.item(), overlap, kind)  # type: ignore[arg-type]
 

@@ -10,12 +10,13 @@ class Limits:
     # Sizes at which the way changes
 
     all_windows: int = 300
-    """Disks up to which all windows are sought, from all eigenvalues: a second for a decomposition, which grows with
-    the cube of the number. Beyond, the first window is sought in slices of the spectrum."""
+    """Disks up to which all windows are sought, from all eigenvalues: a second for a decomposition, which grows
+    with the cube of the number. Beyond, the first window is sought in slices of the spectrum."""
     dense_factors: int = 600
     """Coordinates up to which a dense factorisation of A - sigma is faster than a sparse one."""
     one_basis: int = 1000
-    """Coordinates up to which the basis is one dense decomposition: less than a second. Beyond, it comes in slices."""
+    """Coordinates up to which the basis is one dense decomposition: less than a second. Beyond, it comes in
+    slices."""
 
     # The operator
 
@@ -30,8 +31,8 @@ class Limits:
     narrowest: float = 1e-7
     """Narrowest window, in units of the largest load: its pair would grow more slowly than any run can show."""
     bend: float = 0.05
-    """Curvature that two values and slopes of D do not show, as a share of the smaller D: more than enough for loads
-    between which modes are recognised at all."""
+    """Curvature that two values and slopes of D do not show, as a share of the smaller D: more than enough for
+    loads between which modes are recognised at all."""
 
     screened: int = 4
     """How often an increment is divided before all modes are asked: they take as long as ten looks at a few."""
@@ -48,9 +49,12 @@ class Limits:
     # The edge of a window
 
     root: float = 1e-7
-    """Width to which the root of D is bracketed, in increments: a tenth of the distance of the five points about it."""
+    """Width to which the root of D is bracketed, in increments: a tenth of the distance of the five points about
+    it."""
     jump: float = 1e-9
     """Width to which a jump is bracketed, in increments; its place depends on the path's increment by far more."""
+    steady: float = 1e-9
+    """|Im s| below this share of the largest |s| counts as zero."""
     shortest: float = 2.0**-6
     """Shortest steps, in shares of the straight line from one operator to another, in which pairs and modes are
     followed."""
@@ -62,31 +66,41 @@ class Limits:
     steps_on: int = 12
     """The same with the factors of a neighbour: four solutions a step, against a hundred for a factorisation."""
     pace: int = 5
-    """Steps by which the pace is judged: the iteration slows down while farther modes go, and then keeps its pace."""
+    """Steps by which the pace is judged: the iteration slows down while farther modes go, and then keeps its
+    pace."""
     offsets: tuple[float, ...] = (0.1, -0.1, 1.0, -1.0)
-    """Distances of the shift from the mean of the pair, in units of its spread, tried in turn. A tenth of the spread
-    costs the second direction no more than a digit, and saves half of the iterations; a third eigenvalue may be
-    close."""
+    """Distances of the shift from the mean of the pair, in units of its spread, tried in turn. A tenth of the
+    spread costs the second direction no more than a digit, and saves half of the iterations; a third eigenvalue may
+    be close."""
     shifts: int = 12
     """Shifts for a single mode, whose s is found better with each: one or two are enough."""
     slow: float = 0.1
     """Share of a residual that a step may leave before the shift is renewed: a factorisation costs a few steps."""
-    off_eigenvalue: float = 1e-10
-    """Distance of such a shift from s, as a share: an inverse should exist."""
+    off_eigenvalue: float = 1e-9
+    """Distance of a shift from a point that may be an eigenvalue to the last digit, as a share: an inverse should
+    exist."""
+    inverse_steps: int = 6
+    """Inverse iterations from random vectors: each takes other modes away by the ratio of their distances."""
+    extrapolation: float = 2.0
+    """Distance of a load from the nearer of two others up to which planes are extrapolated, in units of the
+    distance of these two from each other."""
+    same_mode: float = 1e-8
+    """Two modes of one load are one and the same if their eigenvalues agree to this share, over their condition."""
     residual: float = 100.0
     """Residual of an accepted plane, in units of u |A|_F; LAPACK's own are some 10."""
 
     # Screening by perturbation theory
 
     slack: float = 0.05
-    """How far levels and couplings may leave the straight line between two loads, in units of their change. In packings
-    of 100 disks and increments of 1e-3 it is 1.3e-3 in the median, and grows with the increment."""
+    """How far levels and couplings may leave the straight line between two loads, in units of their change. In
+    packings of 100 disks and increments of 1e-3 it is 1.3e-3 in the median, and grows with the increment."""
     few: int = 3
     """Pairs that are examined one by one; where more are named, a decomposition costs no more."""
     core: int = 20
     """Modes that a cluster owns."""
     margin: int = 20
-    """Further modes of a cluster on either side, coupled to its own in all orders."""
+    """Further modes of a cluster on either side, coupled to its own in all orders. Farther ones mix by less than a
+    hundredth."""
     beyond: int = 10
     """Modes of a slice on either side beyond those of its clusters, in second order. What is farther away changes
     levels by less than (coupling / spacing)^2 / 30 of their spacing."""
@@ -97,16 +111,35 @@ class Limits:
     # Screening of growth with dissipation
 
     clusters: float = 5e-5
-    """Clusters of an increment, for each coordinate squared, beyond which all modes take less time: four of 100 disks.
-    Half as many in a half, so that dividing costs no more than that at any depth."""
+    """Clusters of an increment, for each coordinate squared, beyond which all modes take less time: four of 100
+    disks. Half as many in a half, so that dividing costs no more than that at any depth."""
     cluster: float = 1e-4
     """Narrowest windows that are looked for in clusters, in increments: where they begin is known to 1e-2 or so."""
-    nearly_growing: float = 0.3
+    weak_damping: float = 0.3
     """A mode of a cluster whose damping is below this share of the median is looked at with the operator, which
     decides."""
-    beyond_upper_load: float = 0.05
-    """Share of an increment by which a cluster is followed beyond the upper load: a cluster knows to 1e-2 or so of an
-    increment where modes begin to grow. What grows there is looked at with the operator, too."""
+    overshoot: float = 0.05
+    """Share of an increment by which a cluster is followed beyond the upper load: a cluster knows to 1e-2 or so of
+    an increment where modes begin to grow. What grows there is looked at with the operator, too."""
+    third_order: float = 5.0
+    """Third order, in roots of its sum of squares: its terms have random signs."""
+    spare: float = 0.1
+    """Share of a mode's own damping that has to be left."""
+    mixed: float = 0.25
+    """Mixing of two modes up to which the second order is trusted: what is left out is of the relative order of its
+    square, 0.06."""
+    oscillating: float = 0.3
+    """Damping over frequency up to which a mode counts as oscillating."""
+    dissipated: float = 0.7
+    """Share of what dashpots take that has to exceed what the motion is fed: a cluster knows both to a few per
+    cent."""
+    apart: int = 10
+    """Suspects that are closer belong to one cluster."""
+
+    largest_cluster: int = 100
+    """Modes of a cluster with dissipation; beyond, all modes take no longer."""
+    largest_share: float = 1 / 3
+    """The same as a share of all modes, where that is more."""
 
     # Slices of the spectrum
 
@@ -130,8 +163,8 @@ class Limits:
     coordinates. Its square, 1e-11, is what then remains in lengths and angles of the basis."""
     accurate: float = 1e-2
     """Residual of the eigenvectors of a slice, in mean distances of eigenvalues, as of the inverse. It enters an
-    eigenvalue as its square over the distance of modes outside: 4e-6 at the most was measured (29,000 coordinates). An
-    eigenvalue may be off its Rayleigh quotient with S by as much."""
+    eigenvalue as its square over the distance of modes outside: 4e-6 at the most was measured (29,000 coordinates).
+    An eigenvalue may be off its Rayleigh quotient with S by as much."""
 
     # The search in slices
 
@@ -141,9 +174,9 @@ class Limits:
     finest: float = 1e-3
     """Narrowest windows of clusters that are looked for, in increments: the clusters' own error is larger."""
     excess: float = 0.2
-    """What is added to the antisymmetric couplings of a cluster, in units of mixing^2 times the spacing of its levels,
-    so that pairs are announced early, and the operator decides. Modes beyond a slice, and the third order, change the
-    difference of both couplings by a tenth of that unit (360 disks)."""
+    """What is added to the antisymmetric couplings of a cluster, in units of mixing^2 times the spacing of its
+    levels, so that pairs are announced early, and the operator decides. Modes beyond a slice, and the third order,
+    change the difference of both couplings by a tenth of that unit (360 disks)."""
     dips: int = 12
     """Looks at the discriminant of an announced pair before its sign is in doubt; an avoided crossing takes one or
     two."""
@@ -154,16 +187,61 @@ class Limits:
     largest_basis: float = 3e8
     """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision."""
     ahead: int = 2
-    """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""
+    """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the
+    basis."""
     lapack: int = 5000
     """Coordinates up to which all eigenvalues at the first load are asked for: half a minute, and as their cube."""
     axis: int = 10_000
-    """Coordinates up to which all motions that grow at a load are looked for along the imaginary axis, where clusters
-    miss some: the time grows as their square."""
+    """Coordinates up to which all motions that grow at a load are looked for along the imaginary axis, where
+    clusters miss some: the time grows as their square."""
     wait: float = 2.0
     """Seconds between two looks at what other searches have found, where these have taken all that is left."""
     chunk: int = 1024
     """Rows of a basis that are multiplied at a time: what comes out stays in the cache."""
+
+    # Growth with dissipation, in slices
+
+    trusted: float = 0.5
+    """Share of what a slice bears up to which it is left out: its modes change on the way."""
+    wider: float = 1.3
+    """Where further slices have to be looked at, those that would have to at so many times larger loads are looked
+    at, too: bases that are kept are made anew."""
+    most_ahead: int = 8
+    """Increments at the most that are looked at while bases that are not kept pass by."""
+    places: int = 6
+    """Looks at an announced mode, for a load at which it grows."""
+    nearest: int = 12
+    """Modes about a frequency among which one that grows is looked for where a cluster does not know its shape."""
+    stride: int = 2
+    """Ratio of the numbers of two loads at which all motions are looked for: a look takes as long as two passes or
+    more."""
+    below_onset: float = 1e-6
+    """Distance below an onset at which all other motions are looked for, in units of the way from the last load
+    without."""
+    settled: float = 0.02
+    """Share of an increment by which the place of the largest growth may still move."""
+
+    # Discs along the imaginary axis
+
+    krylov: int = 40
+    """Dimension of a Krylov space: 80 cost a fifth more for the same length of the axis, 20 do not reach far
+    enough."""
+    ritz_residual: float = 1e-3
+    """Residual of an eigenvalue that counts as found, in units of its own: that of single precision is some
+    1e-4."""
+    pivot: float = 0.01
+    """Share of the largest entry of a column from which on the diagonal entry is the pivot: MUMPS's default."""
+    covered: float = 0.9
+    """Share of the radius on the axis that counts as covered."""
+    next_disc: float = 0.8
+    """Distance of a new middle from what is covered, in units of the last disc's radius, as radii change."""
+    strayed: float = 0.05
+    """Way that a refined eigenvalue may have gone, in units of its distance from the middle: else it is another
+    one."""
+    norm: float = 1e-2
+    """Share to which norms are found, and by which they are taken larger."""
+    smallest_disc: float = 1e-6
+    """Radius, in units of the largest frequency, below which the axis cannot be covered."""
 
     def chunks(self, size: int) -> list[slice]:
         """The rows of a basis, so many at a time."""

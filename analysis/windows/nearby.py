@@ -4,14 +4,9 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from ..motion.eigenvalues import active_coordinates
+from .limits import LIMITS
 from .space import Space
 from .system import System
-
-NEARER = 6
-"""Inverse iterations from random vectors: each takes others away by the ratio of their distances."""
-
-OFF_EIGENVALUE = 1e-9
-"""Distance of a shift from a point that may be an eigenvalue to the last digit, as a share."""
 
 
 def nearest_mode(system: System, frequency: float) -> Space | None:
@@ -24,7 +19,7 @@ def nearest_mode(system: System, frequency: float) -> Space | None:
     frequency : float
         The point, 1 / time. The mode should be closer to it than others by far, as at a crossing that is known.
     """
-    shift = 1j * frequency * (1 + OFF_EIGENVALUE)
+    shift = 1j * frequency * (1 + LIMITS.off_eigenvalue)
     inverse, active = system.inverse(shift), active_coordinates(system.stiffness)
     if inverse is None:
         return None
@@ -32,7 +27,7 @@ def nearest_mode(system: System, frequency: float) -> Space | None:
     start[active, 0] = np.random.default_rng(0).standard_normal(len(active))
     guess = Space.of(system, start, start, shift)
     right, left = guess.right, guess.left
-    for _ in range(NEARER):
+    for _ in range(LIMITS.inverse_steps):
         right, left = (inverse.solve(each, adjoint) for each, adjoint in ((right, False), (left, True)))
         right, left = right / np.linalg.norm(right), left / np.linalg.norm(left)
     return Space(system, right, left).refined(shift)
@@ -55,7 +50,7 @@ def find_growing_near(system: System, point: complex, count: int) -> list[Space]
     ArpackError
         If they do not converge.
     """
-    shift = point * (1 + OFF_EIGENVALUE)
+    shift = point * (1 + LIMITS.off_eigenvalue)
     inverse = system.inverse(shift)
     if inverse is None:
         return []

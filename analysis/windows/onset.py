@@ -1,7 +1,7 @@
 """What a user asks for: the onset along a ramp, and the windows of a family of systems."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -58,38 +58,11 @@ def windows_rows(windows: Sequence[Window]) -> dict[str, str]:
     return rows
 
 
-@dataclass(frozen=True)
-class Instability:
-    """What makes a packing unstable.
-
-    Attributes
-    ----------
-    pairs : int
-        Complex pairs.
-    negative : int
-        Negative eigenvalues.
-    growth_rate : float
-        Of D in the fastest motion, 1 / time.
-    """
-
-    pairs: int
-    negative: int
-    growth_rate: float
-
-    @classmethod
-    def of(cls, packing: HasConfiguration) -> "Instability":
-        """Count what all eigenvalues of a packing show, without contacts whose force is unknown."""
-        return cls.from_spectrum(spectrum(force_bearing(packing)))
-
-    @classmethod
-    def from_spectrum(cls, found: Spectrum) -> "Instability":
-        """The same of a spectrum that is known."""
-        return cls(len(found.pairs), len(found.negative), found.growth_rate())
-
-    def __str__(self) -> str:
-        counts = [(self.pairs, "complex pair"), (self.negative, "negative eigenvalue")]
-        parts = [f"{count} {what}{'s' * (count > 1)}" for count, what in counts if count]
-        return f"{' and '.join(parts)}; in the fastest motion D grows as exp({self.growth_rate:.6g} t)"
+def instability_in_words(found: Spectrum) -> str:
+    """How many complex pairs and negative eigenvalues a spectrum has, and how fast D grows."""
+    counts = [(len(found.pairs), "complex pair"), (len(found.negative), "negative eigenvalue")]
+    parts = [counted(count, what) for count, what in counts if count]
+    return f"{' and '.join(parts)}; in the fastest motion D grows as exp({found.growth_rate():.6g} t)"
 
 
 @dataclass(frozen=True)
@@ -106,9 +79,9 @@ class Onset(TableDisplay):
         Of a large packing, increments before the onset in which a pair was expected and not found: take smaller ones.
     modes : tuple of (int, int) or None
         Modes among which the onset was sought; None for all.
-    at_start : Instability or None
-        What makes the packing unstable at the smallest load already; None if it is stable there, or too large for all
-        of its eigenvalues to be counted.
+    at_start : Spectrum or None
+        The eigenvalues of a packing that is unstable at the smallest load already; None if it is stable there, or too
+        large for all of its eigenvalues to be counted.
     ends : float or None
         Load before which the branch of equilibria ends, as an eigenvalue is negative there; None if it does not, as far
         as the search went.
@@ -129,7 +102,7 @@ class Onset(TableDisplay):
     complete: bool = True
     doubtful: Increments = ()
     modes: tuple[int, int] | None = None
-    at_start: Instability | None = None
+    at_start: Spectrum | None = None
     ends: float | None = None
     undamped: "Onset | None" = None
     mu: float = np.nan
@@ -155,7 +128,8 @@ class Onset(TableDisplay):
         negative = f"an eigenvalue is {first.eigenvalue:.6g}"
         known = negative if first.eigenvalue < 0 else f"a pair of eigenvalues is complex about {first.eigenvalue:.6g}"
         shear = "before any shear is added" if self.fx_c == 0 else "the smallest load"
-        return f"unstable at F_x = {self.fx_c:g}, {shear}: {known if self.at_start is None else self.at_start}"
+        known = known if self.at_start is None else instability_in_words(self.at_start)
+        return f"unstable at F_x = {self.fx_c:g}, {shear}: {known}"
 
     def _rows(self) -> dict[str, str]:
         return windows_rows(self.windows)
@@ -177,7 +151,7 @@ class Onset(TableDisplay):
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON: fx_c, error, error_of_path, windows, doubtful, and more with dissipation or without."""
-        undamped = self.undamped
+        undamped, start = self.undamped, self.at_start
         known: dict[str, Any] = {
             "fx_c": self.fx_c,
             "error": self.error,
@@ -194,7 +168,9 @@ class Onset(TableDisplay):
             "complete": self.complete,
             "doubtful": [list(increment) for increment in self.doubtful],
             "modes": None if self.modes is None else list(self.modes),
-            "unstable_at_start": None if self.at_start is None else asdict(self.at_start),
+            "unstable_at_start": None
+            if start is None
+            else {"pairs": len(start.pairs), "negative": len(start.negative), "growth_rate": start.growth_rate()},
             "branch_ends": self.ends,
         }
 
@@ -378,7 +354,7 @@ def find_onset(
         return Onset(windows, takes_all and not first, doubtful, modes)
     negative = negative_eigenvalues(force_bearing(start, limits))
     if len(negative):
-        at_start = Instability.of(start) if takes_all else None
+        at_start = spectrum(force_bearing(start)) if takes_all else None
         return Onset((_at_start(start, float(negative[0]), 1.0),), False, (), modes, at_start, start.fx)
     branch = _Branch(equilibrium, start, loads, limits)
     # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
@@ -399,7 +375,7 @@ def find_onset(
         raise OnsetError.among(modes, float(loads[-1]), doubtful)
     unstable = None
     if windows[0].kind == "start" and (all_modes or takes_all):
-        unstable = Instability.from_spectrum(all_modes) if all_modes else Instability.of(start)
+        unstable = all_modes or spectrum(force_bearing(start))
     return Onset(windows, takes_all and not first, doubtful, modes, unstable, branch.ends)
 
 

@@ -220,7 +220,7 @@ class Search:
                 ending.append((below, above, known[1]))
             elif known is not None:
                 now.append((above, known[1]))
-            if below.grows == above.grows and not here.dissipative:
+            if below.grows == above.grows:
                 watched.append(([below], [above]))
         for space, onset in left:
             ahead = _sure(space.follow(there, self.limits))

@@ -44,13 +44,6 @@ from .system import Inverse, System, halves
 
 Planes = tuple[Any, Any]
 
-FAR = 2.0
-"""Distance of a load from the nearer of two others up to which planes are extrapolated, in units of the distance of
-these two from each other."""
-
-SAME = 1e-8
-"""Two modes of one load are one and the same if their eigenvalues agree to this share, over their condition."""
-
 
 @dataclass(frozen=True, eq=False)
 class Space:
@@ -191,7 +184,7 @@ class Space:
         Shapes of two modes that nearly coalesce are alike: eigenvalues tell single modes apart.
         """
         if self.system.dissipative:
-            return abs(self.mean - other.mean) * min(self.overlap, other.overlap) <= SAME * abs(self.mean)
+            return abs(self.mean - other.mean) * min(self.overlap, other.overlap) <= LIMITS.same_mode * abs(self.mean)
         return self.like(other)
 
     def closest(self, others: "Iterable[Space]") -> "Space | None":
@@ -202,9 +195,9 @@ class Space:
     # From load to load
 
     def extrapolate(self, other: "Space", system: System) -> "Space | None":
-        """A guess at another load: subspaces on the line through those at two loads; None beyond FAR."""
+        """A guess at another load: subspaces on the line through those at two loads; None too far away."""
         share = (system.fx - self.fx) / (other.fx - self.fx)
-        if abs(share) > FAR:
+        if abs(share) > LIMITS.extrapolation:
             return None
         ends = (self.right, other.right), (self.left, other.left)
         right, left = (np.linalg.qr(a + share * (b @ np.linalg.inv(a.conj().T @ b) - a))[0] for a, b in ends)

@@ -378,8 +378,7 @@ def ramps_that_end(beds):
         beds.append(bed)
         if len(beds) == 3:
             raise NoEquilibriumError("enough")
-        onset = SimpleNamespace(describe=lambda: "none")
-        return SimpleNamespace(onset=onset)
+        return SimpleNamespace(describe=lambda: "none")
 
     return ramp
 

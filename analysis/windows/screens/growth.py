@@ -10,9 +10,9 @@ nearly diagonal. Mode k alone has :math:`s^2 + s \Gamma_{kk} + H_{kk} = 0`. The 
 
 to :math:`H_{kk}`, so that its damping is :math:`d_k = \Gamma_{kk} + \mathrm{Im}\,\sigma_k / \omega_k`. Only terms with
 at least one factor of :math:`\Gamma` have imaginary parts. The third order is estimated in this way, however weak the
-damping is: the root of the sum of squares of its terms, times `SAFE`. A mode surely loses energy if :math:`d_k` exceeds
-this estimate and `SPARE` of :math:`\Gamma_{kk}`, at both loads and half-way, and if no other mode comes so close that
-:math:`|V_{kl}/g_{kl}|` exceeds `CLOSE` in between.
+damping is: the root of the sum of squares of its terms, times `Limits.third_order`. A mode surely loses energy if
+:math:`d_k` exceeds this estimate and `Limits.spare` of :math:`\Gamma_{kk}`, at both loads and half-way, and if no other
+mode comes so close that :math:`|V_{kl}/g_{kl}|` exceeds `Limits.mixed` in between.
 
 **A cluster is quiet** where no motion of it can be fed as much as it loses. On the axis, :math:`s = i\omega`, a unit
 vector x has :math:`x^H A_s x = \omega^2` and :math:`\omega\, x^H G x = |x^H A_a x|`, with the symmetric and the
@@ -21,9 +21,10 @@ antisymmetric part of A. So nothing crosses the axis if :math:`\omega_0 G + i A_
 at both ends; and as it goes on holding while :math:`A_a` is scaled down to zero, nothing grows there. A Cholesky
 factorisation tells.
 
-**All other modes** are *suspects*. They form clusters with `MARGIN` modes on either side. A cluster is a small pencil:
-that of vectors to which the modes outside are added in first order. It is a straight line between the loads, and all of
-its windows are found as those of a small system. The operator has the last word about what begins or ends there.
+**All other modes** are *suspects*. They form clusters with `Limits.margin` modes on either side. A cluster is a small
+pencil: that of vectors to which the modes outside are added in first order. It is a straight line between the loads,
+and all of its windows are found as those of a small system. The operator has the last word about what begins or ends
+there.
 """
 
 from collections.abc import Iterator, Sequence
@@ -43,31 +44,6 @@ from ..search import Search
 from ..slices.eigenbasis import Basis, Levels
 from ..space import Space
 from ..system import System
-
-SAFE = 5.0
-"""Third order, in roots of its sum of squares: its terms have random signs."""
-
-SPARE = 0.1
-"""Share of a mode's own damping that has to be left."""
-
-CLOSE = 0.25
-"""Mixing of two modes up to which the second order is trusted: what is left out is of the relative order of its square,
-0.06."""
-
-WEAK = 0.3
-"""Damping over frequency up to which a mode counts as oscillating."""
-
-MARGIN = 20
-"""Modes of a cluster on either side: farther ones mix by less than a hundredth, and are there in first order."""
-
-DISSIPATED_SHARE = 0.7
-"""Share of what dashpots take that has to exceed what the motion is fed: a cluster knows both to a few per cent."""
-
-APART = 10
-"""Suspects that are closer belong to one cluster."""
-
-LARGEST = 100, 1 / 3
-"""Modes of a cluster, and the same as a share of all modes where that is more: beyond, all modes take no longer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +92,7 @@ class Reduced:
         if not (softest > 0 and np.any(feed)):
             return 0.0 if softest <= 0 else np.inf
         try:
-            taken = DISSIPATED_SHARE * np.sqrt(softest) * (loss + loss.T)
+            taken = LIMITS.dissipated * np.sqrt(softest) * (loss + loss.T)
             return 1 / float(eigh(1j * (feed - feed.T), taken, eigvals_only=True)[-1])
         except np.linalg.LinAlgError:
             return 0.0
@@ -165,7 +141,7 @@ class Cluster:
         softest = min(float(eigvalsh(0.5 * (each + each.T))[0]) for each in (a, b))
         turning = max(float(np.linalg.norm(each - each.T)) for each in (g, h))
         frequency = np.sqrt(max(0.0, softest)) - turning
-        forms = (DISSIPATED_SHARE * frequency * (loss + loss.T) + 1j * (force - force.T) for force, loss in self.ends)
+        forms = (LIMITS.dissipated * frequency * (loss + loss.T) + 1j * (force - force.T) for force, loss in self.ends)
         try:
             return frequency > 0 and all(np.linalg.cholesky(form).size > 0 for form in forms)
         except np.linalg.LinAlgError:
@@ -190,10 +166,10 @@ class Cluster:
 
     def nearly_growing(self, modes: Modes, limits: Limits = LIMITS) -> list[Space]:
         """Those of its modes at the upper load that grow, nearly do so, or grow a little beyond."""
-        near = np.flatnonzero(modes.values.real > limits.nearly_growing * np.median(modes.values.real))
+        near = np.flatnonzero(modes.values.real > limits.weak_damping * np.median(modes.values.real))
         found = [modes.space((int(k),)) for k in near if self.owns(modes.values[k].imag)]
         below, above = self.loads
-        system = self.system(above + limits.beyond_upper_load * (above - below))
+        system = self.system(above + limits.overshoot * (above - below))
         further = Modes.of(system)
         if len(further.grows) <= len(modes.grows):
             return found
@@ -253,8 +229,8 @@ class GrowthScreen:
         self._seen = there, after
         suspects = may_grow(before, after)
         cores = find_cores(suspects)
-        largest = max(LARGEST[0], LARGEST[1] * len(basis.active))
-        if any(core[-1] - core[0] + 2 * MARGIN > largest for core in cores):
+        largest = max(self.limits.largest_cluster, self.limits.largest_share * len(basis.active))
+        if any(core[-1] - core[0] + 2 * self.limits.margin > largest for core in cores):
             return None
         return [each for each in group_clusters(basis, (here, before), (there, after), cores) if not each.quiet]
 
@@ -282,7 +258,7 @@ def _damping(system: System) -> csr_array:
 
 def find_cores(suspects: Indices) -> list[Indices]:
     """Suspects that are close to each other."""
-    return np.split(suspects, np.flatnonzero(np.diff(suspects) > APART) + 1) if len(suspects) else []
+    return np.split(suspects, np.flatnonzero(np.diff(suspects) > LIMITS.apart) + 1) if len(suspects) else []
 
 
 def group_clusters(
@@ -295,7 +271,7 @@ def group_clusters(
     level, size = middle.stiffness.diagonal, len(basis.values)
     ordered = np.sort(middle.frequencies)
     for core in cores:
-        modes = np.arange(max(0, core[0] - MARGIN), min(size, core[-1] + 1 + MARGIN))
+        modes = np.arange(max(0, core[0] - LIMITS.margin), min(size, core[-1] + 1 + LIMITS.margin))
         coupling = np.asarray(middle.stiffness.coupling, np.float64)
         right, left = (_with_others(each, level, modes) for each in (coupling, coupling.T))
         left = left @ np.linalg.inv(left.T @ right).T
@@ -317,12 +293,12 @@ def may_grow(here: Reduced, there: Reduced) -> Indices:
     points = here, here.mean(there), there
     frequency = np.min([each.frequencies for each in points], axis=0)
     gamma = np.max([each.damping.diagonal for each in points], axis=0)
-    strong = ~(gamma < WEAK * frequency)
+    strong = ~(gamma < LIMITS.oscillating * frequency)
     mixing, third = _mixing_and_third_order(here, there, np.max([each.frequencies for each in points], axis=0))
     least = np.min([each.damping_of_modes for each in points], axis=0)
     own = np.min([each.damping.diagonal for each in points], axis=0)
-    lost = ~(least - SAFE * third / frequency > SPARE * own)
-    return np.flatnonzero(strong | lost | (mixing > CLOSE))
+    lost = ~(least - LIMITS.third_order * third / frequency > LIMITS.spare * own)
+    return np.flatnonzero(strong | lost | (mixing > LIMITS.mixed))
 
 
 def _mixing_and_third_order(here: Reduced, there: Reduced, frequency: Floats) -> tuple[Floats, Floats]:

@@ -15,8 +15,8 @@ axis is covered up to there. Where the discs on the axis do not reach as far to 
 further discs, and halved as long as a disc does not hold one of them. Both bounds are Lanczos's, taken larger by as
 much as they may be wrong.
 
-A disc costs one sparse factorisation and `KRYLOV` solutions in single precision, which tell eigenvalues to 1e-3 of
-their distance from the middle. Whatever comes as close to the axis as that is solved for in double precision.
+A disc costs one sparse factorisation and `Limits.krylov` solutions in single precision, which tell eigenvalues to 1e-3
+of their distance from the middle. Whatever comes as close to the axis as that is solved for in double precision.
 """
 
 from dataclasses import dataclass
@@ -30,33 +30,10 @@ from ...errors import FaultgougeError
 from ...factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
 from ...motion.eigenvalues import Complexes, active_coordinates
 from ...packing.packing import Floats, Indices
+from ..limits import LIMITS
 from ..nearby import drop_duplicates, find_growing_near
 from ..space import Space
 from ..system import System
-
-KRYLOV = 40
-"""Dimension of a Krylov space: 80 cost a fifth more for the same length of the axis, 20 do not reach far enough."""
-
-RESIDUAL_LIMIT = 1e-3
-"""Residual of an eigenvalue that counts as found, in units of its own: that of single precision is some 1e-4."""
-
-PIVOT = 0.01
-"""Share of the largest entry of a column from which on the diagonal entry is the pivot: MUMPS's default."""
-
-TOUCH = 0.9
-"""Share of the radius on the axis that counts as covered."""
-
-AHEAD = 0.8
-"""Distance of a new middle from what is covered, in units of the last disc's radius, as radii change."""
-
-STRAY_LIMIT = 0.05
-"""Way that a refined eigenvalue may have gone, in units of its distance from the middle: else it is another one."""
-
-CLOSE = 1e-2
-"""Share to which norms are found, and by which they are taken larger."""
-
-SMALLEST = 1e-6
-"""Radius, in units of the largest frequency, below which the axis cannot be covered."""
 
 
 class UncoveredAxisError(FaultgougeError):
@@ -92,7 +69,7 @@ class Disc:
         """Arnoldi's iteration with (Z - middle)^(-1), Z of the state (x, s x), by s^2 + s G + A of n coordinates."""
         size, shift = stiffness.shape[0], np.complex64(middle)
         factors = _factors(csc_array(stiffness + middle * damping + middle**2 * eye_array(size)))
-        most = min(KRYLOV, 2 * size)
+        most = min(LIMITS.krylov, 2 * size)
         basis = np.zeros((2 * size, most + 1), np.complex64, order="F")
         small = np.zeros((most + 1, most), complex)
         start = np.random.default_rng(0).standard_normal(2 * size)
@@ -117,7 +94,7 @@ class Disc:
         order = np.argsort(-np.abs(inverse))
         inverse, vectors = inverse[order], vectors[:, order]
         residuals = small[steps, steps - 1].real * np.abs(vectors[-1]) / np.abs(inverse)
-        unknown = np.flatnonzero(residuals > RESIDUAL_LIMIT)
+        unknown = np.flatnonzero(residuals > LIMITS.ritz_residual)
         count = int(unknown[0]) if len(unknown) else steps
         radius = np.inf
         if len(unknown):
@@ -130,8 +107,8 @@ class Disc:
     def near_axis(self) -> list[int]:
         """Which of the eigenvalues may have a real part that is not negative."""
         distance = np.abs(self.values - self.middle)
-        near = self.values.real > -(RESIDUAL_LIMIT + self.residuals) * distance
-        return np.flatnonzero(near & (self.values.imag > -RESIDUAL_LIMIT * distance)).tolist()
+        near = self.values.real > -(LIMITS.ritz_residual + self.residuals) * distance
+        return np.flatnonzero(near & (self.values.imag > -LIMITS.ritz_residual * distance)).tolist()
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +157,7 @@ class _Scaled:
     def look(self, middle: complex) -> tuple[float, list[Space]]:
         """The radius about a point in which all that grows is found, and what is found."""
         disc, system = Disc.about(middle, *self.single_precision), self.system
-        if disc.radius < SMALLEST:
+        if disc.radius < LIMITS.smallest_disc:
             raise UncoveredAxisError(f"motions at F_x = {system.fx:.10g} lie too close to be told from each other")
         found = []
         for k in disc.near_axis:
@@ -230,14 +207,14 @@ def _cover_axis(scaled: _Scaled) -> tuple[list[Space], list[Rectangle]]:
     beside: list[Rectangle] = []
     covered, radius, end = 0.0, 0.05, scaled.largest_frequency
     while covered < end:
-        middle = covered + AHEAD * radius
+        middle = covered + LIMITS.next_disc * radius
         reach, more = scaled.look(1j * middle)
         found += more
-        if middle - TOUCH * reach > covered:
+        if middle - LIMITS.covered * reach > covered:
             radius = min(reach, 0.8 * radius)
             continue
-        begin, covered, radius = covered, middle + TOUCH * reach, min(reach, 1.0)
-        height, fastest = float(np.sqrt(1 - TOUCH**2) * reach), scaled.fastest_growth(begin, covered)
+        begin, covered, radius = covered, middle + LIMITS.covered * reach, min(reach, 1.0)
+        height, fastest = float(np.sqrt(1 - LIMITS.covered**2) * reach), scaled.fastest_growth(begin, covered)
         if height < fastest:
             beside.append((complex(height, begin), complex(fastest, covered)))
     return found, beside
@@ -246,7 +223,7 @@ def _cover_axis(scaled: _Scaled) -> tuple[list[Space], list[Rectangle]]:
 def _solve(system: System, x: Complexes, s: complex, distance: float) -> list[Space]:
     """The mode of an eigenvalue that is nearly known; or those next to it that grow, where it is lost on the way."""
     mode = Space.of(system, x, x.conj(), s).refined(s)
-    if mode is not None and abs(mode.mean - s) < STRAY_LIMIT * distance:
+    if mode is not None and abs(mode.mean - s) < LIMITS.strayed * distance:
         return [mode]
     try:
         return find_growing_near(system, s, 1)
@@ -259,15 +236,15 @@ def _largest_eigenvalue(matrix: csr_array) -> float:
     if matrix.shape[0] < 3:
         return float(np.linalg.eigvalsh(matrix.toarray())[-1])
     start = np.random.default_rng(0).standard_normal(matrix.shape[0]).astype(matrix.dtype)
-    largest = eigsh(matrix, k=1, which="LA", v0=start, tol=CLOSE, return_eigenvectors=False)[0]
-    return float((1 + CLOSE) * largest)
+    largest = eigsh(matrix, k=1, which="LA", v0=start, tol=LIMITS.norm, return_eigenvectors=False)[0]
+    return float((1 + LIMITS.norm) * largest)
 
 
 def _factors(matrix: csc_array) -> Factors:
     """In single precision; where a pivot is zero, those of a matrix that differs by a rounding."""
     single = csc_array(matrix.astype(np.complex64))
     try:
-        return symmetric_lu(single, pivoting=PIVOT)
+        return symmetric_lu(single, pivoting=LIMITS.pivot)
     except SingularMatrixError:
         rounding = np.finfo(np.float32).eps * np.abs(single.data).max()
         return symmetric_lu(csc_array(single + rounding * eye_array(single.shape[0], dtype=np.complex64)))

@@ -6,12 +6,12 @@ grow are named, clusters about them announce where one begins to, and the system
 (:mod:`~faultgouge.analysis.windows.screens.growth`).
 
 **Slices that are left out.** In each slice the antisymmetric part may be so many times larger before it can feed any
-motion as much as the motion loses (`Reduced.bears`). As long as it has not grown by `TRUSTED_SHARE` of that, a
+motion as much as the motion loses (`Reduced.bears`). As long as it has not grown by `Limits.trusted` of that, a
 slice is not looked at again.
 
 **Strong dashpots** couple more modes than a cluster can have, and clusters may miss a motion. From the load on at which
 that is so, all motions that grow are looked for with the operator itself
-(:mod:`~faultgouge.analysis.windows.slices.axis`), at loads whose numbers on the ramp grow by `FARTHER`. Those
+(:mod:`~faultgouge.analysis.windows.slices.axis`), at loads whose numbers on the ramp grow by `Limits.stride`. Those
 that grow are followed back to where they begin to, and all are looked for again right below the first onset and at the
 last load of the ramp before, until none grows there. So no other window is open at the first onset, unless increments
 before it are in doubt. A window that opens and ends between two of these loads is not excluded. Of more than
@@ -33,38 +33,13 @@ from ..edges import DoubtError, LostPairError, Window, follow_to, track
 from ..limits import LIMITS, Limits
 from ..modes import Modes
 from ..nearby import find_growing_near
-from ..screens.growth import LARGEST, Cluster, find_cores, group_clusters, may_grow, reduce_system, shift_load
+from ..screens.growth import Cluster, find_cores, group_clusters, may_grow, reduce_system, shift_load
 from ..space import Space
 from ..system import System
 from .axis import growing_modes
 from .clusters import Increments, SliceSearch
 from .eigenbasis import Basis, Levels
 from .store import Border, Candidate, SliceResult
-
-TRUSTED_SHARE = 0.5
-"""Share of what a slice bears up to which it is left out: its modes change on the way."""
-
-BEFOREHAND = 1.3
-"""Where further slices have to be looked at, those that would have to at so many times larger loads are looked at, too:
-bases that are kept are made anew."""
-
-MOST_AHEAD = 8
-"""Increments at the most that are looked at while bases that are not kept pass by."""
-
-LOOKS = 6
-"""Looks at an announced mode, for a load at which it grows."""
-
-NEAREST = 12
-"""Modes about a frequency among which one that grows is looked for where a cluster does not know its shape."""
-
-FARTHER = 2
-"""Ratio of the numbers of two loads at which all motions are looked for: a look takes as long as two passes or more."""
-
-BESIDE = 1e-6
-"""Distance below an onset at which all other motions are looked for, in units of the way from the last load without."""
-
-SETTLED_SHIFT = 0.02
-"""Share of an increment by which the place of the largest growth may still move."""
 
 
 class SlicedGrowth(SliceSearch):
@@ -94,7 +69,7 @@ class SlicedGrowth(SliceSearch):
 
     def ahead(self, done: int) -> int:
         """More and more of them, as dissipation may put off the onset by much; each costs a tenth of the bases."""
-        return min(done + 1, MOST_AHEAD)
+        return min(done + 1, self.limits.most_ahead)
 
     def first_window(self, loads: Floats) -> tuple[Window | None, Increments]:
         first, doubtful = super().first_window(loads)
@@ -122,7 +97,7 @@ class SlicedGrowth(SliceSearch):
             return [[] for _ in places[1:]]
         first, stop = self.bases.modes or (0, 0)
         if min(self._borne[:first].min(initial=np.inf), self._borne[stop:].min(initial=np.inf)) <= feed:
-            feed *= BEFOREHAND
+            feed *= self.limits.wider
         loud = np.flatnonzero(self._borne <= feed)
         self.bases.narrow((int(loud[0]), int(loud[-1]) + 1))
         self._passing = not self.bases.keeps(places[0].stiffness)
@@ -136,7 +111,7 @@ class SlicedGrowth(SliceSearch):
             return [replace(each, candidates=[[] for _ in places[1:]]) for each in found]
         if self._borne is not None:
             for each in found:
-                self._borne[slice(*each.border.modes)] = TRUSTED_SHARE * each.bears
+                self._borne[slice(*each.border.modes)] = self.limits.trusted * each.bears
         return found
 
     def look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[System]) -> SliceResult:
@@ -146,7 +121,7 @@ class SlicedGrowth(SliceSearch):
             named = may_grow(here, there)
             cores = find_cores(named[(named >= basis.own.start) & (named < basis.own.stop)])
             loud = [each for each in group_clusters(basis, (before, here), (after, there), cores) if not each.quiet]
-            crowded = crowded or any(each.right.shape[1] > LARGEST[0] for each in loud)
+            crowded = crowded or any(each.right.shape[1] > self.limits.largest_cluster for each in loud)
             given_up = crowded and self._few_enough(after)
             announced = [] if given_up else [find_growing(each, self.limits) for each in loud]
             found.append(list(chain.from_iterable(announced)))
@@ -172,7 +147,7 @@ class SlicedGrowth(SliceSearch):
             return self.first, (*doubtful, (self.passed[0].fx, known))
         while True:
             done = int(np.searchsorted(loads, self.passed[-1].fx, side="right"))
-            farther = FARTHER * int(np.searchsorted(loads, known, side="right"))
+            farther = self.limits.stride * int(np.searchsorted(loads, known, side="right"))
             flows = self._pass_loads(loads[done : max(done + 1, farther)])
             growing = self._all_growing(self.passed[-1])
             if growing:
@@ -196,7 +171,7 @@ class SlicedGrowth(SliceSearch):
         They are looked for right below its onset and, if none is followed back from there, at the last load before.
         """
         below = [each for each in self.passed if known < each.fx < first.fx_onset]
-        beside = first.fx_onset - max(BESIDE * (first.fx_onset - known), 10 * first.error)
+        beside = first.fx_onset - max(self.limits.below_onset * (first.fx_onset - known), 10 * first.error)
         places = []
         if beside > known:
             try:
@@ -261,7 +236,7 @@ class SlicedGrowth(SliceSearch):
         """
         try:
             for place in places:
-                growing = find_growing_near(place, rate if rate.imag == 0 else 1j * rate.imag, NEAREST)
+                growing = find_growing_near(place, rate if rate.imag == 0 else 1j * rate.imag, self.limits.nearest)
                 if growing:
                     return min(growing, key=lambda each: abs(each.mean - rate))
         except ArpackError as error:
@@ -278,13 +253,13 @@ class SlicedGrowth(SliceSearch):
             if len(known) < 3:
                 middle = 0.5 * (here.fx + there.fx)
                 known[middle] = at(middle)
-            for _ in range(LOOKS):
+            for _ in range(self.limits.places):
                 best = max(known.values(), key=lambda each: each.mean.real)
                 if best.grows:
                     return best
                 fx = parabola_vertex(sorted(known.values(), key=lambda each: abs(each.fx - best.fx))[:3])
                 fx = float(np.clip(fx, here.fx, there.fx))
-                if min(abs(fx - load) for load in known) < SETTLED_SHIFT * (there.fx - here.fx):
+                if min(abs(fx - load) for load in known) < self.limits.settled * (there.fx - here.fx):
                     return None
                 known[fx] = at(fx)
         except LostPairError as error:  # nothing is lost but what a cluster has announced

@@ -74,7 +74,7 @@ def test_tilt_of_a_slope(tmp_path):
     assert len(spectrum(found[0.1]).pairs) > 0
     asked = []
     onset = find_onset(lambda value: asked.append(value) or found[value], [0.0, 0.02], first=True)
-    assert (onset.fx_c, onset.at_start.pairs) == (0.0, len(spectrum(found[0.0]).pairs))
+    assert (onset.fx_c, len(onset.at_start.pairs)) == (0.0, len(spectrum(found[0.0]).pairs))
     assert asked == [0.0]  # its packing is unstable as it stands, and no further load tells more
     assert np.array_equal(lmp.numpy.extract_atom("x"), before)
     lmp.close()
