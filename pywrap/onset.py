@@ -1,13 +1,9 @@
-"""The onset F_x^c of a scene, with dissipation or without, and the error that its path of equilibria adds.
-
-With dissipation the onset without it is found, too: between the edges of its windows the growth without dissipation is
-largest, and the search looks there.
-"""
+"""The onset F_x^c of a scene, with dissipation or without, and the error that its path of equilibria adds."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path as FilePath
 
@@ -19,7 +15,7 @@ from ..analysis.arrays import Floats
 from ..analysis.errors import TurningPointError
 from ..analysis.motion.eigenvalues import active_coordinates
 from ..analysis.progress import Watch, report_progress, show_progress
-from ..analysis.windows import Ranks, System, Window, full_operator, takes_all_modes, windows_up_to
+from ..analysis.windows import Ranks, full_operator, takes_all_modes
 from .equilibria.quasistatic import Equilibrium
 from .lammps.engine import Engine
 from .runs.equilibrium_path import EquilibriumPath, loads
@@ -141,11 +137,20 @@ def onset_run(
             assert damping is not None
             return packing.with_dissipation(damping.cn, damping.ct, damping.tau)
 
+        def at(fx: float) -> Packing:
+            return path(fx) if damping is None else with_dashpots(path(fx))
+
         try:
-            if damping is None:
-                found = find_onset(path, forces, modes=modes, first=first, ranks=search_ranks(), folder=folder)
-            else:
-                found = _with_dissipation(path, forces, with_dashpots, takes_all, first, known, folder)
+            found = find_onset(
+                at,
+                forces,
+                dissipation=dissipation,
+                modes=modes,
+                first=first,
+                known=known,
+                ranks=search_ranks(),
+                folder=folder,
+            )
         except TurningPointError:
             raise
         except (OnsetError, NoEquilibriumError) as error:
@@ -162,76 +167,6 @@ def onset_run(
         report_progress("the path once more, with other increments")
         found = with_path_error(found, path, with_dashpots)
     return replace(found, mu=mu, equilibria=equilibria, between=between, flows_beyond=last if flows else None)
-
-
-def _with_dissipation(
-    path: EquilibriumPath,
-    forces: Floats,
-    with_dashpots: Callable[[Packing], Packing],
-    takes_all: bool,
-    first: bool,
-    known: Known,
-    folder: FilePath | None,
-) -> Onset:
-    """The onset with dissipation and without it, without the errors of the path."""
-
-    def damped(fx: float) -> Packing:
-        return with_dashpots(path(fx))
-
-    if not takes_all:
-        with show_progress(what="with dissipation, "):
-            found = find_onset(damped, forces, dissipation=True, ranks=search_ranks(), folder=folder)
-        known(found, found.fx_c)
-        with show_progress(what="without dissipation, "):
-            return replace(found, undamped=_undamped(path, forces, first, folder))
-    report_progress(f"pairs that become complex without dissipation, up to F_x = {forces[-1]:.6g}")
-    undamped = _undamped(path, forces, first)
-
-    def so_far(windows: tuple[Window, ...], fx: float) -> None:
-        if windows and not first:
-            known(Onset(windows, undamped=undamped), fx)
-
-    inside = _Inside(path, forces, undamped)
-    found = find_onset(damped, forces, dissipation=True, first=first, look=inside.look, known=so_far)
-    return replace(found, undamped=undamped)
-
-
-def _undamped(path: EquilibriumPath, forces: Floats, first: bool, folder: FilePath | None = None) -> Onset | None:
-    """All windows without dissipation, or the first one; None if there is none."""
-    try:
-        return find_onset(path, forces, first=first, ranks=search_ranks(), folder=folder)
-    except (OnsetError, NoEquilibriumError):
-        return None
-
-
-class _Inside:
-    """Loads inside the undamped windows of a ramp: growth without dissipation is largest there.
-
-    Where the first window alone is known, the others are sought as far as the ramp is walked.
-    """
-
-    def __init__(self, path: EquilibriumPath, forces: Floats, undamped: Onset | None) -> None:
-        self._windows = () if undamped is None else undamped.windows
-        self._reached = np.inf
-        self._along: Iterator[tuple[float, tuple[Window, ...]]] = iter(())
-        if undamped is not None and not undamped.complete:
-            begin = max(0, int(np.searchsorted(forces, undamped.fx_c, side="right")) - 1)
-            if begin < len(forces) - 1:
-                self._reached = float(forces[begin])
-                self._along = windows_up_to(lambda fx: System.of(path(fx)), forces[begin:])
-
-    def look(self, below: float, above: float) -> list[float]:
-        """Onsets between two neighbouring loads, and of windows that end there the middle of what they have there."""
-        if not self._windows or above <= self._windows[0].fx_onset:
-            return []
-        while self._reached < above:
-            try:
-                self._reached, self._windows = next(self._along)
-            except (StopIteration, NoEquilibriumError):
-                self._reached = np.inf
-        onsets = [each.fx_onset for each in self._windows if below < each.fx_onset < above]
-        ends = [(each.fx_onset, each.fx_end) for each in self._windows if each.fx_end is not None]
-        return onsets + [0.5 * (max(begin, below) + end) for begin, end in ends if below < end < above]
 
 
 def search_ranks() -> Ranks:

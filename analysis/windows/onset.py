@@ -1,6 +1,7 @@
 """What a user asks for: the onset along a ramp, and the windows of a family of systems."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -269,8 +270,7 @@ def find_onset(
     narrowest: float | None = None,
     modes: tuple[int, int] | None = None,
     first: bool = False,
-    look: Look = lambda below, above: (),
-    known: Known = lambda windows, fx: None,
+    known: Callable[["Onset", float], None] = lambda onset, fx: None,
     watch: Watch | None = None,
     ranks: Ranks = ALONE,
     folder: Path | None = None,
@@ -293,7 +293,7 @@ def find_onset(
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
     dissipation : bool
-        Whether the packing's own dashpots and drag count.
+        Whether the packing's own dashpots and drag count. The onset without them is found as well, `Onset.undamped`.
     narrowest : float, optional
         Windows narrower than this are not looked for, force; by default as in `Limits`, `narrowest` and `finest`.
     modes : tuple of (int, int), optional
@@ -303,8 +303,9 @@ def find_onset(
     first : bool
         Seek the first window alone. No equilibrium beyond the increment in which it begins is then asked for, and its
         end is None where it ends beyond that increment.
-    look, known : callable, optional
-        As of :func:`find_windows`, of a packing all of whose modes are searched.
+    known : callable, optional
+        With dissipation, given what is known, and the load up to which that is all, as soon as there is a window, and
+        after each increment from there on.
     watch : callable, optional
         Told in words what is being looked at in a large packing.
     ranks : Ranks, optional
@@ -334,49 +335,122 @@ def find_onset(
         raise ValueError("The packing has no dissipation: find_onset without it is what it needs.")
     takes_all = takes_all_modes(start, modes, limits)
 
-    def search(system: At) -> tuple[tuple[Window, ...], Increments]:
+    def search(
+        system: At, look: Look = lambda below, above: (), so_far: Known = lambda windows, fx: None
+    ) -> tuple[tuple[Window, ...], Increments]:
         """The windows of a family, and increments in doubt."""
-        with show_progress(watch):
-            if takes_all:
-                found = find_windows(
-                    system, loads, narrowest=narrowest, look=look, first=first, known=known, limits=limits
-                )
-                return found[:1] if first else found, ()
-            from .slices.first_window import first_window  # with libraries that nothing else needs
+        if takes_all:
+            found = find_windows(
+                system, loads, narrowest=narrowest, look=look, first=first, known=so_far, limits=limits
+            )
+            return found[:1] if first else found, ()
+        from .slices.first_window import first_window  # with libraries that nothing else needs
 
-            one, doubtful = first_window(system, loads, modes, ranks, folder, narrowest or 0.0, limits)
-            return (one,) if one else (), doubtful
+        one, doubtful = first_window(system, loads, modes, ranks, folder, narrowest or 0.0, limits)
+        return (one,) if one else (), doubtful
 
-    if dissipation:
-        windows, doubtful = search(lambda fx: System.of(start if fx == loads[0] else equilibrium(fx), True, limits))
+    def undamped() -> Onset:
+        windows, doubtful, all_modes, ends = _undamped_windows(equilibrium, start, loads, modes, first, search, limits)
+        if not windows:
+            raise OnsetError.among(modes, float(loads[-1]), doubtful)
+        if windows[0].kind == "start" and takes_all:
+            all_modes = all_modes or spectrum(force_bearing(start))
+        complete = takes_all and not first and not windows[0].eigenvalue < 0
+        return Onset(windows, complete, doubtful, modes, all_modes if windows[0].kind == "start" else None, ends)
+
+    def beside() -> Onset | None:
+        with suppress(OnsetError, NoEquilibriumError):
+            return undamped()
+        return None
+
+    with show_progress(watch):
+        if not dissipation:
+            return undamped()
+
+        def damped(fx: float) -> System:
+            return System.of(start if fx == loads[0] else equilibrium(fx), True, limits)
+
+        if takes_all:
+            report_progress(f"pairs that become complex without dissipation, up to F_x = {loads[-1]:.6g}")
+            other = beside()
+            inside = _Inside(lambda fx: System.of(equilibrium(fx), limits=limits), loads, other, limits)
+
+            def so_far(windows: tuple[Window, ...], fx: float) -> None:
+                if windows and not first:
+                    known(Onset(windows, undamped=other), fx)
+
+            windows, doubtful = search(damped, inside.look, so_far)
+        else:
+            with show_progress(what="with dissipation, "):
+                windows, doubtful = search(damped)
+            if windows:
+                known(Onset(windows, False, doubtful), windows[0].fx_onset)
         if not windows:
             raise OnsetError(f"No motion grows up to F_x = {loads[-1]:.10g}: raise the largest load.")
-        return Onset(windows, takes_all and not first, doubtful, modes)
+        if not takes_all:
+            with show_progress(what="without dissipation, "):
+                other = beside()
+        return Onset(windows, takes_all and not first, doubtful, modes, undamped=other)
+
+
+def _undamped_windows(
+    equilibrium: Callable[[float], HasConfiguration],
+    start: HasConfiguration,
+    loads: Floats,
+    modes: tuple[int, int] | None,
+    first: bool,
+    search: Callable[[At], tuple[tuple[Window, ...], Increments]],
+    limits: Limits,
+) -> tuple[tuple[Window, ...], Increments, Spectrum | None, float | None]:
+    """Windows without dissipation, increments in doubt, the spectrum at the smallest load if that is known, and the
+    load before which the branch of equilibria ends."""
+    takes_all = takes_all_modes(start, modes, limits)
     negative = negative_eigenvalues(force_bearing(start, limits))
     if len(negative):
-        at_start = spectrum(force_bearing(start)) if takes_all else None
-        return Onset((_at_start(start, float(negative[0]), 1.0),), False, (), modes, at_start, start.fx)
+        return (_at_start(start, float(negative[0]), 1.0),), (), None, start.fx
     branch = _Branch(equilibrium, start, loads, limits)
     # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
-    all_modes: Spectrum | None = None
     if modes is None and (not takes_all or (first and not isinstance(start, Packing))):
-        all_modes = _complex_at_start(start, limits)
-    windows, doubtful = (), ()
-    if all_modes is None:
-        try:
-            windows, doubtful = search(branch)
-        except NoEquilibriumError:  # beyond the first increment, which the search asks for in any case
-            all_modes = _complex_at_start(start, limits) if takes_all else None
-            if all_modes is None:
-                raise
-    if all_modes is not None:
-        windows = (_fastest(start, all_modes),)
-    if not windows:
-        raise OnsetError.among(modes, float(loads[-1]), doubtful)
-    unstable = None
-    if windows[0].kind == "start" and (all_modes or takes_all):
-        unstable = all_modes or spectrum(force_bearing(start))
-    return Onset(windows, takes_all and not first, doubtful, modes, unstable, branch.ends)
+        found = _complex_at_start(start, limits)
+        if found is not None:
+            return (_fastest(start, found),), (), found, None
+    try:
+        return *search(branch), None, branch.ends
+    except NoEquilibriumError:  # beyond the first increment, which the search asks for in any case
+        found = _complex_at_start(start, limits) if takes_all else None
+        if found is None:
+            raise
+        return (_fastest(start, found),), (), found, branch.ends
+
+
+class _Inside:
+    """Loads inside the undamped windows of a ramp: growth without dissipation is largest there.
+
+    Where the first window alone is known, the others are sought as far as the ramp is walked.
+    """
+
+    def __init__(self, undamped: At, loads: Floats, known: Onset | None, limits: Limits) -> None:
+        self._windows: tuple[Window, ...] = () if known is None else known.windows
+        self._reached = np.inf
+        self._along: Iterator[tuple[float, tuple[Window, ...]]] = iter(())
+        if known is not None and not known.complete:
+            begin = max(0, int(np.searchsorted(loads, known.fx_c, side="right")) - 1)
+            if begin < len(loads) - 1:
+                self._reached = float(loads[begin])
+                self._along = windows_up_to(undamped, loads[begin:], limits=limits)
+
+    def look(self, below: float, above: float) -> list[float]:
+        """Onsets between two neighbouring loads, and of windows that end there the middle of what they have there."""
+        if not self._windows or above <= self._windows[0].fx_onset:
+            return []
+        while self._reached < above:
+            try:
+                self._reached, self._windows = next(self._along)
+            except (StopIteration, NoEquilibriumError):
+                self._reached = np.inf
+        onsets = [each.fx_onset for each in self._windows if below < each.fx_onset < above]
+        ends = [(each.fx_onset, each.fx_end) for each in self._windows if each.fx_end is not None]
+        return onsets + [0.5 * (max(begin, below) + end) for begin, end in ends if below < end < above]
 
 
 class _Branch:

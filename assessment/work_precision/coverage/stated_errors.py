@@ -27,7 +27,7 @@ import numpy as np
 from ....analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from ....analysis.files.atomic_write import write_text
 from ....analysis.packing.packing import Floats
-from ....analysis.windows import System, Window, find_windows
+from ....analysis.windows import Window
 from ....pywrap import Engine, Equilibrium, Scene, settle
 from ....pywrap.runs.equilibrium_path import EquilibriumPath, loads
 from ....pywrap.runs.path_error import OtherPaths, with_path_error
@@ -183,21 +183,14 @@ class FirstOnset:
 
     def _window(self, path: EquilibriumPath, part: Floats) -> Window | None:
         """The first window between some loads."""
+
+        def equilibrium(fx: float) -> Packing:
+            return path(fx) if self._damping is None else self._with_dashpots(path(fx))
+
         try:
-            undamped = find_onset(path, part).windows  # which are where damped ones are looked for, too
+            return find_onset(equilibrium, part, dissipation=self._damping is not None).windows[0]
         except OnsetError:
-            undamped = ()
-        if self._damping is None:
-            return undamped[0] if undamped else None
-        ends = [0.5 * (each.fx_onset + each.fx_end) for each in undamped if each.fx_end is not None]
-        inside = [*(each.fx_onset for each in undamped), *ends]
-        windows = find_windows(
-            lambda fx: System.of(self._with_dashpots(path(fx)), dissipation=True),
-            part,
-            look=lambda below, above: [fx for fx in inside if below < fx < above],
-            first=True,
-        )
-        return windows[0] if windows else None
+            return None
 
     def _with_dashpots(self, packing: Packing) -> Packing:
         assert self._damping is not None

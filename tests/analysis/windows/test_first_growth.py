@@ -260,11 +260,8 @@ def test_all_announced_modes_are_looked_at_also_beside_one_that_grew_before():
         def candidates(self, places, depth):
             return [[Candidate(onset, onset, np.zeros((2, 2)), np.zeros((2, 2))) for onset in begun]]
 
-        def growing_motion(self, candidate, there):
-            return candidate
-
-        def follow_back(self, inside, passed, end=None):
-            return Window(Edge(begun[inside.onset], 0.0, 1j, 1.0, "hopf"), end)
+        def _window_of(self, candidate, there, first):
+            return Window(Edge(begun[candidate.onset], 0.0, 1j, 1.0, "hopf"), None)
 
     search = Told(lambda fx: System(fx, one, one))
     assert search.first_window(np.array([0.0, 1.0]))[0].fx_onset == begun[0.9]

@@ -68,4 +68,4 @@ def test_as_many_windows_are_open_at_each_load_as_motions_grow(increments, dissi
                 continue
             begun = sum(each.fx_onset < fx and (each.fx_end is None or fx < each.fx_end) for each in windows)
             assert begun == growing, (seed, feed, fx, windows)
-    assert found >= 18
+    assert found >= 10
