@@ -155,7 +155,9 @@ def onset_run(
             raise
         except (OnsetError, NoEquilibriumError) as error:
             if not flows and isinstance(error, OnsetError):
-                raise
+                if damping is None:
+                    raise
+                raise OnsetError(f"No motion grows up to F_x = {forces[-1]:.10g}: raise ramp.until.") from error
             raise NoEquilibriumError(
                 f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond: the packing "
                 "flows before an onset"
