@@ -38,7 +38,7 @@ BYTES_OF_MODES = 1.2e6
 FACES = ["#ffffff", BULK, UPPER, FLOOR]
 """Colours of disks: rattlers, others, the upper layer, those that are held."""
 
-FEW, MANY = 4, 40
+FEWEST_ON_PAGE, MOST_ON_PAGE = 4, 40
 """Pairs of a page, at least and at most."""
 
 
@@ -110,7 +110,7 @@ def write_view(
     followed = follow_eigenvalues(packings, progress, reasons)
     opens = _best_frame(followed.verdicts)
     room = BYTES_OF_MODES / (2 * packings[0].coordinates * len(packings))
-    pairs = followed.pairs[: int(np.clip(room, FEW, MANY))]
+    pairs = followed.pairs[: int(np.clip(room, FEWEST_ON_PAGE, MOST_ON_PAGE))]
     legs = _legs(axis.values) if len(packings) > 1 else []
     cycle = _cycle([each for each in packings if isinstance(each, Packing)])
     images = [Images.of(packing) for packing in packings]

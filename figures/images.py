@@ -12,7 +12,7 @@ from faultgouge.analysis.configuration import HasConfiguration
 
 from .packing import View
 
-MARGIN = 0.5
+IMAGE_MARGIN = 0.5
 """Images of disks beyond the sides of a periodic box that move into sight, in units of the largest radius."""
 
 
@@ -58,7 +58,7 @@ class Images:
         """Those of a packing."""
         if packing.dimension == 3:
             return cls._of_spheres(packing.configuration)
-        view = View.of(packing, margin=MARGIN * packing.radius.max())
+        view = View.of(packing, margin=IMAGE_MARGIN * packing.radius.max())
         top = float((packing.position[:, 1] + packing.radius).max())
         room = 1.1 if packing.top.any() else 0.3  # for the arrow of the load
         return cls(

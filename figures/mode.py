@@ -26,7 +26,7 @@ from faultgouge.analysis import (
 from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.configuration import HasConfiguration
 
-from .packing import WIDTH, PackingArtist, View
+from .packing import PACKING_WIDTH, PackingArtist, View
 from .spheres import add_scale_of_turns, draw_turns, new_figure
 from .style import EDGE, INK, styled
 
@@ -39,7 +39,7 @@ radius: a few disks that move far leave the arrows of all others to be seen."""
 MOVING = 0.5
 """Largest displacement of a disk in a film, in units of the largest radius."""
 
-SYMMETRIC = 1e-6
+ORTHOGONAL_COSINE = 1e-6
 """Cosine of two modes up to which they are taken for orthogonal: far above rounding, and an epsilon that no coalescence
 is near."""
 
@@ -159,13 +159,13 @@ def unstable_pair(packing: HasConfiguration, modes: Eigenpairs, believed: Sequen
         mode = Mode.of(packing, modes, number)
         return [mode], f"the complex pair: {TWO_MOMENTS}"
     first, second, cosine = closest_to_meeting(modes)
-    if cosine < SYMMETRIC:
+    if cosine < ORTHOGONAL_COSINE:
         raise ModeError(
-            f"at F_x = {packing.fx:g} all modes are orthogonal to {SYMMETRIC:g}, so that no two of them are about to "
-            "meet: take a later --frame, or a mode by its number"
+            f"at F_x = {packing.fx:g} all modes are orthogonal to {ORTHOGONAL_COSINE:g}, so that no two of them are "
+            "about to meet: take a later --frame, or a mode by its number"
             if packing.top.any()
-            else f"all modes are orthogonal to {SYMMETRIC:g}, so that no two of them are about to meet: take a mode by "
-            "its number"
+            else f"all modes are orthogonal to {ORTHOGONAL_COSINE:g}, so that no two of them are about to meet: take a "
+            "mode by its number"
         )
     words = f"the two real modes closest to meeting: the cosine between them is {cosine:.4f}"
     return [Mode.of(packing, modes, number) for number in (first, second)], words
@@ -330,9 +330,9 @@ def _draw_modes_of_spheres(packing: Configuration, modes: Sequence[Mode], words:
 def side_by_side(packing: HasConfiguration, count: int) -> tuple[Figure, list[Axes], float]:
     """A figure with axes for the same packing, and points per unit of length in them."""
     view = View.of(packing)
-    across = WIDTH - 0.1
+    across = PACKING_WIDTH - 0.1
     height = across * (view.ceiling - view.bottom) / (view.right - view.left)
-    figure = Figure(figsize=(WIDTH * count, height + 0.95), layout="constrained")
+    figure = Figure(figsize=(PACKING_WIDTH * count, height + 0.95), layout="constrained")
     axes = figure.subplots(1, count, squeeze=False)[0]
     return figure, list(axes), 72 * across / (view.right - view.left)
 

@@ -37,7 +37,7 @@ from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER, figure_of, style
 LEAST_SHARE = 1e-4
 """Lower end of the scale of mobilised friction and slip."""
 
-WIDTH = 3.4
+PACKING_WIDTH = 3.4
 """Width of a figure that holds one packing, inch."""
 
 WIDEST_OF_SPHERES = 9.0
@@ -346,9 +346,9 @@ def draw_packing(
         _draw_load(axes, artist)
         return figure_of(axes)
     view = View.of(packing)
-    across = WIDTH - (0.1 if color == "none" else 0.72)  # the scale of colours takes the rest
+    across = PACKING_WIDTH - (0.1 if color == "none" else 0.72)  # the scale of colours takes the rest
     height = across * (view.ceiling - view.bottom) / (view.right - view.left)
-    figure = Figure(figsize=(WIDTH, height + (0.85 if caption else 0.52)), layout="constrained")
+    figure = Figure(figsize=(PACKING_WIDTH, height + (0.85 if caption else 0.52)), layout="constrained")
     if caption:
         load, _, numbers = in_words(packing).partition(": ")
         numbers = numbers.replace("; ", "\n")

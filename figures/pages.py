@@ -11,7 +11,7 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from ..analysis.uncertain_digits import with_uncertainty
 
-WIDTH = 118
+PROSE_WIDTH = 118
 """Characters of a line of prose."""
 
 LAID_OUT = re.compile(r"[|#<$!]|```| {4}")
@@ -86,5 +86,5 @@ def _wrap_lines(line: str) -> str:
     item = ITEM.match(line)
     mark = item.end() if item else 0
     bound, indent = line[:mark].replace(" ", "\0") + NO_BEGINNING.sub("\0", line[mark:]), " " * mark
-    lines = textwrap.wrap(bound, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    lines = textwrap.wrap(bound, PROSE_WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     return "\n".join(lines).replace("\0", " ")

@@ -25,7 +25,7 @@ INSET_POINTS = 8
 BETWEEN = 10
 """Points of a curve between two loads: closer to each other at the ends, where a square root is steep."""
 
-FEW = 100
+DOTTED_LOADS = 100
 """Loads up to which dots show the computed eigenvalues."""
 
 
@@ -155,7 +155,7 @@ def draw_pair(curves: Sequence[PairCurve]) -> Figure:
         fine = curve.smooth()
         for panel, line, dots in ((real, fine.real, curve.real), (imaginary, fine.imaginary, curve.imaginary)):
             panel.plot(fine.fx, line, color=colour)
-            if len(curve.fx) <= FEW:
+            if len(curve.fx) <= DOTTED_LOADS:
                 panel.plot(curve.fx, dots, ".", color=colour, markersize=3)
         where = "" if curve.fx_c is None else f", $F_x^c = {curve.fx_c:.5g}$"
         real.plot([], [], color=colour, label=rf"$\mu = {curve.mu:g}${where}")

@@ -40,7 +40,7 @@ DOTS_ACROSS = 900
 FADED = 0.25
 """Opacity of the bars farthest from the eye."""
 
-MARGIN = 0.25
+ROOM_AROUND = 0.25
 """Room around the spheres, in units of the largest radius, for bars that leave a periodic box."""
 
 
@@ -85,7 +85,7 @@ def frame_of(configuration: Configuration, eye: Eye) -> Frame:
     corners = eye.flat(np.array(list(product(*zip(*corners_of(configuration), strict=True)))))
     place, reach = eye.flat(configuration.position), configuration.radius[:, None]
     low, high = (np.concatenate([corners, place + sign * reach]) for sign in (-1, 1))
-    room = MARGIN * configuration.radius.max()
+    room = ROOM_AROUND * configuration.radius.max()
     (left, bottom), (right, top) = low.min(axis=0) - room, high.max(axis=0) + room
     return float(left), float(right), float(bottom), float(top)
 

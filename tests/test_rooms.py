@@ -132,6 +132,28 @@ def test_every_class_has_a_name_of_its_own():
     assert {name for name in names if names.count(name) > 1} == set()
 
 
+def is_number(node: ast.expr) -> bool:
+    """Whether an expression has numbers alone, or is a tuple of these."""
+    parts = [each for each in ast.walk(node) if isinstance(each, ast.expr)]
+    numbers = (ast.Constant, ast.Tuple, ast.UnaryOp, ast.BinOp)
+    return all(isinstance(each, numbers) for each in parts) and not any(
+        isinstance(each, ast.Constant) and not isinstance(each.value, (int, float)) for each in parts
+    )
+
+
+def test_every_number_has_a_name_of_its_own():
+    """One name stands for one tolerance, size or share; who needs the same number imports it."""
+    names: dict[str, list[str]] = {}
+    for module, path in modules().items():
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.Assign) and is_number(node.value):
+                [target] = node.targets
+                for each in target.elts if isinstance(target, ast.Tuple) else [target]:
+                    names.setdefault(each.id, []).append(module)
+    assert len(names) > 300
+    assert {name: where for name, where in names.items() if len(where) > 1} == {}
+
+
 def test_every_module_is_imported():
     """A name that has moved is then noticed, whatever else is tested."""
     failed = {}

@@ -20,12 +20,12 @@ from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
 from ..packing.packing import Floats
 from .eigenpairs import eigenpairs
 from .eigenvalues import SAFETY, is_negative, operator_rounding, zero_uncertainty
-from .spectrum import DENSE, dynamical_matrix, spectrum
+from .spectrum import DENSE_LARGEST, dynamical_matrix, spectrum
 
 SPREAD = 4.0
 """Factor from one bound that is tried to the next: each costs factors, and a loose one more eigenvalues."""
 
-FIRST = 16
+FIRST_COUNT = 16
 """Eigenvalues that are asked for at first; twice as many until the interval is covered."""
 
 
@@ -50,12 +50,12 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
     bound = uncertainty = zero_uncertainty(packing, rounding)
     if _is_positive(symmetric, bound):
         return np.zeros(0)
-    if size <= DENSE:
+    if size <= DENSE_LARGEST:
         return spectrum(packing).negative
     bound = max(bound, np.finfo(float).eps ** 0.5 * float(np.abs(matrix.data).max()))
     while not _is_positive(symmetric, bound):
         bound *= SPREAD
-    count = FIRST
+    count = FIRST_COUNT
     while True:
         count = min(count, size - 2)
         found = eigenpairs(packing, -0.5 * bound, count)

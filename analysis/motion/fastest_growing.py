@@ -41,7 +41,7 @@ from .block_arnoldi import DEPENDENT, Krylov
 BLOCK = 4
 """Vectors of a start for two motions, and half of those for many. What grows alike, as in a crystal, needs several."""
 
-BLOCKS = 30
+MOST_BLOCKS = 30
 """Blocks of a space at the most."""
 
 FIRST_BLOCKS = 12
@@ -50,7 +50,7 @@ FIRST_BLOCKS = 12
 TRIPLE = 3.0
 """Factor from one time to the next."""
 
-MARGIN = 1.03
+EIGENVALUE_MARGIN = 1.03
 """By how much the largest eigenvalue is taken larger, of which Arnoldi's iteration misses a hundredth."""
 
 CHANCE = 1e-3
@@ -62,7 +62,7 @@ APPEARS = 1e-2
 CONVERGED = 1e-5
 """Relative residual of eigenvalues with which the search ends."""
 
-CERTAIN = 10.0
+GROWTH_OVER_RESIDUAL = 10.0
 """Growth over what the residual may change, from which an eigenvalue is a growing one when the search ends otherwise.
 Many motions that grow nearly alike converge slowly."""
 
@@ -173,7 +173,7 @@ class _Undamped:
 
     @classmethod
     def of(cls, matrix: csr_array | bsr_array) -> "_Undamped":
-        return cls(matrix, np.sqrt(MARGIN * _largest(matrix)))
+        return cls(matrix, np.sqrt(EIGENVALUE_MARGIN * _largest(matrix)))
 
     @property
     def size(self) -> int:
@@ -226,7 +226,7 @@ class _Damped:
 
     @classmethod
     def of(cls, matrix: csr_array | bsr_array, damping: csr_array | bsr_array) -> "_Damped":
-        frequency = np.sqrt(MARGIN * _largest(matrix))
+        frequency = np.sqrt(EIGENVALUE_MARGIN * _largest(matrix))
         # no motion loses more than the largest sum of a row
         return cls(matrix, damping, frequency, float(abs(damping).sum(axis=1).max()) / frequency)
 
@@ -333,7 +333,7 @@ class _Space:
     def result(self, count: int, products: int) -> FastestGrowth:
         """The fastest motions whose growth is certain."""
         rates = self.motion.growth(self.values)
-        uncertain = rates < CERTAIN * self.motion.uncertainty(self.values, self.residuals)
+        uncertain = rates < GROWTH_OVER_RESIDUAL * self.motion.uncertainty(self.values, self.residuals)
         kept = slice(0, min(count, int(np.argmax([*uncertain, True]))))
         moved = self.motion.displacement(self.vectors[:, kept])
         others = rates[kept.stop :].max(initial=0.0)
@@ -351,7 +351,7 @@ class _Space:
 def _search(motion: Equation, step: Step, start: Floats, count: int) -> tuple[_Space, Krylov]:
     """What grows over a time."""
     block = len(start)
-    krylov = Krylov(step.apply, start, BLOCKS * block)
+    krylov = Krylov(step.apply, start, MOST_BLOCKS * block)
     blocks = FIRST_BLOCKS
     while True:
         krylov.extend(blocks * block)

@@ -44,7 +44,7 @@ KNOTS = 4
 A_PERIOD = 20
 """Times a period of the fastest motion at which the largest velocity is looked for; it is refined between them."""
 
-CHUNK = 2000
+EXPONENTIALS_AT_ONCE = 2000
 """Times whose exponentials are kept at once."""
 
 RESONANT = 1e-9
@@ -100,10 +100,10 @@ class ImpulseResponse:
         part = (self.weight / (1j * omegas[:, None] - self.rate)).T
         stationary = part.sum(axis=0)
         largest, where = np.zeros((2, len(omegas)))
-        motion = np.exp(np.multiply.outer(step * np.arange(min(CHUNK, count)), self.rate))
-        onward = np.exp(step * CHUNK * self.rate)
-        for first in range(0, count, CHUNK):
-            t = step * np.arange(first, min(first + CHUNK, count))
+        motion = np.exp(np.multiply.outer(step * np.arange(min(EXPONENTIALS_AT_ONCE, count)), self.rate))
+        onward = np.exp(step * EXPONENTIALS_AT_ONCE * self.rate)
+        for first in range(0, count, EXPONENTIALS_AT_ONCE):
+            t = step * np.arange(first, min(first + EXPONENTIALS_AT_ONCE, count))
             v = np.abs(np.real(np.exp(1j * np.multiply.outer(t, omegas)) * stationary - motion[: len(t)] @ part))
             best = v.argmax(axis=0)
             found = v[best, np.arange(len(omegas))]

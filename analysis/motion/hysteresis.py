@@ -22,7 +22,7 @@ from ..arrays import Floats
 from ..packing.geometry import nearest_image
 from ..packing.packing import Packing
 
-ROUNDING = 1e-9
+DISPLACEMENT_ROUNDING = 1e-9
 """Share of the displacement of a layer: coordinates have 1e-16, which is 1e-12 of a displacement of 1e-4 diameters, and
 soft modes magnify it some hundred times."""
 
@@ -42,7 +42,8 @@ class Hysteresis:
     work : float
         Of the loads on all disks of the layer since then, force length.
     closes : bool
-        Whether what remains is no more than rounding: `ROUNDING` of how far the layer has moved in between.
+        Whether what remains is no more than rounding: `DISPLACEMENT_ROUNDING` of how far the layer has moved in
+        between.
     """
 
     fx: float
@@ -95,5 +96,5 @@ def hysteresis(packings: Sequence[Packing]) -> Hysteresis | None:
     mean = 0.5 * (fx[begin + 1 :] + fx[begin:-1])
     work = mean @ np.diff(moved[:, 0]) - last.fy * (moved[-1, 1] - moved[0, 1])
     remaining = float(moved[-1, 0] - moved[0, 0])
-    closes = abs(remaining) <= ROUNDING * float(np.ptp(moved[:, 0]))
+    closes = abs(remaining) <= DISPLACEMENT_ROUNDING * float(np.ptp(moved[:, 0]))
     return Hysteresis(last.fx, begin, remaining, disks * float(work), closes)

@@ -39,8 +39,7 @@ from .eigenvalues import (
     operator_rounding,
     zero_uncertainty,
 )
-from .fastest_growing import CERTAIN as SURE
-from .fastest_growing import fastest_growing
+from .fastest_growing import GROWTH_OVER_RESIDUAL, fastest_growing
 from .slowest_decay import slowest_decay
 from .state_space import StateSpace
 
@@ -49,14 +48,14 @@ SLICED = 2000
 growing motions alone. Of 870 coordinates of disks LAPACK takes 0.4 of the time of slices, of 900 of spheres 0.3, and
 with the growth of both the times are the same at 2,000 and at 2,900."""
 
-DENSE = 1000
+DENSE_DAMPED = 1000
 """Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, some seconds; of more those next
 to the imaginary axis and the fastest growing ones."""
 
 DISCS_UP_TO = 6000
 """Coordinates up to which the slowest decay is looked for with dissipation, too: one or two minutes."""
 
-PERIODS = 100.0
+PERIODS_BEYOND_DISCS = 100.0
 """Periods of the fastest motion in which growth is looked for, where the slowest decay is not known for certain."""
 
 PERIODS_OF_LARGE = 2e6
@@ -69,10 +68,10 @@ TIMES = (10.0, 300.0)
 SEEN = 3.5
 """Rate times t from which growth is seen, see :mod:`~faultgouge.analysis.motion.fastest_growing`."""
 
-CERTAIN = 1e-7
+GROWTH_OF_DISCS = 1e-7
 """Re s > 0 of discs is believed from this share of the largest frequency on: it is found to some 1e-9 of that."""
 
-FREE = 1e-6
+FREE_SHARE = 1e-6
 """Eigenvalues s below this share of the largest are those of motions that no force opposes: rounding leaves sqrt(u) of
 a double zero."""
 
@@ -181,7 +180,7 @@ class Motion:
         size = len(self.active)
         if not size:
             return Rates(np.zeros(0, complex), np.zeros(0, bool), 0)
-        if size > (DENSE if self.dissipative else SLICED):
+        if size > (DENSE_DAMPED if self.dissipative else SLICED):
             return self._next_to_the_axis() if self.dissipative and size <= DISCS_UP_TO else self._fastest()
         return self._damped_rates() if self.dissipative else self._undamped_rates()
 
@@ -201,9 +200,9 @@ class Motion:
         # growth is looked for from where the discs end
         partly = np.isfinite(slow.covered)
         width = max(slow.width, np.finfo(float).tiny)  # discs of a packing that collapses may only just touch
-        periods = PERIODS if partly else float(np.clip(SEEN * frequency / (4 * np.pi * width), *TIMES))
+        periods = PERIODS_BEYOND_DISCS if partly else float(np.clip(SEEN * frequency / (4 * np.pi * width), *TIMES))
         fast = fastest_growing(self.stiffness, self.damping, periods=(min(TIMES[0], periods), periods))
-        apart = np.maximum(CERTAIN * frequency, SURE * fast.residuals * np.abs(fast.values))
+        apart = np.maximum(GROWTH_OF_DISCS * frequency, GROWTH_OVER_RESIDUAL * fast.residuals * np.abs(fast.values))
         new = [
             value
             for value, far in zip(fast.values, apart, strict=True)
@@ -212,7 +211,7 @@ class Motion:
         values = np.concatenate([slow.values, np.array(new, complex)])
         values = values[np.argsort(-values.real, kind="stable")]
         searched = 0.0 if not partly and fast.limit <= 2 * slow.width else fast.limit
-        return Rates(values, values.real > CERTAIN * frequency, slow.free, searched)
+        return Rates(values, values.real > GROWTH_OF_DISCS * frequency, slow.free, searched)
 
     def _undamped_rates(self) -> Rates:
         values, left, right = all_modes(self.stiffness)
@@ -233,11 +232,11 @@ class Motion:
         values, rounding = eigvals(z, check_finite=False), operator_rounding(self.configuration, z)
         largest = np.abs(values).max()
         grows = values.real > np.sqrt(SAFETY * rounding * largest)  # no double eigenvalue is as uncertain
-        if np.any(~grows & (values.real > 0) & (np.abs(values) > FREE * largest)):
+        if np.any(~grows & (values.real > 0) & (np.abs(values) > FREE_SHARE * largest)):
             # vectors take three times as long as eigenvalues
             values, left, right = eig(z, left=True, check_finite=False)
             grows = growing(values, np.abs(np.sum(left.conj() * right, axis=0)), rounding)
-        free = ~grows & (np.abs(values) <= FREE * largest)
+        free = ~grows & (np.abs(values) <= FREE_SHARE * largest)
         order = np.flatnonzero((values.imag >= 0) & ~free)
         order = order[np.argsort(-values[order].real, kind="stable")]
         return Rates(values[order], grows[order], int(free.sum()) // 2)

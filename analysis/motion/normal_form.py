@@ -50,7 +50,7 @@ it."""
 LEAST_CROSSOVER = 4.0
 """Undamped amplitude from which on damping may take half of it: of a smaller one the start itself would be half."""
 
-PERIODS = 3
+PERIODS_ABOUT_MAXIMUM = 3
 """Periods of the fast oscillation on either side of the envelope's maximum among which the largest is looked for: the
 neighbouring ones may win by their phase, those further out lie lower on the envelope."""
 
@@ -166,7 +166,7 @@ class NormalForm:
             peak = np.arctan2(d.real, gamma) / d.real
         period = 2 * np.pi / s.real
         # |x| has two maxima a period; 64 points see each of them.
-        time = peak + period * np.arange(-64 * PERIODS, 64 * PERIODS + 1) / 64
+        time = peak + period * np.arange(-64 * PERIODS_ABOUT_MAXIMUM, 64 * PERIODS_ABOUT_MAXIMUM + 1) / 64
         time = time[time >= 0]
 
         def size(t: ArrayLike) -> Floats:

@@ -39,7 +39,7 @@ from ..operators.sliders import sliders_of
 from .motion import Motion
 from .stable_timestep import stable_timestep
 
-STEP = 0.05
+MOTION_STEP = 0.05
 """Time step, as a share of the largest stable one. Beside LAMMPS D is right to some per cent after growth by twelve
 decades; with twice the step, to some 8 per cent."""
 
@@ -92,11 +92,11 @@ class OneSidedSystem:
     """
 
     motion: Motion
-    share: float = STEP
+    share: float = MOTION_STEP
     """Time step, as a share of the largest stable one."""
 
     @classmethod
-    def of(cls, packing: HasConfiguration, share: float = STEP) -> "OneSidedSystem":
+    def of(cls, packing: HasConfiguration, share: float = MOTION_STEP) -> "OneSidedSystem":
         """Assemble the equations, with the packing's own dashpots and drag."""
         return cls(Motion.of(packing, sliding=False), share)
 

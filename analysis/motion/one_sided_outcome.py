@@ -3,7 +3,7 @@ r"""What becomes of one-sided motion: it grows, rests or has not settled; or dri
 Motions begin with random pushes of all particles alike, and with their opposites, since one-sided motion is not odd. A
 motion *grows* if D has gained `DECADES` and still gains at a steady rate; it *rests* if the sliders have come to rest
 and the packing with sticking contacts does not grow, since then the motion is linear and decays for ever. Otherwise the
-motion has not settled. The time is `CHUNK` stable time steps as often as needed, up to `WORK` multiplications.
+motion has not settled. The time is `STEPS_OF_CHUNK` stable time steps as often as needed, up to `WORK` multiplications.
 
 Under a load that rises at a constant rate the motion is proportional to the rate. Its *drift* is the mean velocity of
 each particle over a window, its *vibration* what is left: root mean squares over particles and axes. A load that begins
@@ -28,17 +28,17 @@ from .one_sided import OneSidedState, OneSidedSystem
 PUSHES = 2
 """Random pushes; the opposite of each is followed, too, since one-sided motion is not odd."""
 
-STEP = 0.1
+VERDICT_STEP = 0.1
 """Time step of one-sided motion as a share of the largest stable one: rates of growth are right to some per cent."""
 
 STEP_OF_LARGE = 0.3
 """The same of large packings. Beside steps of a sixteenth, of four packings of 50 spheres: rates of growth are 2 to 3 %
 too large, and an amplification 1 %."""
 
-CHUNK = 300
+STEPS_OF_CHUNK = 300
 """Stable time steps between two looks at whether a motion has settled: some ten periods of a slow mode."""
 
-LOOKS = 10
+LOOKS_PER_CHUNK = 10
 """D is looked at so often in a chunk."""
 
 WORK = 2e11
@@ -65,7 +65,7 @@ LATE = 12
 """Chunks after which the slip of all contacts together decides. A motion that grows as exp(t) gains 15 decades in a
 packing of spheres."""
 
-SAMPLES = 400
+SAMPLES_OF_WINDOW = 400
 """Velocities that a window of a load that rises has."""
 
 WINDOWS = 0.2
@@ -83,7 +83,7 @@ VANISHES = 1e-2
 
 def _chunks(system: OneSidedSystem, columns: int, time: float | None) -> tuple[float, int]:
     """Time of a chunk, and how many there are at most."""
-    chunk = CHUNK * system.step / system.share
+    chunk = STEPS_OF_CHUNK * system.step / system.share
     if time is not None:
         return time / 16, 16
     entries = (system.motion.stiffness.nnz + system.motion.damping.nnz) * columns
@@ -111,8 +111,8 @@ def follow_pushes(
     times, sizes, slid, speeds = [0.0], [np.zeros(2 * pushes)], [state.p.copy()], [np.sum(state.v**2, axis=0)]
     grows: bool | None = None
     for number in range(most):
-        for look in range(LOOKS):
-            system.advance(state, chunk * (number + (look + 1) / LOOKS))
+        for look in range(LOOKS_PER_CHUNK):
+            system.advance(state, chunk * (number + (look + 1) / LOOKS_PER_CHUNK))
             times.append(state.time)
             sizes.append(_mean_square(system, state))
             slid.append(state.p.copy())
@@ -162,11 +162,11 @@ def _outcome(time: Floats, size: Floats, slid: list[Floats], sticking_grows: boo
         gained = np.log10(largest / largest[0])
     if gained[-1] > MOST_DECADES or (gained[-1] > DECADES and _still_grows(time, gained)):
         return True
-    if sticking_grows or len(slid) <= 2 * LOOKS:
+    if sticking_grows or len(slid) <= 2 * LOOKS_PER_CHUNK:
         return None
     half, three = len(slid) // 2, 3 * len(slid) // 4
     of_any = _slip_dies(slid[half], slid[three], slid[-1], np.max)
-    of_all = _slip_dies(slid[half], slid[three], slid[-1], np.sum) & (len(slid) > LATE * LOOKS)
+    of_all = _slip_dies(slid[half], slid[three], slid[-1], np.sum) & (len(slid) > LATE * LOOKS_PER_CHUNK)
     return False if np.all(of_any | of_all) else None
 
 
@@ -197,7 +197,7 @@ def _unseen_growth(time: Floats, energy: Floats, states: int) -> float:
     If D grows at the rate g, and the growing motion has a share of :math:`\delta^2/n` of the kinetic energy E or more
     when the second half of the time begins, then :math:`g T/2 < \ln(n/\delta^2) + \ln(E_{end}/E_{half})`.
     """
-    half, few = len(time) // 2, LOOKS // 2
+    half, few = len(time) // 2, LOOKS_PER_CHUNK // 2
     before, after = energy[half : half + few].mean(axis=0), energy[-few:].mean(axis=0)
     span = time[-few:].mean() - time[half : half + few].mean()
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -235,11 +235,11 @@ def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = 
     for number in range(most):
         start = system.displacement(state.z)[..., 0]
         squares: NDArray[np.float64] = np.zeros_like(start)
-        for sample in range(SAMPLES):
-            now = number + (sample + 1) / SAMPLES
+        for sample in range(SAMPLES_OF_WINDOW):
+            now = number + (sample + 1) / SAMPLES_OF_WINDOW
             system.advance(state, chunk * now, direction)
-            state.v *= np.exp(-DRAG / SAMPLES * max(0.0, 1 - now / FADE) ** 2)
-            squares += system.displacement(state.v)[..., 0] ** 2 / SAMPLES
+            state.v *= np.exp(-DRAG / SAMPLES_OF_WINDOW * max(0.0, 1 - now / FADE) ** 2)
+            squares += system.displacement(state.v)[..., 0] ** 2 / SAMPLES_OF_WINDOW
         mean = (system.displacement(state.z)[..., 0] - start) / chunk
         windows.append((_root_mean(mean**2), _root_mean(np.maximum(squares - mean**2, 0.0))))
         report_progress(f"under the rising load: t = {state.time:.4g}, vibration {windows[-1][1]:.3g}")

@@ -22,37 +22,37 @@ Norm = Literal["displacement", "energy"]
 OBLIQUE = 1.1
 """Modes with a larger |x| |l| have a part in the sampling: 1 is what a mode of a symmetric matrix has."""
 
-SHARE = 0.05
+COUNTED_SHARE = 0.05
 """And of these the ones with this share of the largest."""
 
 LEAST, MOST = 4, 16
 """The fewest and the most modes that are sampled; with dissipation a motion is two of them."""
 
-ALONE = 100
+LONE_PERIODS = 100
 """Length of the window, in periods, where the most oblique mode has no partner among these."""
 
-SAMPLES = 8
+TIMES_A_PERIOD = 8
 """Times a period: a phase between two of them is off by no more than pi/8, which costs 8 % and is refined away."""
 
 BEATS = 10
-"""Length of the window, in beats of the most oblique pair; for long beats fewer, see `PERIODS`. With dissipation the
-window ends where the bound, which falls with the slowest mode, leaves no gain."""
+"""Length of the window, in beats of the most oblique pair; for long beats fewer, see `MOST_PERIODS`. With dissipation
+the window ends where the bound, which falls with the slowest mode, leaves no gain."""
 
-PERIODS = 20_000
+MOST_PERIODS = 20_000
 """The window of more than 1.5 beats has no more periods of the most oblique mode than these."""
 
 NOISE = 1e-7
 """Growth rates and differences of frequencies below this share of the largest frequency are rounding where two modes
 are about to coalesce: the root of that of a well-conditioned eigenvalue."""
 
-ACCURACY = 1e-9
+NORM_ACCURACY = 1e-9
 """Relative error of the largest singular value."""
 
 CANDIDATES = 6
 """Maxima of the sampled modes at which the whole propagator is looked at, and besides the largest of each of so many
 octaves of time: at t = 0 the whole propagator is one, but some of its modes alone make an oblique projector."""
 
-CHUNK = 4096
+TIMES_AT_ONCE = 4096
 """Times that are sampled at once."""
 
 
@@ -112,7 +112,7 @@ class Propagator:
         for column in self.modes.blocks:
             weight[[column, column + 1]] = np.inf
         finite = weight[np.isfinite(weight)].max(initial=1.0)
-        least = max(OBLIQUE, SHARE * (finite if np.all(np.isfinite(weight)) else WELL_CONDITIONED**-1))
+        least = max(OBLIQUE, COUNTED_SHARE * (finite if np.all(np.isfinite(weight)) else WELL_CONDITIONED**-1))
         order = np.argsort(-weight, kind="stable")[:MOST]
         return np.sort(order[(weight[order] > least) | (np.arange(len(order)) < LEAST)])
 
@@ -129,9 +129,9 @@ class Propagator:
         parallel[gap <= NOISE * frequency.max(initial=0.0)] = 0.0  # itself, and its mirror image
         a, b = np.unravel_index(np.argmax(parallel), parallel.shape)
         if parallel[a, b] == 0.0:
-            return float(ALONE * 2 * np.pi / frequency[a]) if frequency[a] else 1.0
+            return float(LONE_PERIODS * 2 * np.pi / frequency[a]) if frequency[a] else 1.0
         beat, period = np.pi / gap[a, b], 2 * np.pi / frequency[a]
-        return float(max(1.5 * beat, min(BEATS * beat, PERIODS * period)))
+        return float(max(1.5 * beat, min(BEATS * beat, MOST_PERIODS * period)))
 
     def end(self, bound: float) -> float:
         """A time beyond which the dissipation leaves no gain, time; inf without dissipation."""
@@ -141,13 +141,13 @@ class Propagator:
     def candidates(self, columns: Indices, window: float) -> list[tuple[float, float]]:
         """The times between which P of some modes has its largest maxima."""
         left, right = (np.linalg.qr(part)[1] for part in (self.outward[:, columns], self.inward[columns].conj().T))
-        step = 2 * np.pi / max(self.frequency[columns].max(initial=0.0), 1e-300) / SAMPLES
+        step = 2 * np.pi / max(self.frequency[columns].max(initial=0.0), 1e-300) / TIMES_A_PERIOD
         time = np.linspace(0.0, window, max(2, int(np.ceil(window / step)) + 1))
         some, back = self.modes.some(columns), right.conj().T
         size = np.concatenate(
             [
                 np.linalg.norm(some.between(self.function, part, left, back), 2, (1, 2))
-                for part in np.array_split(time, len(time) // CHUNK + 1)
+                for part in np.array_split(time, len(time) // TIMES_AT_ONCE + 1)
             ]
         )
         inner = np.flatnonzero((size[1:-1] >= size[:-2]) & (size[1:-1] > size[2:])) + 1
@@ -158,7 +158,7 @@ class Propagator:
         best = np.union1d(peaks[:CANDIDATES], peaks[np.unique(octave, return_index=True)[1]])
         return [(float(time[max(k - 1, 0)]), float(time[min(k + 1, len(time) - 1)])) for k in best]
 
-    def largest(self, time: float, accuracy: float = ACCURACY) -> tuple[float, Floats, Floats]:
+    def largest(self, time: float, accuracy: float = NORM_ACCURACY) -> tuple[float, Floats, Floats]:
         """Norm of the whole P(t), what reaches it and the start of norm 1 that does; real."""
         matrix = self.at(np.array([time]))[0]
         if min(matrix.shape) < 3:

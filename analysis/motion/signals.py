@@ -26,7 +26,7 @@ from ..errors import BadInputError
 ONSET_OF_PULSE = 10.0
 """omega t_0 of a pulse: x = 5 at t = 0, where the pulse is 1e-9 of its peak."""
 
-SAMPLES = 256
+ROWS_A_PERIOD = 256
 """Rows a period of pulses and sweeps: straight lines between them are off by (2 pi/256)^2/8 = 8e-5 of the amplitude."""
 
 
@@ -111,7 +111,7 @@ def pulse(omega: float) -> Signal:
     omega : float
         Angular frequency, 1 / time.
     """
-    time = np.linspace(0.0, 2 * ONSET_OF_PULSE / omega, int(2 * ONSET_OF_PULSE / (2 * np.pi) * SAMPLES))
+    time = np.linspace(0.0, 2 * ONSET_OF_PULSE / omega, int(2 * ONSET_OF_PULSE / (2 * np.pi) * ROWS_A_PERIOD))
     squared = (0.5 * (omega * time - ONSET_OF_PULSE)) ** 2
     return Signal(time, (1 - 2 * squared) * np.exp(-squared))
 
@@ -126,6 +126,6 @@ def sweep(first: float, last: float, duration: float) -> Signal:
     duration : float
         Length, time.
     """
-    rows = int(np.ceil(max(first, last) * duration / (2 * np.pi) * SAMPLES)) + 1
-    time = np.linspace(0.0, duration, max(rows, SAMPLES))
+    rows = int(np.ceil(max(first, last) * duration / (2 * np.pi) * ROWS_A_PERIOD)) + 1
+    time = np.linspace(0.0, duration, max(rows, ROWS_A_PERIOD))
     return Signal(time, np.sin(first * time + 0.5 * (last - first) * time**2 / duration))

@@ -26,16 +26,16 @@ NEAREST = 60
 DISCS = 40
 """Discs at the most: of 1,000 spheres they took 60 s of one core."""
 
-FIRST = 0.02
+FIRST_DISC = 0.02
 """Middle of the first disc, as a share of the largest frequency; not zero, where motions without a force are."""
 
 AHEAD = 0.8
 """Distance of a new middle from what is covered, in units of the last disc's reach, as radii change."""
 
-TOLERANCE = 1e-9
+ARNOLDI_TOLERANCE = 1e-9
 """Of Arnoldi's iteration: eigenvalues are right to this share of their distance from the middle."""
 
-FREE = 1e-5
+FREE_OF_DISC = 1e-5
 """Eigenvalues below this share of the largest frequency are those of motions that no force opposes: they are double,
 and Arnoldi's iteration leaves the root of its tolerance."""
 
@@ -90,12 +90,12 @@ def slowest_decay(matrix: csr_array, damping: csr_array, discs: int = DISCS) -> 
     largest = float(np.sqrt(abs(matrix).sum(axis=1).max()))  # no |lambda| of A is larger than the sum of a row
     nearest = min(NEAREST, matrix.shape[0] // 2)
     values, free = np.zeros(0, complex), 0
-    middle, covered, width = FIRST * largest, 0.0, np.inf
+    middle, covered, width = FIRST_DISC * largest, 0.0, np.inf
     last = -middle, 0.0  # the mirror image of the first disc
     for number in range(discs):
         found = _nearest(matrix, damping, 1j * middle, nearest)
         radius = float(np.abs(found - 1j * middle).max())
-        is_free = np.abs(found) < FREE * largest
+        is_free = np.abs(found) < FREE_OF_DISC * largest
         free = max(free, int(is_free.sum() + 1) // 2)
         values = np.concatenate([values, found[~is_free & (found.imag >= 0)]])
         rate = -values.real.max(initial=-radius)
@@ -127,7 +127,7 @@ def _nearest(matrix: csr_array, damping: csr_array, middle: complex, count: int)
 
     start = np.random.default_rng(0).standard_normal(2 * size).astype(complex)
     operator = LinearOperator((2 * size, 2 * size), matvec=inverse, dtype=complex)
-    return np.asarray(shift + 1 / eigs(operator, count, v0=start, tol=TOLERANCE, return_eigenvectors=False))
+    return np.asarray(shift + 1 / eigs(operator, count, v0=start, tol=ARNOLDI_TOLERANCE, return_eigenvectors=False))
 
 
 def _common_width(below: tuple[float, float], above: tuple[float, float]) -> float:

@@ -64,7 +64,7 @@ from .eigenvalues import (
 )
 from .motion import SLICED, Motion, Rates
 
-DENSE = 900
+DENSE_LARGEST = 900
 """Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
 
 LAPACK_UP_TO = 20_000
@@ -395,7 +395,7 @@ def _values_and_vectors(matrix: csr_array, uncertainty: float) -> tuple[Complexe
             return found.values, found.marked
     dense = matrix.toarray()
     # vectors take three times as long as eigenvalues: a large packing under a load has complex pairs, and needs both
-    alone = len(dense) <= DENSE or (matrix != matrix.T).nnz == 0
+    alone = len(dense) <= DENSE_LARGEST or (matrix != matrix.T).nnz == 0
     values = eigvals(dense) if len(dense) and alone else np.zeros(0, complex)
     if alone and not np.any(values.imag != 0) and values.real.min(initial=0.0) >= -uncertainty:
         nothing = np.zeros((len(dense), 0), complex)
@@ -430,7 +430,7 @@ def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:
 
 
 def largest_frequency(packing: HasConfiguration) -> float:
-    """omega_max = max sqrt|lambda|; to `LIMIT`, by Arnoldi's iteration (ARPACK), beyond `DENSE` coordinates.
+    """omega_max = max sqrt|lambda|; to `LIMIT`, by Arnoldi's iteration (ARPACK), beyond `DENSE_LARGEST` coordinates.
 
     Returns
     -------
@@ -444,7 +444,7 @@ def largest_frequency(packing: HasConfiguration) -> float:
     """
     matrix, _ = dynamical_matrix(packing)
     size = matrix.shape[0]
-    if size <= DENSE:
+    if size <= DENSE_LARGEST:
         return spectrum(packing).omega_max
     # always the same one, for a result that is reproducible; without the symmetry that a crystal's fastest mode lacks
     start = np.random.Generator(np.random.PCG64(0)).standard_normal(size)

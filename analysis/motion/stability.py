@@ -23,7 +23,7 @@ from ..operators.sliders import with_sticking_contacts
 from .eigenvalues import in_balance
 from .motion import Motion, Rates
 from .one_sided import OneSidedSystem, forces_on_coordinates
-from .one_sided_outcome import PUSHES, STEP, STEP_OF_LARGE, follow_load, follow_pushes
+from .one_sided_outcome import PUSHES, STEP_OF_LARGE, VERDICT_STEP, follow_load, follow_pushes
 from .spectrum import Spectrum, spectrum
 
 LARGE = 6000
@@ -247,7 +247,7 @@ def stability(
         spectrum_of_stiffness = None  # of contacts that slide
     direction = None if rise is None else _direction(configuration, rise)
     large = configuration.coordinates > LARGE
-    share = STEP_OF_LARGE if large else STEP
+    share = STEP_OF_LARGE if large else VERDICT_STEP
     found = spectrum(configuration) if spectrum_of_stiffness is None and not large else spectrum_of_stiffness
     contacts, damped = configuration.contacts, configuration.damped
     undamped, own = _without_dissipation(configuration, found)

@@ -58,11 +58,11 @@ from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats
 
-FEW, MANY = 40, 10_000
+EXACT_COORDINATES, COARSE_COORDINATES = 40, 10_000
 """Coordinates up to which a time step is that of all eigenvalues, and from which on it has fewer digits."""
 
-TOLERANCE = 1e-8
-"""Relative error of mu^2 for a time step of up to MANY coordinates."""
+TIMESTEP_TOLERANCE = 1e-8
+"""Relative error of mu^2 for a time step of up to COARSE_COORDINATES coordinates."""
 
 ROUGH = 0.1
 """Relative error of the first mu^2 with dashpots, from which the steps begin."""
@@ -71,13 +71,13 @@ PRODUCTS = 24
 """Dimension of the space for more coordinates. Packings have many modes near the fastest one: of 200,000 coordinates 24
 products miss 0.3 % of mu^2, and 150 products miss 0.006 %. Nobody runs so near to the limit."""
 
-CHANCE = 1e-3
+TIMESTEP_CHANCE = 1e-3
 """Probability that the fastest motion of many coordinates is beyond the error."""
 
 HERTZ = 1e-3
 """Deviation of d ln f_n / d ln delta from 3/2 up to which a force is Hertz's."""
 
-LOOKS = 6
+SQUARINGS = 6
 """Steps of the iteration for mu: each squares its error."""
 
 
@@ -152,7 +152,7 @@ def stable_timestep(
     if damping is not None:
         damping = WEIGHT[dashpot_velocity or ("extrapolated" if ours else "half-step")] * damping
     scale = 1.0 / np.sqrt(coordinate_mass(of))
-    found = (_of_all_eigenvalues if len(scale) <= FEW else _of_arnoldi)(scale, stiffness, damping)
+    found = (_of_all_eigenvalues if len(scale) <= EXACT_COORDINATES else _of_arnoldi)(scale, stiffness, damping)
     # rounding may take the limit below the bound where the two are the same
     return StableTimestep(found, found.error, min(float(found), 2.0 / _largest_mu(scale, stiffness, damping)))
 
@@ -222,12 +222,12 @@ def _of_arnoldi(scale: Floats, stiffness: csr_array, damping: csr_array | None) 
         # a rough mu of K alone is where the steps begin
         value, moved, _ = _largest_eigenvalue(scale, stiffness, ROUGH)
         mu = _next_mu(0.0, value, moved, damping)
-    for _ in range(LOOKS):
+    for _ in range(SQUARINGS):
         matrix = stiffness if damping is None else _sum_of(stiffness, mu, damping)
-        value, moved, error = _largest_eigenvalue(scale, matrix, TOLERANCE)
+        value, moved, error = _largest_eigenvalue(scale, matrix, TIMESTEP_TOLERANCE)
         before, mu = mu, _next_mu(mu, value, moved, damping)
         change = 0.0 if damping is None else abs(mu - before) / mu
-        if change <= max(error, TOLERANCE):
+        if change <= max(error, TIMESTEP_TOLERANCE):
             break
     return StableTimestep(2.0 / mu, 2.0 / mu * (0.5 * error + change))
 
@@ -241,13 +241,14 @@ def _largest_eigenvalue(scale: Floats, matrix: csr_array, tolerance: float) -> t
 
     start = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
     # one space without restart: whatever it has found is within the tolerance
-    space = {"ncv": PRODUCTS, "tol": 1.0} if size > MANY and tolerance < ROUGH else {"ncv": 12, "tol": tolerance}
+    coarse = size > COARSE_COORDINATES and tolerance < ROUGH
+    space = {"ncv": PRODUCTS, "tol": 1.0} if coarse else {"ncv": 12, "tol": tolerance}
     operator = LinearOperator((size, size), matvec=product, dtype=np.float64)
     (value,), vectors = eigs(operator, 1, which="LM", v0=start, **space)
     real = abs(value.imag) < 1e-3 * abs(value)
     vector = np.ascontiguousarray(vectors[:, 0].real if real else vectors.sum(axis=1).real)
-    if size > MANY:
-        error = (np.log(1.648 * np.sqrt(size) / CHANCE) / (2 * PRODUCTS - 1)) ** 2
+    if size > COARSE_COORDINATES:
+        error = (np.log(1.648 * np.sqrt(size) / TIMESTEP_CHANCE) / (2 * PRODUCTS - 1)) ** 2
     else:
         residual = product(vectors[:, 0].real) + 1j * product(vectors[:, 0].imag) - value * vectors[:, 0]
         error = np.linalg.norm(residual) / abs(value)

@@ -40,10 +40,10 @@ import numpy as np
 
 from ..configuration import HasConfiguration
 from ..packing.packing import Floats
-from .propagator import ACCURACY, NoGainError, Norm, Propagator, stable_motion
+from .propagator import NORM_ACCURACY, NoGainError, Norm, Propagator, stable_motion
 from .response import LinearMotion
 
-SYMMETRIC = 1e-6
+LEAST_EXCESS = 1e-6
 """An excess of the bound below this is no gain: K is symmetric, but for rounding."""
 
 LOOSE = 1e-4
@@ -55,13 +55,13 @@ FINE = 1e-4
 GRID = 9
 """Times between two samples at which the norm on that space is looked at."""
 
-NEAR = 0.98
+RIVAL_SHARE = 0.98
 """Maxima on that space which come so close to the largest norm that was found are refined, too."""
 
-LOOKS = 12
+JOINED_VECTORS = 12
 """Vectors that join the space, at the most."""
 
-MOST_DISKS = 300
+GAIN_DISKS = 300
 """Disks up to which commands compute the gain."""
 
 
@@ -151,7 +151,7 @@ def _gain(motion: LinearMotion, norm: Norm) -> TransientGain:
         raise NoGainError("the symmetric part of K is not positive: displacements have no energy to compare with")
     propagator = Propagator.of(motion, norm)
     bound, columns = propagator.bound(), propagator.sampled_modes()
-    if bound < 1 + SYMMETRIC:
+    if bound < 1 + LEAST_EXCESS:
         return _zero_gain(packing, norm, 0.0, bound)
     length = min(propagator.window(columns), propagator.end(bound))
     time, size, start = _refine_maxima(propagator, propagator.candidates(columns, length))
@@ -182,13 +182,13 @@ def _refine_maxima(propagator: Propagator, brackets: list[tuple[float, float]]) 
     )
     seen, last = np.zeros(len(grid)), grid.max()
     best = 0.0, 0.0, right[:, 0]
-    for _ in range(LOOKS):
+    for _ in range(JOINED_VECTORS):
         left, right = np.linalg.qr(left)[0], np.linalg.qr(right)[0]
         small = propagator.on(left, right)
         sizes = np.linalg.norm(small.at(grid.ravel()), 2, (1, 2)).reshape(grid.shape)
-        tops = np.where(sizes.max(axis=1) > seen * (1 + ACCURACY), sizes.max(axis=1), 0.0)
+        tops = np.where(sizes.max(axis=1) > seen * (1 + NORM_ACCURACY), sizes.max(axis=1), 0.0)
         place = int(np.argmax(tops))
-        if tops[place] <= NEAR * best[1]:
+        if tops[place] <= RIVAL_SHARE * best[1]:
             break
         top = int(np.argmax(sizes[place]))
         time = _top(small, grid[place, max(top - 1, 0)], grid[place, min(top + 1, GRID - 1)])

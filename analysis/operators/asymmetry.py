@@ -15,7 +15,7 @@ from ..configuration import Configuration
 from ..contacts import LinearisedContacts
 from .stiffness import stiffness_matrix
 
-SYMMETRIC = 1e-12
+ROUNDING_OF_ENTRY = 1e-12
 """Asymmetry below this share of the largest entry is rounding."""
 
 
@@ -46,5 +46,5 @@ def asymmetry(configuration: Configuration) -> dict[str, float]:
     whole = skew(c)
     sizes = {name: float(np.linalg.norm((whole - skew(each)).data)) for name, each in without.items()}
     total = sum(sizes.values())
-    least = SYMMETRIC * float(np.abs((scale @ stiffness_matrix(configuration) @ scale).data).max(initial=0.0))
+    least = ROUNDING_OF_ENTRY * float(np.abs((scale @ stiffness_matrix(configuration) @ scale).data).max(initial=0.0))
     return {name: size / total if total > least else 0.0 for name, size in sizes.items()}

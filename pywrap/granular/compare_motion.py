@@ -37,7 +37,7 @@ from .granular_commands import SnapshotError
 from .lammps_steps import steps_in_a_copy
 from .look_in_a_copy import can_copy
 
-ACCURACY = 1e-10
+STEP_ERROR = 1e-10
 """Error of a step in the motion with two derivatives, as a share of the largest velocity."""
 
 
@@ -156,8 +156,8 @@ def _linear_velocity(
 
     ends = []
     for sign in (1, -1):
-        begin, error = np.concatenate([still, sign * start]), ACCURACY * np.abs(start).max()
-        found = solve_ivp(slope, (0, time), begin, method="DOP853", t_eval=[time], rtol=ACCURACY, atol=error)
+        begin, error = np.concatenate([still, sign * start]), STEP_ERROR * np.abs(start).max()
+        found = solve_ivp(slope, (0, time), begin, method="DOP853", t_eval=[time], rtol=STEP_ERROR, atol=error)
         if not found.success:
             raise SnapshotError(f"The predicted motion was not found: {found.message} Compare over a shorter time.")
         ends.append(found.y[len(start) :, 0])

@@ -53,7 +53,7 @@ from .looks import box_of
 AGREES = 1e-6
 """Relative difference of the normal forces of LAMMPS from those of its commands, besides that of roundings."""
 
-ROUNDING = 1e-14
+OVERLAP_ROUNDING = 1e-14
 """Rounding of an overlap, as a share of the distance of two centres: some units in the last place of coordinates that
 may be ten times as large."""
 
@@ -110,7 +110,7 @@ def _check_torques(others: Floats, commands: Commands, contacts: LinearisedConta
     """Refuse torques besides those of the contacts: in all that is taken here contacts alone turn particles."""
     forces = (
         AGREES * np.abs(contacts.tangential_force).max(initial=0.0),
-        ROUNDING * contacts.normal_force.max(initial=0.0),
+        OVERLAP_ROUNDING * contacts.normal_force.max(initial=0.0),
     )
     if np.abs(others).max() > sum(forces):
         known = known_cause(commands, contacts)
@@ -244,7 +244,7 @@ def _linearise_measured(
 
 def _agree(computed: Floats, stiffness: Floats, contacts: OneLaw) -> None:
     """Refuse normal forces that are not those of the commands."""
-    said, rounding = contacts.forces[:, 0], ROUNDING * stiffness * contacts.geometry["slip_arm"].sum(axis=1)
+    said, rounding = contacts.forces[:, 0], OVERLAP_ROUNDING * stiffness * contacts.geometry["slip_arm"].sum(axis=1)
     if len(said) and np.any(np.abs(computed - said) > AGREES * np.max(np.abs(said)) + rounding):
         raise SnapshotError(
             f"The normal forces of the {contacts.who} are not those of the commands: {GIVE_LINES}, as they hold now."

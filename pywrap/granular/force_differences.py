@@ -48,22 +48,22 @@ from .look_in_a_copy import in_a_copy, quieten
 SLOW = 1e12
 """Length of a step in which particles are displaced, in time steps: dashpots exert nothing, however strong."""
 
-SHARE = 0.003
+SHARE_OF_OVERLAP = 0.003
 """A displacement as a share of the smallest overlap: the third derivative of Hertz's force, which the extrapolation
 leaves, is 1e-7 of its first there."""
 
-ROUNDING = 2e-9
+LEAST_OF_COORDINATE = 2e-9
 """Smallest displacement as a share of the largest coordinate: a force has the rounding of a coordinate, 1e-16, so that
 its difference has 1e-7."""
 
-TURNS = 3e-4
+LEAST_OF_OVERLAP = 3e-4
 """Smallest displacement as a share of the median overlap: `granular` does not turn a history that has left its plane by
 less than 1e-10 of Coulomb's bound, which is 2e-6 of mu of the difference."""
 
-NEAR = 1e-3
+GAP_OF_NEIGHBOURS = 1e-3
 """Gap between particles, as a share of a radius, up to which they are looked for: far beyond all displacements."""
 
-ALONE = 1e-7
+FREE_DISPLACEMENT = 1e-7
 """A displacement as a share of a radius where no particles overlap."""
 
 PUSH = 1e-4
@@ -169,7 +169,7 @@ def _measure(lmp: Any, particles: Particles, force: float | None) -> ForceDiffer
     stiffness, jump, error = _derivative(by_place, colours, step)
     by_velocity = _Probe(lmp, particles, None, (1.0,))
     if force is None:
-        force = step * float(np.abs(stiffness.data).max(initial=0.0)) / SHARE
+        force = step * float(np.abs(stiffness.data).max(initial=0.0)) / SHARE_OF_OVERLAP
     speed = _speed(by_velocity, step / timestep, PUSH * force)
     if speed == 0.0:
         _refuse_errors(particles, error)
@@ -199,11 +199,13 @@ def displacement(particles: Particles, pairs: Pairs) -> float:
     """A step far below the smallest overlap and gap, as far as rounding allows."""
     gaps = np.abs(pairs.gap[np.isfinite(pairs.gap)])
     overlaps = -pairs.gap[pairs.gap < 0]
-    least = ROUNDING * float(np.abs(particles.position).max())
+    least = LEAST_OF_COORDINATE * float(np.abs(particles.position).max())
     if not len(overlaps):
-        return max(least, ALONE * float(particles.radius.min()))
+        return max(least, FREE_DISPLACEMENT * float(particles.radius.min()))
     usual = float(np.median(overlaps))
-    return float(min(max(SHARE * gaps.min(), least, TURNS * usual), max(SHARE * usual, least)))
+    return float(
+        min(max(SHARE_OF_OVERLAP * gaps.min(), least, LEAST_OF_OVERLAP * usual), max(SHARE_OF_OVERLAP * usual, least))
+    )
 
 
 def _speed(by_velocity: "_Probe", speed: float, force: float) -> float:
@@ -288,9 +290,9 @@ def _nearly_touching(lmp: Any, particles: Particles) -> Pairs:
     every = [np.array(lmp.numpy.extract_atom(name)) for name in ("id", "x", "radius")]
     count = lmp.extract_setting("nlocal") + lmp.extract_setting("nghost")
     ids, x, radius = (values[:count] for values in every)
-    i, j = cKDTree(x).query_pairs(2 * float(radius.max()) * (1 + NEAR), output_type="ndarray").T
+    i, j = cKDTree(x).query_pairs(2 * float(radius.max()) * (1 + GAP_OF_NEIGHBOURS), output_type="ndarray").T
     gap = np.linalg.norm(x[i] - x[j], axis=1) - radius[i] - radius[j]
-    near = (gap >= 0) & (gap < NEAR * radius[i])
+    near = (gap >= 0) & (gap < GAP_OF_NEIGHBOURS * radius[i])
     i, j = (np.searchsorted(particles.ids, ids[each[near]]) for each in (i, j))
     return Pairs(i, j, gap[near], np.zeros(len(i), np.bool_))
 

@@ -46,7 +46,7 @@ OTHER = 1e-6
 """Stiffness that is none of contacts, as a share of K's mean diagonal, from which on a packing is refused: far below
 the smallest eigenvalues, some 1e-4 of the largest, and far above rounding, 1e-11 and less."""
 
-STEPS = 10
+STEPS_OF_PROOF = 10
 """Steps of LAMMPS and of the linearised packing."""
 
 PHASE = 0.5
@@ -58,10 +58,10 @@ COMMON = 1.0
 DISPLACED = 1e-3
 """Common displacement in units of the mean radius."""
 
-ROUNDING = 1e-14
+COORDINATE_ROUNDING = 1e-14
 """Rounding of a displacement, as a share of the largest coordinate: some units in the last place."""
 
-SMALL = 1e-2
+SMALL_OVERLAP = 1e-2
 """Share of the median overlap: smaller overlaps do not decide how small the velocities are."""
 
 GOOD = 1e-5
@@ -122,8 +122,8 @@ def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extr
         return difference
     causes = causes or list(others.values())
     says = (
-        f"LAMMPS's forces do not change as K says: in {STEPS} steps from small velocities the change differs by "
-        f"{difference:.2g} of itself"
+        f"LAMMPS's forces do not change as K says: in {STEPS_OF_PROOF} steps from small velocities the change differs "
+        f"by {difference:.2g} of itself"
     )
     if causes:
         raise NotProvedError(f"{says}; {' and '.join(causes)}.")
@@ -175,7 +175,7 @@ class _Comparison:
             return None
         k, c = (_largest_row(matrix, configuration) for matrix in (stiffness, damping))
         timestep, start = PHASE / (0.5 * (c + np.sqrt(c * c + 4 * k))), _start(configuration)
-        start = start / _deformation(configuration, STEPS * timestep * start)
+        start = start / _deformation(configuration, STEPS_OF_PROOF * timestep * start)
         return cls(configuration, stiffness, damping, extrapolates, start, timestep)
 
     @property
@@ -198,7 +198,7 @@ class _Comparison:
             IDs of fixes that are left out.
         """
         overlap = float(np.median(_overlaps(self.configuration)))
-        rounding = ROUNDING * float(np.abs(self.configuration.position).max()) / overlap
+        rounding = COORDINATE_ROUNDING * float(np.abs(self.configuration.position).max()) / overlap
         # roundings over the amplitude are as large as terms of second order, or of third order
         alone, both = rounding ** (1 / 2), rounding ** (1 / 2 if self.one_sided else 1 / 3)
         best, other = self.difference(lmp, alone, (1.0,), without)
@@ -233,7 +233,7 @@ class _Comparison:
                 c,
                 size * self.start,
                 self.timestep,
-                STEPS,
+                STEPS_OF_PROOF,
                 displacement=way if displaces and k == 0 else None,
                 without=without,
             )
@@ -283,7 +283,7 @@ class _Comparison:
         slack = (c.friction - np.linalg.norm(c.tangential_force, axis=1))[c.one_sided, None]
         state.p += slack
         constant = constant + system.sliders[0] @ slack
-        system.take_steps(state, self.timestep, STEPS, constant=constant, extrapolates=self.extrapolates)
+        system.take_steps(state, self.timestep, STEPS_OF_PROOF, constant=constant, extrapolates=self.extrapolates)
         velocity[motion.active] = state.v / motion.root_mass[:, None]
         return velocity
 
@@ -301,7 +301,7 @@ class _Comparison:
         velocity = self.start[:, None] * sizes
         displacement = np.zeros_like(velocity)
         change = acceleration(displacement, velocity)
-        for _ in range(STEPS):
+        for _ in range(STEPS_OF_PROOF):
             half = velocity + 0.5 * dt * change
             displacement += dt * half
             change = acceleration(displacement, 2 * half - velocity if self.extrapolates else half)
@@ -332,7 +332,7 @@ def _deformation(configuration: Configuration, displacement: Floats) -> float:
     c, (u, _) = configuration.contacts, configuration.vectors(displacement)
     overlap = _overlaps(configuration)
     between = u[c.i] - np.where(c.wall[:, None], 0.0, u[c.j]) if len(c) else u
-    return float((np.linalg.norm(between, axis=1) / np.maximum(overlap, SMALL * np.median(overlap))).max())
+    return float((np.linalg.norm(between, axis=1) / np.maximum(overlap, SMALL_OVERLAP * np.median(overlap))).max())
 
 
 def _overlaps(configuration: Configuration) -> Floats:

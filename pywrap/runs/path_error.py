@@ -66,7 +66,7 @@ SHIFTS = 1 / 3, 2 / 3
 LONGEST_RUN = 2
 """Loads that may be left out one after the other."""
 
-SMALL = 30
+DISKS_OF_ALL_MODES = 30
 """Disks up to which all eigenvalues take no longer than some."""
 
 UNKNOWN = 2.0
@@ -289,7 +289,11 @@ def squared_gap(eigenvalue: float) -> Vanishes:
     def discriminant(packing: Packing) -> float:
         near = eigenvalue * (1 + 1e-7)  # no eigenvalue to the last digit
         bare = force_bearing(packing)
-        values = eigvals(dynamical_matrix(bare)[0].toarray()) if len(bare) < SMALL else eigenpairs(bare, near, 4).values
+        values = (
+            eigvals(dynamical_matrix(bare)[0].toarray())
+            if len(bare) < DISKS_OF_ALL_MODES
+            else eigenpairs(bare, near, 4).values
+        )
         one, other = values[np.argsort(np.abs(values - eigenvalue))[:2]]
         return float(((one - other) ** 2).real)
 

@@ -78,7 +78,8 @@ OWN_WORDS = {"law.kt": "kn", "friction.v_ss": "v0", "friction.v0": "calibrated",
 """Texts of a scene that are no quantities, by a word in them."""
 
 DIGITS = 12
-"""Decimal digits of numbers that are converted, as of those that settle."""
+"""Decimal digits of numbers that are converted: more than anybody gives, and fewer than a change of units leaves
+right."""
 
 STIFFNESS_OF_ONE = 2e5
 """k_n where the smallest disks have diameter and mass one: the paper's."""

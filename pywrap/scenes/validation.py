@@ -14,15 +14,13 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ...analysis import BadInputError
+from ...analysis.arrays import LARGEST, SMALLEST
 from ...analysis.files.plain_file import read_plain_text
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
-
-SMALLEST, LARGEST = 1e-100, 1e100
-"""Between these a number may be: LAMMPS reads no subnormal ones, and products of three stay finite."""
 
 
 def check_number(value: float) -> float:

@@ -20,6 +20,7 @@ from ..equilibria.quasistatic import Equilibrium, equilibrate, idle_disks
 from ..equilibria.rattlers import clear_rattlers
 from ..lammps.engine import Engine
 from ..scenes.packing_section import GeneratedPacking
+from ..scenes.quantities import DIGITS
 from ..scenes.scene import Scene
 from ..scenes.validation import SceneError
 from .change_load import change_load
@@ -32,10 +33,6 @@ rearrange rather than relax."""
 STIFFNESS = {1.5: 2e5, 1.0: 7e3}
 """k_n while a packing settles, by the exponent of the law (of others that of 3/2): the paper's, and of harmonic disks
 the stiffness 3/2 k_n delta^(1/2) that a contact of the paper's law has under the paper's load."""
-
-DIGITS = 12
-"""Decimal digits of numbers that are converted: more than anybody gives, and fewer than a change of units leaves
-right."""
 
 SLIPPERY = 1e-3
 """Friction coefficient below which friction bears no packing: contacts are at their bound at slips of a thousandth of

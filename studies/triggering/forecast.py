@@ -13,19 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...analysis import spectrum
+from ...analysis.motion.growth import JUMP_SHARE, LINEAR
 from ...analysis.motion.response import LinearMotion
 from ...pywrap import Equilibrium
 
-JUMP_SHARE = 0.05
-"""Share of the run with mu(v) that shows the jump, from the moment on at which friction weakens: 10 of 200 time units,
-where the slowest modes of 100 disks have periods of 6, and the fastest pairs have just begun to stand out."""
-
 FORECAST_TIMES = 2000
 """Times at which the linear motion is looked at."""
-
-LINEAR = 0.1
-"""Root of D, in units of the smallest overlap, up to which the motion may be linear: of eight runs that were made
-before the rule, D stopped at 0.7 to 31 times the square of that."""
 
 
 @dataclass(frozen=True)

@@ -111,7 +111,7 @@ def test_disk_on_top_of_another_rolls_down():
 
 @pytest.mark.slow
 def test_layer_that_still_sinks_when_steps_run_out_is_refused(monkeypatch):
-    monkeypatch.setattr(minimize_energy_module, "STEPS", 5000)
+    monkeypatch.setattr(minimize_energy_module, "STAGE_STEPS", 5000)
     with pytest.raises(NoEquilibriumError, match=r"leave packing\.top out"):
         settle(scene(**LARGE, top=8))
 

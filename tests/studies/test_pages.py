@@ -9,7 +9,7 @@ from reference_layer import SMALL
 from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import RunFile
-from faultgouge.figures.pages import WIDTH, fill_paragraphs
+from faultgouge.figures.pages import PROSE_WIDTH, fill_paragraphs
 from faultgouge.figures.style import report_failure
 from faultgouge.pywrap import Scene
 from faultgouge.studies.reproduce.compute import growth_run, recorded_ramp, summary_of
@@ -50,7 +50,7 @@ def test_the_page_of_the_protocol_counts_no_windows_that_were_not_counted(tmp_pa
 
 def test_prose_and_items_are_folded_where_no_line_begins_a_list():
     lines = fill_paragraphs(PROSE).split("\n")
-    assert max(map(len, lines)) <= WIDTH
+    assert max(map(len, lines)) <= PROSE_WIDTH
     assert not [line for line in lines if re.match(r"([-+>#]|\d+\.) ", line)]
     assert " ".join(lines).split() == PROSE.split()
     first, *more = fill_paragraphs("- " + PROSE).split("\n")

@@ -215,9 +215,9 @@ def _print_growing_motions(result: Spectrum, dissipative: bool, verbose: bool) -
 
 def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None, with the reason, if unstable, too large, or where it fails."""
-    from faultgouge.analysis.motion.transient import MOST_DISKS, NoGainError, transient_gains
+    from faultgouge.analysis.motion.transient import GAIN_DISKS, NoGainError, transient_gains
 
-    most, size = 3 * MOST_DISKS, packing.configuration.coordinates
+    most, size = 3 * GAIN_DISKS, packing.configuration.coordinates
     if size > most:
         say(f"no gain: it is computed of up to {most} coordinates, and this packing has {size}")
         return None

@@ -199,7 +199,7 @@ def test_large_packings_have_the_verdict_of_small_ones(monkeypatch):
     at_rest = derive_frozen(at_rest, load=-at_rest.contact_force)
     expected = stability(at_rest)
     monkeypatch.setattr(stability_module, "LARGE", 0)
-    for name, value in {"SLICED": 0, "DENSE": 0, "DISCS_UP_TO": 0, "PERIODS_OF_LARGE": 9 * 30.0}.items():
+    for name, value in {"SLICED": 0, "DENSE_DAMPED": 0, "DISCS_UP_TO": 0, "PERIODS_OF_LARGE": 9 * 30.0}.items():
         monkeypatch.setattr(motion_module, name, value)
     found = stability(at_rest)
     assert found.stable is True
@@ -216,7 +216,7 @@ def test_a_search_that_finds_no_growth_is_no_proof_that_a_packing_is_stable(monk
     at_rest = derive_frozen(stuck, load=-stuck.contact_force)
     assert stability(at_rest).stable is True
     monkeypatch.setattr(stability_module, "LARGE", 0)
-    for name, value in {"SLICED": 0, "DENSE": 0, "DISCS_UP_TO": 0, "PERIODS_OF_LARGE": 9 * 30.0}.items():
+    for name, value in {"SLICED": 0, "DENSE_DAMPED": 0, "DISCS_UP_TO": 0, "PERIODS_OF_LARGE": 9 * 30.0}.items():
         monkeypatch.setattr(motion_module, name, value)
     found = stability(at_rest)
     assert found.stable is None

@@ -47,7 +47,7 @@ def test_rates_of_a_packing_beyond_lapack_have_its_slowest_decay(damped, monkeyp
     expected = Motion.of(damped).rates
     assert not expected.grows.any()
     assert expected.growth_rate < 0
-    monkeypatch.setattr(module, "DENSE", 100)
+    monkeypatch.setattr(module, "DENSE_DAMPED", 100)
     found = Motion.of(damped).rates
     assert not found.grows.any()
     assert found.growth_rate == pytest.approx(expected.growth_rate, rel=1e-6)
