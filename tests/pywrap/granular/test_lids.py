@@ -105,6 +105,17 @@ def test_particles_of_different_mass_under_one_mean_force(tmp_path):
     lmp.close()
 
 
+def test_a_spring_in_aveforce_is_refused(tmp_path):
+    """The fix is taken away where forces are differences, and the spring would be missing in K."""
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    spring = "variable pull equal 0.05-10*(xcm(lid,x)-1.65)"
+    lid = f"{spring}\nfix body lid nve\nfix push lid addforce 0 0 -2.0\nfix stiff lid aveforce v_pull 0.0 0.0"
+    lmp = cell(tmp_path, lid)
+    with pytest.raises(SnapshotError, match=r"fix stiff aveforce adds the force v_pull.*fix addforce"):
+        from_lammps(lmp)
+
+
 def test_a_body_that_may_rotate_is_refused(tmp_path):
     from faultgouge.pywrap import SnapshotError, from_lammps
 
