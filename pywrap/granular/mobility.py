@@ -100,8 +100,8 @@ def _apply(found: _Coordinates, name: str, style: str, words: list[str], members
         for k in range(3):
             if words[k].startswith("v_"):  # K by differences takes this fix away, and its force with it
                 raise SnapshotError(
-                    f"fix {name} aveforce adds the force {words[k]}, which may change with the place: give this force to "
-                    "fix addforce, and 0.0 to fix aveforce."
+                    f"fix {name} aveforce adds the force {words[k]}, which may change with the place: give this force "
+                    "to fix addforce, and 0.0 to fix aveforce."
                 )
             joined = members & found.moves[k]
             if words[k] != "NULL" and joined.any():

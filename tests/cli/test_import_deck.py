@@ -185,6 +185,7 @@ def test_regions_that_move(faultgouge_here, tmp_path):
         (tmp_path / "packing.restart").unlink()
 
 
+@pytest.mark.long
 def test_time_step_with_which_nothing_rests(faultgouge_here, tmp_path):
     """Rolling dashpots stronger than the time step allows: spheres vibrate for ever, as their friction bounds it."""
     deck = POUR.format(law=LAW.format(g=500), rise=0.0, steps=6000)

@@ -315,7 +315,8 @@ def with_failing_engine(folder, ranks, script, *arguments):
 
 @pytest.mark.ranks
 @pytest.mark.parametrize(
-    ("ranks", "rank", "call"), [(1, -1, 1), (2, 1, 1), pytest.param(2, -1, 30, marks=pytest.mark.long), (2, 0, 30)]
+    ("ranks", "rank", "call"),
+    [(1, -1, 1), (2, 1, 1), *(pytest.param(2, rank, 30, marks=pytest.mark.long) for rank in (-1, 0))],
 )
 @pytest.mark.slow
 def test_its_sentence_reaches_the_command(settled, ranks, rank, call):

@@ -77,7 +77,6 @@ def test_drive_is_a_table_of_slips_pictures_a_film_and_spectra(faultgouge_here, 
     with Image.open(tmp_path / "film.gif") as gif:
         assert gif.n_frames == 5
     assert "eigenvalues" in faultgouge_here("spectrum", "drive.h5", "--frame", slip["frame_before"]).stdout
-    assert "floor" in faultgouge_here("explain", "scene.toml").stdout
 
 
 @pytest.mark.slow

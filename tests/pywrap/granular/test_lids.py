@@ -90,6 +90,7 @@ def test_a_lid_moves_as_one(tmp_path, lid):
     lmp.close()
 
 
+@pytest.mark.long
 def test_particles_of_different_mass_under_one_mean_force(tmp_path):
     """fix aveforce gives them the same force: a lid of two masses deforms as the inverse masses."""
     from faultgouge import relax

@@ -65,7 +65,9 @@ def look(lmp, log, lines: str = "", run: int = 0, *, prove: bool = True):
 @pytest.mark.parametrize(
     ("fix", "says"),
     [
-        ("smd cvel 2.0 1e-9 tether 1.5 1.5 NULL 0.0", "fix trap smd pulls at particles"),
+        pytest.param(
+            "smd cvel 2.0 1e-9 tether 1.5 1.5 NULL 0.0", "fix trap smd pulls at particles", marks=pytest.mark.long
+        ),
         ("rhok 1 0 0 20.0 0.2", "fix trap rhok acts on particles as contacts do not tell"),
         ("flow/gauss 1 1 0", "fix trap flow/gauss acts on particles as contacts do not tell"),
         ("momentum 1000 linear 1 1 0", "fix trap momentum changes velocities"),
