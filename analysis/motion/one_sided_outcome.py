@@ -32,8 +32,8 @@ VERDICT_STEP = 0.1
 """Time step of one-sided motion as a share of the largest stable one: rates of growth are right to some per cent."""
 
 STEP_OF_LARGE = 0.3
-"""The same of large packings. Beside steps of a sixteenth, of four packings of 50 spheres: rates of growth are 2 to 3 %
-too large, and an amplification 1 %."""
+"""The same of large packings. With 0.4, beside steps of a sixteenth, rates of growth of four packings of 50 spheres are
+3 to 5 % too large."""
 
 STEPS_OF_CHUNK = 300
 """Stable time steps between two looks at whether a motion has settled: some ten periods of a slow mode."""
