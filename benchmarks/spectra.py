@@ -88,7 +88,7 @@ def measured(packing: HasConfiguration, sliced: float) -> tuple[Spectrum, float,
 
 
 def _measure(packing: HasConfiguration, sliced: float) -> tuple[Spectrum, float, float]:
-    spectrum_module.SLICED = sliced  # type: ignore[assignment]
+    spectrum_module.SLICED = sliced  # type: ignore[assignment]  # infinity: no slices at all
     begin = time.process_time()
     found = spectrum(packing)
     return found, time.process_time() - begin, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20

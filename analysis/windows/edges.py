@@ -94,12 +94,13 @@ class Edge:
     def root(cls, fx: float, error: float, spaces: Sequence[Space]) -> "Edge":
         """The edge at a root of the growth, from the motion at loads close to it."""
         middle = spaces[len(spaces) // 2]
-        mean, kind = np.mean([each.mean for each in spaces]), "coalescence"
+        mean = np.mean([each.mean for each in spaces])
+        kind: Kind = "coalescence"
         if middle.system.dissipative:
             size = float(np.sqrt(np.abs(entries(middle.system.stiffness)).max()))
             kind = "steady" if middle.mean.imag <= LIMITS.steady * size else "hopf"
         overlap = min(each.overlap for each in spaces)
-        return cls(fx, error + middle.system.balance, mean.item(), overlap, kind)  # type: ignore[arg-type]
+        return cls(fx, error + middle.system.balance, mean.item(), overlap, kind)
 
     def in_units_of(self, unit: float) -> "Edge":
         """The edge of systems whose A was divided by a unit, 1 / time^2."""

@@ -15,7 +15,7 @@ from .granular_commands import OWN, Commands, SnapshotError
 from .instance_queries import open_files
 from .lammps_arrays import Arrays
 from .look_in_a_copy import in_a_copy
-from .looks import box_of, look_at_forces
+from .looks import box_of, look_at_forces, particles_of
 from .mobility import mobility
 
 
@@ -74,22 +74,10 @@ def still_particles(lmp: Any, given: Commands | None) -> Still:
     axes = 6 if dimension == 3 else 3
     free = np.diff(constraint.indptr).reshape(axes, count).any(axis=0)
     alone = diags_array(np.tile(free, axes).astype(np.float64))
-    box, origin, periodic = box_of(lmp)
     empty = csr_array(constraint.shape)
     made = Configuration(
-        dimension=dimension,
-        position=found["x"][:, :dimension],
-        radius=found["radius"],
-        mass=found["rmass"],
-        inertia=factor * found["rmass"] * found["radius"] ** 2,
-        contacts=_forces_of_pairs(found, box, commands.style),
-        box=box,
-        origin=origin,
-        periodic=periodic,
-        load=np.zeros((count, 2, 3)),
-        free=free,
-        ids=found["id"].astype(np.int64),
-        kind=found["type"].astype(np.int64),
+        **particles_of(lmp, found, free, factor),
+        contacts=_forces_of_pairs(found, box_of(lmp)[0], commands.style),
         stiffness=empty,
         damping=empty,
         constraint=constraint if abs(constraint - alone).nnz else None,

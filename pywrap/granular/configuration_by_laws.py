@@ -48,7 +48,7 @@ from .contact_law_measurement import MeasuredLaw, measure_law
 from .granular_commands import GIVE_LINES, OWN, Commands, NotLinearisedError, SnapshotError, without_suffix
 from .lammps_arrays import Arrays
 from .law_remarks import remark_on
-from .looks import box_of
+from .looks import box_of, particles_of
 
 AGREES = 1e-6
 """Relative difference of the normal forces of LAMMPS from those of its commands, besides that of roundings."""
@@ -63,28 +63,11 @@ KnownLaws = dict[tuple[Any, ...], MeasuredLaw]
 
 def configuration_by_laws(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> Configuration:
     """The configuration of the arrays of a look; laws that are known are not measured, and new ones are added."""
-    count, dimension = len(found["id"]), lmp.extract_setting("dimension")
-    if count == 0:
+    if not len(found["id"]):
         raise SnapshotError("This LAMMPS has no particles.")
     free, frozen, factor = _free_particles(commands, found)
-    box, origin, periodic = box_of(lmp)
-    contacts, remarks = _linearised_contacts(lmp, commands, found, frozen, laws, box)
-    made = Configuration(
-        dimension=dimension,
-        position=found["x"][:, :dimension],
-        radius=found["radius"],
-        mass=found["rmass"],
-        inertia=factor * found["rmass"] * found["radius"] ** 2,
-        contacts=contacts,
-        box=box,
-        origin=origin,
-        periodic=periodic,
-        load=np.zeros((count, 2, 3)),
-        free=free,
-        ids=found["id"].astype(np.int64),
-        kind=found["type"].astype(np.int64),
-        remarks=remarks,
-    )
+    contacts, remarks = _linearised_contacts(lmp, commands, found, frozen, laws, box_of(lmp)[0])
+    made = Configuration(**particles_of(lmp, found, free, factor), contacts=contacts, remarks=remarks)
     total = np.stack([found["f"], found["torque"]], axis=1)
     load = np.where(free[:, None, None], total - made.contact_force, -made.contact_force)
     _check_torques(load[free, 1] / made.radius[free, None], commands, made.contacts)

@@ -157,3 +157,26 @@ def box_of(lmp: Any) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     size = np.subtract(high, low)
     edges = np.array([[size[0], 0, 0], [xy, size[1], 0], [xz, yz, size[2]]])
     return edges, np.array(low), np.array(periodic, dtype=np.bool_)
+
+
+def particles_of(lmp: Any, found: Arrays, free: NDArray[np.bool_], factor: Floats) -> dict[str, Any]:
+    """Fields of a Configuration that are those of the particles and of the box, without load.
+
+    `free` says which particles move, shape (N,), and `factor` is the moment of inertia over m R^2, shape (N,).
+    """
+    dimension = lmp.extract_setting("dimension")
+    box, origin, periodic = box_of(lmp)
+    return {
+        "dimension": dimension,
+        "position": found["x"][:, :dimension],
+        "radius": found["radius"],
+        "mass": found["rmass"],
+        "inertia": factor * found["rmass"] * found["radius"] ** 2,
+        "box": box,
+        "origin": origin,
+        "periodic": periodic,
+        "load": np.zeros((len(found["id"]), 2, 3)),
+        "free": free,
+        "ids": found["id"].astype(np.int64),
+        "kind": found["type"].astype(np.int64),
+    }

@@ -74,18 +74,21 @@ def ramp(
             yield start
 
 
-def reach(scene: Scene, fx: float) -> Iterator[Equilibrium]:
-    """Compute the equilibria up to and including fx, in steps of the scene's ramp or, without a ramp, of F_y/3000."""
+def reach(scene: Scene, fx: float, communicator: MPI.Comm | None = None) -> Iterator[Equilibrium]:
+    """Compute the equilibria up to and including fx, in steps of the scene's ramp or, without a ramp, of F_y/3000.
+
+    The ranks of the communicator share the packing; all by default.
+    """
     step = step_of(scene)
     step = min(step, fx) or step  # one increment, where the first one of the ramp were too large
     settings = scene.ramp or Ramp(step=step, until=step)
     settings = settings.model_copy(update={"step": step, "until": max(fx, step)})
     bounded = scene.model_copy(update={"ramp": settings})
-    for last in ramp(bounded):
+    for last in ramp(bounded, communicator=communicator):
         yield last
         if last.fx >= fx:
             return
-    with Engine(last.packing) as engine:
+    with Engine(last.packing, communicator) as engine:
         yield next_equilibrium(engine, last, fx, bounded)
 
 

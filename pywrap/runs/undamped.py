@@ -152,7 +152,7 @@ def perturb(
     if start is None:
         if settings.fx is None:
             raise SceneError("perturb.fx is missing: give the load of the run, or the equilibrium from which it starts")
-        *_, start = reach(scene, settings.fx)
+        *_, start = reach(scene, settings.fx, communicator)
     packing = start.packing
     dt, steps = sample_steps(settings, packing, samples, early)
     everyone = range(len(packing)) if settings.target == "all" else settings.target
