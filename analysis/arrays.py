@@ -26,8 +26,7 @@ Data = TypeVar("Data", bound="DataclassInstance")
 
 
 def same_bits(one: Any, other: Any) -> bool:
-    """Whether two of a dataclass have the same bits in every field that is compared; -0.0 is not 0.0, and a missing
-    array no zeros."""
+    """Whether two instances of a dataclass have the same bits in every compared field; -0.0 differs from 0.0."""
     for name in (field.name for field in one.__dataclass_fields__.values() if field.compare):
         a, b = getattr(one, name), getattr(other, name)
         if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
@@ -69,7 +68,7 @@ def derive_frozen(data: Data, **changes: object) -> Data:
 
 
 def number(name: str, value: float, *, positive: bool = False) -> float:
-    """A float; a ValueError if it is not finite, or not positive where it has to be."""
+    """The value as a float; ValueError if the value is not finite or, where `positive`, not positive."""
     found = float(value)
     if not np.isfinite(found) or (positive and found <= 0):
         raise ValueError(f"{name} = {found} is not a number that it can have.")
@@ -81,7 +80,7 @@ SMALLEST, LARGEST = 1e-100, 1e100
 
 
 def positive_each(name: str, array: Floats) -> Floats:
-    """The array; an error if one of its values, each of which is a disk's, is not positive, tiny or huge."""
+    """The array; ValueError if the value of a disk is not positive, or is tiny or huge."""
     if np.any(array <= 0):
         raise BadInputError(f"Every {name} must be positive; disk {np.argmin(array)} has another.")
     odd = np.flatnonzero((array < SMALLEST) | (array > LARGEST))
@@ -93,7 +92,7 @@ def positive_each(name: str, array: Floats) -> Floats:
 
 
 def booleans(name: str, value: ArrayLike, count: int) -> NDArray[np.bool_]:
-    """A copy; a ValueError if it is not so many booleans, one for each disk."""
+    """A copy as booleans, one for each disk; ValueError if there are not `count` booleans."""
     array = np.array(value)
     if array.shape != (count,) or array.dtype != np.bool_:
         raise ValueError(f"{name} must be {count} booleans, one for each disk.")
@@ -108,7 +107,7 @@ def real(name: str, value: ArrayLike) -> Floats:
 
 
 def floats(name: str, value: ArrayLike, shape: Iterable[int]) -> Floats:
-    """A copy as doubles; a ValueError if it has another shape, or a value that is not finite and real."""
+    """A copy as doubles; ValueError if the shape differs, or a value is not finite and real."""
     array = real(name, value)
     if array.shape != tuple(shape):
         raise ValueError(f"{name} has shape {array.shape}; {tuple(shape)} is needed.")
@@ -118,7 +117,7 @@ def floats(name: str, value: ArrayLike, shape: Iterable[int]) -> Floats:
 
 
 def square(name: str, value: csr_array, size: int) -> csr_array:
-    """A copy as a sparse matrix, read-only; a ValueError if it has another shape, or an entry that is not finite."""
+    """A read-only copy as a sparse matrix; ValueError if the shape differs, or an entry is not finite."""
     matrix = csr_array(value, dtype=np.float64, copy=True)
     matrix.sum_duplicates()
     if matrix.shape != (size, size):
@@ -131,7 +130,7 @@ def square(name: str, value: csr_array, size: int) -> csr_array:
 
 
 def integers(name: str, value: ArrayLike) -> Indices:
-    """A copy as a list of integers; a ValueError if it is none."""
+    """A copy as an array of integers; ValueError if the values are no integers."""
     array = np.array(value)
     if array.ndim != 1 or not (array.size == 0 or np.issubdtype(array.dtype, np.integer)):
         raise ValueError(f"The contact array {name} must be a list of integers.")

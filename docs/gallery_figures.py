@@ -1,4 +1,4 @@
-"""Figures of the gallery: those that a block of a script has left in its variables, as faultgouge uses no pyplot."""
+"""Figures of the gallery: faultgouge uses no pyplot, so that figures are found in the variables of a script."""
 
 from pathlib import Path
 from typing import Any

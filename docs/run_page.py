@@ -63,7 +63,7 @@ def words_of(lines: tuple[str, ...]) -> list[str]:
 
 
 def alike(shown: str, printed: str) -> bool:
-    """Whether a word of the page is what was printed."""
+    """Whether a word of the page equals the printed word."""
     if shown == printed:
         return True
     if not (NUMBER.match(shown) and NUMBER.match(printed)):

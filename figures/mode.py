@@ -238,7 +238,7 @@ def _arrow_scale(packing: HasConfiguration, mode: Mode) -> float:
 
 
 def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list[Mode], str]:
-    """A mode of a packing by its number, or those of `unstable_pair`; with what they are.
+    """A mode of a packing by its number, or the modes of `unstable_pair`; with a description.
 
     Raises
     ------

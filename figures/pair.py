@@ -177,7 +177,7 @@ def draw_pair(curves: Sequence[PairCurve]) -> Figure:
 
 
 def _limits(curves: Sequence[PairCurve]) -> tuple[float, float] | tuple[None, None]:
-    """Range of the real parts up to the onsets and while the pairs are complex: what comes after may go anywhere."""
+    """Range of the real parts up to the ends of the windows; real parts beyond the windows may lie outside."""
     shown = [
         curve.real[(curve.fx <= (np.inf if curve.fx_c is None else curve.fx_c)) | (curve.imaginary[:, 1] > 0)]
         for curve in curves

@@ -69,7 +69,7 @@ class Eye:
 
 
 def corners_of(configuration: Configuration) -> tuple[Floats, Floats]:
-    """Lower and upper corner of what is shown: the box along periodic axes, walls and spheres along the others."""
+    """Lower and upper corner of the picture: the box along periodic axes, walls and spheres along the others."""
     reach = configuration.radius[:, None]
     low, high = (configuration.position - reach).min(axis=0), (configuration.position + reach).max(axis=0)
     across = configuration.periodic & (np.abs(configuration.box - np.diag(np.diag(configuration.box))).sum(axis=1) == 0)

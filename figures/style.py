@@ -35,7 +35,7 @@ def figure_of(axes: Axes) -> Figure:
 
 @contextmanager
 def report_failure(what: str, say: Callable[[str], None]) -> Iterator[None]:
-    """Pictures whose failure is told in one sentence, and costs nothing of what was computed.
+    """Print the failure of a picture as one sentence, and go on: no computed number is lost.
 
     Parameters
     ----------

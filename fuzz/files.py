@@ -68,7 +68,7 @@ def content(path: Path) -> list[bytes]:
 
 
 def run(count: int, folder: Path, seed: int = 0) -> Iterator[tuple[str, str]]:
-    """Damage files at random; what was done, and what is wrong, for each."""
+    """Damage files at random; yield for each the damage, and the fault that was found."""
     chance = random.Random(seed)
     sound, damaged = folder / "sound.h5", folder / "damaged.h5"
     sound_file(sound)

@@ -103,7 +103,7 @@ def start_command(work: CommandToKill, folder: Path) -> subprocess.Popen[str]:
 
 
 def finish_command(work: CommandToKill, folder: Path, timeout: float = 600.0) -> tuple[float, str]:
-    """Run the command to its end; the seconds, and what is wrong, if something is."""
+    """Run the command to its end; the seconds, and the fault, if there is one."""
     begin = time.monotonic()
     running = start_command(work, folder)
     _, errors = running.communicate(timeout=timeout)
@@ -112,7 +112,7 @@ def finish_command(work: CommandToKill, folder: Path, timeout: float = 600.0) ->
 
 
 def kill_command(work: CommandToKill, folder: Path, number: int, after: float) -> str:
-    """Kill the command after so many seconds; what is wrong with how it ends."""
+    """Kill the command after so many seconds; the fault of its end, if there is one."""
     running = start_command(work, folder)
     try:
         running.communicate(timeout=after)
@@ -165,7 +165,7 @@ def difference(one: dict[str, tuple[object, ...]], other: dict[str, tuple[object
 
 
 def run(kills: int, folder: Path, seed: int = 0, only: str = "") -> Iterator[tuple[str, str]]:
-    """Kill commands at random moments; what was done, and what is wrong, for each."""
+    """Kill commands at random moments; yield for each the moment, and the fault that was found."""
     random_moment = random.Random(seed)
     works = {name: work for name, work in WORKS.items() if only in ("", name)}
     for place, (name, work) in enumerate(works.items()):

@@ -144,7 +144,7 @@ def apart(one: Packing, other: Packing) -> float:
 
 
 def packing_row(number: int) -> Row:
-    """All ramps of a packing, and what is found of them."""
+    """All ramps of a packing, and their onsets."""
     mapping, increments = draw_scene(number)
     climbs = []
     for precision, step in product(ARITHMETICS, increments):
@@ -175,7 +175,7 @@ def _compare_ramps(climb: RampRun, reference: RampRun) -> Row:
 
 
 def rows_of(path: Path, packings: int, workers: int) -> Iterator[Row]:
-    """The rows of packings as they are known; those that are not in the file are computed, and written."""
+    """The rows of packings, from the file or else computed and appended to the file."""
     known = {row["draw"]: row for row in read_keyed_rows(path, "draw", "python -m fuzz.ramps")}
     yield from known.values()
     missing = [number for number in range(packings) if number not in known]

@@ -83,7 +83,7 @@ OTHERS = [
 
 
 def run(count: int, folder: Path, seed: int, longest: int = LONGEST) -> Iterator[tuple[str, str]]:
-    """Try so many scenes, each for `longest` seconds of processor time: what was odd, and what went wrong or ""."""
+    """Try so many scenes, each for `longest` seconds of processor time: the odd keys, and the fault or ""."""
     chance = random.Random(seed)
     for number in range(count):
         scene, section, key = deepcopy(SCENE), *chance.choice([(s, k) for s in SCENE for k in SCENE[s]])
@@ -107,7 +107,7 @@ def run(count: int, folder: Path, seed: int, longest: int = LONGEST) -> Iterator
 
 
 def toml(scene: dict[str, dict[str, Any]]) -> str:
-    """The scene as a file has it."""
+    """The scene as TOML."""
     lines = [
         [f"[{name}]", *(f"{key} = {_literal(value)}" for key, value in keys.items())] for name, keys in scene.items()
     ]

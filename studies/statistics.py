@@ -29,7 +29,7 @@ def share(count: int, of: int) -> dict[str, Any]:
 
 
 def median(values: Sequence[float] | Floats, draws: int = 2000) -> list[float]:
-    """Median with its 95 % interval from resampled packings: [median, low, high]; inf stands for what has no bound."""
+    """Median with its 95 % interval from resampled packings: [median, low, high]; inf without a bound."""
     values = np.sort(np.asarray(values, dtype=float))
     if len(values) == 0:
         return [np.nan] * 3

@@ -41,7 +41,7 @@ BYTES_AT_A_TIME = 1 << 20
 
 @contextmanager
 def replace_whole(path: Path) -> Iterator[Path]:
-    """Replace a file in one step by what is written to a new one, whose name is handed on.
+    """Yield the name of a new file, and put this file in the place of the old one in one step.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def add_checksum(content: bytes) -> bytes:
 
 
 def has_checksum(path: Path) -> bool:
-    """Whether a file has a header, and its content is the one that was sealed.
+    """Whether a file has a header, and the checksum in the header is that of the content.
 
     Returns
     -------

@@ -97,7 +97,7 @@ class SealedFile:
         return not self._unsaved
 
     def save(self) -> None:
-        """Hand what was changed to the system, under the file's name."""
+        """Write all changes to the file on the disk."""
         if self._writable and self._unsaved and self._sound:
             begin = monotonic()
             write(self.path, self._file)
@@ -153,14 +153,14 @@ def new_file() -> h5py.File:
 
 
 def write(path: Path, file: h5py.File) -> None:
-    """Write what is in memory, sealed."""
+    """Write a file that is kept in memory, with its checksum."""
     file.flush()
     image = file.id.get_file_image()
     write_whole(path, add_checksum(image), image)
 
 
 def open_checksummed(path: Path) -> h5py.File:
-    """The file for reading."""
+    """Open a file for reading."""
     import h5py
 
     try:

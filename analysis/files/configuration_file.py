@@ -93,7 +93,7 @@ def write_configuration(
 
 
 def holds_configuration(path: Path) -> bool:
-    """Whether a file is an HDF5 file with a configuration in it; false for what is no HDF5 file.
+    """Whether a file is an HDF5 file with a configuration; False for any other kind of file.
 
     Raises
     ------

@@ -34,7 +34,7 @@ class _UnsoundError(Exception):
 
 
 def _require(sound: object, says: str) -> None:
-    """Refuse the file if it is not sound, in words that say what is wrong."""
+    """Refuse a damaged file, with the reason."""
     if not sound:
         raise _UnsoundError(says)
 

@@ -136,7 +136,7 @@ def _units(scene: Scene) -> dict[str, float] | None:
 
 
 def _run_feature(feature: Feature, scene: InstanceContents, steps: int, folder: Path) -> Part:
-    """Both runs of a feature: what it loads, what it costs, and whether they agree."""
+    """Run a feature switched on and off: what the feature loads, its cost, and whether both runs agree."""
     with ExitStack() as both:
         logs = folder / "without.log", folder / "with.log"
         without, plain = both.enter_context(feature.without.start(MPI.COMM_SELF, logs[0]))
@@ -220,7 +220,7 @@ def _trajectory(scene: Scene, start: Equilibrium, run: UndampedRun, steps: int, 
 
 
 def _affordable(scene: Scene) -> tuple[Scene, str]:
-    """The scene, or a strip of it that settles fast; and what it is."""
+    """The scene, or a strip of the layer that settles fast; with a description."""
     section = scene.packing
     if not isinstance(section, GeneratedPacking):
         return scene, f"the packing of {section.file.name}"

@@ -201,7 +201,7 @@ def _of_contacts(bare: UndampedRun, rough: UndampedRun) -> Iterator[Feature]:
 
 
 def _of_damping(bare: UndampedRun) -> Iterator[Feature]:
-    """Dashpots and drag, each with what the scene has or else a hundredth of what is critical for one contact."""
+    """Dashpots and drag, each with the scene's value or else a hundredth of the critical value of one contact."""
     packing, law, tau = bare.packing, bare.packing.law, bare.packing.drag_time
     rate = np.sqrt(law.stiffness_scale(packing.fy) / packing.mass.mean())
     dashpot = float(0.01 * packing.mass.mean() * rate / law.growth(np.array(law.overlap_of_force(packing.fy))))

@@ -89,7 +89,7 @@ def check(result: dict[str, Any]) -> None:
 
 
 def _write(done: Sequence[tuple[Case, Outcome]], output: Path) -> None:
-    """extremes.json and extremes.md with what there is."""
+    """Write extremes.json and extremes.md with the results so far."""
     write_text(output / "extremes.json", json.dumps(_as_dict(done), indent=1, allow_nan=False) + "\n")
     statuses = [outcome.status for _, outcome in done]
     groups = [(name, list(members)) for name, members in groupby(done, lambda each: each[0].group)]

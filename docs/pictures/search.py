@@ -49,7 +49,7 @@ def pair_at(operator: Operator, fx: float) -> Space:
 
 
 def draw(axes: Axes, operator: Operator, title: str, says: str) -> None:
-    """D over the increment from 0 to 1, with what the search knows of it and what it finds."""
+    """D over the increment from 0 to 1, the points that the search has computed, and the window that it finds."""
     loads = np.linspace(0, 1, 801)
     values = np.array([discriminant(operator, float(fx)) for fx in loads])
     pieces = np.flatnonzero(np.abs(np.diff(values)) > 0.1) + 1

@@ -215,7 +215,7 @@ def _at_rest(engine: Engine, start: Equilibrium, fx: float) -> Equilibrium | Non
 def _through(
     engine: Engine, start: Equilibrium, loads: Iterable[float], force_tolerance: float | None
 ) -> Equilibrium | None:
-    """The equilibrium at the last of some loads, through the others, with patience; None where one of them has none."""
+    """The equilibrium at the last of some loads, in patient steps through all; None if one has no equilibrium."""
     here, evaluations = start, start.evaluations
     for load in loads:
         engine.set_fx(float(load))

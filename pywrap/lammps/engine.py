@@ -209,13 +209,13 @@ class Engine:
         return self._state.displace(base, displacement)
 
     def keep(self, trial: Trial) -> Packing:
-        """The packing of a trial, for displacements from there: LAMMPS is then given what it gave."""
+        """The packing of a trial, for displacements from this packing, with LAMMPS's own arrays to the bit."""
         self._kept = trial
         self._state.keep(trial)
         return trial.packing
 
     def trial_of(self, packing: Packing) -> Trial:
-        """The trial that `keep` was given with this packing; otherwise a trial of the packing without forces."""
+        """The trial that `keep` got with this packing; without such a trial one of the packing, forces unknown."""
         if self._kept is None or self._kept.packing is not packing:
             self._kept = Trial.of(packing)
         return self._kept

@@ -128,7 +128,7 @@ class LammpsState:
         self._scatter("rmass", self._static.mass)
 
     def clear_forces(self) -> None:
-        """Forces of zero, until the first run: LAMMPS leaves in their place what was in memory."""
+        """Set the forces to zero: until its first run LAMMPS leaves them uninitialised."""
         self._scatter("f", np.zeros((len(self._static), 3)))
 
     def write(self, packing: Packing, velocity: Floats | None = None) -> None:
@@ -152,7 +152,7 @@ class LammpsState:
                 self._scatter("d_theta", packing.angle)
 
     def keep(self, trial: Trial) -> None:
-        """Have LAMMPS be given what it gave, when the packing of this trial is written."""
+        """Remember LAMMPS's own arrays of this trial, so that writing its packing back restores the same bits."""
         if not self._static.compensated:  # LAMMPS splits coordinates otherwise than packings do
             self._known = trial.packing, trial.arrays
 
@@ -283,7 +283,7 @@ class LammpsState:
     # all that a run has, to go on from there
 
     def checkpoint(self) -> Arrays:
-        """All that the dynamics has at this moment, by LAMMPS's names."""
+        """The state of the dynamics: arrays by their names in LAMMPS."""
         return {name: self._gather(name, columns) for name, columns in self._checkpoint_columns().items()}
 
     def write_checkpoint(self, arrays: Mapping[str, Floats]) -> None:
@@ -325,7 +325,7 @@ class LammpsState:
         return values.copy()
 
     def _scatter(self, name: str, values: Floats) -> None:
-        """Write such an array, shape (N,) or (N, columns); in fixes it counts from the next run's begin."""
+        """Write an array of LAMMPS, shape (N,) or (N, columns); arrays of fixes take effect with the next run."""
         memory, _, scatter = self._channel(name, values.size // len(self._static))
         memory.reshape(values.shape)[...] = values
         self._call(scatter)

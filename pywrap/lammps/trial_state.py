@@ -21,7 +21,7 @@ EPSILON = float(np.finfo(float).eps)
 
 
 class Branches(NamedTuple):
-    """Where the contacts are; arrays over contacts.
+    """Normals, distances and overlaps of the contacts; arrays over contacts.
 
     Attributes
     ----------
@@ -122,12 +122,12 @@ class Trial:
 
     @cached_property
     def derivatives(self) -> Derivatives:
-        """Forces and stiffnesses of the contacts; those that the displacement has led to Coulomb's bound slide on."""
+        """Forces and stiffnesses of the contacts; contacts that have come to Coulomb's bound slide on."""
         return self.still.law.derivatives(self.branches.overlap, self.slip, self._parting_contacts, sliding=True)
 
     @property
     def _parting_contacts(self) -> NDArray[np.bool_] | float:
-        """Contacts whose overlap the displacement has reduced, shape (C,), as far as the law cares."""
+        """Contacts whose overlap has decreased, shape (C,), if the law distinguishes them."""
         if not self.still.law.rescales or self.displacement is None:
             return 0.0
         graph, moved = self.graph, self.displacement.reshape(3, -1)[:2]

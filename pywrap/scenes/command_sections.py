@@ -33,7 +33,7 @@ class Command:
     needs: tuple[str, ...] = ()
 
     def part(self, scene: Mapping[str, Any]) -> dict[str, Any]:
-        """The sections that are read, of a scene as TOML holds it; of a section with single keys, these."""
+        """The sections of a scene, as TOML holds it, that this command reads; of some sections single keys alone."""
         read = {name: value for name, value in scene.items() if name in self.reads}
         for section, key in (name.split(".") for name in self.reads if "." in name):
             value = scene.get(section)

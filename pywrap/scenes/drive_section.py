@@ -106,7 +106,7 @@ class Drive(Section):
         return self
 
     def _wrong(self) -> tuple[str, str] | None:
-        """The first key that is missing or has nothing to do here, and what to do."""
+        """The first key that is missing or does not belong here, and the advice."""
         if (self.velocity is None) == (self.protocol is None):
             return "velocity", "or drive.protocol says how the far end of the spring moves: give one of the two"
         if self.fastest == 0:

@@ -58,7 +58,7 @@ ROUNDING_LIMIT = 5e-5
 
 
 def refuse_endless(scene: SceneKeys, task: Task) -> None:
-    """Refuse what a command would not end with.
+    """Refuse a scene with which a command would not come to an end.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def refuse_endless(scene: SceneKeys, task: Task) -> None:
 
 
 def refuse_impossible(scene: SceneKeys) -> tuple[str, str] | None:
-    """What in the numbers of a scene no packing can bear: the key, and the rest of the sentence; None if nothing is."""
+    """The key whose number no packing can bear, and the rest of the sentence; None if there is no such key."""
     packing, law, fy = scene.packing, scene.law, scene.load.fy
     if not isinstance(packing, GeneratedPacking):
         return None

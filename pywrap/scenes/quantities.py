@@ -240,7 +240,7 @@ def _stiffness(given: str | None, units: Units, layer: Layer) -> float:
 
 
 def _numbers(place: str, value: Any, powers: Powers | tuple[Powers, Powers], real: RealUnits) -> Any:
-    """A quantity, or each of a list, or both of each pair in a list; what is a number already stays."""
+    """A quantity as a number; of a list, or of a list of pairs, each. Numbers are returned unchanged."""
     if len(powers) == 2:
         pairs = [each for each in value if isinstance(each, (list, tuple)) and len(each) == 2]
         if len(pairs) < len(value):

@@ -17,7 +17,7 @@ DEFAULT_INCREMENTS = 3e4
 
 
 class SceneKeys(Section):
-    """What a scene says.
+    """All keys of a scene.
 
     Attributes
     ----------

@@ -330,7 +330,7 @@ class Output(Section):
 
 
 def _multiple_of_v0(text: str) -> float:
-    """10 for "10 v0"; 0 for what is no multiple."""
+    """10 for "10 v0"; 0 for any other text."""
     match = re.fullmatch(rf"(?:({NUMBER_PATTERN}) )?v0", text.strip())
     factor = float(match[1] or 1) if match else 0.0
     return factor if is_number(factor) else 0.0

@@ -79,7 +79,7 @@ class SignalKeys(Section):
         return self.signal is not None and self.signal not in KINDS
 
     def _unfit(self) -> tuple[str, str] | None:
-        """The first key that has nothing to do here, and what to do."""
+        """The first key that does not belong here, and the advice."""
         given = [key for key in ("amplitude", "omega", "omega_end", *OF_FILES, "on", "quantity") if getattr(self, key)]
         for key in given:
             if self._from_file and key in ("amplitude", "omega", "omega_end"):
@@ -95,7 +95,7 @@ class SignalKeys(Section):
         return None
 
     def _missing_key(self) -> tuple[str, str] | None:
-        """The first key that is not there and should be, and why."""
+        """The first key that is missing, and the reason."""
         if self.amplitude > 0 and self.omega is None:
             return "omega", "is missing: an amplitude needs the frequency of its forcing"
         if self.signal in KINDS:

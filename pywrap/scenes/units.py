@@ -131,7 +131,7 @@ class RealUnits:
 
 
 class Layer(NamedTuple):
-    """What decides the units of a scene beside its grains, in units of the scene.
+    """The quantities that, with the grains, fix the units of a scene; in units of the scene.
 
     Attributes
     ----------
@@ -200,7 +200,7 @@ def check_exponent(exponent: float) -> None:
 
 
 def layer_of(section: GeneratedPacking | StoredPacking) -> Layer:
-    """What a section [packing] says of the layer; refused if it has no width."""
+    """The layer that a section [packing] describes; refused if the section gives no width."""
     if isinstance(section, GeneratedPacking):
         diameter, mass = 2 * min(section.radii), section.mass or 1.0
         width, top = section.width if section.periodic else None, section.top

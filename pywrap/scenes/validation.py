@@ -24,7 +24,7 @@ else:
 
 
 def check_number(value: float) -> float:
-    """A number that is 0 or of a size with which one can compute; any other is refused."""
+    """The number; refused if it is neither 0 nor of a size with which one can compute."""
     if value != 0 and not SMALLEST <= abs(value) <= LARGEST:
         raise refusal_sentence(
             "", f"= {reprlib.repr(value)} is refused: give a number between {SMALLEST:g} and {LARGEST:g}"
@@ -57,7 +57,7 @@ class SceneError(BadInputError):
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """What the TOML file of a scene or of a sweep holds; SceneError if it cannot be read, or is no TOML."""
+    """The contents of the TOML file of a scene or sweep; SceneError if the file cannot be read, or is no TOML."""
     try:
         return tomllib.loads(read_plain_text(path))
     except OSError as error:

@@ -79,7 +79,7 @@ def change_load(packing: Packing, fy: float, communicator: MPI.Comm | None = Non
 
 
 def loads_between(first: float, last: float) -> list[float]:
-    """Loads from one to another, the first left out, on a grid that depends on the first one alone; but for the last.
+    """Loads between two loads, without the first, on a grid that depends on the first load alone; and the last load.
 
     >>> loads_between(1.0, 1.06)
     [1.05, 1.06]
@@ -92,7 +92,7 @@ def loads_between(first: float, last: float) -> list[float]:
 
 
 def _rest(packing: Packing, communicator: MPI.Comm | None) -> Packing:
-    """A packing that the last increment has put out of balance, at rest."""
+    """The packing at rest again after an increment of the load."""
     with Engine(packing, communicator) as engine:
         try:
             found = equilibrate(engine, Equilibrium.of(packing), packing.fx).packing

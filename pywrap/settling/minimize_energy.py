@@ -129,7 +129,7 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
 
 
 def minimize_energy(packing: Packing, iterations: int = MINIMIZER_ITERATIONS) -> tuple[Packing, bool]:
-    """The packing at the energy's minimum downhill from it, by Newton's method with implicit steps.
+    """The packing at the minimum of the energy downhill from a packing, by Newton's method with implicit steps.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def is_minimum(packing: Packing) -> bool:
 
 
 def _downhill(packing: Packing, step: Floats) -> tuple[Packing, float]:
-    """As far along a step as it leads downhill, and the share of it that this is."""
+    """The packing at the end of the downhill part of a step, and the share of this part."""
     move = step.reshape(2, -1).T
     share = min(1.0, LONGEST_DISPLACEMENT * packing.radius.min() / np.hypot(*move.T).max())
     slope = packing.net_force[: len(step)] @ step

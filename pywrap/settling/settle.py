@@ -118,7 +118,7 @@ def settle_bed(
     mu: float | None = None,
     communicator: MPI.Comm | None = None,
 ) -> Packing:
-    """The packing of a scene as it has settled, not yet balanced to the rounding floor; arguments as of `settle`.
+    """The settled packing of a scene, before its balance to the rounding floor; arguments as of `settle`.
 
     Scenes that settle without friction, and differ only in friction and in what follows, share it.
     """
@@ -186,7 +186,7 @@ def _carry(packing: Packing, fy: float, communicator: MPI.Comm | None) -> Packin
 
 
 def settling_units(scene: Scene, law: MindlinLaw) -> tuple[GeneratedPacking, MindlinLaw, float]:
-    """What a scene settles, in `own_units`: under its own load, or under that of packing.settle_at."""
+    """The scene under which a packing settles, in `own_units`: with its own load, or that of packing.settle_at."""
     assert isinstance(scene.packing, GeneratedPacking)
     at = scene.packing.settle_at
     if at is None:
@@ -196,7 +196,7 @@ def settling_units(scene: Scene, law: MindlinLaw) -> tuple[GeneratedPacking, Min
 
 
 def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[GeneratedPacking, MindlinLaw, float]:
-    """What a scene settles, in the units of a packing: its smallest diameter is the length, and k_n is `STIFFNESS`.
+    """The scene in the units of its packing: the smallest diameter is the length, and k_n is `STIFFNESS`.
 
     Settling is chaotic, and amplifies the last digit of any number. A seed is one packing all the same, whatever units
     the scene has: radii, width and F_y are rounded to `DIGITS` when they are converted, so that two scenes that differ
@@ -236,7 +236,7 @@ def _round_numbers(number: float) -> float:
 
 
 def _in_scene(packing: Packing, scene: Scene, law: MindlinLaw, radius: Floats) -> Packing:
-    """A packing in `own_units` as one of the scene's units, law and load, with the radii of the scene."""
+    """A packing in `own_units`, converted to the units of the scene, with the scene's law, load and radii."""
     assert isinstance(scene.packing, GeneratedPacking)
     length = 2 * min(scene.packing.radii)
     contacts = packing.contacts

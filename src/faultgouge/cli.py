@@ -19,7 +19,7 @@ def main() -> NoReturn:
 
 
 def _open_streams() -> None:
-    """Give closed standard streams the null device: the next file to be opened would be taken for one of them."""
+    """Open the null device for closed standard streams, in whose place the next opened file would come otherwise."""
     while (number := os.open(os.devnull, os.O_RDWR)) < 3:
         pass
     os.close(number)

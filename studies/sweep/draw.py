@@ -82,7 +82,7 @@ class SeedSample:
 
     @property
     def label(self) -> str:
-        """Its values, in words."""
+        """The swept values of this sample, in words."""
         return ", ".join(f"{key} = {value}" for key, value in self.values.items())
 
 

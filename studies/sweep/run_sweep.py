@@ -246,7 +246,7 @@ def _common_request(folders: Sequence[Path]) -> dict[str, Any]:
 
 
 def _read_request(folder: Path) -> dict[str, Any]:
-    """What sweep.json says."""
+    """The contents of sweep.json; SceneError if the folder is none of a sweep."""
     if not (folder / ASKED).is_file():
         raise SceneError(
             f"{folder} is no folder of a sweep (it has no {ASKED}): give folders that `faultgouge sweep` has left"

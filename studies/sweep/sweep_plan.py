@@ -66,7 +66,7 @@ class SweepPoint:
 
     @cached_property
     def settling_key(self) -> str:
-        """What decides how the packing settles; points of one settling share the settled packing."""
+        """Digest of all keys on which settling depends; points with the same digest share the settled packing."""
         if self.scene is None:
             return self.key
         resolved = with_contents(self.scene)
@@ -104,7 +104,7 @@ class Sweep:
 
     @classmethod
     def from_toml(cls, path: str | Path, tasks: Mapping[str, object]) -> Sweep:
-        """Read a sweep of one of these tasks from a TOML file; SceneError if it cannot be read, or describes none."""
+        """Read a sweep of one of these tasks from a TOML file; SceneError if unreadable, or no sweep."""
         path = Path(path)
         return cls.from_mapping(read_toml(path, "sweep"), tasks, path.parent, str(path))
 
@@ -116,7 +116,7 @@ class Sweep:
         folder: Path = Path(),
         name: str = "sweep",
     ) -> Sweep:
-        """Make a sweep from what a TOML file would hold; SceneError if it describes none.
+        """Make a sweep from the contents of a TOML file; SceneError if the contents describe no sweep.
 
         Relative names of files count from `folder`.
         """
@@ -178,7 +178,7 @@ class Sweep:
 
     @cached_property
     def _known_as(self) -> tuple[str, str]:
-        """What stands for task and program in the keys of rows: of a function name and code, wherever its file is."""
+        """Task and program in the keys of rows; of a user's function its name and code, without its folder."""
         task = f"{self.task.rpartition(':')[2]} {self.code}" if self.code else self.task
         return task, version("faultgouge")
 

@@ -60,7 +60,7 @@ def grows(eruption: Row) -> bool:
 
 
 def triggering(scene: Scene, start: Start) -> Row:
-    """The task itself; what goes wrong is under "says", beside what was found before.
+    """The task. An error is the row's "says", beside the results of the stages before.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def _examination(scene: Scene, start: Start) -> Iterator[Row]:
 
 
 def frictions(scene: Scene) -> tuple[float, ...]:
-    """The scene's friction coefficients, the one that weakens first and what it weakens to last."""
+    """The scene's friction coefficients: the first one weakens, and the last one is its weakened value."""
     if scene.friction is None:
         return scene.law.mus
     weak = scene.friction.mu_ss * scene.law.mus[0]

@@ -102,7 +102,7 @@ class _Shared:
             self._running[future] = point, bed, group
 
     def _again(self, deaths: int) -> None:
-        """Hand out again what killed workers had in hand."""
+        """Hand out the points of killed workers again."""
         if isinstance(self._pool, Processes) and not self._pool.began:
             raise WorkerError(
                 "the workers end as they start; each reads a script anew that calls run_sweep with several workers, "
@@ -148,7 +148,7 @@ def compute_point(task: str, point: SweepPoint, bed: Packing | None, keep: bool)
 
 
 def _starter(scene: Scene, beds: list[Packing]) -> Start:
-    """The settled packing for a friction coefficient; what settles goes to `beds`, and is taken from there."""
+    """The settled packing for a friction coefficient, from `beds`, or settled now and added to `beds`."""
 
     def start(mu: float) -> Equilibrium:
         if scene.packing.model_dump().get("settle_friction", False) and mu != scene.law.mus[0]:

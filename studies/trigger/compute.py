@@ -59,7 +59,7 @@ BISECTION_WIDTH = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class Wave:
-    """A wave of a scene on a packing in equilibrium, but for its amplitude, and what K says of it."""
+    """A wave of a scene, of any amplitude, on a packing in equilibrium, with the linear response by K."""
 
     scene: Scene
     packing: Packing
@@ -148,7 +148,7 @@ def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats)
 
 
 def spread_over_map(predicted: list[Row], runs: int) -> list[Row]:
-    """So many of the map, spread over its distances and its frequencies."""
+    """A number of points of the map, spread over distances and frequencies."""
     distances = sorted({each["distance"] for each in predicted}, reverse=True)
     rows = [sorted((p for p in predicted if p["distance"] == d), key=lambda p: p["omega"]) for d in distances]
     share = [runs // len(rows) + (k < runs % len(rows)) for k in range(len(rows))]
@@ -205,7 +205,7 @@ def _bracket(wave: Wave) -> tuple[float, float, int, float]:
 
 
 def _triggers(wave: Wave, amplitude: float) -> float | None:
-    """When a wave brings the layer above v_0; None if it does not."""
+    """The time at which a wave brings the layer above v_0; None if there is no such time."""
     dt, given = time_step(wave.packing), settings(wave.scene)
     steps = int(given.time / dt)
     target = None if given.on == "layer" else range(len(wave.packing))

@@ -120,7 +120,7 @@ def _map_predictions(
 
 
 def _bisect_map(scene: Scene, predicted: list[Row], work: Work) -> list[Row]:
-    """The bisections, those that are in the file already and those that are not."""
+    """All bisections: from the file, or else computed."""
     wanted = spread_over_map(predicted, settings(scene).runs)
 
     def row_of(each: Row) -> Row | None:

@@ -164,7 +164,7 @@ def series_of(samples: Iterable[Sample]) -> Series:
 
 
 def differs(run: Series, other: Series) -> bool:
-    """Whether the largest D of a run stands out of that of another one."""
+    """Whether the largest D of a run is `GROWTH_FACTOR` times the largest D of another run, or more."""
     return largest(run) >= GROWTH_FACTOR * largest(other)
 
 
@@ -251,14 +251,14 @@ def judge(run: Series, v0: float, foreseen: Forecast) -> TriggeringOutcome:
 
 
 def foresee(start: Equilibrium, mu: float, run: Series, v0: float) -> Forecast:
-    """The forecast for what is left of a run once the layer has exceeded v_0; of the whole run if it never does."""
+    """The forecast from the moment on at which the layer exceeds v_0; of the whole run if there is no such moment."""
     length = float(run["time"][-1])
     left = length - (time_of_crossing(run, v0) or 0.0)
     return forecast(start, mu, max(left, JUMP_SHARE * length), JUMP_SHARE * length)
 
 
 def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: Onset, path: Path) -> Triggering:
-    """The runs, written to run.h5 as they end, and the linear response beside the last.
+    """Three runs, each written to run.h5 as it ends, and the linear response of the last.
 
     Parameters
     ----------
@@ -322,7 +322,7 @@ def weakened_rate(packing: Packing, mu_ss: float) -> float:
 def equilibrium_at(
     scene: Scene, path: Sequence[Equilibrium], fx: float, communicator: MPI.Comm | None = None
 ) -> Equilibrium:
-    """The equilibrium at a load, from the last one of a path that is not beyond."""
+    """The equilibrium at a load, from the equilibrium of a path next below."""
     below = max((each for each in path if each.fx <= fx), key=lambda each: each.fx)
     with Engine(below.packing, communicator) as engine:
         return below if below.fx == fx else next_equilibrium(engine, below, fx, scene)

@@ -26,7 +26,7 @@ def check_configuration_writer(path: Path) -> None:
 
 
 def export_configuration(path: Path, configuration: Configuration, modes: Sequence[ModeVectors] = ()) -> str:
-    """Write a .vtp or an .xyz; what is in it, in words.
+    """Write a configuration as .vtp or .xyz, and return the contents in words.
 
     Raises
     ------

@@ -80,7 +80,7 @@ class Frame:
 
 
 def scalars(packing: Packing) -> dict[str, float]:
-    """Law, load and inertia by name; those that are not there, or as always, are left out."""
+    """Law, load and inertia by name, without absent values and defaults."""
     law = packing.law
     values = {"kn": law.kn, "kt": law.kt, "mu": law.mu}
     values |= differing_parameters(law)
@@ -90,7 +90,7 @@ def scalars(packing: Packing) -> dict[str, float]:
 
 
 def pick_numbers(values: Mapping[str, Any]) -> dict[str, float]:
-    """The names of `PARAMETER_NAMES` among others, as numbers; what is no number is left out."""
+    """The values of `PARAMETER_NAMES` in a mapping, as far as these are numbers."""
     found = {}
     for key in PARAMETER_NAMES:
         try:

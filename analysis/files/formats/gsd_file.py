@@ -81,7 +81,7 @@ def _type_names(particles: Any) -> list[str]:
 
 
 def write_gsd(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
-    """A GSD file of one frame or several; what is in it, in words."""
+    """Write one frame or several as GSD, and return the contents in words."""
     hoomd = needed_library("gsd.hoomd", path)
     with replace_whole(path) as new, hoomd.open(str(new), "w") as file:
         for number, each in enumerate(frames):

@@ -83,7 +83,7 @@ def _header(path: Path, lines: list[str]) -> dict[str, list[float]]:
 
 
 def write_data(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
-    """A data file that `read_data` takes back to the bit; what LAMMPS itself reads of it is returned in words."""
+    """Write a data file that `read_data` reads back to the bit; returned is, in words, which part LAMMPS reads."""
     (packing,) = (frame.packing for frame in frames)
     volume = sphere_volume(packing.radius)
     density = packing.mass / volume  # no other double gives LAMMPS the mass to the bit where this one does not

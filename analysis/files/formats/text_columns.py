@@ -79,7 +79,7 @@ def columns_of(
 
 
 def choose_frame(path: Path, counts: Sequence[int], frame: int | None) -> int:
-    """Which frame is meant of those that have so many disks: by default the last one, if all have as many."""
+    """The number of the chosen frame, from 0; by default the last frame, if all frames have as many disks."""
     if frame is None and len(set(counts)) > 1:
         raise PackingFileError(
             f"{path} has frames with {min(counts)} and {max(counts)} disks: choose one with --frame."
@@ -93,7 +93,7 @@ def choose_frame(path: Path, counts: Sequence[int], frame: int | None) -> int:
 def block_of_frame(
     path: Path, lines: list[str], head: int, count_at: Callable[[int], int], frame: int | None, format_: str
 ) -> tuple[int, int]:
-    """Where the lines of a frame begin and how many disks it has, in a file of frames one behind the other.
+    """First line of a frame and its number of disks, in a file of consecutive frames.
 
     Parameters
     ----------

@@ -92,7 +92,7 @@ def _of_type(disks: Disks, says: str, value: str) -> NDArray[np.bool_]:
 
 
 def _highest(disks: Disks, count: int) -> NDArray[np.bool_]:
-    """The highest disks of those that touch something; of all, if too few do, as in a packing not yet at rest."""
+    """The highest disks that touch something; the highest of all disks if too few have a contact."""
     if count > len(disks):
         raise BadInputError(f"--top {count}: {disks.source} has {len(disks)} disks alone.")
     order = np.argsort(-disks.position[:, 1], kind="stable")

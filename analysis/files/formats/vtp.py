@@ -32,7 +32,7 @@ SLIPS = ("contact_slip", "contact_mobilised")
 
 
 def write_vtp(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
-    """A .vtp file; what is in it, in words."""
+    """Write a .vtp file, and return the contents in words."""
     (frame,) = frames
     packing = frame.packing
     write_xml(path, _tree(frame, modes))
@@ -86,7 +86,7 @@ def write_poly_data(
     centres: NDArray, ends: NDArray, numbers: dict[str, float], on_particles: dict[str, NDArray],
     on_contacts: dict[str, NDArray],
 ) -> Element:  # fmt: skip
-    """The page of particles, shape (N, 3), and of contacts with two ends each, shape (2C, 3), with what they have."""
+    """PolyData of particles, shape (N, 3), and of both ends of each contact, shape (2C, 3), with their fields."""
     n, count = len(centres), len(ends) // 2
     root = Element("VTKFile", type="PolyData", version="1.0", byte_order="LittleEndian", header_type="UInt64")
     data = ElementTree.SubElement(root, "PolyData")

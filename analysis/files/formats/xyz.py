@@ -103,7 +103,7 @@ def _write_columns(frame: Frame, modes: list[ModeVectors]) -> list[tuple[str, st
 
 
 def write_xyz(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
-    """An extended XYZ file of one frame or several; what is in it, in words."""
+    """Write one frame or several as extended XYZ, and return the contents in words."""
     with replace_whole(path) as new, new.open("w") as stream:
         stream.writelines(_text(frame, modes) for frame in frames)
     return "all of the packing is in it, to the bit"

@@ -64,7 +64,7 @@ class Target:
 
     @classmethod
     def of(cls, packing: Packing, shift: float) -> Target:
-        """Solve the eigenproblem and refine what is nearest to the shift."""
+        """Solve the eigenproblem and refine the eigenvalues next to the shift."""
         found, condition, rounding = refined_near(packing, shift, ARPACK_COUNT)
         exact = np.array([complex(each.value) for each in found])
         error = max(each.error / abs(each.value) for each in found)

@@ -75,7 +75,7 @@ def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = Fa
 def _run(
     output: Path, scene: Scene, what: str, start: Packing | None = None, others: dict[Path, Scene] | None = None
 ) -> Packing:
-    """Run a drive to its end, from a packing or from the one that the scene settles to, which is returned.
+    """Run a drive to its end, from a packing or from the settled packing of the scene; returns the packing.
 
     The files of other scenes, which differ in the signal, begin where the signal does.
     """
