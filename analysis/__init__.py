@@ -17,7 +17,8 @@ from .files.runfile import RunFile
 from .motion.buckling import negative_eigenvalues
 from .motion.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
 from .motion.fastest_growing import FastestGrowth, fastest_growing
-from .motion.growth import Growth, fit_growth, growth_of_run, mean_square_displacement
+from .motion.growth import Growth, fit_growth, mean_square_displacement
+from .motion.growth_of_run import growth_of_run
 from .motion.motion import Motion
 from .motion.one_sided import OneSidedMotion, one_sided_motion
 from .motion.response import layer_force, linear_response

@@ -16,7 +16,8 @@ import numpy as np
 
 from ...analysis import Growth, Onset, Packing, RunFile, Spectrum, fit_growth, solid_fraction, spectrum
 from ...analysis.counted import counted
-from ...analysis.motion.growth import BELOW_TOP, growing_range
+from ...analysis.motion.growth import growing_range
+from ...analysis.motion.growth_of_run import BELOW_TOP
 from ...analysis.packing.packing import Floats
 from ...analysis.windows.pair_form import pair_eigenvalues
 from ...figures.pair import PairCurve

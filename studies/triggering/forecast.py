@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...analysis import spectrum
-from ...analysis.motion.growth import JUMP_SHARE, LINEAR
+from ...analysis.motion.growth_of_run import JUMP_SHARE, LINEAR
 from ...analysis.motion.response import LinearMotion
 from ...pywrap import Equilibrium
 
