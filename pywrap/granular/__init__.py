@@ -4,7 +4,8 @@
 it, and `law_remarks` compares both. `instance_queries` and `lammps_arrays` read an instance, `looks` all that a look
 needs, and `look_in_a_copy` leaves the instance as it was. `contact_geometry` sorts contacts by their laws, of which
 `configuration_by_laws` makes a Configuration. `force_differences` measures K and C by LAMMPS's forces where there is no
-law, on the coordinates that `mobility` finds to move, for `configuration_by_differences`. `balance` says whether a
+law, with those of a `force_probe` on particles of one of the `colours`, on the coordinates that `mobility` finds to
+move, bodies among them (`translating_bodies`), for `configuration_by_differences`. `balance` says whether a
 packing is at rest, and `moving_regions` whether its walls are. `motion_proof` compares a few of LAMMPS's own steps
 (`lammps_steps`) with those of the Configuration, and `acting_fixes` explains why they differ. `from_lammps` chooses
 among all of these; `compare_motion` compares a longer motion. `relax` brings an instance to rest,

@@ -10,8 +10,9 @@ from ...analysis import Configuration, LinearisedContacts
 from ...analysis.arrays import Floats, derive_frozen
 from .balance import force_scale
 from .contact_geometry import OneLaw, contacts_of_pairs
-from .force_differences import Particles, measure_operators
-from .granular_commands import OWN, Commands, SnapshotError
+from .force_differences import measure_operators
+from .force_probe import Particles
+from .granular_commands import BODIES, OWN, Commands, SnapshotError, without_suffix
 from .instance_queries import open_files
 from .lammps_arrays import Arrays
 from .look_in_a_copy import in_a_copy
@@ -42,7 +43,8 @@ def configuration_by_differences(lmp: Any, still: Still) -> Configuration:
     made = still.configuration
     place = np.zeros((len(made), 3))
     place[:, : made.dimension] = made.position
-    particles = Particles(made.dimension, made.ids, place, made.radius, still.constraint)
+    bodies = tuple(still.commands.fixes[name] for name, style in still.fixes.items() if without_suffix(style) in BODIES)
+    particles = Particles(made.dimension, made.ids, place, made.radius, still.constraint, bodies)
     measured = measure_operators(lmp, particles, force_scale(made, still.at_walls) or None)
     return derive_frozen(
         made,

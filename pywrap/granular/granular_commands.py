@@ -168,8 +168,6 @@ def _check_model(words: list[str], line: str) -> None:
 
 
 MOVING = {
-    "rigid/small": "holds particles together in bodies, whose rotation is not linearised here: use single particles",
-    "rigid": "holds particles together in a body: for a lid that does not rotate use fix nve and fix aveforce 0 0 0",
     "poems": "holds particles together in bodies, whose rotation is not linearised here: use single particles",
     "move": "moves particles: unfix it, and let the packing come to rest",
     "deform": "moves the box: unfix it, and let the packing come to rest",
@@ -180,6 +178,9 @@ MOVING = {
     "propel/self": "pushes particles along their velocities as soon as they move: unfix it",
 }
 """Fixes, by the beginnings of their styles, with which no packing of particles rests."""
+
+BODIES = ("rigid", "rigid/nve")
+"""Fixes whose bodies may be kept from rotating (:mod:`~faultgouge.pywrap.granular.translating_bodies`)."""
 
 
 def check_rest(styles: dict[str, str], commands: Commands) -> None:
@@ -204,7 +205,7 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
             raise NotLinearisedError(
                 f"fix {name} {style} does not turn particles by their contacts: use fix nve/sphere."
             )
-        if plain not in (*WALLS, *INTEGRATORS, "freeze"):
+        if plain not in (*WALLS, *INTEGRATORS, *BODIES, "freeze"):
             continue
         line = commands.fixes.get(name)
         if line is None or without_suffix(line.split()[3]) != plain:
@@ -213,6 +214,8 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
             )
         if plain == "wall/gran":
             _check_wall(name, line)
+        if plain in BODIES:
+            raise NotLinearisedError(f"fix {name} {style} has particles move as one: take one rank and one thread.")
 
 
 def _check_wall(name: str, line: str) -> None:

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.arrays import Floats
-from .force_differences import HOLDS, MOVES
+from .force_probe import HOLDS, MOVES
 from .granular_commands import (
+    BODIES,
     GIVE_LINES,
     INTEGRATORS,
     OWN,
@@ -27,6 +28,7 @@ from .lammps_arrays import Arrays, arrays_at_rest, contacts_of_plane, forces_in_
 from .look_in_a_copy import can_copy, quieten
 from .mobility import MOBILE
 from .moving_regions import refuse_moving_regions
+from .translating_bodies import translating_bodies
 
 BY_CONTACT = ("contacts", "partners")
 """Arrays with a row for each contact; all others have one for each particle."""
@@ -97,6 +99,10 @@ def look_at_forces(
             )
     refuse_moving_regions(lmp, given)
     groups = {name: line.split()[2] for name, line in given.fixes.items() if name in moving}
+    for name in list(groups):
+        if without_suffix(styles.fixes[name]) in BODIES:
+            bodies = translating_bodies(given.fixes[name], lmp.extract_setting("dimension"))
+            groups |= {f"{name} {body.group}": body.group for body in bodies}
     quieten(lmp)
     found = arrays_at_rest(lmp, groups, [], columns)
     found["at walls"] = _forces_of_walls(lmp, styles, given, found)
@@ -133,6 +139,9 @@ def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
         units = lmp.extract_global("units")
         raise SnapshotError(f"In units {units} force is not mass times acceleration: use lj, si, cgs, micro or nano.")
     check_rest(styles.fixes, commands)
+    for name, style in styles.fixes.items():
+        if style.startswith("rigid") and name in commands.fixes:
+            translating_bodies(commands.fixes[name], lmp.extract_setting("dimension"))
     if lmp.extract_setting("molecule_flag") and lmp.extract_global("nbonds"):
         raise NotLinearisedError("Bonds hold particles together: take them out.")
     check_pair(commands, lmp.available_styles("pair"))

@@ -3,7 +3,7 @@ r"""Which coordinates of the particles move, and which of them move as one, by t
 The particles of a lid that `fix aveforce` moves have common translations: q = P Q, with the lid's coordinates at its
 first particle. `fix aveforce` gives each particle the same force, so that
 :math:`m_i \ddot x_i = \frac1n \sum_k F_k`, and :math:`x_i = (m_1/m_i) X`: particles of different mass move by different
-amounts. A component that `fix setforce` sets to zero, and whatever no fix moves, is held: its row of P is empty.
+amounts. The particles of a body of fix rigid that does not rotate have one displacement. A component that `fix setforce` sets to zero, and whatever no fix moves, is held: its row of P is empty.
 """
 
 from typing import NamedTuple
@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ...analysis.arrays import Floats
-from .granular_commands import SnapshotError, without_suffix
+from .granular_commands import BODIES, SnapshotError, without_suffix
+from .translating_bodies import translating_bodies
 
-MOBILE = ("nve", "nve/sphere", "nve/disc", "overdamped/disc", "freeze", "setforce", "aveforce")
+MOBILE = ("nve", "nve/sphere", "nve/disc", "overdamped/disc", "freeze", "setforce", "aveforce", *BODIES)
 """Fixes that move or hold coordinates as is known here."""
 
 
@@ -36,10 +37,10 @@ class _Coordinates:
         self.weight = np.ones((6, len(mass)))
         self.factor = np.full(len(mass), 0.4)
 
-    def join(self, component: int, members: NDArray[np.bool_]) -> None:
-        """Have a component of some particles led by the first of them, by inverse masses."""
+    def join(self, component: int, members: NDArray[np.bool_], weight: Floats | float = 1.0) -> None:
+        """Have a component of some particles led by the first of them, by these weights."""
         self.leader[component, members] = np.flatnonzero(members)[0]
-        self.weight[component, members] = self.mass[members][0] / self.mass[members]
+        self.weight[component, members] = weight
 
 
 def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass: Floats, dimension: int) -> Mobility:
@@ -50,7 +51,7 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
     lines : dict of str
         The commands of the fixes by their IDs, in the order of the deck.
     members : dict of ndarray of bool, shape (N,)
-        Who is in the group of each.
+        Who is in the group of each, and in those of the bodies of a fix rigid, by the ID and the group.
     mass : ndarray, shape (N,)
         Masses.
     dimension : int
@@ -65,7 +66,11 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
     # forces are set after all integrators are known, whatever the order of the deck
     for name in sorted(lines, key=lambda each: without_suffix(lines[each].split()[3]) in ("setforce", "aveforce")):
         words = lines[name].split()
-        _apply(found, name, without_suffix(words[3]), words[4:], members[name])
+        if without_suffix(words[3]) in BODIES:
+            for body in translating_bodies(lines[name], dimension):
+                _move_body(found, body.axes, members[f"{name} {body.group}"])
+        else:
+            _apply(found, name, without_suffix(words[3]), words[4:], members[name])
     for name, line in lines.items():
         if without_suffix(line.split()[3]) == "freeze":
             found.moves[:, members[name]] = False
@@ -105,4 +110,13 @@ def _apply(found: _Coordinates, name: str, style: str, words: list[str], members
                 )
             joined = members & found.moves[k]
             if words[k] != "NULL" and joined.any():
-                found.join(k, joined)
+                found.join(k, joined, found.mass[joined][0] / found.mass[joined])
+
+
+def _move_body(found: _Coordinates, axes: tuple[bool, bool, bool], members: NDArray[np.bool_]) -> None:
+    """What a body moves that does not rotate."""
+    found.moves[:, members] = False
+    for k in range(3):
+        if axes[k] and members.any():
+            found.moves[k, members] = True
+            found.join(k, members)

@@ -54,6 +54,8 @@ LIDS = {
     "aveforce": f"fix body lid nve\n{CONFINED}\nfix stiff lid aveforce 0.0 0.0 0.0",
     "aveforce, sideways held": f"fix body lid nve\n{CONFINED}\nfix hold lid setforce NULL 0.0 NULL\n"
     "fix stiff lid aveforce 0.0 NULL 0.0",
+    "rigid": f"{CONFINED}\nfix body lid rigid single torque 1 off off off",
+    "rigid, sideways held": f"{CONFINED}\nfix body lid rigid group 1 lid torque * off off off force 1 on off on",
 }
 
 
@@ -70,7 +72,7 @@ def test_a_lid_moves_as_one(tmp_path, lid):
     assert count == 9
     assert found.operators == "differences"
     assert found.operator_error < 1e-5
-    free = {"aveforce": "xyz", "aveforce, sideways held": "xz"}[lid]
+    free = "xz" if "held" in lid else "xyz"
     n, mass = len(found), found.coordinate_mass
     for k, axis in enumerate("xyzuvw"):
         rows = np.diff(found.stiffness.indptr)[k * n : (k + 1) * n]
@@ -91,12 +93,14 @@ def test_a_lid_moves_as_one(tmp_path, lid):
 
 
 @pytest.mark.long
-def test_particles_of_different_mass_under_one_mean_force(tmp_path):
-    """fix aveforce gives them the same force: a lid of two masses deforms as the inverse masses."""
+@pytest.mark.parametrize("lid", ["aveforce", "rigid"])
+def test_a_lid_of_two_masses(tmp_path, lid):
+    """fix aveforce gives its particles the same force: the lid deforms as the inverse masses. A body of fix rigid does
+    not, and dashpots feel its mass."""
     from faultgouge import relax
     from faultgouge.pywrap import compare_motion, from_lammps
 
-    lmp = cell(tmp_path, LIDS["aveforce"] + "\nset atom 30*32 density 2.0")
+    lmp = cell(tmp_path, "set atom 30*32 density 2.0\n" + LIDS[lid])
     relax(lmp)
     found = from_lammps(lmp)
     assert len(set(found.mass[found.kind == 2].round(10))) == 2
@@ -117,11 +121,19 @@ def test_a_spring_in_aveforce_is_refused(tmp_path):
         from_lammps(lmp)
 
 
-def test_a_body_that_may_rotate_is_refused(tmp_path):
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("single", r"fix rigid single, or group, with `torque \* off off off`"),
+        ("single torque 1 off off on", r"bodies that may rotate.*`torque \* off off off`"),
+        ("single torque 1 off off off reinit no", "has reinit no, which is not known here: leave it out"),
+    ],
+)
+def test_a_body_that_may_rotate_is_refused(tmp_path, words, says):
     from faultgouge.pywrap import SnapshotError, from_lammps
 
-    lmp = cell(tmp_path, f"{CONFINED}\nfix body lid rigid single", **{"run 20000": "run 10"})
-    with pytest.raises(SnapshotError, match="for a lid that does not rotate use fix nve and fix aveforce"):
+    lmp = cell(tmp_path, f"{CONFINED}\nfix body lid rigid {words}", **{"run 20000": "run 10"})
+    with pytest.raises(SnapshotError, match=says):
         from_lammps(lmp)
     lmp.close()
 
