@@ -3,7 +3,8 @@ r"""Which coordinates of the particles move, and which of them move as one, by t
 The particles of a lid that `fix aveforce` moves have common translations: q = P Q, with the lid's coordinates at its
 first particle. `fix aveforce` gives each particle the same force, so that
 :math:`m_i \ddot x_i = \frac1n \sum_k F_k`, and :math:`x_i = (m_1/m_i) X`: particles of different mass move by different
-amounts. The particles of a body of fix rigid that does not rotate have one displacement. A component that `fix setforce` sets to zero, and whatever no fix moves, is held: its row of P is empty.
+amounts. The particles of a body of fix rigid that does not rotate have one displacement. A component that `fix
+setforce` sets to zero, and whatever no fix moves, is held: its row of P is empty.
 """
 
 from typing import NamedTuple
