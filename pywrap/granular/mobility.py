@@ -17,7 +17,10 @@ from ...analysis.arrays import Floats
 from .granular_commands import BODIES, SnapshotError, without_suffix
 from .translating_bodies import translating_bodies
 
-MOBILE = ("nve", "nve/sphere", "nve/disc", "overdamped/disc", "freeze", "setforce", "aveforce", *BODIES)
+MOBILE = (
+    "nve", "nve/sphere", "nve/disc", "overdamped/disc", "freeze", "setforce", "aveforce", "lineforce", "planeforce",
+    *BODIES,
+)  # fmt: skip
 """Fixes that move or hold coordinates as is known here."""
 
 
@@ -102,6 +105,12 @@ def _apply(found: _Coordinates, name: str, style: str, words: list[str], members
                 raise SnapshotError(f"fix {name} setforce drives particles: only 0.0 and NULL hold them.")
             if words[k] != "NULL":
                 found.moves[k, members] = False
+    elif style in ("lineforce", "planeforce"):
+        along = np.array([float(word) for word in words[:3]]) != 0.0
+        if along.sum() != 1:
+            raise SnapshotError(f"fix {name} {style} has a direction along no axis, which is not known here: unfix it.")
+        for k in np.flatnonzero(along if style == "planeforce" else ~along):
+            found.moves[k, members] = False
     elif style == "aveforce":
         for k in range(3):
             if words[k].startswith("v_"):  # K by differences takes this fix away, and its force with it

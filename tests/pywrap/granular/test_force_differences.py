@@ -2,32 +2,10 @@
 
 import numpy as np
 import pytest
-from granular_packings import LAWS, command, instance, start, with_law
+from granular_packings import LAWS, command, instance
 
 from faultgouge.analysis import damping_matrix, stability, stiffness_matrix
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
-
-
-def bed(tmp_path, law: str, d: int):
-    """Particles at rest on a slope."""
-    from faultgouge.pywrap import from_lammps
-
-    lmp = instance(tmp_path / "log.lammps")
-    start(lmp, d, 20 if d == 3 else 18)
-    with_law(lmp, law, d, "40", "40", ("0.2", "0.2"), "10.0" if "rescale" in law and d == 2 else "3.0")
-    command(lmp, f"""
-fix load all gravity 1.0 vector {"0.1 0 -1" if d == 3 else "0.05 -1 0"}
-fix move all nve/sphere
-fix drag all viscous 1.5
-timestep 0.002
-thermo 100000
-""")  # fmt: skip
-    for _ in range(12):
-        lmp.command("run 20000")
-        found = from_lammps(lmp, balance=np.inf)
-        if found.residual < 1e-9 * found.contacts.normal_force.mean():
-            break
-    return lmp, found
 
 
 def apart(one, other) -> float:
@@ -41,12 +19,12 @@ FAST = ("gran/hertz/history", 2), ("gran/hertz/history", 3), ("mindlin_rescale/f
     ("law", "d"),
     [pytest.param(law, d, marks=() if (law, d) in FAST else pytest.mark.long) for law in LAWS for d in (2, 3)],
 )
-def test_measured_laws_and_differences_agree(tmp_path, law, d):
+def test_measured_laws_and_differences_agree(beds, law, d):
     """K within 1e-5, which `granular` and its bound of 1e-10 of Coulomb's needs, and C within 1e-6, of the largest."""
     from faultgouge.pywrap import from_lammps
 
-    lmp, laws = bed(tmp_path, law, d)
-    found = from_lammps(lmp, differences=True)
+    lmp = beds(law, d)
+    laws, found = (from_lammps(lmp, differences=each) for each in (False, True))
     assert (laws.operators, found.operators) == ("laws", "differences")
     assert not laws.contacts.at_bound.any()
     assert apart(stiffness_matrix(found), stiffness_matrix(laws)) < 1e-5
@@ -55,15 +33,13 @@ def test_measured_laws_and_differences_agree(tmp_path, law, d):
     # a law with two derivatives has a jump at every contact, and no other has one where nothing slides
     assert len(found.one_sided_particles) == (len(found) if "rescale" in law else 0)
     assert found.residual == pytest.approx(laws.residual, abs=1e-9 * laws.contacts.normal_force.mean())
-    lmp.close()
 
 
-def test_a_contact_at_the_bound_is_seen(tmp_path):
+def test_a_contact_at_the_bound_is_seen(lammps_with):
     """Its two particles have other derivatives forwards than backwards, and K is the mean of sticking and sliding."""
     from faultgouge.pywrap import from_lammps
 
-    lmp = instance(tmp_path / "log.lammps")
-    command(lmp, """
+    lmp = lammps_with("""
 units lj
 dimension 2
 atom_style sphere
@@ -97,7 +73,6 @@ timestep 1e-3
     assert set(found.ids[found.one_sided_particles]) == {1, 2}
     mean = 0.5 * sum(stiffness_matrix(each) for each in exact)
     assert apart(stiffness_matrix(found), mean) < 1e-6
-    lmp.close()
 
 
 ROW = """
@@ -123,15 +98,14 @@ run 0
 
 
 @pytest.mark.parametrize("gap", [1e-13, 1e-5])
-def test_particles_that_nearly_touch(tmp_path, gap):
+def test_particles_that_nearly_touch(lammps_with, gap):
     """LAMMPS's compute pair/local says nothing of them, and one that is displaced may feel the other one.
 
     A displacement is far longer than one of the gaps, and far shorter than the other.
     """
     from faultgouge.pywrap import from_lammps
 
-    lmp = instance(tmp_path / "log.lammps")
-    command(lmp, ROW.format(x=f"{1 + gap:.17g}"))
+    lmp = lammps_with(ROW.format(x=f"{1 + gap:.17g}"))
     found = from_lammps(lmp, differences=True, balance=np.inf)
     laws = from_lammps(lmp, prove=False, balance=np.inf)
     assert len(found.contacts) == 0
@@ -142,7 +116,6 @@ def test_particles_that_nearly_touch(tmp_path, gap):
         mean[1:3, 1:3] = 0.5 * 1e4 * np.array([[1, -1], [-1, 1]])
         assert set(found.ids[found.one_sided_particles]) == {2, 3}
     assert np.abs(added[:9, :9] - mean[:9, :9]).max() < 1e-3 * 1e4
-    lmp.close()
 
 
 CONE = """

