@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...analysis import BadInputError, Configuration, LinearisedContacts
-from ...analysis.arrays import Floats
+from ...analysis.arrays import Floats, Indices
 from .granular_commands import OWN, Commands, SnapshotError
 
 BALANCE = 1e-4
@@ -59,15 +59,15 @@ LOST = (
 TWICE = "particles touch each other twice, of which LAMMPS mixes the histories: take a box that is wider"
 
 
-def _touch_twice(contacts: LinearisedContacts) -> bool:
-    """Whether two particles touch each other through two periodic images."""
-    pairs = np.sort(np.column_stack([contacts.i, contacts.j])[~contacts.wall], axis=1)
+def touch_twice(i: Indices, j: Indices) -> bool:
+    """Whether two particles, of all pairs that touch, touch each other through two periodic images."""
+    pairs = np.sort(np.column_stack([i, j]), axis=1)
     return len(np.unique(pairs, axis=0)) < len(pairs)
 
 
 def known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
     """Why forces are out of balance though the packing may be at rest; empty if no cause is known."""
-    if _touch_twice(contacts):
+    if touch_twice(contacts.i[~contacts.wall], contacts.j[~contacts.wall]):
         return TWICE
     if commands.write_restart and commands.style != OWN:
         return (

@@ -8,7 +8,7 @@ from scipy.sparse import csr_array, diags_array
 
 from ...analysis import Configuration, LinearisedContacts
 from ...analysis.arrays import Floats, derive_frozen
-from .balance import force_scale
+from .balance import TWICE, force_scale, touch_twice
 from .contact_geometry import OneLaw, contacts_of_pairs
 from .force_differences import measure_operators
 from .force_probe import Particles
@@ -18,6 +18,9 @@ from .lammps_arrays import Arrays
 from .look_in_a_copy import in_a_copy
 from .looks import box_of, look_at_forces, particles_of
 from .mobility import mobility
+
+ALONG = 1e-6
+"""Part of a tangential force along the normal, as a share of all that is handed out: rounding leaves 1e-10 or less."""
 
 
 class Still(NamedTuple):
@@ -98,6 +101,11 @@ def _forces_of_pairs(found: Arrays, box: Floats, style: str) -> LinearisedContac
         count = 0
     none, still = np.zeros(count), np.zeros((count, 3))
     tangential = pairs.forces[:, 1:4] if columns >= 4 else still
+    along = np.abs(np.einsum("ca,ca->c", tangential, pairs.geometry["normal"]))
+    if np.any(along > ALONG * np.abs(pairs.forces).sum(axis=1)):
+        if touch_twice(pairs.geometry["i"], pairs.geometry["j"]):
+            raise SnapshotError(f"The packing cannot rest: {TWICE}.")
+        tangential = still  # this pair style hands out something else
     made = LinearisedContacts(
         **pairs.geometry, lever_arm=pairs.geometry["slip_arm"], lever_slope=none, normal_force=pairs.forces[:, 0],
         tangential_force=tangential, normal_stiffness=none, tangential_stiffness=none, closing=still, parting=still,

@@ -52,8 +52,8 @@ def _relax(lmp: Any, commands: Iterable[str]) -> None:
 
 
 def _keep(lmp: Any, file: Path) -> Path | None:
-    """Write a restart; None if LAMMPS cannot, or there is such a file."""
-    if file.exists():
+    """Write a restart; None if LAMMPS cannot, if there is nothing to write, or there is such a file."""
+    if file.exists() or lmp.get_natoms() == 0:
         return None
     with suppress(Exception):  # LAMMPS raises what its bindings choose, and the first error is the one to be said
         lmp.command("timer timeout unlimited")

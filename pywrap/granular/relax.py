@@ -187,7 +187,7 @@ def _run(lmp: Any, count: int, where: str) -> None:
     lost = count - lmp.extract_setting("nlocal")
     if lost:
         raise NoEquilibriumError(
-            f"{lost} particles left the box while the packing came to rest{where}: delete those that fall outside of "
+            f"{lost} {'particle' if lost == 1 else 'particles'} left the box while the packing came to rest{where}: delete those that fall outside of "
             "the walls, or take a box with walls or periodic edges."
         )
 

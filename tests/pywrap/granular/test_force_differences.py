@@ -118,6 +118,16 @@ def test_particles_that_nearly_touch(lammps_with, gap):
     assert np.abs(added[:9, :9] - mean[:9, :9]).max() < 1e-3 * 1e4
 
 
+def test_particles_far_apart_that_something_couples(lammps_with):
+    """They are displaced together, as no neighbours are; the refusal names the one that feels the other most."""
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    lmp = lammps_with(ROW.format(x="2.5"))
+    command(lmp, "group left id 1\ngroup right id 3\nfix tie left spring couple right 3e3 4 0 0 0")
+    with pytest.raises(SnapshotError, match=r"at particle [13] at \(.*, 0, 0\.4999\).*couples particles that are no"):
+        from_lammps(lmp, differences=True, balance=np.inf)
+
+
 CONE = """
 units si
 atom_style sphere

@@ -309,6 +309,11 @@ set group all density 1
     assert len(from_lammps(lmp, told, balance=np.inf).contacts) == 2
     with pytest.raises(SnapshotError, match=r"touch each other twice.* take a box that is wider"):
         from_lammps(lmp, told)
+    # the history of one of them has a part along the normal of the other
+    lmp.numpy.extract_atom("v")[1] = [0.0, 1.0, 0.5]
+    lmp.command("run 5 post no")
+    with pytest.raises(SnapshotError, match=r"touch each other twice.* take a box that is wider"):
+        from_lammps(lmp, told, balance=np.inf, differences=True)
 
 
 def test_frozen_particles_and_inertia(two):
