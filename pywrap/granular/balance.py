@@ -4,7 +4,7 @@ import numpy as np
 
 from ...analysis import BadInputError, Configuration, LinearisedContacts
 from ...analysis.arrays import Floats, Indices
-from .granular_commands import OWN, Commands, SnapshotError
+from .granular_commands import OWN, Commands, SnapshotError, without_suffix
 
 BALANCE = 1e-4
 """Share of the mean contact force that may be out of balance: then the motion is that of a packing which comes to rest
@@ -65,8 +65,24 @@ def touch_twice(i: Indices, j: Indices) -> bool:
     return len(np.unique(pairs, axis=0)) < len(pairs)
 
 
+def restless_fix(commands: Commands) -> str:
+    """What is said of a fix that keeps particles from resting; empty if there is none."""
+    for name, line in commands.fixes.items():
+        words = line.split()
+        style = without_suffix(words[3])
+        if style == "langevin" and set(words[4:6]) - {"0", "0.0"}:
+            return (
+                f"fix {name} langevin shakes the particles by its temperature: unfix it, or give it the temperature 0.0"
+            )
+        if style == "wall/reflect":
+            return f"fix {name} wall/reflect turns velocities round, but bears no weight: use fix wall/gran"
+    return ""
+
+
 def known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
     """Why forces are out of balance though the packing may be at rest; empty if no cause is known."""
+    if says := restless_fix(commands):
+        return f"{says}, and run on"
     if touch_twice(contacts.i[~contacts.wall], contacts.j[~contacts.wall]):
         return TWICE
     if commands.write_restart and commands.style != OWN:

@@ -44,10 +44,11 @@ def take_or_keep(
 
 
 def _relax(lmp: Any, commands: Iterable[str]) -> None:
-    """Bring the particles that there are to rest."""
+    """Bring the particles that there are to rest, though the deck makes more of them, or has ended its run."""
     for name, style in styles_of(lmp).fixes.items():
-        if style.startswith(INSERTS):
+        if style.startswith((*INSERTS, "halt")):
             lmp.command(f"unfix {name}")
+    lmp.command("timer timeout unlimited")
     relax(lmp, commands)
 
 

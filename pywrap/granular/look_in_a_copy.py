@@ -35,7 +35,7 @@ INSERTS = ("pour", "deposit", "evaporate")
 """Fixes that put particles in or take them out, with which no time step may be changed."""
 
 DRAG = ("viscous", "langevin", "overdamped")
-"""Fixes that take energy away."""
+"""Fixes that take energy away, and may shake."""
 
 
 def can_copy(lmp: Any) -> bool:

@@ -54,7 +54,7 @@ def look_at_contacts(
     walls = [name for name in plain if plain[name] in WALLS]
     columns = "dx dy dz force p3" if given.style == OWN else "dx dy dz force p1 p2 p3"
     if copied:
-        quieten(lmp)
+        quieten(lmp, drag=True)
     silent = _silent_walls(styles, given)
     with nullcontext() if copied else given_back(lmp):
         mine = arrays_at_rest(lmp, groups, [name for name in walls if name not in silent], columns)
@@ -103,7 +103,7 @@ def look_at_forces(
         if without_suffix(styles.fixes[name]) in BODIES:
             bodies = translating_bodies(given.fixes[name], lmp.extract_setting("dimension"))
             groups |= {f"{name} {body.group}": body.group for body in bodies}
-    quieten(lmp)
+    quieten(lmp, drag=True)
     found = arrays_at_rest(lmp, groups, [], columns)
     found["at walls"] = _forces_of_walls(lmp, styles, given, found)
     order = np.argsort(found["id"], kind="stable")

@@ -14,7 +14,8 @@ import numpy as np
 
 from ...analysis import Configuration, NoEquilibriumError, stable_timestep
 from ...analysis.arrays import Floats
-from .balance import force_scale
+from ...analysis.counted import counted
+from .balance import force_scale, restless_fix
 from .configuration_by_differences import still_particles
 from .from_lammps import take_snapshot
 from .granular_commands import SnapshotError, read_commands
@@ -81,9 +82,14 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
             else force_scale(found, still_particles(lmp, lines).at_walls)
         )
 
-    start = still_particles(lmp, lines).configuration
+    still = still_particles(lmp, lines)
     look = partial(take_snapshot, lmp, given, {}, slides=False, balance=np.inf, prove=False)
-    found, _ = bring_to_rest(lmp, look, start, balance, steps, RATE, "", far=FAR, scale=scale)
+    try:
+        found, _ = bring_to_rest(lmp, look, still.configuration, balance, steps, RATE, "", far=FAR, scale=scale)
+    except NoEquilibriumError as error:
+        if says := restless_fix(still.commands):
+            raise NoEquilibriumError(f"{str(error).rstrip('.')}; {says}.") from error
+        raise
     return found.residual / (scale(found) or 1.0)
 
 
@@ -180,15 +186,21 @@ def _refuse_long_steps(found: Configuration, timestep: float, where: str) -> Non
 
 def _run(lmp: Any, count: int, where: str) -> None:
     """Some steps, at the end of which there are as many particles."""
+    began = lmp.extract_global("ntimestep")
     try:
         lmp.command(f"run {STEPS_BETWEEN_LOOKS} post no")
     except Exception as error:  # LAMMPS raises what its bindings choose
         raise SnapshotError(f"While the packing came to rest{where}, {explain_error(error)}") from error
+    if lmp.extract_global("ntimestep") != began + STEPS_BETWEEN_LOOKS:
+        raise SnapshotError(
+            f"LAMMPS ended a run while the packing came to rest{where}, as fix halt and timer timeout do: unfix "
+            "it, and set `timer timeout unlimited`."
+        )
     lost = count - lmp.extract_setting("nlocal")
     if lost:
         raise NoEquilibriumError(
-            f"{lost} {'particle' if lost == 1 else 'particles'} left the box while the packing came to rest{where}: delete those that fall outside of "
-            "the walls, or take a box with walls or periodic edges."
+            f"{counted(lost, 'particle')} left the box while the packing came to rest{where}: delete those that fall "
+            "outside of the walls, or take a box with walls or periodic edges."
         )
 
 

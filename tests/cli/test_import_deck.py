@@ -176,6 +176,24 @@ def test_what_has_been_poured_comes_to_rest(faultgouge_here, tmp_path):
     assert found.proof < 1e-5
 
 
+def test_a_run_that_fix_halt_has_ended(faultgouge_here, tmp_path):
+    """LAMMPS skips all further runs; the particles come to rest all the same."""
+    halted = "variable now equal step\nfix stop all halt 10 v_now > 1500 error soft message no\nrun 6000"
+    (tmp_path / "pile.in").write_text(DECK.format(**ROUND, word="").replace("run 6000", halted))
+    assert "The packing moves" in faultgouge_here("import", "pile.in", "-o", "pile.h5", code=1).stderr
+    faultgouge_here("import", "pile.in", "-o", "pile.h5", "--relax")
+    assert read_configuration(tmp_path / "pile.h5").residual < 1e-8
+
+
+def test_a_deck_without_particles(faultgouge_here, tmp_path):
+    """There is no state to keep."""
+    lines = [line for line in DECK.format(**ROUND, word="").splitlines() if "create_atoms" not in line]
+    (tmp_path / "none.in").write_text("\n".join(line for line in lines if not line.startswith("set ")))
+    said = faultgouge_here("import", "none.in", "-o", "none.h5", code=1).stderr
+    assert "This LAMMPS has no particles.\n" in said
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["none.in"]
+
+
 def test_regions_that_move(faultgouge_here, tmp_path):
     """A part of an intersection that rises with the time: its place is another one in each run."""
     (tmp_path / "pour.in").write_text(POUR.format(law=LAW.format(g=1), rise="1e-6*elapsed", steps=2000))

@@ -1,0 +1,102 @@
+"""What rests and what does not: the scale of forces at walls of regions, and particles that leave the box."""
+
+import numpy as np
+import pytest
+
+BALL = """
+units lj
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -4 4 -4 4 -2 8 units box
+create_box 1 box
+create_atoms 1 single 0 0 {z:.17g} units box
+{more}
+set group all diameter 1.0 density 1.0
+pair_style gran/hooke/history 1e4 3e3 20 10 0.5 1
+pair_coeff * *
+{wall}
+fix load all gravity 1.0 vector 0 0 -1
+fix move all nve/sphere
+timestep 1e-3
+thermo_style custom step
+thermo_modify lost ignore
+run 0
+"""
+REGION = """
+region floor block -4 4 -4 4 0 8 side in open 1 open 2 open 3 open 4 open 6 units box
+fix floor all wall/gran/region hooke/history 1e4 3e3 20 10 0.5 1 region floor
+"""
+WEIGHT = np.pi / 6
+
+
+@pytest.mark.parametrize(("share", "rests"), [(1e-5, True), (1e-3, False)])
+def test_a_sphere_on_a_region(lammps_with, share, rests):
+    """Its weight is the scale of what is out of balance, though a region hands out no contacts."""
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    z = 0.5 - WEIGHT * (1 + share) / 1e4
+    lmp = lammps_with(BALL.format(z=z, wall=REGION, more=""))
+    if rests:
+        found = from_lammps(lmp)
+        assert found.residual == pytest.approx(share * WEIGHT, rel=1e-3)
+        assert found.proof < 1e-4
+        return
+    with pytest.raises(SnapshotError, match=r"residual of particle 1 at .* is 0\.000999 of the mean contact force"):
+        from_lammps(lmp)
+    assert from_lammps(lmp, balance=2 * share).residual == pytest.approx(share * WEIGHT, rel=1e-3)
+
+
+ENDS = "variable high equal 1\nfix stop all halt 10 v_high > 0 error soft message no\nrun 20"
+
+
+def test_a_run_that_fix_halt_ends_brings_nothing_to_rest(lammps_with):
+    """LAMMPS skips all further runs without a word."""
+    from faultgouge import relax
+    from faultgouge.pywrap import SnapshotError
+
+    plane = "fix floor all wall/gran hooke/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL"
+    lmp = lammps_with(BALL.format(z=0.5, wall=plane, more="") + ENDS)
+    with pytest.raises(SnapshotError, match=r"^LAMMPS ended a run while the packing came to rest, as fix halt and"):
+        relax(lmp)
+    lmp.command("unfix stop")
+    lmp.command("timer timeout unlimited")
+    assert relax(lmp) < 1e-8
+
+
+def test_a_wall_without_a_force_is_named(lammps_with):
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    above = "create_atoms 1 single 0 0 1.49 units box"
+    lmp = lammps_with(BALL.format(z=0.5, wall="fix low all wall/reflect zlo -1.0", more=above))
+    with pytest.raises(SnapshotError, match=r"The packing moves: .*; fix low wall/reflect .* bears no weight: use fix"):
+        from_lammps(lmp)
+
+
+def test_a_thermostat_is_named(lammps_with):
+    """It is a drag where its temperature is zero, and brings nothing to rest where it is not."""
+    from faultgouge import relax
+    from faultgouge.analysis import NoEquilibriumError
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    plane = "fix floor all wall/gran hooke/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL"
+    lmp = lammps_with(BALL.format(z=0.4999, wall=plane, more="") + "fix heat all langevin 1e-6 1e-6 1.0 4711\nrun 100")
+    says = "fix heat langevin shakes the particles by its temperature: unfix it"
+    with pytest.raises(SnapshotError, match=f"The packing moves: .*; {says}"):
+        from_lammps(lmp)
+    with pytest.raises(NoEquilibriumError, match=f"^The packing .* in 10000 steps: .*; {says}"):
+        relax(lmp, steps=10_000)
+    lmp.command("fix heat all langevin 0.0 0.0 1.0 4711")
+    assert relax(lmp) < 1e-8
+
+
+def test_particles_that_leave_the_box_while_they_come_to_rest(lammps_with):
+    from faultgouge import relax
+    from faultgouge.analysis import NoEquilibriumError
+
+    plane = "fix floor one wall/gran hooke/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL contacts"
+    falls = "create_atoms 1 single 2 0 -1 units box\ngroup one id 1"
+    lmp = lammps_with(BALL.format(z=0.5 - WEIGHT / 1e4, wall=plane, more=falls))
+    with pytest.raises(NoEquilibriumError, match=r"^1 particle left the box while the packing came to rest: delete"):
+        relax(lmp)
