@@ -26,7 +26,7 @@ from mpi4py import MPI
 
 from ...analysis.arrays import Floats
 from ..lammps.instance import start_lammps
-from .granular_commands import GIVE_LINES, Commands, SnapshotError
+from .granular_commands import GIVE_LINES, PLANES, Commands, SnapshotError
 from .instance_queries import explain_error
 
 EXACT = 1e-6
@@ -171,7 +171,7 @@ class TwoParticleLammps:
 
 def _place_of_planes(words: list[str]) -> int:
     """Which word of a wall is xplane, yplane or zplane; its lower and its upper plane follow."""
-    return next(k for k, word in enumerate(words) if word in ("xplane", "yplane", "zplane"))
+    return next(k for k, word in enumerate(words) if word in PLANES)
 
 
 def _one_plane(words: list[str]) -> list[str]:

@@ -141,7 +141,9 @@ def _refuse_errors(particles: Particles, error: Floats) -> None:
         f"K and C by differences of forces are {error[worst]:.2g} of their largest entry from the forces of a "
         f"displacement of all particles at particle {particles.ids[worst]} at ({place})"
         f"{f', and at {others} more' if others else ''}: contacts there are about to open, to close or to slide, or "
-        "something couples particles that are no neighbours; run on with drag under a load that presses them together."
+        "lie between both planes of one fix wall/gran, of which LAMMPS has the nearer act alone (write a fix for each "
+        "plane), or something couples particles that are no neighbours; run on with drag under a load that presses "
+        "them together."
     )
 
 

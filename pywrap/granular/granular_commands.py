@@ -218,8 +218,14 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
             raise NotLinearisedError(f"fix {name} {style} has particles move as one: take one rank and one thread.")
 
 
+PLANES = ("xplane", "yplane", "zplane")
+
+
 def _check_wall(name: str, line: str) -> None:
     words = line.split()
+    at = [k for k, word in enumerate(words) if word in (*PLANES, "zcylinder", "region")]
+    if not at or len(words) < at[0] + (3 if words[at[0]] in PLANES else 2):
+        raise SnapshotError(f"The line of fix {name} wall/gran does not say where the wall is: give all of it.")
     for word, says in {
         "region": "is a region: use a plane, xplane, yplane or zplane",
         "zcylinder": "is a cylinder: use a plane, xplane, yplane or zplane",

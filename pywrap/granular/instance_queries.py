@@ -41,9 +41,14 @@ def styles_of(lmp: Any) -> Styles:
     return Styles(values["Atoms"].rpartition("style = ")[2], styles, groups, values["Atom style"])
 
 
+def of_lammps(error: BaseException) -> bool:
+    """Whether LAMMPS has raised an error: its bindings raise the plain `Exception`, or one of theirs."""
+    return type(error) is Exception or type(error).__module__.split(".")[0] == "lammps"
+
+
 def explain_error(error: BaseException) -> str:
     """A sentence of an error that LAMMPS has raised."""
-    lines = [line.strip().removeprefix("ERROR: ") for line in str(error).splitlines() if line.strip()]
+    lines = [re.sub(r"^ERROR( on proc \d+)?: ", "", line.strip()) for line in str(error).splitlines() if line.strip()]
     reason = re.sub(r" \(\S+:\d+\)", "", "; ".join(lines) or type(error).__name__)
     return f"LAMMPS stopped: {reason.rstrip('.')}."
 

@@ -14,7 +14,7 @@ import numpy as np
 from ...analysis import Configuration
 from ...analysis.arrays import Floats, Indices
 from ..lammps.instance import load_plugin
-from .granular_commands import NotLinearisedError, SnapshotError
+from .granular_commands import PLANES, NotLinearisedError, SnapshotError
 from .instance_queries import communicator
 
 Arrays = dict[str, Any]
@@ -24,9 +24,6 @@ ATOM_ARRAYS = ("x", "image", "v", "omega", "f", "torque")
 
 NO_FORCE = 1.2345678e300
 """A number that is no force."""
-
-
-PLANES = ("xplane", "yplane", "zplane")
 
 
 def owned_array(lmp: Any, name: str) -> Floats:

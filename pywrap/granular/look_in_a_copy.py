@@ -24,7 +24,7 @@ from mpi4py import MPI
 
 from ...parent_death import end_with
 from .granular_commands import SnapshotError
-from .instance_queries import explain_error, styles_of
+from .instance_queries import explain_error, of_lammps, styles_of
 
 Found = TypeVar("Found")
 
@@ -97,7 +97,7 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
             with suppress(ProcessLookupError):
                 os.kill(child, signal.SIGKILL)  # it has sent all that it has to say, unless there was an interrupt
             os.waitpid(child, 0)
-    if isinstance(found, SnapshotError):
+    if isinstance(found, Exception):
         raise found
     return found
 
@@ -108,7 +108,7 @@ def _send_and_end(work: Callable[[], Found], there: Connection, parent: int) -> 
         end_with(parent)
         there.send(work())
     except Exception as error:  # whatever it is, the parent says it
-        there.send(error if isinstance(error, SnapshotError) else SnapshotError(explain_error(error)))
+        there.send(SnapshotError(explain_error(error)) if of_lammps(error) else error)
     finally:
         os._exit(0)
 

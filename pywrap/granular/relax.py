@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis import Configuration, NoEquilibriumError, stable_timestep
+from ...analysis import BadInputError, Configuration, NoEquilibriumError, stable_timestep
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
-from .balance import force_scale, restless_fix
+from .balance import check_balance, force_scale, restless_fix
 from .configuration_by_differences import still_particles
 from .from_lammps import take_snapshot
 from .granular_commands import SnapshotError, read_commands
@@ -66,9 +66,14 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
     ------
     SnapshotError
         If the instance cannot be taken, as by `from_lammps`.
+    BadInputError
+        If `balance` or `steps` is no such number.
     NoEquilibriumError
         If the packing flows: its particles have moved by ten diameters in the mean, or do not come to rest.
     """
+    check_balance(balance)
+    if steps < 1:
+        raise BadInputError(f"steps = {steps} is refused: nothing would come to rest; give a number from 1 on.")
     if not can_copy(lmp):
         raise SnapshotError("relax looks at copies of the process: use one rank and one thread.")
     given = None if commands is None else list(commands)

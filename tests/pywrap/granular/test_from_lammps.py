@@ -169,6 +169,27 @@ def test_commands_that_are_not_those_of_the_instance(two):
     assert whole == from_lammps(lmp, told, balance=np.inf)
 
 
+@pytest.mark.parametrize("given", ["", " hertz/history 1e5 NULL 1 1 0.5 1", " hertz/history 1e5 NULL 1 1 0.5 1 zplane"])
+def test_a_line_of_a_wall_that_is_not_whole(two, given):
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    wall = "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL"
+    lmp, told = two(HERTZ, "* *", wall + MOVES)
+    lines = [f"fix w all wall/gran{given}" if line == wall else line for line in told]
+    with pytest.raises(
+        SnapshotError, match=r"^The line of fix w wall/gran does not say where the wall is: give all of"
+    ):
+        from_lammps(lmp, lines, balance=np.inf)
+
+
+def test_an_error_in_a_copy_is_that_of_this_process():
+    """It is not laid to LAMMPS."""
+    from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
+
+    with pytest.raises(ZeroDivisionError, match="division by zero"):
+        in_a_copy(lambda: 1 / 0)
+
+
 def test_a_run_that_fix_halt_has_ended(two):
     """Its runs are skipped from then on, but for those of a look."""
     from faultgouge.pywrap import from_lammps

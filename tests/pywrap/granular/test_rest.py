@@ -65,6 +65,16 @@ def test_a_run_that_fix_halt_ends_brings_nothing_to_rest(lammps_with):
     assert relax(lmp) < 1e-8
 
 
+def test_what_relax_cannot_reach_is_refused(lammps_with):
+    from faultgouge import relax
+    from faultgouge.analysis import BadInputError
+
+    lmp = lammps_with(BALL.format(z=0.5, wall=REGION, more=""))
+    for name, value in (("balance", np.nan), ("balance", -1.0), ("steps", 0)):
+        with pytest.raises(BadInputError, match=f"^{name} = {value:g} is refused"):
+            relax(lmp, **{name: value})
+
+
 def test_a_wall_without_a_force_is_named(lammps_with):
     from faultgouge.pywrap import SnapshotError, from_lammps
 
