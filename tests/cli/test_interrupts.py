@@ -165,6 +165,33 @@ def test_an_import_leaves_nothing(tmp_path, monkeypatch, number):
     assert not any(temporary.iterdir())
 
 
+ROW = """
+units lj
+atom_style sphere
+region box block -1 221 -1 1 -1 1 units box
+create_box 1 box
+{spheres}
+set group all diameter 1.0 density 1.0
+pair_style gran/hertz/history 1e3 NULL 10 NULL 0.9 1
+pair_coeff * *
+comm_modify vel yes
+fix move all nve/sphere
+run 0
+"""
+"""Two hundred spheres in a row, of which to say whether they are stable takes seconds."""
+
+
+def test_an_import_says_that_its_file_is_written(tmp_path):
+    """When it is interrupted over the verdict, which comes after the packing."""
+    spheres = "\n".join(f"create_atoms 1 single {0.9999 * k} 0 0 units box" for k in range(220))
+    (tmp_path / "row.in").write_text(ROW.format(spheres=spheres))
+    running = start_command(CommandToKill("import row.in -o row.h5 --balance 10", ""), tmp_path)
+    errors = interrupted(running, signal.SIGINT, (tmp_path / "row.h5").exists)
+    assert errors.strip().endswith(
+        "Error: interrupted: row.h5 has been written; whether the packing is stable says `faultgouge spectrum row.h5`."
+    )
+
+
 LARGE = SWEPT | {"packing": {"disks": 5000, "seed": 1, "width": 84.3}, "ramp": {"step": 4e-4, "until": 0.02}}
 
 

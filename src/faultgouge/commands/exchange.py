@@ -155,6 +155,7 @@ def _import_deck(file: Path, output: Path, slides: bool, balance: float | None, 
         configuration = run_deck(file, slides=slides, balance=allowed, relaxes=relaxes, keep=output)
     if is_root():
         write_configuration(output, configuration, {"deck": file.read_text(errors="replace")})
+    keeps(f"{output} has been written; whether the packing is stable says `faultgouge spectrum {output}`", output)
     for remark in configuration.remarks:
         print_line(remark)
     print_line(f"{repr(configuration).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
