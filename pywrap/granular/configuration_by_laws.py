@@ -49,6 +49,7 @@ from .granular_commands import GIVE_LINES, OWN, Commands, NotLinearisedError, Sn
 from .lammps_arrays import Arrays
 from .law_remarks import remark_on
 from .looks import box_of, particles_of
+from .mobility import refuse_two_integrators
 
 AGREES = 1e-6
 """Relative difference of the normal forces of LAMMPS from those of its commands, besides that of roundings."""
@@ -110,18 +111,18 @@ def _free_particles(commands: Commands, found: Arrays) -> tuple[NDArray[np.bool_
     """Which particles are free, which are frozen, and I/(m R^2) of each."""
     count = len(found["id"])
     frozen, free, factor = np.zeros(count, bool), np.zeros(count, bool), np.full(count, 0.4)
-    for name, line in commands.fixes.items():
-        if f"group {name}" not in found:
-            continue
-        members, words = found[f"group {name}"], line.split()
+    members = {name: found[f"group {name}"] for name in commands.fixes if f"group {name}" in found}
+    refuse_two_integrators({name: commands.fixes[name] for name in members}, members)
+    for name, moved in members.items():
+        words = commands.fixes[name].split()
         style = without_suffix(words[3])
         if style == "freeze":
-            frozen |= members
+            frozen |= moved
         elif style == "nve/sphere":
-            factor[members] = 0.5 if "disc" in words else 0.4
+            factor[moved] = 0.5 if "disc" in words else 0.4
         else:
-            factor[members] = float(words[4 if style == "nve/disc" else 5])
-        free |= members
+            factor[moved] = float(words[4 if style == "nve/disc" else 5])
+        free |= moved
     free &= ~frozen
     if not free.any():
         raise SnapshotError(

@@ -33,6 +33,9 @@ from .translating_bodies import translating_bodies
 BY_CONTACT = ("contacts", "partners")
 """Arrays with a row for each contact; all others have one for each particle."""
 
+SETTING = ("setforce", "aveforce", "lineforce", "planeforce")
+"""Fixes that set forces, of which the force of a wall is then no difference."""
+
 
 def look_at_contacts(
     lmp: Any, given: Commands | None, files: dict[int, OpenFile]
@@ -59,6 +62,12 @@ def look_at_contacts(
     with nullcontext() if copied else given_back(lmp):
         mine = arrays_at_rest(lmp, groups, [name for name in walls if name not in silent], columns)
     forces = mine["f"]
+    setting = [name for name in plain if silent and plain[name] in SETTING]
+    for name in setting:
+        lmp.command(f"unfix {name}")
+    if setting:
+        lmp.command("run 0 post no")
+        forces = forces_in_order(lmp, mine["id"])
     for name in silent:
         mine[f"wall {name}"], forces = contacts_of_plane(lmp, name, given.fixes[name], mine, forces)
     every = world.allgather(mine)

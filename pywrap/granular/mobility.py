@@ -7,6 +7,7 @@ amounts. The particles of a body of fix rigid that does not rotate have one disp
 setforce` sets to zero, and whatever no fix moves, is held: its row of P is empty.
 """
 
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ...analysis.arrays import Floats
+from ...analysis.counted import counted
 from .granular_commands import BODIES, SnapshotError, without_suffix
 from .translating_bodies import translating_bodies
 
@@ -22,6 +24,33 @@ MOBILE = (
     *BODIES,
 )  # fmt: skip
 """Fixes that move or hold coordinates as is known here."""
+
+
+INTEGRATES = ("nve", "nve/sphere", "nve/disc", "overdamped/disc", *BODIES)
+"""Those of them that move particles."""
+
+
+def refuse_two_integrators(lines: dict[str, str], members: dict[str, NDArray[np.bool_]]) -> None:
+    """Refuse particles that two fixes move: LAMMPS moves them twice in each step.
+
+    Parameters
+    ----------
+    lines, members
+        As of :func:`mobility`; other fixes among them do not matter.
+
+    Raises
+    ------
+    SnapshotError
+        With both fixes.
+    """
+    moving = [name for name, line in lines.items() if without_suffix(line.split()[3]) in INTEGRATES]
+    for one, other in combinations(moving, 2):
+        both = int(np.count_nonzero(members[one] & members[other]))
+        if both:
+            raise SnapshotError(
+                f"fix {one} and fix {other} both move {counted(both, 'particle')}, which LAMMPS then moves twice in "
+                "each step: unfix one of them, or have it move other particles."
+            )
 
 
 class Mobility(NamedTuple):
@@ -66,6 +95,7 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
     SnapshotError
         If a fix moves or holds particles otherwise.
     """
+    refuse_two_integrators(lines, members)
     found = _Coordinates(mass)
     # forces are set after all integrators are known, whatever the order of the deck
     for name in sorted(lines, key=lambda each: without_suffix(lines[each].split()[3]) in ("setforce", "aveforce")):
@@ -109,7 +139,7 @@ def _apply(found: _Coordinates, name: str, style: str, words: list[str], members
         along = np.array([float(word) for word in words[:3]]) != 0.0
         if along.sum() != 1:
             raise SnapshotError(f"fix {name} {style} has a direction along no axis, which is not known here: unfix it.")
-        for k in np.flatnonzero(along if style == "planeforce" else ~along):
+        for k in np.flatnonzero(along if style == "planeforce" else ~along).tolist():
             found.moves[k, members] = False
     elif style == "aveforce":
         for k in range(3):

@@ -15,6 +15,7 @@ import numpy as np
 from ...analysis import BadInputError, Configuration, NoEquilibriumError, stable_timestep
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
+from .acting_fixes import acting_fixes
 from .balance import check_balance, force_scale, restless_fix
 from .configuration_by_differences import still_particles
 from .from_lammps import take_snapshot
@@ -92,7 +93,10 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
     try:
         found, _ = bring_to_rest(lmp, look, still.configuration, balance, steps, RATE, "", far=FAR, scale=scale)
     except NoEquilibriumError as error:
-        if says := restless_fix(still.commands):
+        says = restless_fix(still.commands) or " and ".join(
+            f"fix {name} {still.fixes[name]} may drive the packing" for name in acting_fixes(still.fixes)
+        )
+        if says:
             raise NoEquilibriumError(f"{str(error).rstrip('.')}; {says}.") from error
         raise
     return found.residual / (scale(found) or 1.0)

@@ -134,6 +134,8 @@ HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
         (HERTZ, "* *", "fix m all move linear 0 0 0", "unfix it, and let the packing come to rest"),
         (HERTZ, "* *", "fix s all setforce 0 1 NULL" + MOVES, "drives particles"),
         (HERTZ, "* *", "", "Nothing moves"),
+        (HERTZ, "* *", MOVES + "\nfix again all nve/sphere", "fix move and fix again both move 2 particles"),
+        (HERTZ, "* *", MOVES + "\nfix again all nve", "fix move and fix again both move 2 particles"),
         (HERTZ, "* *", MOVES, "The packing moves: the residual of particle [12] at .* and 1 more is out of balance"),
     ],
 )  # fmt: skip

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from granular_packings import command
 
 BALL = """
 units lj
@@ -99,6 +100,34 @@ def test_a_thermostat_is_named(lammps_with):
         relax(lmp, steps=10_000)
     lmp.command("fix heat all langevin 0.0 0.0 1.0 4711")
     assert relax(lmp) < 1e-8
+
+
+def test_a_force_that_swings_is_named(lammps_with):
+    from faultgouge import relax
+    from faultgouge.analysis import NoEquilibriumError
+
+    plane = "fix floor all wall/gran hooke/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL"
+    swings = "variable f equal 0.05*sin(step*0.001)\nfix swing all addforce v_f 0 0"
+    lmp = lammps_with(BALL.format(z=0.4999, wall=plane, more="") + swings)
+    with pytest.raises(NoEquilibriumError, match=r"^The packing .*; fix swing addforce may drive the packing\.$"):
+        relax(lmp, steps=10_000)
+
+
+def test_lines_and_planes_along_axes(lammps_with):
+    """What they hold has no row in K; the sphere rolls along y alone."""
+    from faultgouge.pywrap import SnapshotError, from_lammps
+
+    plane = "fix floor all wall/gran hooke/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL"
+    held = "fix line all planeforce -1 0 0\nrun 0"
+    lmp = lammps_with(BALL.format(z=0.5 - WEIGHT / 1e4, wall=plane, more="") + held)
+    found = from_lammps(lmp)
+    assert found.proof < 1e-5
+    assert list(np.flatnonzero(np.diff(found.stiffness.indptr))) == [1, 2, 3, 4]  # y, z, and rotations about x and y
+    command(lmp, "unfix line\nfix line all lineforce 0 0 2")
+    assert list(np.flatnonzero(np.diff(from_lammps(lmp).stiffness.indptr))) == [2, 3, 4]
+    lmp.command("fix line all lineforce 1 0 1")
+    with pytest.raises(SnapshotError, match="fix line lineforce has a direction along no axis"):
+        from_lammps(lmp, differences=True)
 
 
 def test_particles_that_leave_the_box_while_they_come_to_rest(lammps_with):
