@@ -131,8 +131,10 @@ def interrupts_wait() -> Iterator[None]:
 
 
 def quieten(lmp: Any, *, drag: bool = False) -> None:
-    """Close dumps, averages and restarts of a copy, and let it have the particles that it has; drag too, if asked."""
+    """Close dumps, averages and restarts of a copy, and let it have the particles that it has, and single steps; leave
+    drag out, too, if asked."""
     lmp.command("restart 0")
+    lmp.command("run_style verlet")  # r-RESPA has no steps without a set-up
     lmp.command("timer timeout unlimited")  # fix halt, too, has runs skipped
     for name in lmp.available_ids("dump"):
         lmp.command(f"undump {name}")

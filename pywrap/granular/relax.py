@@ -31,6 +31,9 @@ rounding, 1e-12 of a force whose overlap is 1e-4 of a radius."""
 STEPS_BETWEEN_LOOKS = 2000
 """Steps between two looks: many beside the set-up of a run, few beside a relaxation."""
 
+ROUNDING = 1e-15
+"""Rounding of a coordinate, as a share of the largest one: nothing comes closer to rest."""
+
 RATE = 0.01
 """Rate of the drag at the beginning, per time step: critical for a mode of 1000 steps."""
 
@@ -54,7 +57,8 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
     commands : iterable of str, optional
         As of :func:`~faultgouge.pywrap.from_lammps`.
     balance : float
-        Largest residual at rest, as a share of the mean contact force.
+        Largest residual at rest, as a share of the mean contact force; of packings so stiff that the rounding of
+        coordinates leaves more, this rounding.
     steps : int
         Time steps after which a packing that is not at rest flows.
 
@@ -144,13 +148,15 @@ def bring_to_rest(
     """
     dt, turning = float(lmp.extract_global("dt")), lmp.has_style("fix", "viscous/sphere")  # else dashpots alone
     drags = {"faultgouge_drag": "viscous"} | ({"faultgouge_spin": "viscous/sphere"} if turning else {})
-    way, residual, force = 0.0, np.inf, scale(start)
+    way, residual, force, rounding = 0.0, np.inf, scale(start), 0.0
     mass, squared_radius = float(start.mass[start.free].mean()), float(np.min(start.radius**2))
     fastest = FASTEST * float(start.mass[start.free].min()) / mass
     try:
         for done in range(0, steps, STEPS_BETWEEN_LOOKS):
             if done == PATIENCE:
-                _refuse_long_steps(look(), dt, where)
+                found = look()
+                _refuse_long_steps(found, dt, where)
+                rounding = _rounding(found)
             rate = float(np.clip(rate, min(SLOWEST, fastest), fastest))
             drag = mass * rate / dt
             spin = drag * squared_radius if turning else 0.0
@@ -162,10 +168,11 @@ def bring_to_rest(
             residual = float(np.linalg.norm(np.vstack([forces, drag_forces]), axis=0).max())
             speed = np.linalg.norm(owned_array(lmp, "v")[rows_of(lmp, start)][start.free], axis=1)
             way += STEPS_BETWEEN_LOOKS * dt * float(speed.mean())
-            if force == 0.0 or residual <= balance * force:
+            if force == 0.0 or residual <= max(balance * force, rounding):
                 found = look()
                 force = scale(found)
-                if found.residual <= balance * force:
+                falls = force == 0.0 and bool(np.any(forces))  # what touches nothing has no residual
+                if found.residual <= max(balance * force, rounding) and not falls:
                     set_velocity(lmp, found, np.zeros(found.coordinates))
                     return found, rate
             if way > far * 2 * start.radius.mean():
@@ -181,6 +188,12 @@ def bring_to_rest(
         f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of balance; give more "
         "steps, or the packing creeps."
     )
+
+
+def _rounding(found: Configuration) -> float:
+    """What a rounding of a coordinate makes of the force of the stiffest contact."""
+    stiffness = found.contacts.normal_stiffness if found.stiffness is None else found.stiffness.data
+    return ROUNDING * float(np.abs(found.position).max() * np.abs(stiffness).max(initial=0.0))
 
 
 def _refuse_long_steps(found: Configuration, timestep: float, where: str) -> None:

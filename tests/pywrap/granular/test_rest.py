@@ -102,6 +102,41 @@ def test_a_thermostat_is_named(lammps_with):
     assert relax(lmp) < 1e-8
 
 
+def test_a_packing_so_stiff_that_rounding_moves_it(lammps_with):
+    """An overlap of 5e-11 at a coordinate of 4: the rounding of the force is 1e-5 of the weight."""
+    from faultgouge import relax
+    from faultgouge.pywrap import from_lammps
+
+    law = "hooke/history 1e10 3e9 2e4 1e4 0.5 1"
+    plane = f"fix floor all wall/gran {law} zplane 4 NULL"
+    hard = BALL.format(z=4.5, wall=plane, more="").replace("hooke/history 1e4 3e3 20 10 0.5 1", law)
+    lmp = lammps_with(hard.replace("timestep 1e-3", "timestep 2e-6"))
+    left = relax(lmp, steps=200_000)
+    assert 1e-8 < left < 1e-4
+    assert from_lammps(lmp).proof < 1e-3
+
+
+def test_what_falls_is_not_at_rest(lammps_with):
+    """Nothing touches anything in the first steps, so that nothing is out of balance."""
+    from faultgouge import relax
+    from faultgouge.pywrap import from_lammps
+
+    plane = "fix floor all wall/gran hooke/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL"
+    lmp = lammps_with(BALL.format(z=6.0, wall=plane, more=""))
+    relax(lmp)
+    assert len(from_lammps(lmp).contacts) == 1
+
+
+def test_a_packing_of_rrespa(lammps_with):
+    """Its copies take steps of velocity Verlet; the instance goes on with its own."""
+    from faultgouge.pywrap import from_lammps
+
+    more = "run_style respa 2 2 pair 1\nrun 0"
+    lmp = lammps_with(BALL.format(z=0.5 - WEIGHT / 1e4, wall=REGION, more="") + more)
+    assert from_lammps(lmp).proof < 1e-5
+    lmp.command("run 10")
+
+
 def test_a_force_that_swings_is_named(lammps_with):
     from faultgouge import relax
     from faultgouge.analysis import NoEquilibriumError
