@@ -18,7 +18,7 @@ from .acting_fixes import check_holding
 from .balance import BALANCE, check_balance, force_scale, refuse_motion
 from .configuration_by_differences import configuration_by_differences, still_particles
 from .configuration_by_laws import KnownLaws, check_friction, configuration_by_laws
-from .granular_commands import OWN, Commands, NotLinearisedError, SnapshotError, read_commands
+from .granular_commands import OWN, Commands, NotLinearisedError, SnapshotError, read_commands, with_one_rank
 from .instance_queries import open_files
 from .look_in_a_copy import can_copy, in_a_copy
 from .looks import look_at_contacts
@@ -94,7 +94,7 @@ def take_snapshot(
         return _by_laws(lmp, given, laws, slides=slides, balance=balance, prove=prove)
     except NotLinearisedError as reason:
         if not can_copy(lmp):
-            raise
+            raise NotLinearisedError(with_one_rank(reason)) from reason
         if slides:
             raise SnapshotError(
                 f"{str(reason).rstrip('.')}; so K is found by differences of forces, which have no choice between "

@@ -42,6 +42,11 @@ class NotLinearisedError(SnapshotError):
     """What has no linearised contacts here: K and C by differences of forces may serve."""
 
 
+def with_one_rank(reason: NotLinearisedError) -> str:
+    """What is said where differences of forces cannot serve: they are taken in copies of the process."""
+    return f"{str(reason).rstrip('.')}; or take one rank and one thread, where K is found by differences of forces."
+
+
 @dataclass(frozen=True)
 class Commands:
     """What a deck says of contacts and of motion: pair_style with the pair_coeff that hold, fixes and regions by their
@@ -215,7 +220,7 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
         if plain == "wall/gran":
             _check_wall(name, line)
         if plain in BODIES:
-            raise NotLinearisedError(f"fix {name} {style} has particles move as one: take one rank and one thread.")
+            raise NotLinearisedError(f"fix {name} {style} has particles move as one.")
 
 
 PLANES = ("xplane", "yplane", "zplane")

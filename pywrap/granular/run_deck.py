@@ -17,7 +17,14 @@ from mpi4py import MPI
 from ...analysis import BadInputError, Configuration
 from ..lammps.instance import lammps_instance
 from .balance import BALANCE, check_balance
-from .granular_commands import NotLinearisedError, SnapshotError, commands_in, logged_text, read_commands
+from .granular_commands import (
+    NotLinearisedError,
+    SnapshotError,
+    commands_in,
+    logged_text,
+    read_commands,
+    with_one_rank,
+)
 from .instance_queries import communicator, explain_error, name_of, styles_of
 from .kept_state import take_or_keep
 from .look_in_a_copy import can_copy
@@ -142,7 +149,8 @@ def _refuse_what_stays(lmp: Any, path: Path, text: str, ahead: str) -> None:
         again = re.findall(r"\bfix\s+(\S+)\s", ahead)  # a fix takes the place of one with the same ID
         if not any(name in styles.fixes or "$" in name for name in again):
             check_instance(lmp, styles, commands)
+    except NotLinearisedError as error:
+        if not can_copy(lmp):  # for K by differences of forces
+            raise BadInputError(f"{path}: {with_one_rank(error)}") from error
     except SnapshotError as error:
-        if isinstance(error, NotLinearisedError) and can_copy(lmp):
-            return  # K by differences of forces
         raise BadInputError(f"{path}: {error}") from error

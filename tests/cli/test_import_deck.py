@@ -194,6 +194,14 @@ def test_a_deck_without_particles(faultgouge_here, tmp_path):
     assert sorted(each.name for each in tmp_path.iterdir()) == ["none.in"]
 
 
+@pytest.mark.ranks
+def test_what_is_taken_on_one_rank_alone(faultgouge, tmp_path):
+    """K by differences of forces needs copies of the process, which several ranks cannot have."""
+    (tmp_path / "pour.in").write_text(POUR.format(law=LAW.format(g=1), rise=0.0, steps=100))
+    said = faultgouge("import", "pour.in", ranks=2, code=2).stderr
+    assert "or take one rank and one thread, where K is found by differences of forces." in said
+
+
 def test_regions_that_move(faultgouge_here, tmp_path):
     """A part of an intersection that rises with the time: its place is another one in each run."""
     (tmp_path / "pour.in").write_text(POUR.format(law=LAW.format(g=1), rise="1e-6*elapsed", steps=2000))
