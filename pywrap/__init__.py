@@ -15,7 +15,7 @@ from ..analysis import NoEquilibriumError
 from .equilibria.quasistatic import Equilibrium, equilibrate
 from .granular.compare_motion import MotionComparison, compare_motion
 from .granular.from_lammps import from_lammps
-from .granular.granular_commands import SnapshotError
+from .granular.granular_commands import NotTakenError
 from .granular.lammps_equilibrium_path import LammpsPath, lammps_path
 from .granular.relax import relax
 from .lammps.engine import Engine
@@ -35,11 +35,11 @@ __all__ = [
     "LammpsPath",
     "MotionComparison",
     "NoEquilibriumError",
+    "NotTakenError",
     "Record",
     "Sample",
     "Scene",
     "SceneError",
-    "SnapshotError",
     "bring_to_rest",
     "compare_motion",
     "equilibrate",

@@ -4,7 +4,7 @@ import numpy as np
 
 from ...analysis import BadInputError, Configuration, LinearisedContacts
 from ...analysis.arrays import Floats, Indices
-from .granular_commands import OWN, Commands, SnapshotError, without_suffix
+from .granular_commands import OWN, Commands, NotTakenError, without_suffix
 
 BALANCE = 1e-4
 """Share of the mean contact force that may be out of balance: then the motion is that of a packing which comes to rest
@@ -19,34 +19,34 @@ def check_balance(balance: float) -> None:
         raise BadInputError(f"balance = {balance:g} is refused: give a share of the mean contact force, from 0 on.")
 
 
-def force_scale(snapshot: Configuration, at_walls: Floats = NONE) -> float:
+def force_scale(configuration: Configuration, at_walls: Floats = NONE) -> float:
     """The mean normal force of contacts, and of walls whose contacts are not known, by particle; where nothing is
     known, the force of an overlap of 1e-4 of a radius."""
-    forces = np.concatenate([np.abs(snapshot.contacts.normal_force), at_walls[at_walls > 0]])
+    forces = np.concatenate([np.abs(configuration.contacts.normal_force), at_walls[at_walls > 0]])
     if len(forces):
         return float(forces.mean())
-    if snapshot.stiffness is None:
+    if configuration.stiffness is None:
         return 0.0
-    return 1e-4 * float(np.abs(snapshot.stiffness.data).max(initial=0.0) * snapshot.radius.mean())
+    return 1e-4 * float(np.abs(configuration.stiffness.data).max(initial=0.0) * configuration.radius.mean())
 
 
-def refuse_motion(snapshot: Configuration, balance: float, commands: Commands, at_walls: Floats = NONE) -> None:
+def refuse_motion(configuration: Configuration, balance: float, commands: Commands, at_walls: Floats = NONE) -> None:
     """Refuse a packing that moves, with the particle that is farthest from rest."""
-    force = force_scale(snapshot, at_walls)
-    if not snapshot.residual > balance * force:  # an infinite balance allows no number where nothing touches
+    force = force_scale(configuration, at_walls)
+    if not configuration.residual > balance * force:  # an infinite balance allows no number where nothing touches
         return
-    size = snapshot.particle_residual
+    size = configuration.particle_residual
     worst = int(np.argmax(size))
-    place = ", ".join(f"{x:.6g}" for x in snapshot.position[worst])
+    place = ", ".join(f"{x:.6g}" for x in configuration.position[worst])
     others = int(np.sum(size > balance * force)) - 1
     also = f", and {others} more {'are' if others > 1 else 'is'} out of balance" if others else ""
-    advice = known_cause(commands, snapshot.contacts) or (
+    advice = known_cause(commands, configuration.contacts) or (
         "bring it to rest by faultgouge.relax(lmp), in a command --relax, or a longer run with drag (fix viscous, and "
         "fix viscous/sphere for rotation), or allow more by from_lammps(lmp, balance=...), in a command --balance"
     )
-    raise SnapshotError(
-        f"The packing moves: the residual of particle {snapshot.ids[worst]} at ({place}) is {size[worst] / force:.3g} "
-        f"of the mean contact force, and {balance:g} is allowed{also}; {advice}."
+    raise NotTakenError(
+        f"The packing moves: the residual of particle {configuration.ids[worst]} at ({place}) is "
+        f"{size[worst] / force:.3g} of the mean contact force, and {balance:g} is allowed{also}; {advice}."
     )
 
 

@@ -33,7 +33,7 @@ from ...analysis import BadInputError, Configuration, damping_matrix, largest_fr
 from ...analysis.arrays import Floats, Indices
 from ...analysis.motion.eigenvalues import active_coordinates, mass_weighted
 from ...analysis.operators.linearised_contacts import rescaling_operators
-from .granular_commands import SnapshotError
+from .granular_commands import NotTakenError
 from .lammps_steps import steps_in_a_copy
 from .look_in_a_copy import can_copy
 
@@ -77,7 +77,13 @@ class MotionComparison:
 
 
 def compare_motion(
-    lmp: Any, snapshot: Configuration, time: float, amplitude: float, *, timestep: float | None = None, seed: int = 0
+    lmp: Any,
+    configuration: Configuration,
+    time: float,
+    amplitude: float,
+    *,
+    timestep: float | None = None,
+    seed: int = 0,
 ) -> MotionComparison:
     """LAMMPS's undamped motion from small velocities against exp(t G).
 
@@ -86,8 +92,8 @@ def compare_motion(
     Parameters
     ----------
     lmp : lammps.lammps
-        The instance, as it was when the snapshot was taken; on one rank.
-    snapshot : Configuration
+        The instance, as it was when the configuration was taken; on one rank.
+    configuration : Configuration
         Of :func:`~faultgouge.pywrap.from_lammps`.
     time : float
         How long, positive.
@@ -106,47 +112,47 @@ def compare_motion(
 
     Raises
     ------
-    SnapshotError
-        If the instance has several ranks or threads, or other particles than the snapshot.
+    NotTakenError
+        If the instance has several ranks or threads, or other particles than the configuration.
     BadInputError
         If a time, the step or the amplitude is not positive and finite: nothing would move, and nothing be compared.
     """
     if not can_copy(lmp):
-        raise SnapshotError("compare_motion runs LAMMPS in copies of the process: use one rank and one thread.")
+        raise NotTakenError("compare_motion runs LAMMPS in copies of the process: use one rank and one thread.")
     step = float(lmp.extract_global("dt")) if timestep is None else float(timestep)
     for name, value in (("time", time), ("timestep", step), ("amplitude", amplitude)):
         if not 0 < value < np.inf:
             raise BadInputError(f"{name} = {value:g} is refused: nothing would be compared; give a number above 0.")
     steps = max(1, round(time / step))
-    stiffness = mass_weighted(stiffness_matrix(snapshot), snapshot)
+    stiffness = mass_weighted(stiffness_matrix(configuration), configuration)
     active = active_coordinates(stiffness)
-    root = np.sqrt(snapshot.coordinate_mass)
-    start = np.zeros(snapshot.coordinates)
+    root = np.sqrt(configuration.coordinate_mass)
+    start = np.zeros(configuration.coordinates)
     start[active] = amplitude * np.random.Generator(np.random.PCG64(seed)).standard_normal(len(active))
-    there, back = (steps_in_a_copy(lmp, snapshot, sign * start, step, steps).velocity for sign in (1, -1))
+    there, back = (steps_in_a_copy(lmp, configuration, sign * start, step, steps).velocity for sign in (1, -1))
     velocity = (0.5 * (there - back) * root)[active]
-    linear = _linear_velocity(snapshot, stiffness, active, (start * root)[active], step * steps)
+    linear = _linear_velocity(configuration, stiffness, active, (start * root)[active], step * steps)
     difference = float(np.linalg.norm(velocity - linear) / np.linalg.norm(linear))
-    periods = step * steps * largest_frequency(snapshot) / (2 * np.pi)
+    periods = step * steps * largest_frequency(configuration) / (2 * np.pi)
     return MotionComparison(difference, step * steps, step, velocity, linear, periods)
 
 
 def _linear_velocity(
-    snapshot: Configuration, stiffness: csr_array, active: Indices, start: Floats, time: float
+    configuration: Configuration, stiffness: csr_array, active: Indices, start: Floats, time: float
 ) -> Floats:
     """Velocities after some time; these and `start` are multiplied by the root of the masses."""
     a = stiffness[active][:, active]
-    g = mass_weighted(damping_matrix(snapshot), snapshot)[active][:, active]
+    g = mass_weighted(damping_matrix(configuration), configuration)[active][:, active]
     # displacements or forces over omega, so that both halves weigh as much
     omega = float(np.sqrt(np.abs(a).sum(axis=1).max()))
     still = np.zeros_like(start)
-    rates, forces = rescaling_operators(snapshot)
+    rates, forces = rescaling_operators(configuration)
     if not forces.data.any():
         system = csr_array(block_array([[None, omega * diags_array(np.ones(len(start)))], [-a / omega, -g]]))
         return np.asarray(expm_multiply(time * system, np.concatenate([still, start])))[len(start) :]
     from scipy.integrate import solve_ivp
 
-    weight = diags_array(1.0 / np.sqrt(snapshot.coordinate_mass[active]))
+    weight = diags_array(1.0 / np.sqrt(configuration.coordinate_mass[active]))
     n, b = csr_array(rates[:, active] @ weight), csr_array(weight @ forces[active])
 
     def slope(_: float, state: Floats) -> Floats:
@@ -159,6 +165,6 @@ def _linear_velocity(
         begin, error = np.concatenate([still, sign * start]), STEP_ERROR * np.abs(start).max()
         found = solve_ivp(slope, (0, time), begin, method="DOP853", t_eval=[time], rtol=STEP_ERROR, atol=error)
         if not found.success:
-            raise SnapshotError(f"The predicted motion was not found: {found.message} Compare over a shorter time.")
+            raise NotTakenError(f"The predicted motion was not found: {found.message} Compare over a shorter time.")
         ends.append(found.y[len(start) :, 0])
     return np.asarray(0.5 * (ends[0] - ends[1]))

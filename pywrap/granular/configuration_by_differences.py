@@ -12,7 +12,7 @@ from .balance import TWICE, force_scale, touch_twice
 from .contact_geometry import OneLaw, contacts_of_pairs
 from .force_differences import measure_operators
 from .force_probe import Particles
-from .granular_commands import BODIES, OWN, Commands, SnapshotError, without_suffix
+from .granular_commands import BODIES, OWN, Commands, NotTakenError, without_suffix
 from .instance_queries import open_files
 from .lammps_arrays import Arrays
 from .look_in_a_copy import in_a_copy
@@ -67,13 +67,13 @@ def still_particles(lmp: Any, given: Commands | None) -> Still:
             look = partial(look_at_forces, lmp, given, files, columns[0])
             commands, fixes, found, members = in_a_copy(look)
             break
-        except SnapshotError:
+        except NotTakenError:
             columns.pop(0)
             if not columns:
                 raise
     count, dimension = len(found["id"]), lmp.extract_setting("dimension")
     if count == 0:
-        raise SnapshotError("This LAMMPS has no particles.")
+        raise NotTakenError("This LAMMPS has no particles.")
     lines = {name: line for name, line in commands.fixes.items() if name in members}
     constraint, factor = mobility(lines, members, found["rmass"], dimension)
     axes = 6 if dimension == 3 else 3
@@ -104,7 +104,7 @@ def _forces_of_pairs(found: Arrays, box: Floats, style: str) -> LinearisedContac
     along = np.abs(np.einsum("ca,ca->c", tangential, pairs.geometry["normal"]))
     if np.any(along > ALONG * np.abs(pairs.forces).sum(axis=1)):
         if touch_twice(pairs.geometry["i"], pairs.geometry["j"]):
-            raise SnapshotError(f"The packing cannot rest: {TWICE}.")
+            raise NotTakenError(f"The packing cannot rest: {TWICE}.")
         tangential = still  # this pair style hands out something else
     made = LinearisedContacts(
         **pairs.geometry, lever_arm=pairs.geometry["slip_arm"], lever_slope=none, normal_force=pairs.forces[:, 0],

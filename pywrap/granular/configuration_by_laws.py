@@ -45,7 +45,7 @@ from .contact_geometry import (
     median_state,
 )
 from .contact_law_measurement import MeasuredLaw, measure_law
-from .granular_commands import GIVE_LINES, OWN, Commands, NotLinearisedError, SnapshotError, without_suffix
+from .granular_commands import GIVE_LINES, OWN, Commands, NotLinearisedError, NotTakenError, without_suffix
 from .lammps_arrays import Arrays
 from .law_remarks import remark_on
 from .looks import box_of, particles_of
@@ -65,7 +65,7 @@ KnownLaws = dict[tuple[Any, ...], MeasuredLaw]
 def configuration_by_laws(lmp: Any, commands: Commands, found: Arrays, laws: KnownLaws) -> Configuration:
     """The configuration of the arrays of a look; laws that are known are not measured, and new ones are added."""
     if not len(found["id"]):
-        raise SnapshotError("This LAMMPS has no particles.")
+        raise NotTakenError("This LAMMPS has no particles.")
     free, frozen, factor = _free_particles(commands, found)
     contacts, remarks = _linearised_contacts(lmp, commands, found, frozen, laws, box_of(lmp)[0])
     made = Configuration(**particles_of(lmp, found, free, factor), contacts=contacts, remarks=remarks)
@@ -83,7 +83,7 @@ def check_friction(contacts: LinearisedContacts, *, rests: bool) -> None:
         most = np.max(size[beyond] / contacts.normal_force[beyond])
         mu = np.min(contacts.friction[beyond] / contacts.normal_force[beyond])
         moves = "" if rests else "the packing moves: bring it to rest by faultgouge.relax(lmp); or "
-        raise SnapshotError(
+        raise NotTakenError(
             f"{np.count_nonzero(beyond)} contacts carry more than Coulomb's bound of the commands, up to |f_t| = "
             f"{most:.3g} f_n with mu = {mu:.3g}: {moves}the commands are not those of the instance; {GIVE_LINES}, as "
             "they hold now."
@@ -102,7 +102,7 @@ def _check_torques(others: Floats, commands: Commands, contacts: LinearisedConta
             "either something else turns them, which is not linearised here, or this release of LAMMPS hands out "
             "contacts in a way that is not known here; releases of 29 Aug 2024 to 22 Jul 2025 are"
         )
-        raise (SnapshotError if known else NotLinearisedError)(
+        raise (NotTakenError if known else NotLinearisedError)(
             f"The torques on particles are not those of their contacts: {reason}."
         )
 
@@ -125,7 +125,7 @@ def _free_particles(commands: Commands, found: Arrays) -> tuple[NDArray[np.bool_
         free |= moved
     free &= ~frozen
     if not free.any():
-        raise SnapshotError(
+        raise NotTakenError(
             "Nothing moves the particles: give the line of fix nve/sphere, or set it up, so that it is known which of "
             "them are free and what their moments of inertia are."
         )
@@ -230,6 +230,6 @@ def _agree(computed: Floats, stiffness: Floats, contacts: OneLaw) -> None:
     """Refuse normal forces that are not those of the commands."""
     said, rounding = contacts.forces[:, 0], OVERLAP_ROUNDING * stiffness * contacts.geometry["slip_arm"].sum(axis=1)
     if len(said) and np.any(np.abs(computed - said) > AGREES * np.max(np.abs(said)) + rounding):
-        raise SnapshotError(
+        raise NotTakenError(
             f"The normal forces of the {contacts.who} are not those of the commands: {GIVE_LINES}, as they hold now."
         )

@@ -7,7 +7,7 @@ import numpy as np
 from ...analysis.arrays import Floats, Indices
 from ...analysis.contacts import WALL
 from .contact_law_measurement import State
-from .granular_commands import SnapshotError
+from .granular_commands import NotTakenError
 from .lammps_arrays import Arrays
 
 
@@ -37,7 +37,7 @@ def contacts_of_pairs(found: Arrays, box: Floats) -> OneLaw:
         rows, partners = np.zeros((0, 7)), np.zeros((0, 2))
     i, j = np.searchsorted(found["id"], partners).T
     if np.any(i == j):
-        raise SnapshotError(
+        raise NotTakenError(
             f"Particle {int(partners[i == j][0, 0])} touches its own periodic image: take a box that is wider."
         )
     branch = _towards_first(rows[:, :3], found["x"][i] - found["x"][j], box)

@@ -26,7 +26,7 @@ from mpi4py import MPI
 
 from ...analysis.arrays import Floats
 from ..lammps.instance import start_lammps
-from .granular_commands import GIVE_LINES, PLANES, Commands, SnapshotError
+from .granular_commands import GIVE_LINES, PLANES, Commands, NotTakenError
 from .instance_queries import explain_error
 
 EXACT = 1e-6
@@ -185,7 +185,7 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
 
     Raises
     ------
-    SnapshotError
+    NotTakenError
         If it is no power law of the kind above.
     """
     least, most = (share * state.radii[0] for share in OVERLAP_RANGE)
@@ -199,7 +199,7 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
     try:
         bench = TwoParticleLammps(lmp, commands, name, max(state.radii))
     except Exception as error:  # whatever LAMMPS says of the commands
-        raise SnapshotError(
+        raise NotTakenError(
             f"The commands of the {who} do not stand alone ({explain_error(error)}): {GIVE_LINES}."
         ) from error
     with closing(bench.lammps):
@@ -215,13 +215,13 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
         if not any(values):
             return PowerOfOverlap(0.0)
         if min(values) <= 0:
-            raise SnapshotError(f"The {what} changes its sign, which that of no contact law does.")
+            raise NotTakenError(f"The {what} changes its sign, which that of no contact law does.")
         by_depth, by_mass, by_size = (
             quarter(np.log(value / values[0]) / scale, what)
             for value, scale in zip(values[1:], (depth, weight, size), strict=True)
         )
         if by_depth != by_size:
-            raise SnapshotError(f"The {what} is no power of its contact radius.")
+            raise NotTakenError(f"The {what} is no power of its contact radius.")
         factor = values[0] / (first.mass**by_mass * (first.radius * first.overlap) ** by_depth)
         return PowerOfOverlap(factor, by_depth, by_mass)
 
@@ -238,7 +238,7 @@ def quarter(value: float, what: str) -> float:
     """The multiple of 1/4 that a measured exponent is; an error if it is none."""
     nearest = round(4 * value) / 4
     if not abs(value - nearest) < EXACT:
-        raise SnapshotError(
+        raise NotTakenError(
             f"The {what} has the measured exponent {value:.9g}, which no contact law of LAMMPS that is known here has."
         )
     return nearest
@@ -249,7 +249,7 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
     state = bench.place_at(wanted)
     fn, delta = bench.force()[0], state.overlap
     if not fn > 0:
-        raise SnapshotError("A contact law has no normal force that pushes: it cannot be measured.")
+        raise NotTakenError("A contact law has no normal force that pushes: it cannot be measured.")
     # a time step so long that dashpots are weak beside slips
     step = 1e3 * np.sqrt(state.mass * delta / fn)
     bench.run(f"timestep {step:.17g}")
@@ -270,7 +270,7 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
         slip *= 0.01 * mu * fn / ft  # a stiff spring: once more, with less
         ft = _push_contact(bench, wanted, slip / step)
     if not 0 < ft <= 0.1 * mu * fn:
-        raise SnapshotError("A contact law has friction without a tangential stiffness: use one with a history.")
+        raise NotTakenError("A contact law has friction without a tangential stiffness: use one with a history.")
     arm = abs(bench.array("torque")[0, bench.about] / bench.array("f")[0, bench.across])
     lever = float(state.radii[0] - arm) / delta
     # the exponents at constant slip, in steps of a tenth of the overlap

@@ -30,7 +30,7 @@ from scipy.sparse import coo_array, csr_array
 from ...analysis.arrays import Floats
 from .colours import Colours, Pairs, neighbouring_pairs
 from .force_probe import Particles, Probe, Sides, hold_still, set_coordinate_velocity
-from .granular_commands import SnapshotError
+from .granular_commands import NotTakenError
 from .look_in_a_copy import in_a_copy
 
 SLOW = 1e12
@@ -98,7 +98,7 @@ def measure_operators(lmp: Any, particles: Particles, force: float | None) -> Fo
 
     Raises
     ------
-    SnapshotError
+    NotTakenError
         If LAMMPS's forces are not functions of displacements and velocities of neighbours.
     """
     return in_a_copy(partial(_measure, lmp, particles, force))
@@ -137,7 +137,7 @@ def _refuse_errors(particles: Particles, error: Floats) -> None:
         return
     place = ", ".join(f"{x:.6g}" for x in particles.position[worst, : particles.dimension])
     others = int(np.sum(error > TOO_LARGE)) - 1
-    raise SnapshotError(
+    raise NotTakenError(
         f"K and C by differences of forces are {error[worst]:.2g} of their largest entry from the forces of a "
         f"displacement of all particles at particle {particles.ids[worst]} at ({place})"
         f"{f', and at {others} more' if others else ''}: contacts there are about to open, to close or to slide, or "

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ...analysis.arrays import Floats, Indices
-from .granular_commands import BODIES, SnapshotError, without_suffix
+from .granular_commands import BODIES, NotTakenError, without_suffix
 from .instance_queries import styles_of
 from .lammps_arrays import owned_array
 from .look_in_a_copy import in_a_copy, quieten
@@ -78,7 +78,7 @@ def _rows(lmp: Any, particles: Particles) -> Indices:
     ids = owned_array(lmp, "id")
     rows = np.argsort(ids)
     if not np.array_equal(ids[rows], particles.ids):
-        raise SnapshotError("Particles left LAMMPS while they were displaced: let the packing come to rest first.")
+        raise NotTakenError("Particles left LAMMPS while they were displaced: let the packing come to rest first.")
     return rows
 
 
@@ -122,14 +122,14 @@ class Probe:
         """
         try:
             return in_a_copy(partial(self.there_and_back, directions))
-        except SnapshotError as error:
+        except NotTakenError as error:
             if str(error) != CHANGES:
                 raise
         rest = self._alone(0.0 * directions[0])
         return [(rest, [(self._alone(s * q), self._alone(-s * q)) for s in self.sizes]) for q in directions]
 
     def there_and_back(self, directions: list[Floats]) -> list[Sides]:
-        """Forces along each direction; a SnapshotError if a way there and back changes the state."""
+        """Forces along each direction; a NotTakenError if a way there and back changes the state."""
         first = rest = self._from_rest(0.0 * directions[0])
         found, place = [], self._positions()
         for q in directions:
@@ -138,7 +138,7 @@ class Probe:
                 there, back = self._go(way * q), self._go(-way * q if self.duration else 0.0 * q)
                 left = np.abs(back - [rest, first]).max(axis=1) - ROUNDS * np.abs(first).max()
                 if np.any(left > np.array([RETURNS, RETURNS_IN_ALL]) * np.abs(there - rest).max()):
-                    raise SnapshotError(CHANGES)
+                    raise NotTakenError(CHANGES)
                 if self.duration:
                     self._put(place)
                 sides.append(there)

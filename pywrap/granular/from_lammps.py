@@ -18,7 +18,7 @@ from .acting_fixes import check_holding
 from .balance import BALANCE, check_balance, force_scale, refuse_motion
 from .configuration_by_differences import configuration_by_differences, still_particles
 from .configuration_by_laws import KnownLaws, check_friction, configuration_by_laws
-from .granular_commands import OWN, Commands, NotLinearisedError, SnapshotError, read_commands, with_one_rank
+from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError, read_commands, with_one_rank
 from .instance_queries import open_files
 from .look_in_a_copy import can_copy, in_a_copy
 from .looks import look_at_contacts
@@ -68,14 +68,14 @@ def from_lammps(
 
     Raises
     ------
-    SnapshotError
+    NotTakenError
         If the packing cannot be taken: it moves, or has moving walls or bodies that rotate; or the commands are not
         those of the instance; or LAMMPS's forces do not change as K says.
     """
-    return take_snapshot(lmp, commands, {}, slides=slides, balance=balance, prove=prove, differences=differences)
+    return take_configuration(lmp, commands, {}, slides=slides, balance=balance, prove=prove, differences=differences)
 
 
-def take_snapshot(
+def take_configuration(
     lmp: Any,
     commands: Iterable[str] | None,
     laws: KnownLaws,
@@ -96,14 +96,14 @@ def take_snapshot(
         if not can_copy(lmp):
             raise NotLinearisedError(with_one_rank(reason)) from reason
         if slides:
-            raise SnapshotError(
+            raise NotTakenError(
                 f"{str(reason).rstrip('.')}; so K is found by differences of forces, which have no choice between "
                 "sticking and sliding contacts: leave slides out."
             ) from reason
         if not isinstance(reason, NotProvedError):
             return _by_differences(lmp, given, balance=balance, prove=prove)
         # what acts on velocities, or on particles far apart, is not in differences either, and has been named
-        with suppress(SnapshotError):
+        with suppress(NotTakenError):
             found = _by_differences(lmp, given, balance=balance, prove=prove)
             if found.proof is not None and max(found.proof / BOUND, found.operator_error / GOOD) <= 1:
                 return found
@@ -117,26 +117,28 @@ def _by_laws(
     look = partial(look_at_contacts, lmp, given, open_files())
     deck, fixes, found = in_a_copy(look) if can_copy(lmp) else look()
     try:
-        snapshot = configuration_by_laws(lmp, deck, found, laws)
+        configuration = configuration_by_laws(lmp, deck, found, laws)
     except ValueError as error:  # of what no contact at rest has
-        raise SnapshotError(f"The packing moves: {error}; bring it to rest by faultgouge.relax(lmp).") from error
-    contacts = snapshot.contacts
-    rests = not snapshot.residual > BALANCE * force_scale(snapshot)
+        raise NotTakenError(f"The packing moves: {error}; bring it to rest by faultgouge.relax(lmp).") from error
+    contacts = configuration.contacts
+    rests = not configuration.residual > BALANCE * force_scale(configuration)
     proves = prove and can_copy(lmp) and rests
     if not proves:
         check_holding(fixes)
     check_friction(contacts, rests=rests)
-    refuse_motion(snapshot, balance, deck)
+    refuse_motion(configuration, balance, deck)
     if proves:
-        snapshot = _proved(lmp, snapshot, deck, fixes)
+        configuration = _proved(lmp, configuration, deck, fixes)
     if slides:
-        return derive_frozen(snapshot, contacts=derive_frozen(contacts, sliding=contacts.at_bound))
-    return snapshot
+        return derive_frozen(configuration, contacts=derive_frozen(contacts, sliding=contacts.at_bound))
+    return configuration
 
 
-def _proved(lmp: Any, snapshot: Configuration, commands: Commands, fixes: dict[str, str]) -> Configuration:
+def _proved(lmp: Any, configuration: Configuration, commands: Commands, fixes: dict[str, str]) -> Configuration:
     """A Configuration with its proof."""
-    return derive_frozen(snapshot, proof=prove_motion(lmp, snapshot, fixes, extrapolates=commands.style == OWN))
+    return derive_frozen(
+        configuration, proof=prove_motion(lmp, configuration, fixes, extrapolates=commands.style == OWN)
+    )
 
 
 def _by_differences(lmp: Any, given: Commands | None, *, balance: float, prove: bool) -> Configuration:

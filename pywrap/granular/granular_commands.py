@@ -34,11 +34,11 @@ TANGENTIAL = (
 )  # fmt: skip
 
 
-class SnapshotError(FaultgougeError):
+class NotTakenError(FaultgougeError):
     """A packing of LAMMPS cannot be taken as it stands: one sentence with what would do."""
 
 
-class NotLinearisedError(SnapshotError):
+class NotLinearisedError(NotTakenError):
     """What has no linearised contacts here: K and C by differences of forces may serve."""
 
 
@@ -73,7 +73,7 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
 
     Raises
     ------
-    SnapshotError
+    NotTakenError
         If no line is a pair_style, or a line that a user gives has a variable in it.
     """
     style = restart = ""
@@ -89,7 +89,7 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
         if "$" in text and words[0] in ("pair_style", "pair_coeff", "fix", "region"):
             if log:
                 continue  # the line that follows has numbers
-            raise SnapshotError(f"{line.strip()!r} has a variable: write its number, as a log of LAMMPS has it.")
+            raise NotTakenError(f"{line.strip()!r} has a variable: write its number, as a log of LAMMPS has it.")
         if words[0] == "clear":
             style, coefficients, fixes, regions = "", [], {}, {}
         elif words[0] == "pair_style" and len(words) > 1:
@@ -108,7 +108,7 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
             restart = text.strip() if words[0] == "write_restart" else ""
     if not style:
         where = "The log of this LAMMPS has" if log else "The commands have"
-        raise SnapshotError(f"{where} no pair_style: {GIVE_LINES}.")
+        raise NotTakenError(f"{where} no pair_style: {GIVE_LINES}.")
     return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes, regions, restart)
 
 
@@ -126,11 +126,11 @@ def logged_text(text: str, folder: Path) -> str:
 
 
 def commands_in(text: str) -> list[str]:
-    """The commands of a log with variables filled in; a SnapshotError if no pair_style is among them."""
+    """The commands of a log with variables filled in; a NotTakenError if no pair_style is among them."""
     lines = [line.split("#")[0] for line in re.sub(r"&[ \t]*\n", " ", text).splitlines()]
     lines = [line for line in lines if "$" not in line]
     if not any(line.split()[:1] == ["pair_style"] for line in lines):
-        raise SnapshotError(
+        raise NotTakenError(
             "No pair_style is in the log: write one, behind read_restart, too; and leave out log none and echo, which "
             "keep commands out of the log."
         )
@@ -194,10 +194,10 @@ def check_rest(styles: dict[str, str], commands: Commands) -> None:
         plain = without_suffix(style)
         for begin, says in MOVING.items():
             if plain.startswith(begin):
-                raise SnapshotError(f"fix {name} {style} {says}.")
+                raise NotTakenError(f"fix {name} {style} {says}.")
         for word in ("wiggle", "shear"):
             if plain == "wall/gran" and word in commands.fixes.get(name, "").split()[4:]:
-                raise SnapshotError(f"The wall of fix {name} moves: let it rest without {word}.")
+                raise NotTakenError(f"The wall of fix {name} moves: let it rest without {word}.")
 
 
 def check_fixes(styles: dict[str, str], commands: Commands) -> None:
@@ -214,7 +214,7 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
             continue
         line = commands.fixes.get(name)
         if line is None or without_suffix(line.split()[3]) != plain:
-            raise SnapshotError(
+            raise NotTakenError(
                 f"The commands have no line of fix {name} {style}: give the line that the deck has among commands."
             )
         if plain == "wall/gran":
@@ -230,7 +230,7 @@ def _check_wall(name: str, line: str) -> None:
     words = line.split()
     at = [k for k, word in enumerate(words) if word in (*PLANES, "zcylinder", "region")]
     if not at or len(words) < at[0] + (3 if words[at[0]] in PLANES else 2):
-        raise SnapshotError(f"The line of fix {name} wall/gran does not say where the wall is: give all of it.")
+        raise NotTakenError(f"The line of fix {name} wall/gran does not say where the wall is: give all of it.")
     for word, says in {
         "region": "is a region: use a plane, xplane, yplane or zplane",
         "zcylinder": "is a cylinder: use a plane, xplane, yplane or zplane",

@@ -10,7 +10,7 @@ from typing import IO, Any, NamedTuple
 
 from mpi4py import MPI
 
-from .granular_commands import SnapshotError
+from .granular_commands import NotTakenError
 
 
 def communicator(lmp: Any) -> MPI.Comm:
@@ -110,10 +110,10 @@ def only_log() -> list[str] | None:
 
 
 def _lines_of(log: OpenFile) -> list[str]:
-    """The lines of a log; a SnapshotError where another LAMMPS writes to the same file."""
+    """The lines of a log; a NotTakenError where another LAMMPS writes to the same file."""
     text = Path(log.path).read_text(errors="replace")
     if "\0" in text or os.path.getsize(log.path) != log.place:
-        raise SnapshotError(
+        raise NotTakenError(
             f"{log.path} is the log of another LAMMPS, too: give each LAMMPS a log of its own (-log FILE), or the "
             f"lines as from_lammps(lmp, commands=[...])."
         )

@@ -11,7 +11,7 @@ from typing import Any
 
 from ...analysis import Configuration, NoEquilibriumError
 from .from_lammps import from_lammps
-from .granular_commands import SnapshotError
+from .granular_commands import NotTakenError
 from .instance_queries import styles_of
 from .look_in_a_copy import INSERTS
 from .relax import relax
@@ -25,19 +25,19 @@ def take_or_keep(
 
     Raises
     ------
-    SnapshotError
+    NotTakenError
         If the packing cannot be taken, or flows.
     """
     try:
         if relaxes:
             _relax(lmp, commands)
         return from_lammps(lmp, commands, slides=slides, balance=balance)
-    except (SnapshotError, NoEquilibriumError) as error:
+    except (NotTakenError, NoEquilibriumError) as error:
         kept = None if keep is None else _keep(lmp, keep.with_suffix(".restart"))
         if kept is None:
             raise
         longer = "" if isinstance(error, NoEquilibriumError) else ", and with a longer run"
-        raise SnapshotError(
+        raise NotTakenError(
             f"{str(error).rstrip('.')}. The state is kept in {kept}: go on by a deck of read_restart {kept} and the "
             f"lines of this deck from pair_style on, without those that make particles{longer}."
         ) from error

@@ -14,7 +14,7 @@ import numpy as np
 from ...analysis import Configuration
 from ...analysis.arrays import Floats, Indices
 from ..lammps.instance import load_plugin
-from .granular_commands import PLANES, NotLinearisedError, SnapshotError
+from .granular_commands import PLANES, NotLinearisedError, NotTakenError
 from .instance_queries import communicator
 
 Arrays = dict[str, Any]
@@ -33,21 +33,21 @@ def owned_array(lmp: Any, name: str) -> Floats:
     return np.zeros((0, 3)) if values is None else values[:count]
 
 
-def rows_of(lmp: Any, snapshot: Configuration) -> Indices:
-    """Rows of LAMMPS's arrays on one rank, in the order of the particles of a snapshot."""
+def rows_of(lmp: Any, configuration: Configuration) -> Indices:
+    """Rows of LAMMPS's arrays on one rank, in the order of the particles of a configuration."""
     ids = owned_array(lmp, "id")
     rows = np.argsort(ids)
-    if not np.array_equal(ids[rows], snapshot.ids):
-        raise SnapshotError("The instance has other particles than the snapshot: take a new one.")
+    if not np.array_equal(ids[rows], configuration.ids):
+        raise NotTakenError("The instance has other particles than the configuration: take a new one.")
     return rows
 
 
-def set_velocity(lmp: Any, snapshot: Configuration, velocity: Floats) -> None:
+def set_velocity(lmp: Any, configuration: Configuration, velocity: Floats) -> None:
     """Give the particles the velocities of their coordinates, shape (axes N,)."""
-    rows = rows_of(lmp, snapshot)
-    translation, rotation = snapshot.vectors(velocity)
+    rows = rows_of(lmp, configuration)
+    translation, rotation = configuration.vectors(velocity)
     owned_array(lmp, "v")[rows] = translation
-    owned_array(lmp, "omega")[rows] = rotation / snapshot.radius[:, None]
+    owned_array(lmp, "omega")[rows] = rotation / configuration.radius[:, None]
 
 
 def arrays_at_rest(lmp: Any, groups: dict[str, str], walls: list[str], columns: str) -> Arrays:

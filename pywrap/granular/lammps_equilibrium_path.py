@@ -40,8 +40,8 @@ from ...analysis.factors.sparse_lu import general_lu
 from ...parent_death import end_with
 from .balance import check_balance
 from .configuration_by_laws import KnownLaws
-from .from_lammps import take_snapshot
-from .granular_commands import INTEGRATORS, SnapshotError, read_commands, without_suffix
+from .from_lammps import take_configuration
+from .granular_commands import INTEGRATORS, NotTakenError, read_commands, without_suffix
 from .instance_queries import OpenFile, explain_error, log_file, log_of, open_files
 from .lammps_arrays import owned_array, rows_of, set_velocity
 from .look_in_a_copy import can_copy, in_a_copy, interrupts_wait, quieten, silent_copy
@@ -87,7 +87,7 @@ def lammps_path(
 
     Raises
     ------
-    SnapshotError
+    NotTakenError
         If the instance has several ranks or threads. ``path(value)`` raises it as `from_lammps` does, with the proof at
         the first value alone, and where a load changes no force.
     BadInputError
@@ -97,7 +97,7 @@ def lammps_path(
         come to rest.
     """
     if not can_copy(lmp):
-        raise SnapshotError("lammps_path keeps copies of the process: use one rank and one thread.")
+        raise NotTakenError("lammps_path keeps copies of the process: use one rank and one thread.")
     check_balance(balance)
     given = None if commands is None else list(commands)
     return LammpsPath(_Relaxation(lmp, apply, given, slides, balance, steps))
@@ -122,7 +122,7 @@ class LammpsPath:
     def __call__(self, value: float) -> Configuration:
         """The packing in equilibrium at a value."""
         if not self._end.alive:
-            raise SnapshotError("The path is closed: ask it inside of its `with` block, or make a new one.")
+            raise NotTakenError("The path is closed: ask it inside of its `with` block, or make a new one.")
         value = float(value)
         below, there, snapshot = next(each for each in reversed(self._kept) if each[0] <= value or each[0] == -np.inf)
         if snapshot is not None and below == value:
@@ -170,7 +170,7 @@ def _ask(there: Connection, value: float, *, relaxes: bool) -> tuple[Connection,
             os.kill(copy, signal.SIGKILL)
         raise
     except EOFError:
-        return here, SnapshotError(f"LAMMPS ended without a word while it relaxed at {value:g}.")
+        return here, NotTakenError(f"LAMMPS ended without a word while it relaxed at {value:g}.")
 
 
 def _end(kept: list[Kept], first: int, owner: int, folder: "TemporaryDirectory[str]") -> None:
@@ -245,10 +245,10 @@ class _Relaxation:
             if not relaxes:
                 return None  # particles that nothing holds fly off: the relaxation has its own words for it
             return (
-                error if isinstance(error, FaultgougeError) else SnapshotError(f"At {value:g}: {explain_error(error)}")
+                error if isinstance(error, FaultgougeError) else NotTakenError(f"At {value:g}: {explain_error(error)}")
             )
         if change == 0.0:
-            return SnapshotError(
+            return NotTakenError(
                 f"No force changes with the load at {value:g}: does apply set it, or a fix read the variable?"
             )
         return derive_frozen(found, fx=value, load_error=found.residual / change)
@@ -263,7 +263,7 @@ class _Relaxation:
             except (Exception, SystemExit) as error:  # of whatever kind: the function is the user's
                 of_lammps = str(error).startswith("ERROR")
                 what = explain_error(error) if of_lammps else f"apply failed with {type(error).__name__}: {error}"
-                raise SnapshotError(f"At {value:g}: {what.rstrip('.')}{place_in_user_code(error)}.") from None
+                raise NotTakenError(f"At {value:g}: {what.rstrip('.')}{place_in_user_code(error)}.") from None
         elif self.lmp.set_internal_variable(self.apply, value) != 0:
             self.lmp.command(f"variable {self.apply} equal {value:.17g}")
 
@@ -271,7 +271,7 @@ class _Relaxation:
         """The packing as it stands, moving or not."""
         # a proof may have shown at the first load that laws do not serve
         differences = self.found is not None and self.found.operators == "differences"
-        return take_snapshot(
+        return take_configuration(
             self.lmp,
             self.commands,
             self.laws,

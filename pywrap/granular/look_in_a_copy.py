@@ -23,7 +23,7 @@ from typing import Any, NoReturn, TypeVar
 from mpi4py import MPI
 
 from ...parent_death import end_with
-from .granular_commands import SnapshotError
+from .granular_commands import NotTakenError
 from .instance_queries import explain_error, of_lammps, styles_of
 
 Found = TypeVar("Found")
@@ -77,7 +77,7 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
 
     Raises
     ------
-    SnapshotError
+    NotTakenError
         With what went wrong in the copy.
     """
     here, there = Pipe(duplex=False)
@@ -90,7 +90,7 @@ def in_a_copy(work: Callable[[], Found]) -> Found:
         there.close()
         found = here.recv()
     except EOFError:
-        found = SnapshotError("LAMMPS ended while its packing was looked at; does the deck run on as it stands?")
+        found = NotTakenError("LAMMPS ended while its packing was looked at; does the deck run on as it stands?")
     finally:
         here.close()
         if child:
@@ -108,7 +108,7 @@ def _send_and_end(work: Callable[[], Found], there: Connection, parent: int) -> 
         end_with(parent)
         there.send(work())
     except Exception as error:  # whatever it is, the parent says it
-        there.send(SnapshotError(explain_error(error)) if of_lammps(error) else error)
+        there.send(NotTakenError(explain_error(error)) if of_lammps(error) else error)
     finally:
         os._exit(0)
 

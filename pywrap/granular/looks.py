@@ -16,7 +16,7 @@ from .granular_commands import (
     WALLS,
     Commands,
     NotLinearisedError,
-    SnapshotError,
+    NotTakenError,
     check_fixes,
     check_pair,
     check_rest,
@@ -46,7 +46,7 @@ def look_at_contacts(
     if given is None:
         lines = log_of(lmp, files) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
         if lines is None:
-            raise SnapshotError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
+            raise NotTakenError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
         given = read_commands(lines, log=True)
     elif copied:
         lmp.command("log none")
@@ -89,7 +89,7 @@ def look_at_forces(
     if given is None:
         lines = log_of(lmp, files)
         if lines is None:
-            raise SnapshotError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
+            raise NotTakenError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
         given = read_commands(lines, log=True)
     lmp.command("log none")
     styles = styles_of(lmp)
@@ -99,11 +99,11 @@ def look_at_forces(
     for name in moving:
         style = styles.fixes[name]
         if without_suffix(style) not in MOBILE:
-            raise SnapshotError(
+            raise NotTakenError(
                 f"fix {name} {style} moves or holds particles in a way that is not known here: unfix it."
             )
         if name not in given.fixes or without_suffix(given.fixes[name].split()[3]) != without_suffix(style):
-            raise SnapshotError(
+            raise NotTakenError(
                 f"The commands have no line of fix {name} {style}: give the line that the deck has among commands."
             )
     refuse_moving_regions(lmp, given)
@@ -139,14 +139,14 @@ def _forces_of_walls(lmp: Any, styles: Styles, commands: Commands, found: Arrays
 def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
     """Refuse what an instance has that is not linearised here, whatever its particles do."""
     if without_suffix(styles.pair) != commands.style:
-        raise SnapshotError(
+        raise NotTakenError(
             f"The commands have pair_style {commands.style}, and the instance has {styles.pair}: {GIVE_LINES}."
         )
     if not lmp.extract_setting("radius_flag") or any(word in styles.atom for word in ("body", "ellipsoid", "bpm")):
-        raise SnapshotError(f"atom_style {styles.atom} has no disks and spheres alone: use atom_style sphere.")
+        raise NotTakenError(f"atom_style {styles.atom} has no disks and spheres alone: use atom_style sphere.")
     if lmp.extract_global("ftm2v") != 1.0:
         units = lmp.extract_global("units")
-        raise SnapshotError(f"In units {units} force is not mass times acceleration: use lj, si, cgs, micro or nano.")
+        raise NotTakenError(f"In units {units} force is not mass times acceleration: use lj, si, cgs, micro or nano.")
     check_rest(styles.fixes, commands)
     for name, style in styles.fixes.items():
         if style.startswith("rigid") and name in commands.fixes:
@@ -157,7 +157,7 @@ def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
     check_fixes(styles.fixes, commands)
     silent = _silent_walls(styles, commands)
     if silent and not can_copy(lmp):
-        raise SnapshotError(
+        raise NotTakenError(
             f"fix {silent[0]} wall/gran does not hand out its contacts, and on several ranks or with threads they are "
             "not found without it: write contacts at its end."
         )

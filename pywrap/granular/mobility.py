@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
-from .granular_commands import BODIES, SnapshotError, without_suffix
+from .granular_commands import BODIES, NotTakenError, without_suffix
 from .translating_bodies import translating_bodies
 
 MOBILE = (
@@ -40,14 +40,14 @@ def refuse_two_integrators(lines: dict[str, str], members: dict[str, NDArray[np.
 
     Raises
     ------
-    SnapshotError
+    NotTakenError
         With both fixes.
     """
     moving = [name for name, line in lines.items() if without_suffix(line.split()[3]) in INTEGRATES]
     for one, other in combinations(moving, 2):
         both = int(np.count_nonzero(members[one] & members[other]))
         if both:
-            raise SnapshotError(
+            raise NotTakenError(
                 f"fix {one} and fix {other} both move {counted(both, 'particle')}, which LAMMPS then moves twice in "
                 "each step: unfix one of them, or have it move other particles."
             )
@@ -92,7 +92,7 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
 
     Raises
     ------
-    SnapshotError
+    NotTakenError
         If a fix moves or holds particles otherwise.
     """
     refuse_two_integrators(lines, members)
@@ -110,7 +110,7 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
             found.moves[:, members[name]] = False
     axes = np.arange(6) if dimension == 3 else np.array([0, 1, 5])
     if not found.moves[axes].any():
-        raise SnapshotError(
+        raise NotTakenError(
             "Nothing moves the particles: give the line of fix nve/sphere, or set it up, so that it is known which of "
             "them are free and what their moments of inertia are."
         )
@@ -132,19 +132,19 @@ def _apply(found: _Coordinates, name: str, style: str, words: list[str], members
     elif style == "setforce":
         for k in range(3):
             if words[k] != "NULL" and float(words[k] if "v_" not in words[k] else "nan") != 0.0:
-                raise SnapshotError(f"fix {name} setforce drives particles: only 0.0 and NULL hold them.")
+                raise NotTakenError(f"fix {name} setforce drives particles: only 0.0 and NULL hold them.")
             if words[k] != "NULL":
                 found.moves[k, members] = False
     elif style in ("lineforce", "planeforce"):
         along = np.array([float(word) for word in words[:3]]) != 0.0
         if along.sum() != 1:
-            raise SnapshotError(f"fix {name} {style} has a direction along no axis, which is not known here: unfix it.")
+            raise NotTakenError(f"fix {name} {style} has a direction along no axis, which is not known here: unfix it.")
         for k in np.flatnonzero(along if style == "planeforce" else ~along).tolist():
             found.moves[k, members] = False
     elif style == "aveforce":
         for k in range(3):
             if words[k].startswith("v_"):  # K by differences takes this fix away, and its force with it
-                raise SnapshotError(
+                raise NotTakenError(
                     f"fix {name} aveforce adds the force {words[k]}, which may change with the place: give this force "
                     "to fix addforce, and 0.0 to fix aveforce."
                 )

@@ -30,7 +30,7 @@ from ...analysis import Configuration, damping_matrix, stiffness_matrix
 from ...analysis.arrays import Floats, Indices
 from ...analysis.motion.one_sided import OneSidedSystem
 from .acting_fixes import acting_fixes
-from .granular_commands import GIVE_LINES, NotLinearisedError, SnapshotError
+from .granular_commands import GIVE_LINES, NotLinearisedError, NotTakenError
 from .lammps_steps import steps_in_a_copy
 
 BOUND = 1e-3
@@ -96,7 +96,7 @@ def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extr
     ------
     NotProvedError
         If LAMMPS's forces do not change as K says, with the likeliest cause: something acts beside contacts.
-    SnapshotError
+    NotTakenError
         If nothing is known to act beside contacts: the commands are others.
     """
     comparison = _Comparison.of(configuration, extrapolates=extrapolates)
@@ -128,15 +128,15 @@ def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extr
     if causes:
         raise NotProvedError(f"{says}; {' and '.join(causes)}.")
     if configuration.operators == "differences":
-        raise SnapshotError(f"{says}, though K and C are differences of these forces: do they depend on the time?")
+        raise NotTakenError(f"{says}, though K and C are differences of these forces: do they depend on the time?")
     contacts = configuration.contacts
     close = np.count_nonzero((configuration.mobilised > CLOSE) & ~contacts.at_bound)
     if close:
-        raise SnapshotError(
+        raise NotTakenError(
             f"{says}; {close} contacts are just below Coulomb's bound and may be sliding while the packing creeps: run "
             f"on with drag until it rests; or the commands are not those of the instance: {GIVE_LINES}."
         )
-    raise SnapshotError(
+    raise NotTakenError(
         f"{says}; the commands are those of another run or instance, or some are not in the log (echo none, a full "
         f"disk), or a restart has lost histories of contacts: {GIVE_LINES}, as they hold now."
     )

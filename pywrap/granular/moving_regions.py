@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .granular_commands import Commands, SnapshotError, without_suffix
+from .granular_commands import Commands, NotTakenError, without_suffix
 from .instance_queries import styles_of
 from .look_in_a_copy import in_a_copy, quieten
 
@@ -22,7 +22,7 @@ def refuse_moving_regions(lmp: Any, commands: Commands) -> None:
 
     Raises
     ------
-    SnapshotError
+    NotTakenError
         With the region and its variable.
     """
     styles = styles_of(lmp).fixes
@@ -36,7 +36,7 @@ def refuse_moving_regions(lmp: Any, commands: Commands) -> None:
     moving = in_a_copy(partial(_changing, lmp, sorted({each for *_, each in found}))) if found else set()
     for name, region, variable in found:
         if variable in moving:
-            raise SnapshotError(
+            raise NotTakenError(
                 f"Region {region} of fix {name} moves with v_{variable}: give this variable a constant before the last "
                 "run, and run on until the packing rests."
             )

@@ -18,8 +18,8 @@ from ...analysis.counted import counted
 from .acting_fixes import acting_fixes
 from .balance import check_balance, force_scale, restless_fix
 from .configuration_by_differences import still_particles
-from .from_lammps import take_snapshot
-from .granular_commands import SnapshotError, read_commands
+from .from_lammps import take_configuration
+from .granular_commands import NotTakenError, read_commands
 from .instance_queries import explain_error
 from .lammps_arrays import owned_array, rows_of, set_velocity
 from .look_in_a_copy import can_copy
@@ -69,7 +69,7 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
 
     Raises
     ------
-    SnapshotError
+    NotTakenError
         If the instance cannot be taken, as by `from_lammps`.
     BadInputError
         If `balance` or `steps` is no such number.
@@ -80,7 +80,7 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
     if steps < 1:
         raise BadInputError(f"steps = {steps} is refused: nothing would come to rest; give a number from 1 on.")
     if not can_copy(lmp):
-        raise SnapshotError("relax looks at copies of the process: use one rank and one thread.")
+        raise NotTakenError("relax looks at copies of the process: use one rank and one thread.")
     given = None if commands is None else list(commands)
     lines = None if given is None else read_commands(given)
 
@@ -93,7 +93,7 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
         )
 
     still = still_particles(lmp, lines)
-    look = partial(take_snapshot, lmp, given, {}, slides=False, balance=np.inf, prove=False)
+    look = partial(take_configuration, lmp, given, {}, slides=False, balance=np.inf, prove=False)
     try:
         found, _ = bring_to_rest(lmp, look, still.configuration, balance, steps, RATE, "", far=FAR, scale=scale)
     except NoEquilibriumError as error:
@@ -212,9 +212,9 @@ def _run(lmp: Any, count: int, where: str) -> None:
     try:
         lmp.command(f"run {STEPS_BETWEEN_LOOKS} post no")
     except Exception as error:  # LAMMPS raises what its bindings choose
-        raise SnapshotError(f"While the packing came to rest{where}, {explain_error(error)}") from error
+        raise NotTakenError(f"While the packing came to rest{where}, {explain_error(error)}") from error
     if lmp.extract_global("ntimestep") != began + STEPS_BETWEEN_LOOKS:
-        raise SnapshotError(
+        raise NotTakenError(
             f"LAMMPS ended a run while the packing came to rest{where}, as fix halt and timer timeout do: unfix "
             "it, and set `timer timeout unlimited`."
         )

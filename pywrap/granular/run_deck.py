@@ -19,7 +19,7 @@ from ..lammps.instance import lammps_instance
 from .balance import BALANCE, check_balance
 from .granular_commands import (
     NotLinearisedError,
-    SnapshotError,
+    NotTakenError,
     commands_in,
     logged_text,
     read_commands,
@@ -75,7 +75,7 @@ def run_deck(
     ------
     BadInputError
         If the deck is missing, or before its first run has what cannot be taken.
-    SnapshotError
+    NotTakenError
         If LAMMPS stops, or the packing cannot be taken.
     """
     check_balance(balance)
@@ -128,7 +128,7 @@ def _carry_out(lmp: Any, path: Path, name: str) -> None:
         os.chdir(path.parent.resolve())
         lmp.file(name)
     except Exception as error:  # LAMMPS raises what its bindings choose
-        raise SnapshotError(f"{path}: {explain_error(error)}") from error
+        raise NotTakenError(f"{path}: {explain_error(error)}") from error
     finally:
         os.chdir(here)
 
@@ -152,5 +152,5 @@ def _refuse_what_stays(lmp: Any, path: Path, text: str, ahead: str) -> None:
     except NotLinearisedError as error:
         if not can_copy(lmp):  # for K by differences of forces
             raise BadInputError(f"{path}: {with_one_rank(error)}") from error
-    except SnapshotError as error:
+    except NotTakenError as error:
         raise BadInputError(f"{path}: {error}") from error

@@ -7,7 +7,7 @@ holds the velocity of each body (`HELD`), which the body takes from its particle
 
 from typing import NamedTuple
 
-from .granular_commands import BODIES, SnapshotError, without_suffix
+from .granular_commands import BODIES, NotTakenError, without_suffix
 
 HELD = "force * off off off torque * off off off"
 """Words by which a body keeps its velocity, whatever its particles feel."""
@@ -25,27 +25,27 @@ def translating_bodies(line: str, dimension: int) -> list[Body]:
 
     Raises
     ------
-    SnapshotError
+    NotTakenError
         If they may rotate, or the command has what is not known here.
     """
     words = line.split()
     name, style = words[1], words[3]
     if without_suffix(style) not in BODIES:
-        raise SnapshotError(f"fix {name} {style} {WAY_OUT}.")
+        raise NotTakenError(f"fix {name} {style} {WAY_OUT}.")
     if words[4] == "single":
         groups, at = [words[2]], 5
     elif words[4] == "group":
         at = 6 + int(words[5])
         groups = words[6:at]
     else:
-        raise SnapshotError(f"fix {name} {style} {words[4]} {WAY_OUT}.")
+        raise NotTakenError(f"fix {name} {style} {words[4]} {WAY_OUT}.")
     axes, turns = ([[True] * 3 for _ in groups] for _ in range(2))
     while at < len(words):
         if words[at] == "reinit" and words[at + 1] in ("yes", "on", "true"):
             at += 2
             continue
         if words[at] not in ("force", "torque"):
-            raise SnapshotError(
+            raise NotTakenError(
                 f"fix {name} {style} has {' '.join(words[at : at + 2])}, which is not known here: leave it out."
             )
         moves = axes if words[at] == "force" else turns
@@ -53,7 +53,7 @@ def translating_bodies(line: str, dimension: int) -> list[Body]:
             moves[k] = [word in ("on", "yes", "true") for word in words[at + 2 : at + 5]]
         at += 5
     if any(any(each if dimension == 3 else each[2:]) for each in turns):
-        raise SnapshotError(f"fix {name} {style} {words[4]} {WAY_OUT}.")
+        raise NotTakenError(f"fix {name} {style} {words[4]} {WAY_OUT}.")
     return [Body(group, (x, y, z)) for group, (x, y, z) in zip(groups, axes, strict=True)]
 
 

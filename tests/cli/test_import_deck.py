@@ -49,21 +49,23 @@ def test_deck(faultgouge_here, tmp_path, shape):
     (folder / "pile.in").write_text(DECK.format(**shape, word="contacts"))
     done = faultgouge_here("import", "own/pile.in", "-o", "pile.h5")
     assert f"3 {'disks' if shape is FLAT else 'spheres'}, " in done.stdout
-    snapshot = read_configuration(tmp_path / "pile.h5")
-    assert snapshot.residual < 1e-6
+    configuration = read_configuration(tmp_path / "pile.h5")
+    assert configuration.residual < 1e-6
     found = json.loads(faultgouge_here("spectrum", "pile.h5", "--json").stdout)
-    assert [complex(*each) for each in found["eigenvalues"]] == pytest.approx(list(eigenvalues(snapshot)), abs=1e-8)
+    assert [complex(*each) for each in found["eigenvalues"]] == pytest.approx(
+        list(eigenvalues(configuration)), abs=1e-8
+    )
     assert "as LAMMPS left them" in faultgouge_here("spectrum", "pile.h5").stdout
     assert "has no upper layer" in faultgouge_here("spectrum", "pile.h5", "--rise", code=2).stderr
 
     faultgouge_here("export", "pile.h5", "--mode", "1", "-o", "pile.vtp")
     piece = ElementTree.parse(tmp_path / "pile.vtp").find(".//Piece")
-    assert (piece.get("NumberOfVerts"), piece.get("NumberOfLines")) == ("3", str(len(snapshot.contacts)))
+    assert (piece.get("NumberOfVerts"), piece.get("NumberOfLines")) == ("3", str(len(configuration.contacts)))
     names = {each.get("Name"): each.get("NumberOfComponents") for each in piece.find("PointData")}
     assert names["mode_1"] == names["mode_1_rotation"] == names["net_force"] == "3"
     faultgouge_here("export", "pile.h5", "-o", "pile.xyz")
     rows = np.loadtxt((tmp_path / "pile.xyz").read_text().splitlines()[2:])
-    assert np.array_equal(rows[:, : snapshot.dimension], snapshot.position)
+    assert np.array_equal(rows[:, : configuration.dimension], configuration.position)
     assert "goes into .vtp, .xyz" in faultgouge_here("export", "pile.h5", "-o", "pile.data", code=2).stderr
     assert "nothing moves in it" in faultgouge_here("movie", "pile.h5", code=None).stderr
     assert "3 contacts (3 with walls)" in faultgouge_here("draw", "pile.h5", "-o", "pile.png").stdout
@@ -73,14 +75,14 @@ def test_deck(faultgouge_here, tmp_path, shape):
         assert "(.xyz) or ParaView (.pvd)" in faultgouge_here("movie", "pile.h5", "--mode", "0", code=2).stderr
         too_large = faultgouge_here("export", "pile.h5", "--mode", "99", "-o", "pile.vtp", code=2).stderr
         assert "15 modes, counted from 0" in too_large
-        _check_film_of_spheres(faultgouge_here, tmp_path, snapshot)
+        _check_film_of_spheres(faultgouge_here, tmp_path, configuration)
         return
     assert "mode 1 of 9" in faultgouge_here("draw", "pile.h5", "--mode", "1", "-o", "mode.png").stdout
     assert "no slips" in faultgouge_here("draw", "pile.h5", "--color", "slip", code=2).stderr
     faultgouge_here("movie", "pile.h5", "--mode", "1", "--seconds", "0.2", "-o", "mode.gif")
 
 
-def _check_film_of_spheres(faultgouge_here, tmp_path, snapshot):
+def _check_film_of_spheres(faultgouge_here, tmp_path, configuration):
     """Each frame has the spheres where the mode moves them, about where they rest, half a radius away at most."""
     faultgouge_here("movie", "pile.h5", "--mode", "1", "--seconds", "0.8", "-o", "mode.xyz")
     lines = (tmp_path / "mode.xyz").read_text().splitlines()
@@ -89,10 +91,10 @@ def _check_film_of_spheres(faultgouge_here, tmp_path, snapshot):
     column = {name: slice(end - int(size), end) for (name, _, size), end in zip(names, ends, strict=True)}
     frames = np.array([np.loadtxt(lines[k + 2 : k + 5]) for k in range(0, len(lines), 5)])
     assert len(frames) == 8
-    moved = frames[..., column["pos"]] - snapshot.position
+    moved = frames[..., column["pos"]] - configuration.position
     assert moved == pytest.approx(frames[..., column["displacement"]], abs=1e-15)
     assert moved.sum(axis=0) == pytest.approx(0, abs=1e-15)
-    assert 0 < np.linalg.norm(moved, axis=2).max() <= 0.5 * snapshot.radius.min() * (1 + 1e-15)
+    assert 0 < np.linalg.norm(moved, axis=2).max() <= 0.5 * configuration.radius.min() * (1 + 1e-15)
     faultgouge_here("movie", "pile.h5", "--mode", "1", "--seconds", "0.8", "-o", "mode.pvd")
     files = [each.get("file") for each in ElementTree.parse(tmp_path / "mode.pvd").iter("DataSet")]
     assert len(files) == 8
@@ -535,10 +537,10 @@ def test_contacts_at_the_bound_stick_or_slide(faultgouge_here, tmp_path):
     found, verdicts = {}, set()
     for acts, more in (("stick", ()), ("slide", ("--slides",))):
         faultgouge_here("import", "slid.in", "-o", f"{acts}.h5", *more)
-        snapshot = read_configuration(tmp_path / f"{acts}.h5")
-        count = int(snapshot.contacts.at_bound.sum())
+        configuration = read_configuration(tmp_path / f"{acts}.h5")
+        count = int(configuration.contacts.at_bound.sum())
         assert count > 0
-        assert snapshot.contacts.sliding.sum() == (count if more else 0)
+        assert configuration.contacts.sliding.sum() == (count if more else 0)
         verdict, *_ = faultgouge_here("spectrum", f"{acts}.h5").stdout.partition("5 disks")
         assert f"{count} of {len(c)} contacts are at Coulomb's bound: each slides on ahead" in verdict
         verdicts.add(verdict)

@@ -120,11 +120,11 @@ def test_particles_that_nearly_touch(lammps_with, gap):
 
 def test_particles_far_apart_that_something_couples(lammps_with):
     """They are displaced together, as no neighbours are; the refusal names the one that feels the other most."""
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     lmp = lammps_with(ROW.format(x="2.5"))
     command(lmp, "group left id 1\ngroup right id 3\nfix tie left spring couple right 3e3 4 0 0 0")
-    with pytest.raises(SnapshotError, match=r"at particle [13] at \(.*, 0, 0\.4999\).*couples particles that are no"):
+    with pytest.raises(NotTakenError, match=r"at particle [13] at \(.*, 0, 0\.4999\).*couples particles that are no"):
         from_lammps(lmp, differences=True, balance=np.inf)
 
 

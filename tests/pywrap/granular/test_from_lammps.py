@@ -1,4 +1,4 @@
-"""Snapshots of LAMMPS's own packings: LAMMPS's motion beside exp(t G), b of two spheres, and refusals."""
+"""Configurations of LAMMPS's own packings: LAMMPS's motion beside exp(t G), b of two spheres, and refusals."""
 
 import os
 import subprocess
@@ -27,10 +27,10 @@ def test_motion_of_lammps(beds, law, damped, d):
     from faultgouge.pywrap import compare_motion, from_lammps
 
     lmp = beds(law, d, damped)
-    snapshot = from_lammps(lmp)
-    contacts = snapshot.contacts
-    assert len(contacts) > len(snapshot)
-    assert snapshot.damped
+    configuration = from_lammps(lmp)
+    contacts = configuration.contacts
+    assert len(contacts) > len(configuration)
+    assert configuration.damped
     steps = [(2e-4 if damped else 8e-4) / 2**k for k in range(4)]
     # displacements are a fifth of these velocities: no contact opens, nor do the forces of Hertz need more than cubic
     # terms
@@ -43,7 +43,9 @@ def test_motion_of_lammps(beds, law, damped, d):
     # 1e-10 of Coulomb's bound, below which `granular` does not turn a history. With two derivatives the motions from
     # both signs are not opposite, and terms of second order stay in half of their difference, too
     weights = np.array([1, -12, 32]) / 3 if law in RESCALED else np.array([-1, 8]) / 3
-    runs = [[compare_motion(lmp, snapshot, 0.2, large / 2**k, timestep=h) for k in range(len(weights))] for h in steps]
+    runs = [
+        [compare_motion(lmp, configuration, 0.2, large / 2**k, timestep=h) for k in range(len(weights))] for h in steps
+    ]
     predicted = runs[0][0].linear_velocity / large
     linear = [sum(w * run.velocity for w, run in zip(weights, each, strict=True)) / large for each in runs]
     size = np.linalg.norm(predicted)
@@ -140,30 +142,30 @@ HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
     ],
 )  # fmt: skip
 def test_what_is_refused(two, pair, coefficients, more, says):
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     lmp, told = two(pair, coefficients, more.strip())
-    with pytest.raises(SnapshotError, match=says) as refusal:
+    with pytest.raises(NotTakenError, match=says) as refusal:
         from_lammps(lmp, told)
     assert "\n" not in str(refusal.value)
 
 
 def test_commands_that_are_not_those_of_the_instance(two):
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     lmp, told = two(HERTZ, "* *", MOVES.strip())
-    with pytest.raises(SnapshotError, match=r"no log to read its commands from: give the lines pair_style"):
+    with pytest.raises(NotTakenError, match=r"no log to read its commands from: give the lines pair_style"):
         from_lammps(lmp)
     other = [told[0].replace("1e5", "2e5"), *told[1:]]
-    with pytest.raises(SnapshotError, match=r"normal forces of the contacts of types 1 and 1 are not those"):
+    with pytest.raises(NotTakenError, match=r"normal forces of the contacts of types 1 and 1 are not those"):
         from_lammps(lmp, other)
-    with pytest.raises(SnapshotError, match=r"pair_style gran/hooke/history, and the instance has gran/hertz"):
+    with pytest.raises(NotTakenError, match=r"pair_style gran/hooke/history, and the instance has gran/hertz"):
         from_lammps(lmp, ["pair_style gran/hooke/history 1 1 1 1 1 1"])
-    with pytest.raises(SnapshotError, match="has a variable: write its number"):
+    with pytest.raises(NotTakenError, match="has a variable: write its number"):
         from_lammps(lmp, ["pair_style gran/hertz/history ${kn} 1 1 1 1 1"])
-    with pytest.raises(SnapshotError, match="no pair_style"):
+    with pytest.raises(NotTakenError, match="no pair_style"):
         from_lammps(lmp, told[2:])
-    with pytest.raises(SnapshotError, match=r"do not stand alone \(LAMMPS stopped: .*\): give the lines") as refusal:
+    with pytest.raises(NotTakenError, match=r"do not stand alone \(LAMMPS stopped: .*\): give the lines") as refusal:
         from_lammps(lmp, [told[0], "pair_coeff A A", *told[2:]])
     assert "\n" not in str(refusal.value)
     # a comment is none of the command, and one text is as good as many lines
@@ -173,13 +175,13 @@ def test_commands_that_are_not_those_of_the_instance(two):
 
 @pytest.mark.parametrize("given", ["", " hertz/history 1e5 NULL 1 1 0.5 1", " hertz/history 1e5 NULL 1 1 0.5 1 zplane"])
 def test_a_line_of_a_wall_that_is_not_whole(two, given):
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     wall = "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL"
     lmp, told = two(HERTZ, "* *", wall + MOVES)
     lines = [f"fix w all wall/gran{given}" if line == wall else line for line in told]
     with pytest.raises(
-        SnapshotError, match=r"^The line of fix w wall/gran does not say where the wall is: give all of"
+        NotTakenError, match=r"^The line of fix w wall/gran does not say where the wall is: give all of"
     ):
         from_lammps(lmp, lines, balance=np.inf)
 
@@ -313,7 +315,7 @@ def test_soft_and_stiff_springs(two, model, kt):
 
 def test_two_spheres_that_touch_twice(lammps_with):
     """LAMMPS has one history for both contacts, so that no run brings such a packing to rest."""
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     told = [f"pair_style {HERTZ}", "pair_coeff * *", MOVES.strip()]
     lmp = lammps_with("""
@@ -330,12 +332,12 @@ set group all diameter 1.0
 set group all density 1
 """ + "\n".join([*told, "run 0"]), log=None)  # fmt: skip
     assert len(from_lammps(lmp, told, balance=np.inf).contacts) == 2
-    with pytest.raises(SnapshotError, match=r"touch each other twice.* take a box that is wider"):
+    with pytest.raises(NotTakenError, match=r"touch each other twice.* take a box that is wider"):
         from_lammps(lmp, told)
     # the history of one of them has a part along the normal of the other
     lmp.numpy.extract_atom("v")[1] = [0.0, 1.0, 0.5]
     lmp.command("run 5 post no")
-    with pytest.raises(SnapshotError, match=r"touch each other twice.* take a box that is wider"):
+    with pytest.raises(NotTakenError, match=r"touch each other twice.* take a box that is wider"):
         from_lammps(lmp, told, balance=np.inf, differences=True)
 
 
@@ -501,13 +503,13 @@ def test_a_narrow_slot(two, width):
 
 def test_a_log_that_two_instances_write(two, lammps_with, tmp_path):
     """The commands in it may be those of the other one."""
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     lmp, told = two(HERTZ, "* *", MOVES.strip())
     lmp.command(f'log "{tmp_path}/log.lammps"')
     command(lmp, "\n".join(told))
     lammps_with()
-    with pytest.raises(SnapshotError, match=r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
+    with pytest.raises(NotTakenError, match=r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
         from_lammps(lmp, balance=np.inf)
 
 

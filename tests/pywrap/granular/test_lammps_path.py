@@ -89,9 +89,9 @@ def test_windows_of_spheres_are_those_of_all_eigenvalues(spheres):
 
     lmp = spheres
 
-    def pairs(snapshot) -> int:
-        root = np.sqrt(snapshot.coordinate_mass)
-        values = np.linalg.eigvals(stiffness_matrix(snapshot).toarray() / np.outer(root, root))
+    def pairs(configuration) -> int:
+        root = np.sqrt(configuration.coordinate_mass)
+        values = np.linalg.eigvals(stiffness_matrix(configuration).toarray() / np.outer(root, root))
         # imaginary parts at 1e-7 from an edge are some 1e-4 of the largest eigenvalue, those of rounding 1e-8
         return int(np.sum(values.imag > 1e-6 * np.abs(values).max()))
 
@@ -144,7 +144,7 @@ def test_where_drag_leaves_it(layer, tmp_path):
 @pytest.mark.slow
 def test_force_on_a_layer(layer):
     """By a function; it says where it changes nothing, and what it raises reaches the caller in a sentence."""
-    from faultgouge.pywrap import SnapshotError, lammps_path
+    from faultgouge.pywrap import NotTakenError, lammps_path
 
     lmp = layer
 
@@ -153,11 +153,11 @@ def test_force_on_a_layer(layer):
 
     with lammps_path(lmp, push) as path:
         assert path(0.02).load[15:, 0, 0] == pytest.approx(0.02, abs=1e-9)
-    with lammps_path(lmp, lambda *_: None) as path, pytest.raises(SnapshotError, match=r"No force changes .* at 0\.1"):
+    with lammps_path(lmp, lambda *_: None) as path, pytest.raises(NotTakenError, match=r"No force changes .* at 0\.1"):
         path(0.1)
-    with lammps_path(lmp, "tilt") as path, pytest.raises(SnapshotError, match=r"At 0\.1: LAMMPS stopped: .*tilt"):
+    with lammps_path(lmp, "tilt") as path, pytest.raises(NotTakenError, match=r"At 0\.1: LAMMPS stopped: .*tilt"):
         path(0.1)
-    with lammps_path(lmp, lambda *_: os._exit(1)) as path, pytest.raises(SnapshotError, match="ended without a word"):
+    with lammps_path(lmp, lambda *_: os._exit(1)) as path, pytest.raises(NotTakenError, match="ended without a word"):
         path(0.1)
 
 
@@ -165,7 +165,7 @@ def test_force_on_a_layer(layer):
 def test_what_is_wrong_with_a_path_is_said(layer, tmp_path):
     """An error of the user's function with its line in the user's file, and a path that is closed."""
     from faultgouge.analysis import BadInputError
-    from faultgouge.pywrap import SnapshotError, lammps_path
+    from faultgouge.pywrap import NotTakenError, lammps_path
 
     lmp = layer
     (tmp_path / "load.py").write_text(
@@ -183,9 +183,9 @@ def test_what_is_wrong_with_a_path_is_said(layer, tmp_path):
         "ends": r"^At 0\.1: apply failed with SystemExit: 3 \(load\.py, line 7\)\.$",
         "lammps": r"^At 0\.1: LAMMPS stopped: .*nobody.* \(load\.py, line 10\)\.$",
     }.items():
-        with lammps_path(lmp, own[name]) as path, pytest.raises(SnapshotError, match=says):
+        with lammps_path(lmp, own[name]) as path, pytest.raises(NotTakenError, match=says):
             path(0.1)
-    with pytest.raises(SnapshotError, match=r"The path is closed: ask it inside of its `with` block"):
+    with pytest.raises(NotTakenError, match=r"The path is closed: ask it inside of its `with` block"):
         path(0.1)
     path.close()  # a second time does no harm
     for balance in (np.nan, -1.0):
@@ -221,7 +221,7 @@ def stress(found) -> np.ndarray:
 @pytest.mark.slow
 def test_histories_that_a_restart_file_has_lost_are_named(periodic, lammps_with, tmp_path):
     """Another granular instance was there in the process, and LAMMPS reads no history at all."""
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     lmp = periodic
     count = len(from_lammps(lmp).contacts)
@@ -231,7 +231,7 @@ def test_histories_that_a_restart_file_has_lost_are_named(periodic, lammps_with,
         f"pair_style gran/{LAW.replace(' 0.5 1', ' 2.0 1')}", "pair_coeff * *", "fix move all nve/sphere disc",
     ]), log="log.again")  # fmt: skip
     with pytest.raises(
-        SnapshotError, match=f"{count} of {count} contacts have no tangential force, as where histories"
+        NotTakenError, match=f"{count} of {count} contacts have no tangential force, as where histories"
     ):
         from_lammps(again)
 

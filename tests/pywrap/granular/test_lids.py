@@ -113,12 +113,12 @@ def test_a_lid_of_two_masses(cell, lid):
 
 def test_a_spring_in_aveforce_is_refused(cell):
     """The fix is taken away where forces are differences, and the spring would be missing in K."""
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     spring = "variable pull equal 0.05-10*(xcm(lid,x)-1.65)"
     lid = f"{spring}\nfix body lid nve\nfix push lid addforce 0 0 -2.0\nfix stiff lid aveforce v_pull 0.0 0.0"
     lmp = cell(lid)
-    with pytest.raises(SnapshotError, match=r"fix stiff aveforce adds the force v_pull.*fix addforce"):
+    with pytest.raises(NotTakenError, match=r"fix stiff aveforce adds the force v_pull.*fix addforce"):
         from_lammps(lmp)
 
 
@@ -131,10 +131,10 @@ def test_a_spring_in_aveforce_is_refused(cell):
     ],
 )
 def test_a_body_that_may_rotate_is_refused(cell, words, says):
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     lmp = cell(f"{CONFINED}\nfix body lid rigid {words}", **{"run 20000": "run 10"})
-    with pytest.raises(SnapshotError, match=says):
+    with pytest.raises(NotTakenError, match=says):
         from_lammps(lmp)
 
 

@@ -77,9 +77,9 @@ def look(lmp, log, lines: str = "", run: int = 0, *, prove: bool = True):
     ],
 )
 def test_fixes_that_act_as_contacts_do_not_tell(bed, fix, says):
-    from faultgouge.pywrap import SnapshotError
+    from faultgouge.pywrap import NotTakenError
 
-    with pytest.raises(SnapshotError, match=f"^LAMMPS's forces do not change as K says: .*{says}") as refusal:
+    with pytest.raises(NotTakenError, match=f"^LAMMPS's forces do not change as K says: .*{says}") as refusal:
         look(*bed, f"fix trap all {fix}", 60000)
     assert "\n" not in str(refusal.value)
 
@@ -118,9 +118,9 @@ def test_a_force_of_places_is_in_the_operator(bed):
     ],
 )
 def test_fixes_that_act_on_what_moves(bed, fix, says):
-    from faultgouge.pywrap import SnapshotError
+    from faultgouge.pywrap import NotTakenError
 
-    with pytest.raises(SnapshotError, match=says):
+    with pytest.raises(NotTakenError, match=says):
         look(*bed, f"fix trap all {fix}")
 
 
@@ -155,16 +155,16 @@ def test_proof_is_kept(sliding, tmp_path):
 
 def test_commands_of_another_run(sliding):
     """The same normal forces, but other tangential stiffnesses, dashpots or friction."""
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     style = HERTZ.replace("0.5", "0.3")
     rest = ["pair_coeff * *", "fix floor all wall/gran hertz/history 3e3 9e2 40 40 0.3 1 yplane 0 NULL contacts",
             "fix move all nve/sphere"]  # fmt: skip
     assert from_lammps(sliding, [f"pair_style {style}", *rest]) == from_lammps(sliding)
     for before, after in (("NULL", "1e3"), ("40 40", "20 40"), ("40 40", "40 10"), ("40 0.3", "40 0.9")):
-        with pytest.raises(SnapshotError, match=r"as K says: .*the commands are those of another run or instance"):
+        with pytest.raises(NotTakenError, match=r"as K says: .*the commands are those of another run or instance"):
             from_lammps(sliding, [f"pair_style {style.replace(before, after)}", *rest])
-    with pytest.raises(SnapshotError, match=r"contacts carry more than Coulomb's bound .* with mu = 0.1"):
+    with pytest.raises(NotTakenError, match=r"contacts carry more than Coulomb's bound .* with mu = 0.1"):
         from_lammps(sliding, [f"pair_style {style.replace('40 0.3', '40 0.1')}", *rest])
 
 
@@ -177,7 +177,7 @@ def test_commands_of_another_run(sliding):
     ],
 )
 def test_logs_that_lack_commands_or_have_others(tmp_path, around):
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     log = tmp_path / "log.lammps"
     lmp = instance(log)
@@ -196,14 +196,14 @@ fix drag all viscous 1.5
 timestep 0.002
 run 60000
 """)  # fmt: skip
-    with pytest.raises(SnapshotError, match=r"as K says: .*some are not in the log"):
+    with pytest.raises(NotTakenError, match=r"as K says: .*some are not in the log"):
         from_lammps(lmp)
     lmp.close()
 
 
 def test_log_of_another_instance(tmp_path):
     """Two instances of one process with one log: the commands of the second are found for the first."""
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     made = []
     for kt in ("NULL", "2e3"):
@@ -220,7 +220,7 @@ timestep 0.002
 run 60000
 """)  # fmt: skip
         made.append(lmp)
-    with pytest.raises(SnapshotError, match=r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
+    with pytest.raises(NotTakenError, match=r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
         from_lammps(made[0])
     assert from_lammps(made[1]).proof < 1e-5
     for lmp in made:

@@ -94,7 +94,7 @@ def run_script(folder: Path, *arguments: object, script: str = "next_run.py", ra
     ],
 )
 def test_on_several_ranks(tmp_path, law, ranks):
-    """All contacts are in the snapshot, whichever rank has them, and the next run is the same to the bit."""
+    """All contacts are in the configuration, whichever rank has them, and the next run is the same to the bit."""
     run_script(tmp_path, law, 1, ranks=ranks)
 
 

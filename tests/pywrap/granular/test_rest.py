@@ -35,7 +35,7 @@ WEIGHT = np.pi / 6
 @pytest.mark.parametrize(("share", "rests"), [(1e-5, True), (1e-3, False)])
 def test_a_sphere_on_a_region(lammps_with, share, rests):
     """Its weight is the scale of what is out of balance, though a region hands out no contacts."""
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     z = 0.5 - WEIGHT * (1 + share) / 1e4
     lmp = lammps_with(BALL.format(z=z, wall=REGION, more=""))
@@ -44,7 +44,7 @@ def test_a_sphere_on_a_region(lammps_with, share, rests):
         assert found.residual == pytest.approx(share * WEIGHT, rel=1e-3)
         assert found.proof < 1e-4
         return
-    with pytest.raises(SnapshotError, match=r"residual of particle 1 at .* is 0\.000999 of the mean contact force"):
+    with pytest.raises(NotTakenError, match=r"residual of particle 1 at .* is 0\.000999 of the mean contact force"):
         from_lammps(lmp)
     assert from_lammps(lmp, balance=2 * share).residual == pytest.approx(share * WEIGHT, rel=1e-3)
 
@@ -55,11 +55,11 @@ ENDS = "variable high equal 1\nfix stop all halt 10 v_high > 0 error soft messag
 def test_a_run_that_fix_halt_ends_brings_nothing_to_rest(lammps_with):
     """LAMMPS skips all further runs without a word."""
     from faultgouge import relax
-    from faultgouge.pywrap import SnapshotError
+    from faultgouge.pywrap import NotTakenError
 
     plane = "fix floor all wall/gran hooke/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL"
     lmp = lammps_with(BALL.format(z=0.5, wall=plane, more="") + ENDS)
-    with pytest.raises(SnapshotError, match=r"^LAMMPS ended a run while the packing came to rest, as fix halt and"):
+    with pytest.raises(NotTakenError, match=r"^LAMMPS ended a run while the packing came to rest, as fix halt and"):
         relax(lmp)
     lmp.command("unfix stop")
     lmp.command("timer timeout unlimited")
@@ -77,11 +77,11 @@ def test_what_relax_cannot_reach_is_refused(lammps_with):
 
 
 def test_a_wall_without_a_force_is_named(lammps_with):
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     above = "create_atoms 1 single 0 0 1.49 units box"
     lmp = lammps_with(BALL.format(z=0.5, wall="fix low all wall/reflect zlo -1.0", more=above))
-    with pytest.raises(SnapshotError, match=r"The packing moves: .*; fix low wall/reflect .* bears no weight: use fix"):
+    with pytest.raises(NotTakenError, match=r"The packing moves: .*; fix low wall/reflect .* bears no weight: use fix"):
         from_lammps(lmp)
 
 
@@ -89,12 +89,12 @@ def test_a_thermostat_is_named(lammps_with):
     """It is a drag where its temperature is zero, and brings nothing to rest where it is not."""
     from faultgouge import relax
     from faultgouge.analysis import NoEquilibriumError
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     plane = "fix floor all wall/gran hooke/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL"
     lmp = lammps_with(BALL.format(z=0.4999, wall=plane, more="") + "fix heat all langevin 1e-6 1e-6 1.0 4711\nrun 100")
     says = "fix heat langevin shakes the particles by its temperature: unfix it"
-    with pytest.raises(SnapshotError, match=f"The packing moves: .*; {says}"):
+    with pytest.raises(NotTakenError, match=f"The packing moves: .*; {says}"):
         from_lammps(lmp)
     with pytest.raises(NoEquilibriumError, match=f"^The packing .* in 10000 steps: .*; {says}"):
         relax(lmp, steps=10_000)
@@ -150,7 +150,7 @@ def test_a_force_that_swings_is_named(lammps_with):
 
 def test_lines_and_planes_along_axes(lammps_with):
     """What they hold has no row in K; the sphere rolls along y alone."""
-    from faultgouge.pywrap import SnapshotError, from_lammps
+    from faultgouge.pywrap import NotTakenError, from_lammps
 
     plane = "fix floor all wall/gran hooke/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL"
     held = "fix line all planeforce -1 0 0\nrun 0"
@@ -161,7 +161,7 @@ def test_lines_and_planes_along_axes(lammps_with):
     command(lmp, "unfix line\nfix line all lineforce 0 0 2")
     assert list(np.flatnonzero(np.diff(from_lammps(lmp).stiffness.indptr))) == [2, 3, 4]
     lmp.command("fix line all lineforce 1 0 1")
-    with pytest.raises(SnapshotError, match="fix line lineforce has a direction along no axis"):
+    with pytest.raises(NotTakenError, match="fix line lineforce has a direction along no axis"):
         from_lammps(lmp, differences=True)
 
 
