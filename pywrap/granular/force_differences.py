@@ -14,7 +14,8 @@ particles at once in random directions are then compared with K q and C v. The d
 which nothing is known would show in it.
 
 **One-sided derivatives.** A contact at Coulomb's bound, one that is about to open or close, and a law with two
-derivatives have another derivative forwards than backwards. K is the mean of both, and the jump between them is said.
+derivatives have another derivative forwards than backwards. K is the mean of both, and the jump between them is said. A displacement may also
+be too long for a contact that is far weaker than the others: where a force is not linear a finer one is tried.
 
 **Bodies.** q = P Q, where several coordinates move as one. The columns of K are displacements of Q, and its rows sums
 of forces on the coordinates that Q moves.
@@ -22,12 +23,12 @@ of forces on the coordinates that Q moves.
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from ...analysis.arrays import Floats
+from ...analysis.arrays import Floats, Indices
 from .colours import Colours, Pairs, neighbouring_pairs
 from .force_probe import Particles, Probe, Sides, hold_still, set_coordinate_velocity
 from .granular_commands import NotTakenError
@@ -58,6 +59,10 @@ there, and the rounding of forces is 1e-7 of it or less."""
 SIDES = 1e-3
 """Jump of a derivative, as a share of the largest entry, from which on two sides are said to differ; the extrapolation
 leaves 1e-5 of one."""
+
+FINER = 0.03
+"""A finer displacement, where sides differ: a contact whose force is far below the mean one slides within the first,
+as those of cohesive particles do that pull about as much as they push."""
 
 TOO_LARGE = 0.1
 """Error, relative to the largest entry, beyond which the differences describe nothing."""
@@ -182,36 +187,72 @@ def _derivative(probe: Probe, colours: Colours, step: float) -> tuple[csr_array,
             directions.append(np.zeros(size))
             directions[-1][k + np.array(members)] = step
     random = step * np.random.Generator(np.random.PCG64(0)).uniform(-1, 1, size)
-    *found, last = probe.each([*directions, random])
+    owners = [owner for owner in colours.owner for _ in axis]
+    *found, last = _slopes(probe, [*directions, random], [*owners, np.arange(count)], step)
     rows, columns, values, jump = [], [], [], np.zeros(count)
-    for k, each in enumerate(found):
-        owner = colours.owner[k // len(axis)]
+    for k, (slope, owner) in enumerate(zip(found, owners, strict=True)):
         felt = np.flatnonzero(owner >= 0)
-        slope, sides = _slope_and_jump(each, probe.sizes, step)
         where = axis[:, None] + felt
         rows.append(where.ravel())
         columns.append(np.broadcast_to(axis[k % len(axis)] + owner[felt], where.shape).ravel())
-        values.append(-slope[where].ravel())
-        jump[felt] = np.maximum(jump[felt], np.abs(sides[where]).max(axis=0))
+        values.append(-slope.mean[where].ravel())
+        jump[felt] = np.maximum(jump[felt], np.abs(slope.jump[where]).max(axis=0))
     moved = csr_array(probe.particles.constraint != 0).astype(np.float64).T
     raw = coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(size, size))
     matrix = csr_array(moved @ raw.tocsr())
     matrix.eliminate_zeros()
-    forces = moved @ _slope_and_jump(last, probe.sizes, step)[0]
+    forces = moved @ last.mean
     largest, felt = np.abs(matrix.data).max(initial=0.0), np.abs(forces).max(initial=0.0)
     error = np.abs(forces + matrix @ random / step).reshape(-1, count).max(axis=0) / (felt or 1.0)
     return matrix, np.where(jump > SIDES * largest, jump, 0.0) / (largest or 1.0), error
 
 
-def _slope_and_jump(found: Sides, sizes: tuple[float, ...], step: float) -> tuple[Floats, Floats]:
-    """dF along a direction over its size, the mean of both sides, and by how much they differ.
+class _Slope(NamedTuple):
+    """dF along a direction over its size, the mean of both sides; by how much the sides differ, and by how much means
+    of both sizes of a displacement do; shape (axes N,) each."""
 
-    Slopes of each side are extrapolated to a step of zero, by Lagrange's polynomial in the step.
+    mean: Floats
+    jump: Floats
+    bend: Floats
+
+    @property
+    def uneven(self) -> Floats:
+        """How far the force is from a linear function of the size, shape (axes N,)."""
+        return np.maximum(np.abs(self.jump), np.abs(self.bend))
+
+
+def _slopes(probe: Probe, directions: list[Floats], owners: list[Indices], step: float) -> list[_Slope]:
+    """Slopes along directions of this size, or along finer ones where forces are far more linear there.
+
+    `owners` has the body that each particle feels in a direction, shape (N,), -1 for none.
     """
+    found = [_slope(each, probe.sizes, step) for each in probe.each(directions)]
+    largest = max(np.abs(each.mean).max() for each in found)
+    uneven = [k for k, each in enumerate(found) if each.uneven.max() > SIDES * largest]
+    if uneven:
+        for k, each in zip(uneven, probe.each([FINER * directions[k] for k in uneven]), strict=True):
+            found[k] = _more_linear(found[k], _slope(each, probe.sizes, FINER * step), owners[k])
+    return found
+
+
+def _more_linear(one: _Slope, other: _Slope, owner: Indices) -> _Slope:
+    """The other slopes on all that feel a body, where they are far more linear."""
+    bodies = np.tile(owner, len(one.mean) // len(owner))
+    most = np.zeros((2, len(owner) + 1))  # the last is that of no body
+    for uneven, slope in zip(most, (one, other), strict=True):
+        np.maximum.at(uneven, bodies, slope.uneven)
+    better = (most[1] < 0.5 * most[0])[bodies]
+    return _Slope(*(np.where(better, new, old) for old, new in zip(one, other, strict=True)))
+
+
+def _slope(found: Sides, sizes: tuple[float, ...], step: float) -> _Slope:
+    """Slopes of each side, extrapolated to a step of zero by Lagrange's polynomial in the step."""
     rest, both = found
-    sides = np.zeros((2, len(rest)))
+    sides, means = np.zeros((2, len(rest))), []
     for share, forces in zip(sizes, both, strict=True):
         weight = np.prod([other / (other - share) for other in sizes if other != share])
-        sides += weight * (np.array(forces) - rest) / (share * step)
+        slopes = (np.array(forces) - rest) / (share * step)
+        sides += weight * slopes
+        means.append((slopes[0] - slopes[1]) / 2)
     ahead, behind = sides
-    return (ahead - behind) / 2, ahead + behind
+    return _Slope((ahead - behind) / 2, ahead + behind, means[-1] - means[0])

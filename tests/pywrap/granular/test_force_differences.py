@@ -118,6 +118,33 @@ def test_particles_that_nearly_touch(lammps_with, gap):
     assert np.abs(added[:9, :9] - mean[:9, :9]).max() < 1e-3 * 1e4
 
 
+def test_a_weak_contact_among_strong_ones(lammps_with):
+    """The displacement that suits the others opens it; a finer one does not."""
+    from faultgouge.pywrap import from_lammps
+
+    places = (0.0, 0.99, 1.98, 2.98 - 1e-6)
+    lmp = lammps_with("""
+units lj
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -4 4 -4 4 -4 4 units box
+create_box 1 box
+""" + "\n".join(f"create_atoms 1 single {x:.17g} 0 0 units box" for x in places) + """
+set group all diameter 1.0 density 1.0
+pair_style gran/hooke/history 1e4 3e3 20 NULL 0.5 1
+pair_coeff * *
+fix move all nve/sphere
+timestep 1e-3
+run 0
+""")  # fmt: skip
+    found, laws = (from_lammps(lmp, differences=each, prove=False, balance=np.inf) for each in (True, False))
+    assert not len(found.one_sided_particles)
+    assert found.operator_error < 1e-5
+    assert apart(stiffness_matrix(found), stiffness_matrix(laws)) < 1e-6
+
+
 def test_particles_far_apart_that_something_couples(lammps_with):
     """They are displaced together, as no neighbours are; the refusal names the one that feels the other most."""
     from faultgouge.pywrap import NotTakenError, from_lammps
