@@ -1,6 +1,7 @@
 """The command line as a user types it: what it prints, what it leaves behind, and what it refuses in one sentence."""
 
 import json
+import re
 import time
 from dataclasses import replace
 from functools import partial
@@ -421,6 +422,20 @@ def test_every_command_has_help_with_an_example(faultgouge, faultgouge_here):
         done = faultgouge_here(command, "--help")
         assert "Example" in done.stdout
         assert "\\" not in done.stdout  # plain text escapes no brackets
+
+
+def test_the_overview_has_the_whole_first_sentence_of_each_command(faultgouge_here, refusal):
+    from faultgouge.commands import program
+
+    _, table = faultgouge_here("--help").stdout.split("Commands:")
+    text = " ".join(table.split())
+    assert "ramp Raise F_x from equilibrium to equilibrium, and store each equilibrium. perturb Run" in text
+    assert "merge Join the shards of a sweep; the table is that of an undivided sweep. modes" in text
+    commands = program().commands
+    hidden = {name for name in commands if commands[name].hidden}
+    assert hidden == {"stability"}  # the name that `extremes` once had
+    assert set(re.findall(r"^  (\w+)  ", table, re.MULTILINE)) == set(commands) - hidden
+    assert "Did you mean 'onset'?" in refusal("onst")
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from importlib.resources import files
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -50,6 +49,8 @@ def init(
     """Write a scene with every section and key, commented."""
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
+    from importlib.resources import files
+
     from faultgouge.analysis.files.atomic_write import write_text
 
     lock_output(context, output)
