@@ -8,6 +8,7 @@ import importlib
 import re
 import subprocess
 import sys
+from functools import cache
 from glob import glob
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -67,11 +68,17 @@ def modules() -> dict[str, Path]:
     return found
 
 
+@cache
+def tree(path: Path) -> ast.Module:
+    """The text of a module as Python reads it."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def imports(name: str, path: Path, known: dict[str, Path]) -> set[str]:
     """Modules of the package that a module imports, anywhere in its text."""
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -123,10 +130,7 @@ def test_nothing_of_the_program_imports_research():
 def test_every_class_has_a_name_of_its_own():
     """One name stands for one idea wherever it is read."""
     names = [
-        node.name
-        for path in modules().values()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.ClassDef)
+        node.name for path in modules().values() for node in ast.walk(tree(path)) if isinstance(node, ast.ClassDef)
     ]
     assert len(names) > 200
     assert {name for name in names if names.count(name) > 1} == set()
@@ -145,7 +149,7 @@ def test_every_number_has_a_name_of_its_own():
     """One name stands for one tolerance, size or share; who needs the same number imports it."""
     names: dict[str, list[str]] = {}
     for module, path in modules().items():
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        for node in tree(path).body:
             if isinstance(node, ast.Assign) and is_number(node.value):
                 [target] = node.targets
                 for each in target.elts if isinstance(target, ast.Tuple) else [target]:

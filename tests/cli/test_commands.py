@@ -277,7 +277,7 @@ def test_onset_as_json_and_among_some_modes(faultgouge_here, tmp_path):
 
 @pytest.mark.slow
 def test_results_go_to_standard_output_and_progress_to_standard_error(faultgouge, faultgouge_here, tmp_path):
-    """As two pipes of a shell see them; the onset of the reference packing is the first of its windows."""
+    """As two pipes of a shell see those of `onset`; the onset of the reference packing is the first of its windows."""
     scene = LAYER + toml({"ramp": {"step": 5.5e-3, "until": 0.022}, "perturb": {"fx": 0.022, "time": 0.1}})
     (tmp_path / "scene.toml").write_text(scene)
     first = faultgouge("onset", "scene.toml")
@@ -296,7 +296,7 @@ def test_results_go_to_standard_output_and_progress_to_standard_error(faultgouge
     assert (len(found["windows"]), found["fx_c"]) == (1, every["fx_c"])
     assert every["windows"] == sorted(every["windows"], key=lambda window: window["fx_onset"])
     for command, result in (("settle", "100 disks"), ("ramp", "F_x = 0.022 reached"), ("perturb", "F_x = 0.022, mu")):
-        done = faultgouge(command, "scene.toml", "-o", f"{command}.h5")
+        done = faultgouge_here(command, "scene.toml", "-o", f"{command}.h5")
         assert done.stdout.startswith(result)
         assert result not in done.stderr
 

@@ -241,8 +241,12 @@ def test_a_rising_load_is_followed_where_pushes_have_not_settled():
     assert found.rising["drift"] > 0
 
 
+@pytest.mark.parametrize("cluster", [1.0], indirect=True)
 def test_a_body_moves_as_one(bound):
-    """Two disks that move as one along x on a spring: forces add up, both have the displacement, masses add up."""
+    """Two disks that move as one along x on a spring: forces add up, both have the displacement, masses add up.
+
+    No disk touches another, so that one law is enough.
+    """
     configuration, n = bound.configuration, len(bound)
     size, k, rate = configuration.coordinates, 3.0, 0.5
     lead = np.zeros((size, size))
