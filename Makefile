@@ -37,10 +37,10 @@ reproduce: $(VENV)/.installed
 
 # Tests and checks take Python from src, where links lead to the folders: an edit of Python needs no installation.
 test: $(VENV)/.test
-	$(PYTEST) -n 2 -m "not long"
+	$(PYTEST) -n 2 --dist worksteal -m "not long"
 
 long: $(VENV)/.test
-	$(PYTEST) -n 2 -m long
+	$(PYTEST) -n 2 --dist worksteal -m long
 
 plugin: $(VENV)/.plugin
 

@@ -76,7 +76,7 @@ def test_vectors_are_those_of_lapack():
 def test_more_equal_eigenvalues_than_a_block_has_vectors(copies):
     """As of spheres that spin without a force. A slice that lacks some is found again with larger blocks."""
     rng = np.random.default_rng(copies)
-    real = np.concatenate([np.zeros(copies), np.full(copies, 7.0), rng.uniform(1, 50, 150)])
+    real = np.concatenate([np.zeros(copies), np.full(copies, 7.0), rng.uniform(1, 50, 300)])
     found = all_eigenvalues(turned([np.array([[value]]) for value in real], rng), SMALL)
     np.testing.assert_allclose(found.values.real, np.sort(real), rtol=0, atol=1e-6)
 
