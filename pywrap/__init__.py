@@ -2,7 +2,8 @@
 
 `scenes` describes a computation. `settling` brings the packing of a scene to equilibrium, `equilibria` follows the
 equilibrium along F_x, and `runs` perturbs it. `runs.run_recorder` stores all results in run.h5 and continues an
-interrupted run. `lammps.engine` is a LAMMPS instance with one packing. To write a ramp of your own, loop over
+interrupted run. `lammps.engine` is a LAMMPS instance with one packing. `load_path` has equilibria as a function of a
+load: `scene_path` makes that of a scene, `lammps_path` that of any LAMMPS. To write a ramp of your own, loop over
 `equilibrate`.
 """
 
@@ -16,12 +17,14 @@ from .equilibria.quasistatic import Equilibrium, equilibrate
 from .granular.compare_motion import MotionComparison, compare_motion
 from .granular.from_lammps import from_lammps
 from .granular.granular_commands import SnapshotError
-from .granular.lammps_equilibrium_path import LammpsPath, lammps_path
+from .granular.lammps_path import lammps_path
 from .granular.relax import relax
 from .lammps.engine import Engine
 from .lammps.instance import EngineError
-from .runs.equilibrium_path import ramp, reach
+from .load_path import LoadPath
+from .runs.ramp import ramp, reach
 from .runs.run_recorder import Record
+from .runs.scene_path import scene_path
 from .runs.undamped import Sample, perturb
 from .scenes.scene import Scene
 from .scenes.validation import SceneError
@@ -32,7 +35,7 @@ __all__ = [
     "Engine",
     "EngineError",
     "Equilibrium",
-    "LammpsPath",
+    "LoadPath",
     "MotionComparison",
     "NoEquilibriumError",
     "Record",
@@ -49,5 +52,6 @@ __all__ = [
     "ramp",
     "reach",
     "relax",
+    "scene_path",
     "settle",
 ]

@@ -18,8 +18,9 @@ from ..analysis.progress import Watch, report_progress, show_progress
 from ..analysis.windows import Ranks, full_operator, takes_all_modes
 from .equilibria.quasistatic import Equilibrium
 from .lammps.engine import Engine
-from .runs.equilibrium_path import EquilibriumPath, loads
 from .runs.path_error import with_path_error
+from .runs.ramp_loads import loads
+from .runs.scene_path import scene_path
 from .scenes.scene import Scene
 from .scenes.validation import SceneError, require_section
 from .settling.settle import settle
@@ -123,7 +124,7 @@ def onset_run(
     reached = reached or (lambda _: None)
     reached(start)
     with show_progress(watch), Engine(start.packing) as engine:
-        path = EquilibriumPath(engine, start, scene, onward=True)
+        path = scene_path(engine, start, scene, onward=True)
         forces = wanted
         if whole:
             report_progress(f"ramp up to F_x = {wanted[-1]:g}")

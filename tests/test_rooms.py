@@ -43,7 +43,7 @@ FLOORS = {
         ("windows",),
     ),
     "faultgouge.pywrap": (
-        ("lammps",),
+        ("lammps", "load_path"),
         ("equilibria", "exchange", "granular"),
         ("scenes",),
         ("settling",),

@@ -48,7 +48,7 @@ from faultgouge.analysis.motion.eigenvalues import active_coordinates
 from faultgouge.analysis.packing.packing import Floats, Indices
 from faultgouge.analysis.windows import force_bearing, full_operator
 from faultgouge.pywrap import Equilibrium, Scene
-from faultgouge.pywrap.runs.equilibrium_path import loads
+from faultgouge.pywrap.runs.ramp_loads import loads
 from faultgouge.pywrap.scenes.validation import require_section
 from faultgouge.studies.packing_tools import path_from
 

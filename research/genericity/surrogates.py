@@ -33,7 +33,7 @@ from faultgouge.analysis.operators.stiffness import stiffness_matrix
 from faultgouge.analysis.packing.packing import Floats
 from faultgouge.analysis.windows import complex_windows, force_bearing
 from faultgouge.pywrap import Equilibrium, Scene
-from faultgouge.pywrap.runs.equilibrium_path import loads
+from faultgouge.pywrap.runs.ramp_loads import loads
 from faultgouge.studies.packing_tools import path_from
 from research.genericity.levels import Pencil, pencil_of
 

@@ -13,7 +13,7 @@ from ...analysis import NoEquilibriumError
 from ...analysis.counted import counted
 from ...analysis.motion.growth import ABOVE
 from ...pywrap import Scene, SceneError
-from ...pywrap.runs.equilibrium_path import loads
+from ...pywrap.runs.ramp_loads import loads
 from ...pywrap.scenes.study_sections import Eruptions
 from ...pywrap.scenes.validation import require_section
 from ...pywrap.settling.settle import settle

@@ -65,7 +65,7 @@ from ...analysis.motion.eigenvalues import (
     unit_rounding,
 )
 from ...pywrap import Equilibrium, Scene
-from ...pywrap.runs.equilibrium_path import EquilibriumPath
+from ...pywrap.load_path import LoadPath
 from ...pywrap.scenes.study_sections import ModesSection
 from ...pywrap.scenes.validation import require_section
 from ..packing_tools import Start, path_from
@@ -235,7 +235,7 @@ def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[s
     return row | {"reach": path.equilibria[-1].fx, "contacts": len(rest.packing.contacts)}
 
 
-def _climb_to(path: EquilibriumPath, fx: float, step: float) -> Packing:
+def _climb_to(path: LoadPath[Equilibrium], fx: float, step: float) -> Packing:
     """The packing at fx, by multiples of the step up to there."""
     for k in range(round(path.equilibria[-1].fx / step), int(fx / step) + 1):
         if path.equilibria[-1].fx < k * step < fx:

@@ -30,8 +30,10 @@ from ...analysis.motion.eigenvalues import active_coordinates
 from ...analysis.packing.packing import Floats, Indices
 from ...analysis.windows import force_bearing, full_operator, takes_all_modes
 from ...pywrap import Scene, SceneError
-from ...pywrap.runs.equilibrium_path import EquilibriumPath, loads
+from ...pywrap.equilibria.quasistatic import Equilibrium
+from ...pywrap.load_path import LoadPath
 from ...pywrap.runs.path_error import with_path_error
+from ...pywrap.runs.ramp_loads import loads
 from ...pywrap.scenes.validation import require_section
 from ..packing_tools import Start, contact_pairs, path_from
 
@@ -69,7 +71,7 @@ def onset(scene: Scene, start: Start) -> dict[str, Any]:
     return row
 
 
-def first_window(path: EquilibriumPath, scene: Scene) -> tuple[Ends, float, Onset | None]:
+def first_window(path: LoadPath[Equilibrium], scene: Scene) -> tuple[Ends, float, Onset | None]:
     """How the ramp ends, the largest F_x up to which there is no window, and the onset if there is one."""
     try:
         found = find_onset(path, loads(require_section(scene.ramp, "ramp")), first=True)

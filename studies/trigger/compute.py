@@ -31,7 +31,7 @@ from ...analysis.motion.forcing import floor_force, impulse_response
 from ...analysis.motion.response import layer_force
 from ...analysis.packing.packing import Floats
 from ...pywrap import Engine, Scene, SceneError
-from ...pywrap.runs.equilibrium_path import loads
+from ...pywrap.runs.ramp_loads import loads
 from ...pywrap.runs.undamped import time_step
 from ...pywrap.scenes.study_sections import Trigger
 from ...pywrap.scenes.units import RealUnits

@@ -38,7 +38,7 @@ from ...analysis.packing.packing import Floats
 from ...analysis.windows.pair_form import PairForm, pair_forms
 from ...pywrap import Engine, Equilibrium, Sample, Scene
 from ...pywrap.lammps.dynamics import Weakening
-from ...pywrap.runs.equilibrium_path import next_equilibrium
+from ...pywrap.runs.scene_path import next_equilibrium
 from ...pywrap.runs.undamped import perturb, time_step, weakening_of
 from ...pywrap.scenes.sections import Friction
 from ...pywrap.scenes.validation import require_section

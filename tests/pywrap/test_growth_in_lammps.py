@@ -13,7 +13,7 @@ from faultgouge.analysis import (
 )
 from faultgouge.analysis.windows import Modes, System
 from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath
+from faultgouge.pywrap.runs.scene_path import scene_path
 from faultgouge.pywrap.runs.undamped import time_step
 
 
@@ -103,7 +103,7 @@ def path():
     )
     start = settle(scene)
     with Engine(start.packing) as engine:
-        found = EquilibriumPath(engine, start, scene)
+        found = scene_path(engine, start, scene)
         for k in range(1, 16):
             found(k * 1e-3)
         yield found

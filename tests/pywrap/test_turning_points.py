@@ -10,7 +10,7 @@ import pytest
 from faultgouge.analysis import RunFile
 from faultgouge.analysis.motion.hysteresis import hysteresis, layer_displacement, turning_points
 from faultgouge.pywrap import SceneError
-from faultgouge.pywrap.runs.equilibrium_path import all_loads, count_behind, loads
+from faultgouge.pywrap.runs.ramp_loads import all_loads, count_behind, loads
 from faultgouge.pywrap.scenes.sections import Ramp
 
 SCENE = """

@@ -20,7 +20,7 @@ from faultgouge.analysis.windows.slices.first_window import first_window
 from faultgouge.analysis.windows.slices.growth import SlicedGrowth
 from faultgouge.analysis.windows.slices.store import Candidate
 from faultgouge.pywrap import Scene, settle
-from faultgouge.pywrap.runs.equilibrium_path import loads
+from faultgouge.pywrap.runs.ramp_loads import loads
 from faultgouge.studies.packing_tools import path_from
 
 KINDS = {"weak": {"cn": 0.1}, "medium": {"cn": 10.0}, "drag": {"drag_time": 100.0}}
