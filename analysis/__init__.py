@@ -15,20 +15,19 @@ from .files.dumps import read_dump
 from .files.json_packing import read_packing
 from .files.runfile import RunFile
 from .motion.buckling import negative_eigenvalues
-from .motion.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
 from .motion.fastest_growing import FastestGrowth, fastest_growing
 from .motion.growth import Growth, fit_growth, mean_square_displacement
 from .motion.growth_of_run import growth_of_run
+from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_modes
 from .motion.motion import Motion
+from .motion.nearest_modes import nearest_modes
 from .motion.one_sided import OneSidedMotion, one_sided_motion
 from .motion.response import layer_force, linear_response
 from .motion.spectrum import (
-    ComplexPair,
     Spectrum,
     discrete_frequency,
     dynamical_matrix,
     eigenvalues,
-    growth_rate,
     largest_frequency,
     spectrum,
 )
@@ -51,16 +50,16 @@ Snapshot = Configuration
 __all__ = [
     "FLOOR",
     "BadInputError",
-    "ComplexPair",
     "Configuration",
     "ContactGeometry",
     "Contacts",
-    "Eigenpairs",
     "FastestGrowth",
     "FaultgougeError",
     "Growth",
     "LinearisedContacts",
     "MindlinLaw",
+    "Mode",
+    "Modes",
     "Motion",
     "NoEquilibriumError",
     "NoGainError",
@@ -81,7 +80,6 @@ __all__ = [
     "damping_matrix",
     "discrete_frequency",
     "dynamical_matrix",
-    "eigenpairs",
     "eigenvalues",
     "fastest_growing",
     "find_onset",
@@ -94,6 +92,7 @@ __all__ = [
     "linear_response",
     "mean_square_displacement",
     "nearest_image",
+    "nearest_modes",
     "negative_eigenvalues",
     "normal_modes",
     "one_sided_motion",

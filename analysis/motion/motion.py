@@ -32,7 +32,6 @@ from .eigenvalues import (
     SAFETY,
     Complexes,
     active_coordinates,
-    all_modes,
     growing,
     growing_undamped,
     mass_weighted,
@@ -40,6 +39,7 @@ from .eigenvalues import (
     zero_uncertainty,
 )
 from .fastest_growing import GROWTH_OVER_RESIDUAL, fastest_growing
+from .modes import Modes
 from .slowest_decay import slowest_decay
 from .state_space import StateSpace
 
@@ -214,8 +214,8 @@ class Motion:
         return Rates(values, values.real > GROWTH_OF_DISCS * frequency, slow.free, searched)
 
     def _undamped_rates(self) -> Rates:
-        values, left, right = all_modes(self.stiffness)
-        overlap = np.abs(np.sum(left.conj() * right, axis=0))
+        modes = Modes.of_matrix(self.stiffness)
+        values, overlap = modes.values, modes.overlap
         rounding = operator_rounding(self.configuration, self.stiffness.data)
         zero = zero_uncertainty(self.configuration, rounding)
         oscillates, buckles = growing_undamped(values, overlap, rounding, zero)

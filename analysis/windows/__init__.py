@@ -12,7 +12,6 @@
 
 from .edges import Edge, LostPairError, Window
 from .limits import LIMITS, Limits
-from .modes import Modes
 from .onset import (
     Increments,
     Onset,
@@ -26,6 +25,7 @@ from .onset import (
 from .slices.ranks import Ranks
 from .space import Space
 from .system import System, force_bearing, full_operator
+from .system_modes import SystemModes
 
 __all__ = [
     "LIMITS",
@@ -33,12 +33,12 @@ __all__ = [
     "Increments",
     "Limits",
     "LostPairError",
-    "Modes",
     "Onset",
     "OnsetError",
     "Ranks",
     "Space",
     "System",
+    "SystemModes",
     "Window",
     "complex_windows",
     "find_onset",

@@ -16,9 +16,9 @@ import numpy as np
 from ..motion.eigenvalues import Complexes
 from ..motion.normal_form import ORTHOGONAL, NormalForm
 from ..packing.packing import Floats, Packing
-from .modes import Modes
 from .space import Space
 from .system import System
+from .system_modes import SystemModes
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +136,7 @@ def _follow_pair(packings: Sequence[Packing], eigenvalue: float) -> Iterator[Spa
         system = System.of(packing)
         image = None if pair is None else pair.at(system)
         if image is None:
-            modes = Modes.of(system)
+            modes = SystemModes.of(system)
             image = modes.space(modes.nearest(pair) if pair else modes.about(eigenvalue))
         pair = image
         yield pair

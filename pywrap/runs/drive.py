@@ -24,7 +24,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ...analysis import Contacts, FaultgougeError, Packing, dynamical_matrix, eigenpairs, layer_force
+from ...analysis import Contacts, FaultgougeError, Packing, dynamical_matrix, layer_force, nearest_modes
 from ...analysis.arrays import Floats
 from ...analysis.factors.sparse_lu import general_lu
 from ...analysis.motion.slips import Slip, SlipDetector
@@ -199,7 +199,7 @@ def check_drive(scene: Scene, start: Packing) -> list[str]:
     if settings.spring == "rigid":
         return warnings
     matrix, active = dynamical_matrix(start)
-    slowest = eigenpairs(start, 0.0, 1).values.real.min()
+    slowest = nearest_modes(start, 0.0, 1).values.real.min()
     period = 2 * math.pi / math.sqrt(max(slowest, np.finfo(float).tiny))
     loading = strength(start) / (settings.spring * settings.fastest)
     says = (

@@ -41,7 +41,7 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, eigvals
 from scipy.sparse.linalg import ArpackError
 
-from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, dynamical_matrix, eigenpairs
+from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, dynamical_matrix, nearest_modes
 from ...analysis.arrays import Floats
 from ...analysis.windows import Space, System, Window, force_bearing
 from ...analysis.windows.nearby import nearest_mode
@@ -306,7 +306,7 @@ def squared_gap(eigenvalue: float) -> Vanishes:
         values = (
             eigvals(dynamical_matrix(bare)[0].toarray())
             if len(bare) < DISKS_OF_ALL_MODES
-            else eigenpairs(bare, near, 4).values
+            else nearest_modes(bare, near, 4).values
         )
         one, other = values[np.argsort(np.abs(values - eigenvalue))[:2]]
         return float(((one - other) ** 2).real)

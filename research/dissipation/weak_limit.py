@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike
 from faultgouge.analysis import NoEquilibriumError, Packing, Window, damping_matrix
 from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.motion.eigenvalues import mass_weighted
-from faultgouge.analysis.windows import LostPairError, Modes, Space, System, force_bearing
+from faultgouge.analysis.windows import LostPairError, Space, System, SystemModes, force_bearing
 from faultgouge.analysis.windows.edges import follow_to, track
 
 DIGITS = 1e-12
@@ -184,5 +184,5 @@ def _follow_pair(equilibrium: Callable[[float], Packing], window: Window) -> Cal
         return System.of(equilibrium(fx))
 
     onset = system(window.fx_onset)
-    modes = Modes.of(onset)
+    modes = SystemModes.of(onset)
     return track(system, {onset.fx: follow_to(modes.space(modes.about(window.eigenvalue)), replace(onset))})

@@ -28,9 +28,9 @@ import numpy as np
 from ...analysis import Configuration, Packing
 from ...analysis.arrays import Complexes, Floats, derive_frozen
 from ...analysis.configuration import HasConfiguration
-from ...analysis.motion.eigenvalues import all_modes, growing_undamped, in_balance, unit_rounding, zero_uncertainty
+from ...analysis.motion.eigenvalues import growing_undamped, in_balance, unit_rounding, zero_uncertainty
+from ...analysis.motion.modes import Modes, participation_ratio
 from ...analysis.motion.motion import Motion
-from ...analysis.motion.spectrum import participation_ratio
 
 LONE_PARTICIPATION = 1.5
 """Disks that take part in a motion, below which the motion is that of one disk."""
@@ -102,12 +102,12 @@ def cycle_state(packing: Packing, spring: float) -> dict[str, Any]:
 def linear_state(configuration: Configuration, sliding: bool) -> LinearState:
     """What grows about a configuration in linear motion."""
     motion = Motion.of(configuration, sliding=sliding)
-    values, right, left = all_modes(motion.stiffness)
+    modes = Modes.of_matrix(motion.stiffness)
     rounding = unit_rounding(motion.stiffness.data)
     zero = zero_uncertainty(configuration, rounding)
-    overlap = np.abs(np.sum(left.conj() * right, axis=0))
-    complex_, negative = growing_undamped(values, overlap, rounding, zero)
-    shared = _disks(motion, right) >= LONE_PARTICIPATION
+    values = modes.values
+    complex_, negative = growing_undamped(values, modes.overlap, rounding, zero)
+    shared = _disks(motion, modes.right) >= LONE_PARTICIPATION
     grows = (complex_ | negative) & shared
     rates = 2 * np.abs(np.sqrt(values[grows].astype(complex)).imag)
     return LinearState(

@@ -25,8 +25,8 @@ import numpy as np
 from scipy.linalg import eigh, eigvals
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
-from ...analysis.motion.eigenpairs import eigenpairs
 from ...analysis.motion.eigenvalues import active_coordinates
+from ...analysis.motion.nearest_modes import nearest_modes
 from ...analysis.packing.packing import Floats, Indices
 from ...analysis.windows import force_bearing, full_operator, takes_all_modes
 from ...pywrap import Scene, SceneError
@@ -87,7 +87,7 @@ def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
 
     The packing is just below the onset, and `rest` the one at F_x = 0.
     """
-    near = eigenpairs(force_bearing(packing), eigenvalue * (1 + 1e-6), 2)
+    near = nearest_modes(force_bearing(packing), eigenvalue * (1 + 1e-6), 2)
     vector = near.right[:, 0].real / np.linalg.norm(near.right[:, 0].real)
     axes = vector.reshape(3, -1) ** 2
     weight = axes.sum(axis=0)

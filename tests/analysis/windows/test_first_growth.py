@@ -13,7 +13,7 @@ from test_slicing import FEW, on_ranks
 from faultgouge.analysis import NoEquilibriumError
 from faultgouge.analysis.motion.state_space import StateSpace
 from faultgouge.analysis.progress import show_progress
-from faultgouge.analysis.windows import LIMITS, Edge, Modes, System, Window, find_onset, find_windows
+from faultgouge.analysis.windows import LIMITS, Edge, System, SystemModes, Window, find_onset, find_windows
 from faultgouge.analysis.windows.nearby import find_growing_near, nearest_mode
 from faultgouge.analysis.windows.slices.axis import growing_modes
 from faultgouge.analysis.windows.slices.first_window import first_window
@@ -207,7 +207,7 @@ def test_what_cannot_be_followed_back_is_in_doubt_and_ends_the_search():
 @pytest.mark.slow
 def test_modes_near_a_frequency_are_those_of_all(path):
     damped = with_dissipation(path, cn=0.1)
-    modes = Modes.of(System.of(damped(0.023), dissipation=True))
+    modes = SystemModes.of(System.of(damped(0.023), dissipation=True))
     for rate in modes.values[[3, 100, 200]]:
         found = nearest_mode(modes.system, float(rate.imag) * (1 + 1e-6))
         assert found.mean == pytest.approx(rate, rel=1e-9)
