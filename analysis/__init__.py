@@ -42,7 +42,7 @@ from .packing.law import MindlinLaw
 from .packing.packing import Packing
 from .packing.solid_fraction import solid_fraction
 from .windows import Onset, OnsetError, Window, complex_windows, find_onset
-from .windows.pair_form import pair_eigenvalues
+from .windows.pair_over_load import pair_eigenvalues
 
 Snapshot = Configuration
 """The name of `Configuration` until version 1."""

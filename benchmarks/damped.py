@@ -41,9 +41,10 @@ from pathlib import Path
 
 import numpy as np
 from scipy.linalg import eigvals
+from scipy.sparse import csr_array
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError, Window, find_onset
-from faultgouge.analysis.motion.state_space import StateSpace
+from faultgouge.analysis.motion.energy_norm import EnergyNorm
 from faultgouge.analysis.windows import LIMITS, System, find_windows
 from faultgouge.analysis.windows.search import windows_along
 from faultgouge.analysis.windows.slices.first_window import first_window
@@ -133,8 +134,8 @@ def against_all_eigenvalues(
 
     def fastest(fx: float) -> float:
         place = system(fx)
-        first_order = StateSpace.of_matrices(place.stiffness, place.damping, np.ones(place.stiffness.shape[0]))
-        return float(eigvals(first_order.matrix).real.max())
+        a, g = csr_array(place.stiffness), csr_array(place.damping)
+        return float(eigvals(EnergyNorm.of(a).first_order(a, g)).real.max())
 
     def largest(loads: Iterable[float]) -> float:
         return max(map(fastest, loads), default=-np.inf)

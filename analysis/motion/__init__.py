@@ -5,7 +5,7 @@ the negative ones; of large packings
 `all_eigenvalues` finds all, with `block_arnoldi`, and `fastest_growing` the ones that matter most. `normal_form` has
 how two modes coalesce, `response` and `forcing` the motion under forces, `transient` its largest amplitude, `growth`
 its growth in a LAMMPS run, `stable_timestep` the time step. `matrix_functions`, `oscillator`, `propagator` and
-`state_space` contain the mathematics.
+`energy_norm` contain the mathematics.
 
 May import: `configuration`, `packing`, `operators`, `factors`.
 """

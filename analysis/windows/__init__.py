@@ -3,11 +3,11 @@
 - `onset`: what a user calls; `limits`: every size and tolerance, with its reason
 - `system`: the matrix of small motion at one load; `space`: the modes that are followed from load to load
 - `edges`: windows, and their edges: where the growth of a motion goes through zero, or jumps
-- `modes`: all modes of one load, and which is which at the next; `between`: where a narrow window may hide
+- `system_modes`: all modes of one load, and which is which at the next; `between`: where a narrow window may hide
 - `search`: the walk along a ramp
 - `screens`: the few motions that may change, by perturbation theory
 - `slices`: large packings, in slices of the spectrum
-- `pair_form`: where a pair stands in the normal form
+- `pair_over_load`: one pair through many loads, its eigenvalues and its normal form
 """
 
 from .edges import Edge, LostPairError, Window

@@ -2,7 +2,7 @@ r"""All modes at one load, and which of them is which at the next.
 
 Without dissipation these are the eigenvalues of A, with right vectors x and left vectors y; with dissipation the
 eigenvalues s of the first-order matrix with :math:`\mathrm{Im}\, s \ge 0`, from LAPACK in coordinates of the energy
-(:mod:`~faultgouge.analysis.motion.state_space`), with displacements x and y. Modes at neighbouring loads a, b are
+(:mod:`~faultgouge.analysis.motion.energy_norm`), with displacements x and y. Modes at neighbouring loads a, b are
 assigned by :math:`|x_a^H x_b|\,|y_a^H y_b|` over unit vectors, so modes that cross do not swap names.
 (:math:`|y_a^H x_b|`, the obvious weight, vanishes at an exceptional point, where it is needed most.) For shapes that
 two overdamped motions share the eigenvalues decide.
@@ -22,8 +22,8 @@ from scipy.linalg import eig
 from scipy.sparse import csr_array
 
 from ..motion.eigenvalues import Complexes, exceeds_rounding, growing
+from ..motion.energy_norm import EnergyNorm
 from ..motion.modes import Modes
-from ..motion.state_space import StateSpace
 from ..packing.packing import Floats, Indices
 from .space import Space
 from .system import Operator, System
@@ -154,16 +154,15 @@ def _without(system: System) -> SystemModes:
 
 def _with_dissipation(system: System) -> SystemModes:
     assert system.damping is not None
-    first_order = StateSpace.of_matrices(
-        csr_array(system.stiffness), csr_array(system.damping), np.ones(system.stiffness.shape[0])
-    )
-    active, size = first_order.active, len(first_order.active)
-    values, left, right = eig(first_order.matrix, left=True, check_finite=False)
+    a, g = csr_array(system.stiffness), csr_array(system.damping)
+    norm = EnergyNorm.of(a)
+    active, size = norm.active, len(norm.active)
+    values, left, right = eig(norm.first_order(a, g), left=True, check_finite=False)
     kept = np.flatnonzero(values.imag >= 0)
     kept = kept[np.lexsort((values[kept].real, values[kept].imag))]
     overlap = np.abs(np.sum(left[:, kept].conj() * right[:, kept], axis=0))
     x, y = np.zeros((2, system.stiffness.shape[0], len(kept)), complex)
-    x[active] = _normalise(first_order.unweight @ right[:size, kept])
+    x[active] = _normalise(norm.unweight @ right[:size, kept])
     y[active] = _normalise(left[size:, kept])
     return SystemModes(
         values=np.asarray(values[kept], complex),

@@ -11,7 +11,7 @@ from test_found import PASSING, cut_off
 from test_slicing import FEW, on_ranks
 
 from faultgouge.analysis import NoEquilibriumError
-from faultgouge.analysis.motion.state_space import StateSpace
+from faultgouge.analysis.motion.energy_norm import EnergyNorm
 from faultgouge.analysis.progress import show_progress
 from faultgouge.analysis.windows import LIMITS, Edge, System, SystemModes, Window, find_onset, find_windows
 from faultgouge.analysis.windows.nearby import find_growing_near, nearest_mode
@@ -100,8 +100,8 @@ def test_windows_are_the_same_to_the_bit_in_another_unit_of_time(path):
 
 def first_order(system):
     """The first-order matrix in coordinates of the energy."""
-    masses = np.ones(system.stiffness.shape[0])
-    return StateSpace.of_matrices(system.stiffness, system.damping, masses).matrix
+    a, g = csr_array(system.stiffness), csr_array(system.damping)
+    return EnergyNorm.of(a).first_order(a, g)
 
 
 def oscillators(feed):
