@@ -19,9 +19,9 @@ from faultgouge.analysis import (
 from faultgouge.analysis.uncertain_digits import with_uncertainty
 from faultgouge.analysis.windows import Limits, System, SystemModes, force_bearing, full_operator
 from faultgouge.analysis.windows.between import Few, deepest_dip
-from faultgouge.analysis.windows.modes import assign_modes
 from faultgouge.analysis.windows.screens.pairs import PairScreen
 from faultgouge.analysis.windows.search import windows_along
+from faultgouge.analysis.windows.system_modes import assign_modes
 
 
 @pytest.mark.parametrize("d", [0.01, 0.3])
