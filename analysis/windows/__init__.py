@@ -1,6 +1,7 @@
 """Windows of loads on which motion grows, solved for and not scanned, with dissipation and without: one search.
 
-- `onset`: what a user calls; `limits`: every size and tolerance, with its reason
+- `find_onset`, `find_windows`: what a user calls; `onset`: what the search finds, in numbers and in words
+- `limits`: every size and tolerance, with its reason
 - `system`: the matrix of small motion at one load; `space`: the modes that are followed from load to load
 - `edges`: windows, and their edges: where the growth of a motion goes through zero, or jumps
 - `system_modes`: all modes of one load, and which is which at the next; `between`: where a narrow window may hide
@@ -10,18 +11,11 @@
 - `pair_over_load`: one pair through many loads, its eigenvalues and its normal form
 """
 
-from .edges import Edge, LostPairError, Window
+from .edges import Edge, Increments, LostPairError, Window
+from .find_onset import find_onset, takes_all_modes
+from .find_windows import complex_windows, find_windows, windows_up_to
 from .limits import LIMITS, Limits
-from .onset import (
-    Increments,
-    Onset,
-    OnsetError,
-    complex_windows,
-    find_onset,
-    find_windows,
-    takes_all_modes,
-    windows_up_to,
-)
+from .onset import Onset, OnsetError
 from .slices.ranks import Ranks
 from .space import Space
 from .system import System, force_bearing, full_operator

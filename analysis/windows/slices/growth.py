@@ -29,7 +29,7 @@ from ...errors import FaultgougeError, NoEquilibriumError
 from ...motion.eigenvalues import active_coordinates
 from ...packing.packing import Floats
 from ...progress import report_progress
-from ..edges import DoubtError, LostPairError, Window, follow_to, track
+from ..edges import DoubtError, Increments, LostPairError, Window, follow_to, track
 from ..limits import LIMITS, Limits
 from ..nearby import find_growing_near
 from ..screens.growth import Cluster, find_cores, group_clusters, may_grow, reduce_system, shift_load
@@ -37,7 +37,7 @@ from ..space import Space
 from ..system import System
 from ..system_modes import SystemModes
 from .axis import growing_modes
-from .clusters import Increments, SliceSearch
+from .clusters import SliceSearch
 from .eigenbasis import Basis, Levels
 from .store import Border, Candidate, SliceResult
 

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-FAMILIES = ("runs", "drive", "eigenvalues", "pictures", "exchange", "studies", "sweeps")
+FAMILIES = ("runs", "drive", "spectrum", "onset", "pictures", "exchange", "studies", "sweeps")
 """Modules with commands."""
 
 
