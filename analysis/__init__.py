@@ -8,6 +8,7 @@ matrix), `onset` (where eigenvalues become complex), `growth` (growth in a run).
 write packings.
 """
 
+from .arrays import Complexes, Floats, Indices
 from .configuration import Configuration
 from .contacts import LinearisedContacts
 from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
@@ -15,6 +16,7 @@ from .files.dumps import read_dump
 from .files.json_packing import read_packing
 from .files.runfile import RunFile
 from .motion.buckling import negative_eigenvalues
+from .motion.eigenvalues import mass_weighted
 from .motion.fastest_growing import FastestGrowth, fastest_growing
 from .motion.growth import Growth, fit_growth, mean_square_displacement
 from .motion.growth_of_run import growth_of_run
@@ -22,7 +24,10 @@ from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_m
 from .motion.motion import Motion
 from .motion.nearest_modes import nearest_modes
 from .motion.one_sided import OneSidedMotion, one_sided_motion
+from .motion.power_law import PowerLaw, fit_power_law
 from .motion.response import layer_force, linear_response
+from .motion.signals import Signal
+from .motion.slips import Slip
 from .motion.spectrum import (
     Spectrum,
     discrete_frequency,
@@ -50,12 +55,15 @@ Snapshot = Configuration
 __all__ = [
     "FLOOR",
     "BadInputError",
+    "Complexes",
     "Configuration",
     "ContactGeometry",
     "Contacts",
     "FastestGrowth",
     "FaultgougeError",
+    "Floats",
     "Growth",
+    "Indices",
     "LinearisedContacts",
     "MindlinLaw",
     "Mode",
@@ -69,7 +77,10 @@ __all__ = [
     "OutputError",
     "Packing",
     "PackingFileError",
+    "PowerLaw",
     "RunFile",
+    "Signal",
+    "Slip",
     "Snapshot",
     "Spectrum",
     "Stability",
@@ -84,12 +95,14 @@ __all__ = [
     "fastest_growing",
     "find_onset",
     "fit_growth",
+    "fit_power_law",
     "growth_of_run",
     "growth_rate",
     "largest_damping_rate",
     "largest_frequency",
     "layer_force",
     "linear_response",
+    "mass_weighted",
     "mean_square_displacement",
     "nearest_image",
     "nearest_modes",

@@ -50,7 +50,7 @@ from faultgouge.analysis.windows.search import windows_along
 from faultgouge.analysis.windows.slices.first_window import first_window
 from faultgouge.pywrap import Equilibrium, LoadPath, Scene, scene_path, settle
 from faultgouge.pywrap.lammps.engine import Engine
-from faultgouge.pywrap.runs.ramp_loads import loads
+from faultgouge.pywrap.runs.ramp_loads import ramp_loads
 
 KINDS = ({"cn": 1.0}, {"cn": 10.0, "ct": 5.0}, {"ct": 0.1}, {"cn": 0.1, "drag_time": 300.0})
 """Dissipation, in turn."""
@@ -159,7 +159,7 @@ def cases(disks: int, seeds: Iterator[int], packings: int, until: float, kinds: 
         packing = {"disks": disks, "width": round(1.192 * disks**0.5, 1), "seed": seed}
         steps = {"step": until / 20, "until": until}
         scene = Scene.from_mapping({"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": steps})
-        wanted = loads(scene.ramp)
+        wanted = ramp_loads(scene)
         try:
             start = settle(scene)
             with Engine(start.packing) as engine:

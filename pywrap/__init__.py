@@ -18,20 +18,29 @@ from .granular.compare_motion import MotionComparison, compare_motion
 from .granular.from_lammps import from_lammps
 from .granular.granular_commands import SnapshotError
 from .granular.lammps_path import lammps_path
+from .granular.look_in_a_copy import in_a_copy
 from .granular.relax import relax
+from .lammps.dynamics import Dynamics
 from .lammps.engine import Engine
-from .lammps.instance import EngineError
+from .lammps.instance import EngineError, lammps_instance
 from .load_path import LoadPath
+from .onset import onset_run
+from .runs.drive import DriveSample, drive, settle_for_drive
 from .runs.ramp import ramp, reach
+from .runs.ramp_loads import ramp_loads
 from .runs.run_recorder import Record
 from .runs.scene_path import scene_path
-from .runs.undamped import Sample, perturb
+from .runs.undamped import Checkpoint, Sample, perturb, time_step
 from .scenes.scene import Scene
+from .scenes.units import dashpot, real_units, restitution
 from .scenes.validation import SceneError
 from .settling.relax import bring_to_rest
 from .settling.settle import settle
 
 __all__ = [
+    "Checkpoint",
+    "DriveSample",
+    "Dynamics",
     "Engine",
     "EngineError",
     "Equilibrium",
@@ -45,13 +54,23 @@ __all__ = [
     "SnapshotError",
     "bring_to_rest",
     "compare_motion",
+    "dashpot",
+    "drive",
     "equilibrate",
     "from_lammps",
+    "in_a_copy",
+    "lammps_instance",
     "lammps_path",
+    "onset_run",
     "perturb",
     "ramp",
+    "ramp_loads",
     "reach",
+    "real_units",
     "relax",
+    "restitution",
     "scene_path",
     "settle",
+    "settle_for_drive",
+    "time_step",
 ]

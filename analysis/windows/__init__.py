@@ -11,7 +11,7 @@
 - `pair_over_load`: one pair through many loads, its eigenvalues and its normal form
 """
 
-from .edges import Edge, Increments, LostPairError, Window
+from .edges import Edge, Increments, LostPairError, Window, follow_to, track
 from .find_onset import find_onset, takes_all_modes
 from .find_windows import complex_windows, find_windows, windows_up_to
 from .limits import LIMITS, Limits
@@ -37,8 +37,10 @@ __all__ = [
     "complex_windows",
     "find_onset",
     "find_windows",
+    "follow_to",
     "force_bearing",
     "full_operator",
     "takes_all_modes",
+    "track",
     "windows_up_to",
 ]

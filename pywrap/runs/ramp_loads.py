@@ -7,18 +7,20 @@ import math
 import numpy as np
 
 from ...analysis.arrays import Floats
+from ..scenes.scene import Scene
 from ..scenes.sections import Ramp
-from ..scenes.validation import SceneError
+from ..scenes.validation import SceneError, require_section
 
 
-def loads(settings: Ramp) -> Floats:
-    """F_x of the equilibria up to the first turning point of a ramp, force, from 0: where onsets are sought.
+def ramp_loads(scene: Scene) -> Floats:
+    """F_x of the equilibria up to the first turning point of the scene's ramp, force, from 0: where onsets are sought.
 
     Raises
     ------
     SceneError
-        If F_x goes below 0 first.
+        If the scene has no section [ramp], or F_x goes below 0 first.
     """
+    settings = require_section(scene.ramp, "ramp")
     if settings.first < 0:
         raise SceneError(
             f"ramp.until goes to F_x = {settings.first:g} first, and onsets are sought above 0: give a first turning "

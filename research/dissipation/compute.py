@@ -17,14 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from faultgouge.analysis import OnsetError, Packing, Window, find_onset
-from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.transient import NoGainError, transient_gain
+from faultgouge.analysis import Floats, NoGainError, OnsetError, Packing, Window, find_onset, transient_gain
 from faultgouge.analysis.windows import System, find_windows
-from faultgouge.pywrap import Equilibrium, LoadPath, Scene, scene_path, settle
-from faultgouge.pywrap.lammps.engine import Engine
-from faultgouge.pywrap.runs.ramp_loads import loads
-from faultgouge.pywrap.scenes.validation import require_section
+from faultgouge.pywrap import Engine, Equilibrium, LoadPath, Scene, ramp_loads, scene_path, settle
 from research.dissipation.weak_limit import drag_onset, weak_limit
 
 Row = dict[str, Any]
@@ -43,7 +38,7 @@ FEW = 3
 @contextmanager
 def ramped(scene: Scene) -> Iterator[LoadPath[Equilibrium]]:
     """The path of a scene, climbed to the end of its ramp, or to where the packing flows."""
-    wanted = loads(require_section(scene.ramp, "ramp"))
+    wanted = ramp_loads(scene)
     start = settle(scene)
     with Engine(start.packing) as engine:
         path = scene_path(engine, start, scene, onward=True)

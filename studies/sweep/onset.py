@@ -33,7 +33,7 @@ from ...pywrap import Scene, SceneError
 from ...pywrap.equilibria.quasistatic import Equilibrium
 from ...pywrap.load_path import LoadPath
 from ...pywrap.runs.path_error import with_path_error
-from ...pywrap.runs.ramp_loads import loads
+from ...pywrap.runs.ramp_loads import ramp_loads
 from ...pywrap.scenes.validation import require_section
 from ..packing_tools import Start, contact_pairs, path_from
 
@@ -74,7 +74,7 @@ def onset(scene: Scene, start: Start) -> dict[str, Any]:
 def first_window(path: LoadPath[Equilibrium], scene: Scene) -> tuple[Ends, float, Onset | None]:
     """How the ramp ends, the largest F_x up to which there is no window, and the onset if there is one."""
     try:
-        found = find_onset(path, loads(require_section(scene.ramp, "ramp")), first=True)
+        found = find_onset(path, ramp_loads(scene), first=True)
     except NoEquilibriumError:
         return "flows", path.equilibria[-1].fx, None
     except OnsetError:

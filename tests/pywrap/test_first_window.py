@@ -8,7 +8,7 @@ from faultgouge.analysis import find_onset
 from faultgouge.analysis.motion.eigenvalues import unit_rounding
 from faultgouge.analysis.windows import full_operator
 from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.runs.ramp_loads import loads
+from faultgouge.pywrap.runs.ramp_loads import ramp_loads
 from faultgouge.pywrap.runs.scene_path import scene_path
 
 
@@ -62,7 +62,7 @@ def test_a_window_is_found_between_loads_far_apart(keys, apart, window, known):
     scene = Scene.from_mapping({**keys, "load": {"fy": 3.0}})
     with Engine((start := settle(scene)).packing) as engine:
         path = scene_path(engine, start, scene)
-        for fx in loads(scene.ramp)[1:]:
+        for fx in ramp_loads(scene)[1:]:
             path(float(fx))
-        (found,) = find_onset(path, loads(scene.ramp) if apart is None else apart).windows
+        (found,) = find_onset(path, ramp_loads(scene) if apart is None else apart).windows
     assert (found.fx_onset, found.fx_end) == pytest.approx(window, abs=known)

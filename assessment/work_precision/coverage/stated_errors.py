@@ -31,7 +31,7 @@ from ....analysis.windows import Window
 from ....pywrap import Engine, Equilibrium, Scene, settle
 from ....pywrap.load_path import LoadPath
 from ....pywrap.runs.path_error import PathErrors, with_path_error
-from ....pywrap.runs.ramp_loads import loads
+from ....pywrap.runs.ramp_loads import ramp_loads
 from ....pywrap.runs.scene_path import scene_path
 from ....pywrap.scenes.validation import require_section
 
@@ -162,7 +162,7 @@ class FirstOnset:
     def __init__(self, scene: Scene, engine: Engine, start: Equilibrium) -> None:
         self._engine, self._damping, self._start = engine, scene.damping, start
         self._scene = scene.model_copy(update={"damping": None})
-        self._wanted = loads(require_section(scene.ramp, "ramp"))
+        self._wanted = ramp_loads(scene)
 
     def first_window(self, finer: int = 1, beyond: float = 0.0) -> tuple[LoadPath[Equilibrium], Window] | None:
         """The ramp with increments so many times smaller, and the first window on it, without the error of the path.

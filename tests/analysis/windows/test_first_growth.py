@@ -20,7 +20,7 @@ from faultgouge.analysis.windows.slices.first_window import first_window
 from faultgouge.analysis.windows.slices.growth import SlicedGrowth
 from faultgouge.analysis.windows.slices.store import Candidate
 from faultgouge.pywrap import Scene, settle
-from faultgouge.pywrap.runs.ramp_loads import loads
+from faultgouge.pywrap.runs.ramp_loads import ramp_loads
 from faultgouge.studies.packing_tools import path_from
 
 KINDS = {"weak": {"cn": 0.1}, "medium": {"cn": 10.0}, "drag": {"drag_time": 100.0}}
@@ -170,7 +170,7 @@ def test_a_motion_that_grows_where_another_one_begins_to_is_found():
     )
     with path_from(settle(scene), scene) as path:
         damped = with_dissipation(path, drag_time=100.0)
-        window, doubtful = first_window(lambda fx: System.of(damped(fx), dissipation=True), loads(scene.ramp))
+        window, doubtful = first_window(lambda fx: System.of(damped(fx), dissipation=True), ramp_loads(scene))
         assert doubtful == ()
         among_all = find_windows(lambda fx: System.of(damped(fx), dissipation=True), [0.01, 0.012], first=True)
         assert window.fx_onset == pytest.approx(min(each.fx_onset for each in among_all), abs=1e-9)
@@ -242,7 +242,7 @@ def test_packings_against_all_eigenvalues(disks, seed, kind, grows):
         def fastest(fx):
             return np.linalg.eigvals(first_order(System.of(path(fx), dissipation=True))).real.max()
 
-        window, doubtful = first_window(lambda fx: System.of(path(fx), dissipation=True), loads(scene.ramp), limits=FEW)
+        window, doubtful = first_window(lambda fx: System.of(path(fx), dissipation=True), ramp_loads(scene), limits=FEW)
         assert doubtful == ()
         if grows:
             assert fastest(window.fx_onset * (1 - 1e-6)) < 1e-11 < fastest(window.fx_onset * (1 + 1e-6))
