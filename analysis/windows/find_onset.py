@@ -100,15 +100,15 @@ def find_onset(
     start = equilibrium(float(loads[0]))
     if dissipation and not start.damped:
         raise ValueError("The packing has no dissipation: find_onset without it is what it needs.")
-    ramp = _Ramp(equilibrium, start, loads, narrowest, modes, first, ranks, folder, limits)
+    search = _OnsetSearch(equilibrium, start, loads, narrowest, modes, first, ranks, folder, limits)
     with show_progress(watch):
         if not dissipation:
-            return ramp.undamped_onset()
-        return ramp.damped_onset(known) if ramp.takes_all else ramp.damped_onset_in_slices(known)
+            return search.undamped_onset()
+        return search.damped_onset(known) if search.takes_all else search.damped_onset_in_slices(known)
 
 
 @dataclass(frozen=True, eq=False)
-class _Ramp:
+class _OnsetSearch:
     """What is searched, and how; fields as of `find_onset`, and the packing at the smallest load."""
 
     equilibrium: Callable[[float], HasConfiguration]
