@@ -2,6 +2,7 @@
 
 python -m research.cycle.make compute RUNS SEEDS   the runs of the seeds 1 to SEEDS that the table lacks; their files
                                                    go to the folder RUNS; half a minute a run
+python -m research.cycle.make many RUNS SEEDS      the same of 400 disks; three minutes a run
 python -m research.cycle.make springs SEEDS        what the table of three springs lacks; four minutes a seed
 python -m research.cycle.make clock SEEDS          what the table of clock advances lacks; a minute a seed
 python -m research.cycle.make page                 README.md and further.md from the tables
@@ -25,12 +26,12 @@ from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.figures.pages import render
 from faultgouge.studies.statistics import share
 from research.cycle import clock, further, springs
-from research.cycle.compute import LAWS, UNTIL, compute
+from research.cycle.compute import LAWS, UNTIL, compute, compute_many
 from research.statistics import interval
 from research.tables import read_rows
 
 HERE = Path(__file__).parent
-TABLE = "cycles.jsonl"
+TABLE, MANY_TABLE = "cycles.jsonl", "cycles_400.jsonl"
 
 Row = dict[str, Any]
 
@@ -222,6 +223,8 @@ if __name__ == "__main__":
     match sys.argv[1:]:
         case ["compute", runs, seeds]:
             compute(HERE / "tables" / TABLE, Path(runs), range(1, int(seeds) + 1))
+        case ["many", runs, seeds]:
+            compute_many(HERE / "tables" / MANY_TABLE, Path(runs), range(1, int(seeds) + 1))
         case ["springs", seeds]:
             springs.compute(HERE / "tables" / further.SPRINGS_TABLE, range(1, int(seeds) + 1))
         case ["clock", seeds]:
