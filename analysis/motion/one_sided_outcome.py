@@ -14,7 +14,8 @@ steady for ten chunks and then to grow to another one; so half of the time at le
 which differ in whether the drag acts on rotations. One packing may vibrate in two ways, by its start.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from itertools import count, islice
 from typing import Any
 
 import numpy as np
@@ -233,12 +234,38 @@ def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = 
     time : float, optional
         How long; the vibration of the two last quarters is compared.
     """
+    chunk, most = _chunks(system, 1, time)
+    windows: list[Floats] = []
+    for window in islice(windows_under_load(system, direction, chunk), most):
+        windows.append(window)
+        report_progress(f"under the rising load: t = {chunk * len(windows):.4g}, vibration {window[1].max():.3g}")
+        if time is None and 2 * len(windows) >= most and all(map(_vibrates, _of_starts(windows))):
+            break
+    found = []
+    for after in _of_starts(windows):
+        last = np.array(after[-(len(after) // 4 or 1) :])
+        drift, vibration = np.sqrt(np.mean(last**2, axis=0)).tolist()
+        found.append({"drift": drift, "vibration": vibration, "steady": _vibrates(after) or _vanishes(after)})
+    first, *others = found
+    return {**first, "time": chunk * len(windows), "other_start": others[0] if others else None}
+
+
+def windows_under_load(system: OneSidedSystem, direction: Floats, chunk: float) -> Iterator[Floats]:
+    """Drift and vibration in one window after the other under a load that rises, shape (2, S) of S starts.
+
+    Parameters
+    ----------
+    system : OneSidedSystem
+        Of the configuration.
+    direction : ndarray, shape (coordinates, 1)
+        Forces per unit of time.
+    chunk : float
+        Time of a window; the drag fades out in `FADE` of them.
+    """
     drag = _drag_of_starts(system)
     direction = np.repeat(direction, drag.shape[1], axis=1)
     state = system.start(np.zeros_like(direction))
-    chunk, most = _chunks(system, 1, time)
-    windows: list[Floats] = []
-    for number in range(most):
+    for number in count():
         start = system.displacement(state.z)
         squares: NDArray[np.float64] = np.zeros_like(start)
         for sample in range(SAMPLES_OF_WINDOW):
@@ -247,17 +274,7 @@ def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = 
             state.v *= np.exp(-DRAG / SAMPLES_OF_WINDOW * max(0.0, 1 - now / FADE) ** 2 * drag)
             squares += system.displacement(state.v) ** 2 / SAMPLES_OF_WINDOW
         mean = (system.displacement(state.z) - start) / chunk
-        windows.append(np.array([_root_mean(mean**2), _root_mean(np.maximum(squares - mean**2, 0.0))]))
-        report_progress(f"under the rising load: t = {state.time:.4g}, vibration {windows[-1][1].max():.3g}")
-        if time is None and 2 * (number + 1) >= most and all(map(_vibrates, _of_starts(windows))):
-            break
-    found = []
-    for after in _of_starts(windows):
-        last = np.array(after[-(len(after) // 4 or 1) :])
-        drift, vibration = np.sqrt(np.mean(last**2, axis=0)).tolist()
-        found.append({"drift": drift, "vibration": vibration, "steady": _vibrates(after) or _vanishes(after)})
-    first, *others = found
-    return {**first, "time": state.time, "other_start": others[0] if others else None}
+        yield np.array([_root_mean(mean**2), _root_mean(np.maximum(squares - mean**2, 0.0))])
 
 
 def _drag_of_starts(system: OneSidedSystem) -> Floats:

@@ -28,7 +28,7 @@ from faultgouge.studies.statistics import share
 from research.cycle import clock, further, springs
 from research.cycle.compute import LAWS, UNTIL, compute, compute_many
 from research.statistics import interval
-from research.tables import read_rows
+from research.tables import add_seeds, read_rows
 
 HERE = Path(__file__).parent
 TABLE, MANY_TABLE = "cycles.jsonl", "cycles_400.jsonl"
@@ -226,9 +226,9 @@ if __name__ == "__main__":
         case ["many", runs, seeds]:
             compute_many(HERE / "tables" / MANY_TABLE, Path(runs), range(1, int(seeds) + 1))
         case ["springs", seeds]:
-            springs.compute(HERE / "tables" / further.SPRINGS_TABLE, range(1, int(seeds) + 1))
+            add_seeds(HERE / "tables" / further.SPRINGS_TABLE, range(1, int(seeds) + 1), springs.rows_of)
         case ["clock", seeds]:
-            clock.compute(HERE / "tables" / further.CLOCK_TABLE, range(1, int(seeds) + 1))
+            add_seeds(HERE / "tables" / further.CLOCK_TABLE, range(1, int(seeds) + 1), clock.rows_of)
         case ["page"]:
             print(write_page(), further.write_further())
         case ["check"]:

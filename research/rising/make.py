@@ -28,11 +28,11 @@ from research.rising.compute import (
     SEEDS,
     SLOPES,
     STIFFNESSES,
-    compute_layers,
     compute_poured,
     layers,
     read,
 )
+from research.tables import add_seeds
 
 HERE = Path(__file__).parent
 LAYERS, POURED = (HERE / "tables" / f"{name}.jsonl" for name in ("layers", "poured"))
@@ -179,7 +179,7 @@ def check() -> list[str]:
 if __name__ == "__main__":
     match sys.argv[1:]:
         case ["layers"]:
-            compute_layers(LAYERS)
+            add_seeds(LAYERS, range(1, SEEDS + 1), layers)
         case ["poured"]:
             compute_poured(POURED)
         case ["page"]:
