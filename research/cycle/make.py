@@ -26,7 +26,7 @@ from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.figures.pages import render
 from faultgouge.studies.statistics import share
 from research.cycle import clock, further, springs
-from research.cycle.compute import LAWS, UNTIL, compute, compute_many
+from research.cycle.compute import DISKS, LAWS, LOOKED_AT, MANY, UNTIL, compute, compute_many
 from research.statistics import interval
 from research.tables import add_seeds, read_rows
 
@@ -86,7 +86,7 @@ def before_or_control(rows: Sequence[Row], law: str) -> dict[str, dict[str, Any]
         alone = [0, 0]
         for row in (each for each in rows if each["law"] == law):
             state = {(each["kind"], each["slip"]): (begins_with(each) | each)[name] for each in row["states"]}
-            for number in range(len(row["slips"])):
+            for number in (each["slip"] for each in row["states"] if each["kind"] == "before"):
                 before, control = state["before", number], state["control", number]
                 alone[0] += before > control
                 alone[1] += control > before
@@ -164,7 +164,37 @@ def sizes(row: Row) -> dict[str, Any]:
     }
 
 
-def numbers(rows: Sequence[Row]) -> dict[str, Any]:
+def by_size(few: Sequence[Row], many: Sequence[Row]) -> list[dict[str, Any]]:
+    """Slips of both sizes: how many a run, and medians with intervals of their numbers."""
+    found = []
+    for law in LAWS:
+        for disks, rows in ((DISKS, few), (MANY, many)):
+            own = [row for row in rows if row["law"] == law]
+            slips = [slip for row in own for slip in row["slips"]]
+            apart = [gap for row in own for gap in np.diff([slip["begins"] for slip in row["slips"]])]
+            drops = [slip["force_before"] - slip["force_after"] for slip in slips]
+            found.append(
+                {"law": law, "disks": disks, "runs": len(own), "slips": len(slips)}
+                | {"before": further.middle([slip["force_before"] for slip in slips]), "drop": further.middle(drops)}
+                | {"slip": further.middle([slip["slip"] for slip in slips]), "apart": further.middle(apart)}
+                | {"largest": max(drops, default=None)}
+            )
+    return found
+
+
+def of_many(rows: Sequence[Row]) -> dict[str, Any]:
+    """Counts of the states of runs of `MANY` disks, by the law."""
+    laws = [law for law in LAWS if any(row["law"] == law for row in rows)]
+    return {
+        "laws": laws,
+        "seeds": {law: [row["seed"] for row in rows if row["law"] == law] for law in laws},
+        "before": {law: counts(rows, law, "before") for law in laws},
+        "control": {law: counts(rows, law, "control") for law in laws},
+        "paired": {law: before_or_control(rows, law) for law in laws},
+    }
+
+
+def numbers(rows: Sequence[Row], many: Sequence[Row] = ()) -> dict[str, Any]:
     """All numbers of the page."""
     laws = [law for law in LAWS if any(row["law"] == law for row in rows)]
     every = {law: [row for row in rows if row["law"] == law] for law in laws}
@@ -182,6 +212,10 @@ def numbers(rows: Sequence[Row]) -> dict[str, Any]:
         "resting": share(
             sum(state["rests"] for row in rows for state in row["states"]), sum(len(row["states"]) for row in rows)
         ),
+        "by_size": by_size(rows, many),
+        "many": of_many(many),
+        "disks": MANY,
+        "looked_at": LOOKED_AT,
         "residual": float(np.median([state["residual"] for row in rows for state in row["states"]])),
     }
 
@@ -195,7 +229,7 @@ def percent(part: dict[str, Any]) -> str:
 
 def write_page(folder: Path = HERE) -> Path:
     """Write README.md of a folder from its table."""
-    found = numbers(read_rows(folder / "tables" / TABLE))
+    found = numbers(*(read_rows(folder / "tables" / name) for name in (TABLE, MANY_TABLE)))
     write_text(
         folder / "README.md", render("research.cycle", "README.md.j2", **found, percent=percent, interval=interval)
     )

@@ -7,7 +7,7 @@ under a load that rises.
 **Which packings.** *Ramps*: layers of 100 disks (k_n = 2e5, F_y = 3, mu = 1) that settle without friction and are then
 loaded in increments of 1e-3 F_y, either with the slider from the beginning (law "coulomb") or with the smoothed law
 ("total"), at 0.1, 0.2 and 0.3 F_y, with dashpots of the restitutions 0.9 and 0.97 (C_T = 2/7 C_N). *Poured*: layers of
-50 spheres under LAMMPS's own laws on slopes of 0.2 and 0.3, with two stiffnesses and dashpots of one restitution.
+50 spheres under LAMMPS's own laws on slopes of 0.2 and 0.3, with three stiffnesses and dashpots of one restitution.
 
 **The rule.** Packings are those of the seeds 1, 2, 3, ... in this order, all of them, with all that is asked of one
 seed before the next; the number of seeds is what the time allowed.
@@ -55,9 +55,9 @@ RATES = (3e-4, 3e-5, 3e-6)
 WINDOWS, STAGES, LOOKS = 24, 40, 400
 """Windows of a run, stages in which the drag fades, and looks at velocities in each of the last two windows."""
 
-POURED_LAWS = ("granular hertz, mindlin/force", "granular hertz, mindlin_rescale/force")
-STIFFNESSES = (KN, KN / 10**1.5)
-"""Overlaps go as k_n^(-2/3): some 1e-3 and 1e-2 of a diameter. Dashpots go as k_n^(2/3), with one restitution."""
+POURED_LAWS = tuple(f"granular hertz, {law}" for law in ("mindlin/force", "mindlin_rescale/force", "linear_history"))
+STIFFNESSES = (KN, KN / 10**1.5, KN / 10**2.25)
+"""Overlaps go as k_n^(-2/3): some 6e-4, 6e-3 and 2e-2 of a diameter. Dashpots go as k_n^(2/3), with one restitution."""
 
 SLOPES, POURED_SEEDS = (0.2, 0.3), 5
 
