@@ -4,7 +4,7 @@ python -m research.rising.make layers    what the table of layers lacks, on one 
 python -m research.rising.make poured    what the table of poured spheres lacks; ten minutes
 python -m research.rising.make starts SEEDS   what the table of two starts lacks; a minute a seed
 python -m research.rising.make page      README.md from the tables
-python -m research.rising.make check     the first seed of the layers once more, compared
+python -m research.rising.make check     the first seed of the layers and a tenth of the spheres once more, compared
 
 From the folder of the repository.
 """
@@ -36,6 +36,7 @@ from research.rising.compute import (
     STIFFNESSES,
     compute_poured,
     layers,
+    poured,
     read,
 )
 from research.rising.starts import APART, order, rows_of
@@ -199,7 +200,7 @@ def numbers(tables: tuple[Path, Path, Path, Path] = (LAYERS, POURED, STARTS, LAW
                 cells.append(dict(zip(("law", "load", "restitution"), key, strict=True)) | outcomes(own))
                 if law == "coulomb":
                     cells[-1]["rising"] = under_the_load(own)
-    poured = []
+    piles = []
     for law in POURED_LAWS:
         for kn in STIFFNESSES:
             for slope in SLOPES:
@@ -208,7 +209,7 @@ def numbers(tables: tuple[Path, Path, Path, Path] = (LAYERS, POURED, STARTS, LAW
                 cell: Row = {"law": law, "kn": kn, "slope": slope, "tried": len(tried)} | outcomes(good)
                 cell["overlap"] = float(np.median([row["overlap"] for row in good])) if good else None
                 cell["pairs"] = sum(row["pairs"] > 0 for row in good)
-                poured.append(cell)
+                piles.append(cell)
     return {
         "cells": cells,
         "usual": {cell["load"]: cell for cell in cells if (cell["law"], cell["restitution"]) == ("coulomb", 0.9)},
@@ -222,7 +223,7 @@ def numbers(tables: tuple[Path, Path, Path, Path] = (LAYERS, POURED, STARTS, LAW
         "over_loss": over_loss(laws, cells),
         "over_quality": over_quality(laws),
         "qualities": QUALITIES,
-        "poured": poured,
+        "poured": piles,
         "poured_seeds": max((row["seed"] for row in spheres), default=0),
         "poured_rows": len(spheres),
         "poured_asked": POURED_SEEDS * len(POURED_LAWS) * len(STIFFNESSES) * len(SLOPES),
@@ -261,7 +262,7 @@ def write_page(folder: Path = HERE) -> Path:
 
 
 def check() -> list[str]:
-    """The rows of the first seed computed again that differ from the table."""
+    """The rows of the first seed, and the first tenth of the spheres, computed again, that differ from the tables."""
     names = ("law", "fx_over_fy", "restitution")
     known = {tuple(row[name] for name in names): row for row in read(LAYERS) if row["seed"] == 1 and "stable" in row}
     wrong = []
@@ -272,6 +273,11 @@ def check() -> list[str]:
         )
         if not same:
             wrong.append(f"{key}: {row['stable']}, {row['sticking']:.6g}; before {known[key]['stable']}")
+    spheres = read(POURED)
+    for old in spheres[: len(spheres) // 10]:
+        new = poured(*(old[name] for name in ("law", "kn", "slope", "seed")))
+        if any(old[name] != new[name] for name in ("rests", "stable") if name in old):
+            wrong.append(f"{new}; before {old}")
     return wrong
 
 
