@@ -31,6 +31,12 @@ STAYS = 0.1
 ROW = 0.1
 """Time between two rows of a series, which no clock advance is better than; rounded up."""
 
+LONG = 0.05
+"""Length of a slip from which it is called long."""
+
+FULL, HALF = 0.9, 0.5
+"""Clock advance over the wait that was left when the pulse began: of a full one the slip comes with the pulse."""
+
 Row = dict[str, Any]
 
 
@@ -125,6 +131,28 @@ def advances(rows: Sequence[Row]) -> Row:
     }
 
 
+def long_slips(rows: Sequence[Row]) -> list[Row]:
+    """How many slips are long, of each spring."""
+    found = []
+    for spring in SPRINGS:
+        slips = [slip["slip"] for row in rows if row["spring"] == spring for slip in row["slips"]]
+        found.append({"spring": spring, "long": share(sum(each > LONG for each in slips), len(slips))})
+    return found
+
+
+def full_advances(rows: Sequence[Row]) -> list[Row]:
+    """How many pulses of each height advance the slip by all, or by half, of the wait that was left."""
+    begins = {(row["seed"], row["slip"]): row["begins"] for row in rows if row["kind"] == "slip"}
+    found = []
+    for height in HEIGHTS:
+        own = [row for row in rows if row["kind"] == "pulse" and row["height"] == height]
+        parts = [(row["advance"] or 0.0) / (begins[row["seed"], row["slip"]] - row["at"]) for row in own]
+        counts = {name: share(sum(part > least for part in parts), len(own)) for name, least in
+                  (("full", FULL), ("half", HALF))}  # fmt: skip
+        found.append({"height": height, "largest": max(parts)} | counts)
+    return found
+
+
 def moved(rows: Sequence[Row]) -> Row:
     """By how many pulses the next slip comes earlier or later than by any noise, or not at all; the median of all."""
     known = [(row["advance"], row["floor"]) for row in rows if row["advance"] is not None]
@@ -140,12 +168,16 @@ def moved(rows: Sequence[Row]) -> Row:
 def numbers(folder: Path = HERE) -> Row:
     """All numbers of the page."""
     springs = read_rows(folder / "tables" / SPRINGS_TABLE)
+    pulses = read_rows(folder / "tables" / CLOCK_TABLE)
     return {
         "sizes": sizes(springs),
+        "long": long_slips(springs),
+        "longer": LONG,
+        "full": full_advances(pulses),
         "seeds": sorted({row["seed"] for row in springs}),
         "verdicts": {spring: verdicts(springs, [spring]) for spring in SPRINGS},
         "all": verdicts(springs, SPRINGS),
-        "clock": advances(read_rows(folder / "tables" / CLOCK_TABLE)),
+        "clock": advances(pulses),
         "stays": STAYS,
     }
 

@@ -3,6 +3,7 @@
 python -m research.rising.make layers    what the table of layers lacks, on one core, resumable; an hour
 python -m research.rising.make poured    what the table of poured spheres lacks; ten minutes
 python -m research.rising.make starts SEEDS   what the table of two starts lacks; a minute a seed
+python -m research.rising.make onsets SEEDS   what the table of onsets lacks; ten seconds a seed
 python -m research.rising.make page      README.md from the tables
 python -m research.rising.make check     the first seed of the layers and a tenth of the spheres once more, compared
 
@@ -23,6 +24,7 @@ from faultgouge.figures.style import save, styled
 from faultgouge.studies.statistics import share
 from research.laws.both_laws import RESTITUTIONS as WEAKEST_FIRST
 from research.modes.loss import GROWS as LINEAR
+from research.rising import onsets
 from research.rising.compute import (
     COMPARED,
     HISTORIES,
@@ -43,7 +45,9 @@ from research.rising.starts import APART, order, rows_of
 from research.tables import add_seeds
 
 HERE = Path(__file__).parent
-LAYERS, POURED, STARTS = (HERE / "tables" / f"{name}.jsonl" for name in ("layers", "poured", "starts"))
+LAYERS, POURED, STARTS, ONSETS = (
+    HERE / "tables" / f"{name}.jsonl" for name in ("layers", "poured", "starts", "onsets")
+)
 LAWS = HERE.parent / "laws" / "tables" / "force_100.jsonl"
 
 QUALITIES = (50, 100, 200, 300)
@@ -149,6 +153,24 @@ def over_quality(laws: list[Row]) -> list[Row]:
     return found
 
 
+def onsets_over_undamped(rows: list[Row]) -> list[Row]:
+    """Damped over undamped onsets of each restitution: how many there are, their quartiles and range."""
+    found = []
+    for restitution in onsets.RESTITUTIONS:
+        both = [(row[str(restitution)], row["undamped"]) for row in rows if row["undamped"] is not None]
+        ratios = np.array([damped / undamped for damped, undamped in both if damped is not None])
+        found.append(
+            {
+                "restitution": restitution,
+                "found": share(len(ratios), len(both)),
+                "below": int(np.sum(ratios < 1)),
+                "quartiles": np.quantile(ratios, [0.25, 0.5, 0.75]).tolist() if len(ratios) else None,
+                "range": [float(ratios.min()), float(ratios.max())] if len(ratios) else None,
+            }
+        )
+    return found
+
+
 def of_two_starts(rows: list[Row]) -> list[Row]:
     """Vibration of each start at the end, one-sided and in LAMMPS, and whether it is steady."""
     found = []
@@ -187,9 +209,9 @@ def figure_of_starts(rows: list[Row]) -> Figure:
     return figure
 
 
-def numbers(tables: tuple[Path, Path, Path, Path] = (LAYERS, POURED, STARTS, LAWS)) -> dict[str, Any]:
+def numbers() -> dict[str, Any]:
     """All numbers of the page."""
-    every, spheres, starts, laws = (read(table) for table in tables)
+    every, spheres, starts, laws, firsts = (read(table) for table in (LAYERS, POURED, STARTS, LAWS, ONSETS))
     rows = [row for row in every if "stable" in row]
     cells = []
     for load in LOADS:
@@ -223,6 +245,9 @@ def numbers(tables: tuple[Path, Path, Path, Path] = (LAYERS, POURED, STARTS, LAW
         "over_loss": over_loss(laws, cells),
         "over_quality": over_quality(laws),
         "qualities": QUALITIES,
+        "onsets": onsets_over_undamped(firsts),
+        "onset_seeds": [row["seed"] for row in firsts],
+        "without_onset": sum(row["undamped"] is None for row in firsts),
         "poured": piles,
         "poured_seeds": max((row["seed"] for row in spheres), default=0),
         "poured_rows": len(spheres),
@@ -257,7 +282,8 @@ def write_page(folder: Path = HERE) -> Path:
     text = render("research.rising", "README.md.j2", **found, **words)
     write_text(folder / "README.md", text)
     (folder / "pictures").mkdir(exist_ok=True)
-    save(figure_of_starts(read(STARTS)), folder / "pictures" / "starts")
+    _, vectors = save(figure_of_starts(read(STARTS)), folder / "pictures" / "starts")
+    vectors.unlink()  # the page shows dots, and the lines of this file are many
     return folder / "README.md"
 
 
@@ -289,6 +315,8 @@ if __name__ == "__main__":
             compute_poured(POURED)
         case ["starts", seeds]:
             add_seeds(STARTS, order(int(seeds)), rows_of)
+        case ["onsets", seeds]:
+            add_seeds(ONSETS, range(1, int(seeds) + 1), onsets.rows_of)
         case ["page"]:
             print(write_page())
         case ["check"]:

@@ -60,7 +60,7 @@ def test_growth_over_load_and_loss_is_that_of_both_tables():
         rows = [row for row in FOUND["over_quality"] if row["law"] == law]
         shares = [[count["share"] for count in row["counts"].values()] for row in rows]
         assert all(few == sorted(few) for few in shares)
-        assert all(few == sorted(few) for few in zip(*shares, strict=True))
+        assert all(list(few) == sorted(few) for few in zip(*shares, strict=True))
     at = {row["law"]: row["counts"] for row in FOUND["over_quality"] if row["load"] == 0.2}
     assert at["loaded"][50]["count"] == 0
     assert at["loaded"][300]["count"] > 10
