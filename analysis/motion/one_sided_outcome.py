@@ -280,8 +280,7 @@ def windows_under_load(system: OneSidedSystem, direction: Floats, chunk: float) 
 def _drag_of_starts(system: OneSidedSystem) -> Floats:
     """Which coordinates the drag at the beginning acts on, shape (E, S): on all; and on all but rotations.
 
-    Sliders remember what they have slid, so that one packing may vibrate in two ways. Large packings, and bodies, whose
-    coordinates are of another kind, have one start.
+    Large packings, and bodies, whose coordinates are of another kind, have one start.
     """
     configuration = system.motion.configuration
     spins = system.motion.active >= configuration.dimension * len(configuration)
