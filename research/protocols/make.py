@@ -29,12 +29,11 @@ from research.protocols.compute import (
     LAST,
     VELOCITY,
     WEAKER,
-    compute,
-    compute_weak,
     rows_of,
+    weak_rows_of,
 )
 from research.statistics import interval
-from research.tables import read_rows
+from research.tables import add_seeds, read_rows
 
 HERE = Path(__file__).parent
 TABLE, WEAK = "protocols.jsonl", "dashpots.jsonl"
@@ -144,8 +143,8 @@ def check() -> list[str]:
 if __name__ == "__main__":
     match sys.argv[1:]:
         case ["compute", seeds]:
-            compute(HERE / "tables" / TABLE, range(1, int(seeds) + 1))
-            compute_weak(HERE / "tables" / WEAK, range(1, int(seeds) + 1))
+            for table, rows in ((TABLE, rows_of), (WEAK, weak_rows_of)):
+                add_seeds(HERE / "tables" / table, range(1, int(seeds) + 1), rows)
         case ["page"]:
             print(write_page())
         case ["check"]:
