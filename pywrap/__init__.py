@@ -25,7 +25,7 @@ from .lammps.engine import Engine
 from .lammps.instance import EngineError, lammps_instance
 from .load_path import LoadPath
 from .onset import onset_run
-from .runs.drive import DriveSample, drive, settle_for_drive
+from .runs.drive import DriveSample, DriveStep, drive, settle_for_drive
 from .runs.ramp import ramp, reach
 from .runs.ramp_loads import ramp_loads
 from .runs.run_recorder import Record
@@ -40,6 +40,7 @@ from .settling.settle import settle
 __all__ = [
     "Checkpoint",
     "DriveSample",
+    "DriveStep",
     "Dynamics",
     "Engine",
     "EngineError",

@@ -7,11 +7,8 @@ from dataclasses import dataclass
 
 from mpi4py import MPI
 
-from faultgouge.analysis import Packing
-from faultgouge.analysis.motion.slips import Slip
-from faultgouge.pywrap import Scene
-from faultgouge.pywrap.runs.drive import DriveSample, DriveStep, drive, settle_for_drive
-from faultgouge.pywrap.runs.undamped import Checkpoint
+from faultgouge.analysis import Packing, Slip
+from faultgouge.pywrap import Checkpoint, DriveSample, DriveStep, Scene, drive, settle_for_drive
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,8 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from faultgouge.analysis.motion.slips import Slip
-from faultgouge.pywrap import Scene
-from faultgouge.pywrap.runs.drive import DriveStep
+from faultgouge.analysis import Slip
+from faultgouge.pywrap import DriveStep, Scene
 from faultgouge.pywrap.runs.drive_recorder import COMPARABLE, advance_of
 from faultgouge.pywrap.scenes.drive_section import PROBE_SCALE
 from research.cycle.compute import UNTIL, scene

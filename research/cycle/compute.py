@@ -29,13 +29,10 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis import RunFile
-from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.slips import Slip
-from faultgouge.pywrap import Equilibrium, Scene
-from faultgouge.pywrap.runs.drive import settle_for_drive
+from faultgouge.analysis import Floats, RunFile, Slip
+from faultgouge.pywrap import Equilibrium, Scene, settle_for_drive
 from faultgouge.pywrap.runs.drive_recorder import DriveRecord, slips_in
-from faultgouge.studies.cycle.compute import cycle_state
+from faultgouge.studies.cycle import cycle_state
 from faultgouge.studies.result_rows import append_row
 from research.modes.sets import WIDTH
 from research.tables import read_rows

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis.files.atomic_write import write_text
-from faultgouge.figures.pages import render
+from faultgouge.figures import render
 from faultgouge.studies.statistics import median, share
 from research.cycle import clock
 from research.cycle.clock import FREQUENCIES, HEIGHTS, PHASES
@@ -216,7 +215,7 @@ def count(value: Row) -> str:
 def write_further(folder: Path = HERE) -> Path:
     """Write further.md of a folder from its tables."""
     found = numbers(folder)
-    write_text(
-        folder / "further.md", render("research.cycle", "further.md.j2", **found, count=count, interval=interval)
+    (folder / "further.md").write_text(
+        render("research.cycle", "further.md.j2", **found, count=count, interval=interval)
     )
     return folder / "further.md"

@@ -22,8 +22,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from faultgouge.analysis.files.atomic_write import write_text
-from faultgouge.figures.pages import render
+from faultgouge.figures import render
 from faultgouge.studies.statistics import share
 from research.cycle import clock, further, springs
 from research.cycle.compute import DISKS, LAWS, LOOKED_AT, MANY, UNTIL, compute, compute_many
@@ -230,8 +229,8 @@ def percent(part: dict[str, Any]) -> str:
 def write_page(folder: Path = HERE) -> Path:
     """Write README.md of a folder from its table."""
     found = numbers(*(read_rows(folder / "tables" / name) for name in (TABLE, MANY_TABLE)))
-    write_text(
-        folder / "README.md", render("research.cycle", "README.md.j2", **found, percent=percent, interval=interval)
+    (folder / "README.md").write_text(
+        render("research.cycle", "README.md.j2", **found, percent=percent, interval=interval)
     )
     return folder / "README.md"
 

@@ -24,12 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis import NoEquilibriumError, Packing, RunFile, stability
-from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.slips import Slip
+from faultgouge.analysis import Floats, NoEquilibriumError, Packing, RunFile, Slip, stability
+from faultgouge.pywrap import bring_to_rest
 from faultgouge.pywrap.runs.drive_recorder import slips_in
-from faultgouge.pywrap.settling.relax import bring_to_rest
-from faultgouge.studies.cycle.compute import cycle_state, drawn
+from faultgouge.studies.cycle import cycle_state, drawn
 from research.cycle.compute import LAWS, run, scene, sizes_of, where
 
 SPRINGS = (3.0, 10.0, 30.0)

@@ -28,8 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.pywrap import Scene
-from faultgouge.pywrap.runs.drive import DriveSample
+from faultgouge.pywrap import DriveSample, Scene
 from research.driven_runs import DrivenRun
 
 FY = 3.0

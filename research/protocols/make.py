@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import t as student
 
-from faultgouge.analysis.files.atomic_write import write_text
-from faultgouge.figures.pages import render
+from faultgouge.figures import render
 from research.protocols.compute import (
     EDGES,
     ENDS,
@@ -125,7 +124,7 @@ def numbers(rows: Sequence[Row], weak: Sequence[Row]) -> Row:
 def write_page(folder: Path = HERE) -> Path:
     """Write README.md of a folder from its table."""
     found = numbers(*(read_rows(folder / "tables" / name) for name in (TABLE, WEAK)))
-    write_text(folder / "README.md", render("research.protocols", "README.md.j2", **found, interval=interval))
+    (folder / "README.md").write_text(render("research.protocols", "README.md.j2", **found, interval=interval))
     return folder / "README.md"
 
 

@@ -29,12 +29,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from faultgouge.analysis import Configuration, Packing, Stability, stability
+from faultgouge.analysis import Configuration, Packing, Signal, Stability, stability
 from faultgouge.analysis.motion.one_sided_outcome import DRAG, FADE
-from faultgouge.analysis.motion.signals import Signal
-from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.runs.undamped import time_step
-from faultgouge.pywrap.scenes.units import dashpot
+from faultgouge.pywrap import Engine, Scene, dashpot, settle, time_step
 from research.lammps_laws.compute import GAMMA, KN, MU, pour, rest
 from research.laws.both_laws import as_slider, at_loads
 from research.modes.loss import impact_velocity, with_dashpots

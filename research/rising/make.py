@@ -17,10 +17,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.analysis.motion.one_sided_outcome import FADE, WINDOWS
-from faultgouge.figures.pages import render
-from faultgouge.figures.style import save, styled
+from faultgouge.figures import render, save, styled
 from faultgouge.studies.statistics import share
 from research.laws.both_laws import RESTITUTIONS as WEAKEST_FIRST
 from research.modes.loss import GROWS as LINEAR
@@ -280,7 +278,7 @@ def write_page(folder: Path = HERE) -> Path:
     contrast = [at[law][q] for q in (QUALITIES[0], QUALITIES[-1]) for law in ("smooth", "loaded")]
     words = {"count": count, "spread": spread, "part": part, "contrast": contrast, "at": COMPARED}
     text = render("research.rising", "README.md.j2", **found, **words)
-    write_text(folder / "README.md", text)
+    (folder / "README.md").write_text(text)
     (folder / "pictures").mkdir(exist_ok=True)
     _, vectors = save(figure_of_starts(read(STARTS)), folder / "pictures" / "starts")
     vectors.unlink()  # the page shows dots, and the lines of this file are many

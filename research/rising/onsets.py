@@ -16,8 +16,7 @@ from typing import Any
 import faultgouge
 from faultgouge.analysis import NoEquilibriumError
 from faultgouge.analysis.windows import OnsetError
-from faultgouge.pywrap import Scene
-from faultgouge.pywrap.scenes.units import dashpot
+from faultgouge.pywrap import Scene, dashpot
 from research.modes.loss import TANGENTIAL, impact_velocity
 from research.modes.sets import sets
 

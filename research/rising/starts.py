@@ -20,8 +20,7 @@ import numpy as np
 from faultgouge.analysis import Packing
 from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
 from faultgouge.analysis.motion.one_sided_outcome import FADE, STEPS_OF_CHUNK, VERDICT_STEP, windows_under_load
-from faultgouge.pywrap import Scene, settle
-from faultgouge.pywrap.scenes.units import dashpot
+from faultgouge.pywrap import Scene, dashpot, settle
 from research.laws.both_laws import as_slider, at_loads
 from research.modes.loss import impact_velocity, with_dashpots
 from research.modes.sets import sets
