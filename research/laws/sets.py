@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS
+from faultgouge.studies.sweep import TASKS, Sweep
 from research.modes.sets import quartz
 from research.modes.sets import sets as sets_of_modes
 

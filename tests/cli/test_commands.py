@@ -186,8 +186,8 @@ def test_spectrum_of_a_run_file_is_that_of_the_packing_and_says_how_far_it_moves
 @pytest.mark.slow
 def test_spectrum_of_a_large_packing(faultgouge_here, beyond, monkeypatch):
     pairs = json.loads(faultgouge_here("spectrum", beyond / "ramp.h5", "--json").stdout)["pair_count"]
-    monkeypatch.setattr("faultgouge.commands.eigenvalues.MOST_PAIRS", pairs - 1)
-    monkeypatch.setattr("faultgouge.commands.eigenvalues.SLOW_COORDINATES", 0)
+    monkeypatch.setattr("faultgouge.commands.spectrum.MOST_PAIRS", pairs - 1)
+    monkeypatch.setattr("faultgouge.commands.spectrum.SLOW_COORDINATES", 0)
     done = faultgouge_here("spectrum", beyond / "ramp.h5")
     assert "coordinates: their spectrum needs" in done.stderr
     said = done.stdout

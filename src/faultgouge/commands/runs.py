@@ -83,7 +83,7 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     """
     from faultgouge.pywrap import Record
     from faultgouge.pywrap import ramp as ramp_up
-    from faultgouge.pywrap.runs.equilibrium_path import all_loads, count_behind
+    from faultgouge.pywrap.runs.ramp_loads import all_loads, count_behind
     from faultgouge.pywrap.scenes.validation import require_section
 
     wanted = read_scene(scene, "ramp", "ramp")
@@ -132,7 +132,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     from faultgouge.analysis import RunFile
     from faultgouge.pywrap import Record, reach
     from faultgouge.pywrap.onset import load_at_onset
-    from faultgouge.pywrap.runs.equilibrium_path import step_of
+    from faultgouge.pywrap.runs.ramp import step_of
     from faultgouge.pywrap.scenes.validation import require_section
 
     wanted = read_scene(scene, "perturb", "perturb")
