@@ -1,5 +1,5 @@
 # make reproduce   sets everything up and runs the paper's protocol into results/
-# make test        sets everything up and runs the tests (four minutes on two cores)
+# make test        sets everything up and runs the tests (five minutes on two cores)
 # make long        runs the tests that take longest: kills, odd scenes, research tables, reproduce (a quarter of an hour)
 # make readers     reads exports by OVITO and VTK, in tests
 # make fuzz        a thousand odd scenes, 300 damaged files, 60 kills; says what went wrong (an hour)
@@ -37,10 +37,10 @@ reproduce: $(VENV)/.installed
 
 # Tests and checks take Python from src, where links lead to the folders: an edit of Python needs no installation.
 test: $(VENV)/.test
-	$(PYTEST) -n 2 -m "not long"
+	$(PYTEST) -n 2 --dist worksteal -m "not long"
 
 long: $(VENV)/.test
-	$(PYTEST) -n 2 -m long
+	$(PYTEST) -n 2 --dist worksteal -m long
 
 plugin: $(VENV)/.plugin
 

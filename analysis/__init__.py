@@ -8,6 +8,7 @@ matrix), `onset` (where eigenvalues become complex), `growth` (growth in a run).
 write packings.
 """
 
+from .arrays import Complexes, Floats, Indices
 from .configuration import Configuration
 from .contacts import LinearisedContacts
 from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
@@ -15,20 +16,23 @@ from .files.dumps import read_dump
 from .files.json_packing import read_packing
 from .files.runfile import RunFile
 from .motion.buckling import negative_eigenvalues
-from .motion.eigenpairs import Eigenpairs, closest_to_meeting, eigenpairs, normal_modes
+from .motion.eigenvalues import mass_weighted
 from .motion.fastest_growing import FastestGrowth, fastest_growing
 from .motion.growth import Growth, fit_growth, mean_square_displacement
 from .motion.growth_of_run import growth_of_run
+from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_modes
 from .motion.motion import Motion
+from .motion.nearest_modes import nearest_modes
 from .motion.one_sided import OneSidedMotion, one_sided_motion
+from .motion.power_law import PowerLaw, fit_power_law
 from .motion.response import layer_force, linear_response
+from .motion.signals import Signal
+from .motion.slips import Slip
 from .motion.spectrum import (
-    ComplexPair,
     Spectrum,
     discrete_frequency,
     dynamical_matrix,
     eigenvalues,
-    growth_rate,
     largest_frequency,
     spectrum,
 )
@@ -43,7 +47,7 @@ from .packing.law import MindlinLaw
 from .packing.packing import Packing
 from .packing.solid_fraction import solid_fraction
 from .windows import Onset, OnsetError, Window, complex_windows, find_onset
-from .windows.pair_form import pair_eigenvalues
+from .windows.pair_over_load import pair_eigenvalues
 
 Snapshot = Configuration
 """The name of `Configuration` until version 1."""
@@ -51,16 +55,19 @@ Snapshot = Configuration
 __all__ = [
     "FLOOR",
     "BadInputError",
-    "ComplexPair",
+    "Complexes",
     "Configuration",
     "ContactGeometry",
     "Contacts",
-    "Eigenpairs",
     "FastestGrowth",
     "FaultgougeError",
+    "Floats",
     "Growth",
+    "Indices",
     "LinearisedContacts",
     "MindlinLaw",
+    "Mode",
+    "Modes",
     "Motion",
     "NoEquilibriumError",
     "NoGainError",
@@ -70,7 +77,10 @@ __all__ = [
     "OutputError",
     "Packing",
     "PackingFileError",
+    "PowerLaw",
     "RunFile",
+    "Signal",
+    "Slip",
     "Snapshot",
     "Spectrum",
     "Stability",
@@ -81,19 +91,21 @@ __all__ = [
     "damping_matrix",
     "discrete_frequency",
     "dynamical_matrix",
-    "eigenpairs",
     "eigenvalues",
     "fastest_growing",
     "find_onset",
     "fit_growth",
+    "fit_power_law",
     "growth_of_run",
     "growth_rate",
     "largest_damping_rate",
     "largest_frequency",
     "layer_force",
     "linear_response",
+    "mass_weighted",
     "mean_square_displacement",
     "nearest_image",
+    "nearest_modes",
     "negative_eigenvalues",
     "normal_modes",
     "one_sided_motion",

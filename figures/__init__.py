@@ -8,8 +8,21 @@ may have any units.
 from .cycle import draw_cycle
 from .mode import draw_mode
 from .packing import draw_packing
+from .pages import render
 from .pair import PairCurve, draw_pair
 from .series import draw_series
-from .style import save
+from .style import INK, save, save_as, styled
 
-__all__ = ["PairCurve", "draw_cycle", "draw_mode", "draw_packing", "draw_pair", "draw_series", "save"]
+__all__ = [
+    "INK",
+    "PairCurve",
+    "draw_cycle",
+    "draw_mode",
+    "draw_packing",
+    "draw_pair",
+    "draw_series",
+    "render",
+    "save",
+    "save_as",
+    "styled",
+]

@@ -27,7 +27,7 @@ from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.motion.hysteresis import layer_displacement
 
 from .cycle import in_powers_of_ten
-from .mode import Mode, ModeArtist, finish, side_by_side
+from .mode import ModeArtist, ModeShape, finish, side_by_side
 from .packing import COLOURS, PackingArtist, View
 from .series import few_decades
 from .style import BULK, EDGE, INK, styled
@@ -228,7 +228,7 @@ class ModeFilm(Film):
     ----------
     packing : Packing or Configuration
         The packing.
-    modes : sequence of Mode
+    modes : sequence of ModeShape
         Which.
     words : str
         What they are.
@@ -240,7 +240,7 @@ class ModeFilm(Film):
     def __init__(
         self,
         packing: HasConfiguration,
-        modes: Sequence[Mode],
+        modes: Sequence[ModeShape],
         words: str,
         frames: int,
         periods: int,

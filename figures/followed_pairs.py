@@ -1,9 +1,9 @@
 """The pairs of eigenvalues of a ramp, each followed through the loads, and the verdict at each load.
 
 A pair is followed from the load at which it is complex first. Its image at another load is the pair of modes that lies
-closest to its planes (:meth:`~faultgouge.analysis.windows.Modes.nearest`). If the planes of the image are not those of
-the pair, the pair is unknown at that load, and it may be found again at a later one. If no pair of the ramp is complex,
-the two real modes of the last load that are closest to merging are followed.
+closest to its planes (:meth:`~faultgouge.analysis.windows.SystemModes.nearest`). If the planes of the image are not
+those of the pair, the pair is unknown at that load, and it may be found again at a later one. If no pair of the ramp is
+complex, the two real modes of the last load that are closest to merging are followed.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from faultgouge.analysis import (
-    ComplexPair,
-    Eigenpairs,
+    Mode,
+    Modes,
     Spectrum,
     Stability,
     closest_to_meeting,
@@ -21,7 +21,7 @@ from faultgouge.analysis import (
 )
 from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.motion.eigenvalues import is_negative, zero_uncertainty
-from faultgouge.analysis.windows import Modes, Space, System, force_bearing
+from faultgouge.analysis.windows import Space, System, SystemModes, force_bearing
 
 from .mode import Complexes, displacement
 
@@ -95,7 +95,7 @@ def follow_eigenvalues(
     followed = _Followed(packings)
     values, verdicts = [], []
     for k, packing in enumerate(progress(packings)):
-        modes = Modes.of(System.of(packing))
+        modes = SystemModes.of(System.of(packing))
         values.append(modes.values)
         verdicts.append(_verdict_on(force_bearing(packing), modes, reasons, alone=len(packings) == 1))
         followed.add(k, modes)
@@ -115,10 +115,10 @@ class _Followed:
     def __init__(self, packings: Sequence[HasConfiguration]) -> None:
         self.packings = packings
         self.pairs: list[dict[int, Space]] = []
-        self._modes: dict[int, Modes] = {}
-        self._last: Modes | None = None
+        self._modes: dict[int, SystemModes] = {}
+        self._last: SystemModes | None = None
 
-    def add(self, k: int, modes: Modes) -> None:
+    def add(self, k: int, modes: SystemModes) -> None:
         """The next load, with all of its modes."""
         size = 32.0 * modes.right.size  # right and left vectors
         if size * (len(self._modes) + 1) <= MEMORY:
@@ -141,7 +141,7 @@ class _Followed:
                 if k not in known and (image := self._image(known[min(n for n in known if n > k)], k)) is not None:
                     known[k] = image
 
-    def _members(self, known: dict[int, Space], k: int, modes: Modes) -> tuple[int, int] | None:
+    def _members(self, known: dict[int, Space], k: int, modes: SystemModes) -> tuple[int, int] | None:
         """The members of a pair at this load, from its last load, or from the one with the closest load."""
         closest = min(known, key=lambda n: abs(self.packings[n].fx - self.packings[k].fx))
         for pair in (known[max(known)], known[closest]):
@@ -159,7 +159,7 @@ class _Followed:
         return image if image is not None and image.like(pair) else None
 
 
-def _verdict_on(packing: HasConfiguration, modes: Modes, reasons: Sequence[str], alone: bool) -> Stability:
+def _verdict_on(packing: HasConfiguration, modes: SystemModes, reasons: Sequence[str], alone: bool) -> Stability:
     """Whether a packing moves; of one among many the motion of contacts at Coulomb's bound is not followed."""
     slide = int(packing.configuration.contacts.one_sided.sum())
     if slide and not alone:
@@ -169,13 +169,13 @@ def _verdict_on(packing: HasConfiguration, modes: Modes, reasons: Sequence[str],
     return stability(packing, spectrum_of_stiffness=_spectrum_of(packing, modes), reasons=reasons)
 
 
-def _spectrum_of(packing: HasConfiguration, modes: Modes) -> Spectrum:
+def _spectrum_of(packing: HasConfiguration, modes: SystemModes) -> Spectrum:
     """The spectrum of a packing whose modes are known, fastest growing pair first."""
-    found = Eigenpairs(modes.values, modes.right, modes.left, 0, packing.axes)
+    found = Modes(modes.values, modes.right, modes.left, packing.axes)
     rounding = modes.system.rounding
     zero = zero_uncertainty(packing, rounding)
     numbers = zip(modes.values, found.overlap, found.participation, found.rotation, strict=True)
-    pairs = [ComplexPair(complex(value), *map(float, rest)) for value, *rest in numbers if value.imag > 0]
+    pairs = [Mode(complex(value), *map(float, rest)) for value, *rest in numbers if value.imag > 0]
     return Spectrum(
         eigenvalues=modes.values,
         pairs=tuple(sorted(pairs, key=lambda pair: -pair.growth_rate)),
@@ -188,10 +188,10 @@ def _spectrum_of(packing: HasConfiguration, modes: Modes) -> Spectrum:
     )
 
 
-def _about_to_meet(modes: Modes) -> list[Space]:
+def _about_to_meet(modes: SystemModes) -> list[Space]:
     """The two real modes that are closest to meeting; none of a packing with fewer than two."""
     try:
-        first, second, _ = closest_to_meeting(Eigenpairs(modes.values, modes.right, modes.left, 0))
+        first, second, _ = closest_to_meeting(modes)
     except ValueError:
         return []
     return [modes.space((first, second))]

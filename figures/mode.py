@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from faultgouge.analysis import (
     BadInputError,
     Configuration,
-    Eigenpairs,
+    Modes,
     closest_to_meeting,
     normal_modes,
     spectrum,
@@ -55,8 +55,8 @@ class ModeError(BadInputError):
 
 
 @dataclass(frozen=True, eq=False)
-class Mode:
-    """A mode of a packing.
+class ModeShape:
+    """How the disks of a packing move in a mode.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Mode:
     rotation: float
 
     @classmethod
-    def of(cls, packing: HasConfiguration, modes: Eigenpairs, number: int) -> "Mode":
+    def of(cls, packing: HasConfiguration, modes: Modes, number: int) -> "ModeShape":
         """One of the modes of a packing."""
         moved = displacement(packing, modes.right[:, number])
         return cls(
@@ -119,7 +119,7 @@ class Mode:
 
 
 def displacement(packing: HasConfiguration, vector: Complexes) -> Complexes:
-    """A mass-weighted vector, shape (axes N,), as of :class:`Mode`: the coordinates of every particle, (axes, N)."""
+    """A mass-weighted vector, shape (axes N,), as of `ModeShape`: the coordinates of every particle, (axes, N)."""
     vector = vector / np.sqrt(packing.coordinate_mass)
     vector = vector * np.exp(-0.5j * np.angle(np.sum(vector**2)))
     moved = vector.reshape(packing.axes, -1)
@@ -128,14 +128,14 @@ def displacement(packing: HasConfiguration, vector: Complexes) -> Complexes:
     return np.asarray(moved / (largest if largest > PURE_ROTATION * rotation else rotation))
 
 
-def unstable_pair(packing: HasConfiguration, modes: Eigenpairs, believed: Sequence[complex]) -> tuple[list[Mode], str]:
+def unstable_pair(packing: HasConfiguration, modes: Modes, believed: Sequence[complex]) -> tuple[list[ModeShape], str]:
     """The modes that make a packing unstable, or are about to.
 
     Parameters
     ----------
     packing : Packing or Configuration
         The packing.
-    modes : Eigenpairs
+    modes : Modes
         All its modes.
     believed : sequence of complex
         Eigenvalues of the complex pairs that are no rounding noise, fastest growing first, as of
@@ -143,7 +143,7 @@ def unstable_pair(packing: HasConfiguration, modes: Eigenpairs, believed: Sequen
 
     Returns
     -------
-    modes : list of Mode
+    modes : list of ModeShape
         The member with positive imaginary part of the fastest growing pair; without one, the two real modes that are
         closest to a coalescence.
     words : str
@@ -156,7 +156,7 @@ def unstable_pair(packing: HasConfiguration, modes: Eigenpairs, believed: Sequen
     """
     if len(believed):
         number = int(np.argmin(np.abs(modes.values - believed[0])))
-        mode = Mode.of(packing, modes, number)
+        mode = ModeShape.of(packing, modes, number)
         return [mode], f"the complex pair: {TWO_MOMENTS}"
     first, second, cosine = closest_to_meeting(modes)
     if cosine < ORTHOGONAL_COSINE:
@@ -168,7 +168,7 @@ def unstable_pair(packing: HasConfiguration, modes: Eigenpairs, believed: Sequen
             "mode by its number"
         )
     words = f"the two real modes closest to meeting: the cosine between them is {cosine:.4f}"
-    return [Mode.of(packing, modes, number) for number in (first, second)], words
+    return [ModeShape.of(packing, modes, number) for number in (first, second)], words
 
 
 class ModeArtist:
@@ -180,7 +180,7 @@ class ModeArtist:
         Where.
     packing : Packing or Configuration
         The packing at rest.
-    mode : Mode
+    mode : ModeShape
         The mode.
     points : float, optional
         Points per unit of length; as the axes stand now by default.
@@ -189,7 +189,7 @@ class ModeArtist:
     """
 
     def __init__(
-        self, axes: Axes, packing: HasConfiguration, mode: Mode, points: float | None = None, moves: bool = False
+        self, axes: Axes, packing: HasConfiguration, mode: ModeShape, points: float | None = None, moves: bool = False
     ) -> None:
         self.mode, self.moves = mode, moves
         self.reach = MOVING * packing.radius.max() if moves else _arrow_scale(packing, mode)
@@ -230,14 +230,14 @@ class ModeArtist:
             self.arrows.set_UVC(*(self.reach * moved[:2, disk]))
 
 
-def _arrow_scale(packing: HasConfiguration, mode: Mode) -> float:
+def _arrow_scale(packing: HasConfiguration, mode: ModeShape) -> float:
     """Length of an arrow for a displacement of one, length."""
     largest = np.sqrt(np.sum(np.abs(mode.displacement[: packing.dimension]) ** 2, axis=0))
     typical, radius = np.quantile(np.delete(largest, packing.rattlers), 0.75), packing.radius.mean()
     return float(radius * min(TYPICAL / max(typical, PURE_ROTATION), LONGEST / max(largest.max(), PURE_ROTATION)))
 
 
-def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list[Mode], str]:
+def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list[ModeShape], str]:
     """A mode of a packing by its number, or the modes of `unstable_pair`; with a description.
 
     Raises
@@ -252,7 +252,7 @@ def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list
         return unstable_pair(packing, modes, [pair.eigenvalue for pair in spectrum(packing).pairs])
     if not 0 <= number < len(modes.values):
         raise ModeError(f"mode {number}: the packing has {len(modes.values)} modes, counted from 0")
-    return [Mode.of(packing, modes, number)], f"mode {number} of {len(modes.values)}"
+    return [ModeShape.of(packing, modes, number)], f"mode {number} of {len(modes.values)}"
 
 
 def draw_mode(packing: HasConfiguration, number: int | None = None) -> Figure:
@@ -280,14 +280,14 @@ def draw_mode(packing: HasConfiguration, number: int | None = None) -> Figure:
 
 
 @styled
-def draw_modes(packing: HasConfiguration, modes: Sequence[Mode], words: str) -> Figure:
+def draw_modes(packing: HasConfiguration, modes: Sequence[ModeShape], words: str) -> Figure:
     """Modes side by side, with their numbers below.
 
     Parameters
     ----------
     packing : Packing or Configuration
         The packing.
-    modes : sequence of Mode
+    modes : sequence of ModeShape
         One or two.
     words : str
         What they are, a line above.
@@ -312,7 +312,7 @@ def draw_modes(packing: HasConfiguration, modes: Sequence[Mode], words: str) -> 
     return figure
 
 
-def _draw_modes_of_spheres(packing: Configuration, modes: Sequence[Mode], words: str) -> Figure:
+def _draw_modes_of_spheres(packing: Configuration, modes: Sequence[ModeShape], words: str) -> Figure:
     """Modes of spheres side by side, each at its largest displacement."""
     figure = new_figure(packing, len(modes))
     axes = figure.subplots(1, len(modes), squeeze=False)[0]

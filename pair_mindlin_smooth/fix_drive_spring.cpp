@@ -63,7 +63,7 @@ void FixDriveSpring::read_protocol(int narg, char **arg)
 
 int FixDriveSpring::setmask()
 {
-  return POST_FORCE;
+  return POST_NEIGHBOR | POST_FORCE;
 }
 
 void FixDriveSpring::init()
@@ -78,6 +78,18 @@ void FixDriveSpring::init()
     if (const auto *const moves = dynamic_cast<const FixNVEDisc *>(fix); moves && moves->drags())
       error->all(FLERR, "fix {} rigid does not work with the drag of fix {}: leave the drag out, or give a spring",
                  style, fix->id);
+}
+
+void FixDriveSpring::setup_post_neighbor()
+{
+  post_neighbor();
+}
+
+void FixDriveSpring::post_neighbor()
+{
+  layer.clear();
+  for (int i = 0; i < atom->nlocal; i++)
+    if (atom->mask[i] & groupbit) layer.push_back(i);
 }
 
 void FixDriveSpring::setup(int vflag)
@@ -109,20 +121,17 @@ void FixDriveSpring::move_far_end()
 
 bigint FixDriveSpring::add_positions(ExactAccumulator &sum) const
 {
-  ExactAccumulator of_rank;
-  ExactAccumulator &mine = comm->me == 0 ? sum : of_rank;
-  std::int64_t disks = 0, periods = 0;
-  for (int i = 0; i < atom->nlocal; i++) {
-    if (!(atom->mask[i] & groupbit)) continue;
-    disks++;
-    mine.add(atom->x[i][0]);
-    if (low_parts) mine.add(low_parts->array_atom[i][FixLowParts::X]);
+  std::int64_t disks = static_cast<std::int64_t>(layer.size()), periods = 0;
+  if (comm->me > 0) sum = ExactAccumulator();    // what was in the sum counts once
+  for (const int i : layer) {
+    sum.add(atom->x[i][0]);
+    if (low_parts) sum.add(low_parts->array_atom[i][FixLowParts::X]);
     periods += (atom->image[i] & IMGMASK) - IMGMAX;
   }
   if (comm->nprocs > 1) {
     constexpr int SIZE = ExactAccumulator::SIZE;
     std::int64_t all[SIZE + 2];
-    std::copy_n(mine.integers(), SIZE, all);
+    std::copy_n(sum.integers(), SIZE, all);
     all[SIZE] = disks;
     all[SIZE + 1] = periods;
     MPI_Allreduce(MPI_IN_PLACE, all, SIZE + 2, MPI_INT64_T, MPI_SUM, world);
@@ -144,8 +153,7 @@ bigint FixDriveSpring::add_positions(ExactAccumulator &sum) const
 double FixDriveSpring::hold_layer()
 {
   ExactAccumulator all;
-  for (int i = 0; i < atom->nlocal; i++) {
-    if (!(atom->mask[i] & groupbit)) continue;
+  for (const int i : layer) {
     all.add(atom->f[i][0]);
     atom->f[i][0] = 0.0;
     if (low_parts) all.add(std::exchange(low_parts->array_atom[i][FixLowParts::FX], 0.0));
@@ -160,7 +168,7 @@ void FixDriveSpring::post_force(int /*vflag*/)
   move_far_end();
   ExactAccumulator moved = origin.less;
   const bigint disks = add_positions(moved);
-  if (disks != origin.disks)
+  if (disks != origin.disks || disks == 0)
     error->all(FLERR, "fix {}: its group had {} disks when the spring began to draw, and has {} now", style,
                origin.disks, disks);
   displacement = moved.sum() / static_cast<double>(disks);
@@ -169,8 +177,7 @@ void FixDriveSpring::post_force(int /*vflag*/)
     return;
   }
   force = stiffness * (way - displacement);
-  for (int i = 0; i < atom->nlocal; i++)
-    if (atom->mask[i] & groupbit) atom->f[i][0] += force;
+  for (const int i : layer) atom->f[i][0] += force;
 }
 
 void FixDriveSpring::write_restart(FILE *fp)

@@ -30,6 +30,8 @@ public:
   FixDriveSpring(class LAMMPS *, int, char **);
   int setmask() override;
   void init() override;
+  void setup_post_neighbor() override;
+  void post_neighbor() override;
   void setup(int) override;
   void post_force(int) override;
   void write_restart(FILE *) override;
@@ -50,6 +52,7 @@ private:
   bool rigid = false, has_origin = false;
   double stiffness = 0.0;
   std::vector<Stage> protocol;
+  std::vector<int> layer;    // this rank's disks of the group, which change their places with neighbour lists alone
   Origin origin;
   double force = 0.0, displacement = 0.0, way = 0.0, velocity = 0.0;
   class FixLowParts *low_parts = nullptr;    // null: plain doubles

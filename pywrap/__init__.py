@@ -2,7 +2,8 @@
 
 `scenes` describes a computation. `settling` brings the packing of a scene to equilibrium, `equilibria` follows the
 equilibrium along F_x, and `runs` perturbs it. `runs.run_recorder` stores all results in run.h5 and continues an
-interrupted run. `lammps.engine` is a LAMMPS instance with one packing. To write a ramp of your own, loop over
+interrupted run. `lammps.engine` is a LAMMPS instance with one packing. `load_path` has equilibria as a function of a
+load: `scene_path` makes that of a scene, `lammps_path` that of any LAMMPS. To write a ramp of your own, loop over
 `equilibrate`.
 """
 
@@ -16,23 +17,35 @@ from .equilibria.quasistatic import Equilibrium, equilibrate
 from .granular.compare_motion import MotionComparison, compare_motion
 from .granular.from_lammps import from_lammps
 from .granular.granular_commands import NotTakenError
-from .granular.lammps_equilibrium_path import LammpsPath, lammps_path
+from .granular.lammps_path import lammps_path
+from .granular.look_in_a_copy import in_a_copy
 from .granular.relax import relax
+from .lammps.dynamics import Dynamics
 from .lammps.engine import Engine
-from .lammps.instance import EngineError
-from .runs.equilibrium_path import ramp, reach
+from .lammps.instance import EngineError, lammps_instance
+from .load_path import LoadPath
+from .onset import onset_run
+from .runs.drive import DriveSample, DriveStep, drive, settle_for_drive
+from .runs.ramp import ramp, reach
+from .runs.ramp_loads import ramp_loads
 from .runs.run_recorder import Record
-from .runs.undamped import Sample, perturb
+from .runs.scene_path import scene_path
+from .runs.undamped import Checkpoint, Sample, perturb, time_step
 from .scenes.scene import Scene
+from .scenes.units import dashpot, real_units, restitution
 from .scenes.validation import SceneError
 from .settling.relax import bring_to_rest
 from .settling.settle import settle
 
 __all__ = [
+    "Checkpoint",
+    "DriveSample",
+    "DriveStep",
+    "Dynamics",
     "Engine",
     "EngineError",
     "Equilibrium",
-    "LammpsPath",
+    "LoadPath",
     "MotionComparison",
     "NoEquilibriumError",
     "NotTakenError",
@@ -42,12 +55,23 @@ __all__ = [
     "SceneError",
     "bring_to_rest",
     "compare_motion",
+    "dashpot",
+    "drive",
     "equilibrate",
     "from_lammps",
+    "in_a_copy",
+    "lammps_instance",
     "lammps_path",
+    "onset_run",
     "perturb",
     "ramp",
+    "ramp_loads",
     "reach",
+    "real_units",
     "relax",
+    "restitution",
+    "scene_path",
     "settle",
+    "settle_for_drive",
+    "time_step",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path as FilePath
+from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
@@ -18,8 +18,9 @@ from ..analysis.progress import Watch, report_progress, show_progress
 from ..analysis.windows import Ranks, full_operator, takes_all_modes
 from .equilibria.quasistatic import Equilibrium
 from .lammps.engine import Engine
-from .runs.equilibrium_path import EquilibriumPath, loads
 from .runs.path_error import with_path_error
+from .runs.ramp_loads import ramp_loads
+from .runs.scene_path import scene_path
 from .scenes.scene import Scene
 from .scenes.validation import SceneError, require_section
 from .settling.settle import settle
@@ -68,7 +69,7 @@ def onset_run(
     known: Known = lambda found, fx: None,
     bed: Packing | None = None,
     watch: Watch | None = None,
-    folder: FilePath | None = None,
+    folder: Path | None = None,
 ) -> Onset:
     """Ramp a scene for one friction coefficient and find the onset.
 
@@ -112,7 +113,7 @@ def onset_run(
         If the packing flows from the first increment on, or before an onset; a TurningPointError if an eigenvalue is
         negative before any is complex.
     """
-    wanted = loads(require_section(scene.ramp, "ramp"))
+    wanted = ramp_loads(scene)
     damping = require_section(scene.damping, "damping") if dissipation else None
     scene = scene.model_copy(update={"damping": None})
     with show_progress(watch, "settling: "):
@@ -123,7 +124,7 @@ def onset_run(
     reached = reached or (lambda _: None)
     reached(start)
     with show_progress(watch), Engine(start.packing) as engine:
-        path = EquilibriumPath(engine, start, scene, onward=True)
+        path = scene_path(engine, start, scene, onward=True)
         forces = wanted
         if whole:
             report_progress(f"ramp up to F_x = {wanted[-1]:g}")

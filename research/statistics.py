@@ -5,7 +5,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from faultgouge.analysis.arrays import Floats, Indices
+from faultgouge.analysis import Floats, Indices
 
 Values = TypeVar("Values", Indices, Floats)
 

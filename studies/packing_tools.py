@@ -11,17 +11,18 @@ from numpy.typing import NDArray
 
 from ..analysis import Packing
 from ..pywrap import Engine, Equilibrium, Scene
-from ..pywrap.runs.equilibrium_path import EquilibriumPath
+from ..pywrap.load_path import LoadPath
+from ..pywrap.runs.scene_path import scene_path
 
 Start = Callable[[float], Equilibrium]
 """mu -> the settled packing of a scene with this friction coefficient."""
 
 
 @contextmanager
-def path_from(rest: Equilibrium, scene: Scene) -> Iterator[EquilibriumPath]:
+def path_from(rest: Equilibrium, scene: Scene) -> Iterator[LoadPath[Equilibrium]]:
     """The equilibria of a scene over F_x from the settled packing on; LAMMPS closes in the end."""
     with Engine(rest.packing, MPI.COMM_SELF) as engine:
-        yield EquilibriumPath(engine, rest, scene)
+        yield scene_path(engine, rest, scene)
 
 
 def unit_of_time(packing: Packing) -> float:

@@ -52,8 +52,11 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(autouse=True)
 def _in_turns(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Tests of several ranks take turns: ranks spin while they wait, and those of two tests would starve each other."""
-    if request.node.get_closest_marker("ranks") is None:
+    """Tests of several ranks take turns: ranks spin while they wait, and those of two tests would starve each other.
+
+    Workers share a folder, and the lock in it. A process without workers has nobody to wait for.
+    """
+    if request.node.get_closest_marker("ranks") is None or not hasattr(request.config, "workerinput"):
         yield
         return
     with (tmp_path_factory.getbasetemp().parent / "ranks.lock").open("w") as file:

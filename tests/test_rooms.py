@@ -8,6 +8,7 @@ import importlib
 import re
 import subprocess
 import sys
+from functools import cache
 from glob import glob
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -43,7 +44,7 @@ FLOORS = {
         ("windows",),
     ),
     "faultgouge.pywrap": (
-        ("lammps",),
+        ("lammps", "load_path"),
         ("equilibria", "exchange", "granular"),
         ("scenes",),
         ("settling",),
@@ -67,11 +68,17 @@ def modules() -> dict[str, Path]:
     return found
 
 
+@cache
+def tree(path: Path) -> ast.Module:
+    """The text of a module as Python reads it."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def imports(name: str, path: Path, known: dict[str, Path]) -> set[str]:
     """Modules of the package that a module imports, anywhere in its text."""
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -123,10 +130,7 @@ def test_nothing_of_the_program_imports_research():
 def test_every_class_has_a_name_of_its_own():
     """One name stands for one idea wherever it is read."""
     names = [
-        node.name
-        for path in modules().values()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.ClassDef)
+        node.name for path in modules().values() for node in ast.walk(tree(path)) if isinstance(node, ast.ClassDef)
     ]
     assert len(names) > 200
     assert {name for name in names if names.count(name) > 1} == set()
@@ -145,7 +149,7 @@ def test_every_number_has_a_name_of_its_own():
     """One name stands for one tolerance, size or share; who needs the same number imports it."""
     names: dict[str, list[str]] = {}
     for module, path in modules().items():
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        for node in tree(path).body:
             if isinstance(node, ast.Assign) and is_number(node.value):
                 [target] = node.targets
                 for each in target.elts if isinstance(target, ast.Tuple) else [target]:
@@ -202,3 +206,49 @@ def test_one_module_makes_sparse_factors():
     called = re.compile(r"\b(splu|spilu|spsolve|factorized)\b")
     users = {name for name, path in modules().items() if called.search(path.read_text())}
     assert users == {"faultgouge.analysis.factors.sparse_lu"}
+
+
+DOORS = {
+    "faultgouge",
+    "faultgouge.analysis",
+    "faultgouge.analysis.windows",
+    "faultgouge.figures",
+    "faultgouge.pywrap",
+    "faultgouge.studies.cycle",
+    "faultgouge.studies.eruptions",
+    "faultgouge.studies.modes",
+    "faultgouge.studies.result_rows",
+    "faultgouge.studies.statistics",
+    "faultgouge.studies.sweep",
+    "faultgouge.studies.triggering",
+}
+"""What a user's script imports from."""
+
+INSIDE = {
+    "analysis.files.formats.lammps_data": "the box of a data file for LAMMPS's own styles",
+    "analysis.motion.one_sided": "the pages compare starts and steps of that motion",
+    "analysis.motion.one_sided_outcome": "the pages state the lengths and the drag with which the outcome is decided",
+    "pywrap.granular.lammps_arrays": "velocities of a live LAMMPS are set in a unit that the Configuration has",
+    "pywrap.runs.drive_recorder": "slips and clock advances from the rows of a drive.h5",
+    "pywrap.scenes.drive_section": "the scale of the probe that a page states",
+    "pywrap.scenes.validation": "read_toml, as Python 3.10 has no reader; require_section",
+    "studies.eruptions.compute": "the growth rate that a row of that study has",
+    "studies.modes.count_in_slices": "the page compares this way of counting with another",
+    "studies.modes.count_pairs": "the number of disks at which the study changes its way of counting",
+    "studies.modes.draw": "the page goes on with curves of that study",
+    "studies.modes.table": "the page goes on with tables of that study",
+}
+"""Modules behind the doors that research uses for all that, and what for."""
+
+
+def test_research_uses_the_program_as_any_user_may():
+    """From the doors, but for what is listed here with its reason."""
+    root = ROOT.resolve().parents[1]
+    used = [
+        module.removeprefix("faultgouge.")
+        for path in (root / "research").rglob("*.py")
+        for module in re.findall(r"^\s*from (faultgouge[\w.]*) import", path.read_text(encoding="utf-8"), re.M)
+        if module not in DOORS
+    ]
+    assert set(used) == INSIDE.keys()
+    assert len(used) <= 20  # imports, all told

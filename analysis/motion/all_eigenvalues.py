@@ -27,7 +27,8 @@ from ..arrays import Complexes, Floats
 from ..factors.inertia import count_places, factor_shifted, places_of_numbers
 from ..factors.sparse_lu import minimum_degree
 from ..progress import report_progress
-from .block_arnoldi import Marked, Reach, ShiftedDisc, SpectrumError
+from .block_arnoldi import Reach, ShiftedDisc, SpectrumError
+from .modes import Modes
 
 
 @dataclass(frozen=True)
@@ -63,12 +64,12 @@ class AllEigenvalues:
     ----------
     values : ndarray of complex, shape (n,)
         Sorted by real part, then imaginary part.
-    marked : Marked
+    marked : Modes
         Those with a positive imaginary part, those that are real and negative, and real ones that are oblique.
     """
 
     values: Complexes
-    marked: Marked
+    marked: Modes
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,19 +80,18 @@ class SpectrumSlice:
     ----------
     shift, radius : float
     values : ndarray of complex, shape (k,)
-    vectors : Marked
+    vectors : Modes
     """
 
     shift: float
     radius: float
     values: Complexes
-    vectors: Marked
+    vectors: Modes
 
     @classmethod
     def empty(cls, shift: float, size: int) -> "SpectrumSlice":
         """A slice of which nothing was found."""
-        nothing = np.zeros((size, 0), complex)
-        return cls(shift, 0.0, np.zeros(0, complex), Marked(np.zeros(0, complex), nothing, nothing))
+        return cls(shift, 0.0, np.zeros(0, complex), Modes.none(size))
 
     def between(self, low: float, high: float) -> Complexes:
         """Those with a real part in [low, high)."""
@@ -178,8 +178,7 @@ class _SlicedSpectrum:
                 for sign, end in ((-1, low), (1, high))]  # fmt: skip
         chosen &= (values.real > shift - ends[0]) & (values.real < shift + ends[1])
         if not chosen.any():
-            nothing = np.zeros((len(self.order), 0), complex)
-            return SpectrumSlice(shift, disc.radius, values, Marked(values[:0], nothing, nothing)), disc.enough(reach)
+            return SpectrumSlice(shift, disc.radius, values, Modes.none(len(self.order))), disc.enough(reach)
         marked = disc.marked(chosen, accuracy)
         return SpectrumSlice(shift, disc.radius, np.concatenate([values[~chosen], marked.values]), marked), disc.enough(
             reach
@@ -235,14 +234,14 @@ class _SlicedSpectrum:
         """All eigenvalues, and vectors in the given order of coordinates."""
         ends = self.ends(slices)
         values = np.concatenate(self.values(slices))
-        parts: list[Marked] = []
+        parts: list[Modes] = []
         for part, low, high in zip(slices, ends[:-1], ends[1:], strict=True):
             known = part.vectors
             own = (known.values.real >= low) & (known.values.real < high) & (known.values.imag >= 0)
-            parts.append(Marked(known.values[own], known.right[:, own], known.left[:, own]))
+            parts.append(Modes(known.values[own], known.right[:, own], known.left[:, own]))
         right, left = (np.concatenate([getattr(part, side) for part in parts], axis=1) for side in ("right", "left"))
         place = np.argsort(self.order)
-        marked = Marked(np.concatenate([part.values for part in parts]), right[place], left[place])
+        marked = Modes(np.concatenate([part.values for part in parts]), right[place], left[place])
         return AllEigenvalues(values[np.lexsort((values.imag, values.real))], marked)
 
 

@@ -23,6 +23,7 @@ from scipy.sparse import csc_array, eye_array
 from ..arrays import Complexes, Floats
 from ..errors import FaultgougeError
 from ..factors.sparse_lu import DIAGONAL_PIVOT, Factors, SingularMatrixError, symmetric_lu
+from .modes import Modes
 
 INACCURATE = 1e-9
 """Relative residual of solutions without pivoting from which on pivots are chosen; usually it is some 1e-13."""
@@ -113,27 +114,6 @@ class Krylov:
         if count != len(wanted):
             raise SpectrumError(f"{len(wanted)} eigenvalues are not set apart from {len(others)} others of one space")
         return np.asarray(self.basis[: self.used].T @ vectors[:, :count])
-
-
-@dataclass(frozen=True, eq=False)
-class Marked:
-    """Eigenvalues with their vectors.
-
-    Attributes
-    ----------
-    values : ndarray of complex, shape (k,)
-    right, left : ndarray of complex, shape (n, k)
-        Unit vectors A x = lambda x and y^H A = lambda y^H in columns.
-    """
-
-    values: Complexes
-    right: Complexes
-    left: Complexes
-
-    @property
-    def overlap(self) -> Floats:
-        """|y^H x|, shape (k,)."""
-        return np.abs(np.sum(self.left.conj() * self.right, axis=0))
 
 
 @dataclass(frozen=True)
@@ -233,7 +213,7 @@ class ShiftedDisc:
         """Vectors that would have been enough for what a disc has to hold, and a few more, as looks cost more."""
         return int(ROOM * self.krylov.used * min(1.0, reach.radius(self.shift, self.values) / self.radius))
 
-    def marked(self, chosen: NDArray[np.bool_], accuracy: float) -> Marked:
+    def marked(self, chosen: NDArray[np.bool_], accuracy: float) -> Modes:
         """Some of the eigenvalues, closed under conjugation, with right and left vectors.
 
         Raises
@@ -250,7 +230,7 @@ class ShiftedDisc:
         small = np.linalg.solve(both, left.T @ (self.matrix @ right))
         values, y, x = eig(small, left=True, right=True)
         x, y = right @ x, left @ np.linalg.solve(both.T, y)
-        return Marked(values, x / np.linalg.norm(x, axis=0), y / np.linalg.norm(y, axis=0))
+        return Modes(values, x / np.linalg.norm(x, axis=0), y / np.linalg.norm(y, axis=0))
 
     def _left_space(self, right: Floats, wanted: Complexes, accuracy: float) -> Krylov:
         """The space of the transposed inverse, until it has the eigenvalues that are wanted."""

@@ -18,8 +18,8 @@ from scipy.sparse import csc_array, eye_array
 from ..configuration import HasConfiguration
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
 from ..packing.packing import Floats
-from .eigenpairs import eigenpairs
 from .eigenvalues import SAFETY, is_negative, operator_rounding, zero_uncertainty
+from .nearest_modes import nearest_modes
 from .spectrum import DENSE_LARGEST, dynamical_matrix, spectrum
 
 SPREAD = 4.0
@@ -58,7 +58,7 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
     count = FIRST_COUNT
     while True:
         count = min(count, size - 2)
-        found = eigenpairs(packing, -0.5 * bound, count)
+        found = nearest_modes(packing, -0.5 * bound, count)
         if count == size - 2 or np.abs(found.values + 0.5 * bound).max() > 0.5 * bound:
             break
         count *= 2

@@ -8,7 +8,6 @@ eigenvalue s of the first-order matrix Z grows if Re s exceeds :math:`\kappa u |
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eig
 from scipy.sparse import csr_array
 
 from ..arrays import Complexes, Floats, Indices
@@ -39,22 +38,6 @@ def mass_weighted(stiffness: csr_array, packing: HasConfiguration) -> csr_array:
 def active_coordinates(matrix: csr_array) -> Indices:
     """Coordinates that feel a force: the rows that are not zero."""
     return np.flatnonzero(np.diff(matrix.indptr))
-
-
-def all_modes(matrix: csr_array) -> tuple[Complexes, Complexes, Complexes]:
-    """All eigenvalues, shape (E,), with unit right and left vectors in columns, shape (n, E), by LAPACK.
-
-    They are sorted by real part, then imaginary part. Coordinates that feel no force are left out.
-    """
-    active = active_coordinates(matrix)
-    right, left = np.zeros((2, matrix.shape[0], len(active)), dtype=np.complex128)
-    if len(active) == 0:
-        return np.zeros(0, dtype=np.complex128), right, left
-    inner = matrix[active][:, active].toarray()
-    values, y, x = eig(inner, left=True, right=True, overwrite_a=True, check_finite=False)
-    order = np.lexsort((values.imag, values.real))
-    right[active], left[active] = x[:, order], y[:, order]
-    return values[order], right, left
 
 
 def unit_rounding(matrix: Floats | Complexes) -> float:

@@ -34,9 +34,9 @@ from scipy.linalg import eig, expm
 
 from ..packing.packing import Floats, Packing
 from .eigenvalues import Complexes
+from .motion import Motion
 from .response import Response, coordinates
 from .signals import Signal
-from .state_space import StateSpace
 
 KNOTS = 4
 """Steps, at the least, between two rows of a signal: its corners are then cut by less than 1/32 of their height."""
@@ -137,17 +137,17 @@ def impulse_response(packing: Packing, force: ArrayLike) -> ImpulseResponse:
     -------
     ImpulseResponse
     """
-    system = StateSpace.of(packing)
+    system = Motion.of(packing)
     drive = coordinates(packing, "force", force)[system.active] / system.root_mass
     mean = np.concatenate([packing.top / max(1, packing.top.sum()), np.zeros(2 * len(packing))])
     watch = mean[system.active] / system.root_mass
-    if not system.damping.any():
-        value, right = eig(system.stiffness)
+    if not system.dissipative:
+        value, right = eig(system.stiffness.toarray())
         weight = (watch @ right) * np.linalg.solve(right, drive)
         frequency = np.sqrt(value.astype(np.complex128))
         return ImpulseResponse(np.concatenate([1j * frequency, -1j * frequency]), np.tile(0.5 * weight, 2) + 0j)
     still = np.zeros_like(drive)
-    rate, right = eig(system.matrix)
+    rate, right = eig(system.first_order)
     weight = (np.concatenate([still, watch]) @ right) * np.linalg.solve(right, np.concatenate([still, drive]))
     return ImpulseResponse(rate + 0j, weight)
 
@@ -184,12 +184,12 @@ def sampled_response(
     # a part in a million is far above the rounding of times that were printed or summed
     if time.ndim != 1 or not len(time) or np.any(np.abs(time - time[0] * np.arange(1, len(time) + 1)) > 1e-6 * time[0]):
         raise ValueError("The times of a sampled response are h, 2h, 3h and so on.")
-    system = StateSpace.of(packing)
+    system = Motion.of(packing)
     active, root = system.active, system.root_mass
     pieces = max(1, int(np.ceil(KNOTS * time[0] / signal.shortest)))
     step, size = time[0] / pieces, len(active)
     forced = np.zeros((2 * size + 2, 2 * size + 2))
-    forced[: 2 * size, : 2 * size] = system.matrix
+    forced[: 2 * size, : 2 * size] = system.first_order
     forced[size : 2 * size, 2 * size] = coordinates(packing, "force", force)[active] / root
     forced[2 * size, 2 * size + 1] = 1.0
     onward = expm(step * forced)[: 2 * size]
@@ -200,7 +200,7 @@ def sampled_response(
         state[2 * size :] = values[k], (values[k + 1] - values[k]) / step
         state[: 2 * size] = onward @ state
         if (k + 1) % pieces == 0:
-            displacement[k // pieces, active] = system.unweight @ state[:size] / root
+            displacement[k // pieces, active] = system.energy_norm.unweight @ state[:size] / root
             velocity[k // pieces, active] = state[size : 2 * size] / root
     return Response(time, displacement, velocity, packing.top)
 

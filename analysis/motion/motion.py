@@ -11,7 +11,7 @@ all slide on for ever, with :math:`K + G Y` and :math:`C + G Z`, since then the 
 Neither bounds what contacts do that stick and slide in turn.
 
 **What grows** beyond rounding is said by :mod:`~faultgouge.analysis.motion.eigenvalues`, of A without dissipation, and
-of the first-order matrix Z in coordinates of the energy (:mod:`~faultgouge.analysis.motion.state_space`) with it. A
+of the first-order matrix Z in coordinates of the energy (:mod:`~faultgouge.analysis.motion.energy_norm`) with it. A
 motion that no force opposes has s = 0 twice, in one block of Jordan's: rounding turns that into a pair of either sign.
 """
 
@@ -32,16 +32,16 @@ from .eigenvalues import (
     SAFETY,
     Complexes,
     active_coordinates,
-    all_modes,
     growing,
     growing_undamped,
     mass_weighted,
     operator_rounding,
     zero_uncertainty,
 )
+from .energy_norm import EnergyNorm
 from .fastest_growing import GROWTH_OVER_RESIDUAL, fastest_growing
+from .modes import Modes
 from .slowest_decay import slowest_decay
-from .state_space import StateSpace
 
 SLICED = 2000
 """Coordinates beyond which `spectrum` takes the eigenvalues of K in slices, and beyond which `Motion` has the fastest
@@ -170,9 +170,14 @@ class Motion:
         return bsr_array(matrix, blocksize=(size, size))
 
     @cached_property
-    def first_order(self) -> StateSpace:
-        """The dense first-order system in coordinates of the energy."""
-        return StateSpace.of_matrices(self.stiffness, self.damping, self.root_mass)
+    def energy_norm(self) -> EnergyNorm:
+        """The coordinates in which the energy is a sum of squares."""
+        return EnergyNorm.of(self.stiffness)
+
+    @property
+    def first_order(self) -> Floats:
+        """Z, the dense matrix of the first-order system in coordinates of the energy, shape (2E, 2E), 1 / time."""
+        return self.energy_norm.first_order(self.stiffness, self.damping)
 
     @cached_property
     def rates(self) -> Rates:
@@ -214,8 +219,8 @@ class Motion:
         return Rates(values, values.real > GROWTH_OF_DISCS * frequency, slow.free, searched)
 
     def _undamped_rates(self) -> Rates:
-        values, left, right = all_modes(self.stiffness)
-        overlap = np.abs(np.sum(left.conj() * right, axis=0))
+        modes = Modes.of_matrix(self.stiffness)
+        values, overlap = modes.values, modes.overlap
         rounding = operator_rounding(self.configuration, self.stiffness.data)
         zero = zero_uncertainty(self.configuration, rounding)
         oscillates, buckles = growing_undamped(values, overlap, rounding, zero)
@@ -228,7 +233,7 @@ class Motion:
         return Rates(s[order], grows[order], int(free.sum()))
 
     def _damped_rates(self) -> Rates:
-        z = self.first_order.matrix
+        z = self.first_order
         values, rounding = eigvals(z, check_finite=False), operator_rounding(self.configuration, z)
         largest = np.abs(values).max()
         grows = values.real > np.sqrt(SAFETY * rounding * largest)  # no double eigenvalue is as uncertain

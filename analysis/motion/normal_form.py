@@ -34,9 +34,16 @@ and
 
 a function of :math:`\tau/\tau_d` alone with :math:`\tau_d = 1/\delta\sqrt\epsilon`: half of g at :math:`\tau =
 1.36\,\tau_d`, g far above and :math:`(2/e)\, g\, d\, \tau`, which does not depend on :math:`\epsilon`, far below.
+
+**Of a packing.** On the right invariant subspace of two modes the operator A of a packing is a real 2 x 2 block. In an
+orthonormal basis of that plane its traceless part is a symmetric one, which a rotation makes diag(-p, p), and an
+antisymmetric one, q times the quarter turn, which a rotation leaves alone. With the mean m of the eigenvalues,
+:math:`\delta = p/m`, :math:`\eta = q/m` and :math:`t \to \sqrt m\, t`, it is the normal form without an approximation;
+a reflection takes care of the sign of q. What is oblique is only how the plane sees the other coordinates: a
+displacement z of the packing enters it by the left plane, :math:`W^T z`, with :math:`W^T V = 1`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,17 +62,22 @@ PERIODS_ABOUT_MAXIMUM = 3
 neighbouring ones may win by their phase, those further out lie lower on the envelope."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NormalForm:
-    """Two modes near their coalescence, in units of time in which the mean eigenvalue is one.
+    """Two modes near their coalescence; of a packing with where they stand in its coordinates.
 
     Parameters
     ----------
     delta : float
-        Half the distance of the uncoupled eigenvalues, 0 < delta < 1.
+        Half the distance of the uncoupled eigenvalues over their mean, 0 < delta < 1.
     epsilon : float
         1 - eta/delta, the distance from the coalescence; at most 1, negative where the pair is complex. It is
         given rather than eta because eta loses the digits of a small one.
+    frequency : float
+        Square root of the mean eigenvalue, radian / time: the unit of time of the equations is its inverse.
+    right, left : ndarray, shape (n, 2)
+        V, orthonormal directions of the two coordinates x in mass-weighted coordinates of the packing, and W, with
+        W^T V = 1: coordinates of a displacement z are W^T z.
 
     Raises
     ------
@@ -75,12 +87,47 @@ class NormalForm:
 
     delta: float
     epsilon: float
+    frequency: float = 1.0
+    right: Floats = field(default_factory=lambda: np.eye(2), repr=False)
+    left: Floats = field(default_factory=lambda: np.eye(2), repr=False)
 
     def __post_init__(self) -> None:
         if not 0 < self.delta < 1:
             raise ValueError(f"delta = {self.delta} must lie between 0 and 1.")
         if not -np.inf < self.epsilon <= 1:
             raise ValueError(f"epsilon = {self.epsilon} must be finite and at most 1.")
+
+    @classmethod
+    def of_block(cls, block: Floats, discriminant: float, right: Floats, left: Floats) -> "NormalForm":
+        """That of A on the plane of two modes.
+
+        Parameters
+        ----------
+        block : ndarray, shape (2, 2)
+            W^T A V, 1 / time^2.
+        discriminant : float
+            Of the characteristic polynomial of the block, 1 / time^4.
+        right, left : ndarray, shape (n, 2)
+            Orthonormal V, and W with W^T V = 1.
+        """
+        mean = 0.5 * (block[0, 0] + block[1, 1])
+        # Traceless part: ((-c, k), (k, c)) + q ((0, 1), (-1, 0)); c = p cos 2a, k = -p sin 2a.
+        c, k, q = (
+            0.5 * (block[1, 1] - block[0, 0]),
+            0.5 * (block[0, 1] + block[1, 0]),
+            0.5 * (block[0, 1] - block[1, 0]),
+        )
+        p, angle = np.hypot(c, k), 0.5 * np.arctan2(-k, c)
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        turn[:, 1] *= 1.0 if q >= 0 else -1.0
+        # (p - |q|)/p by way of the discriminant, the one number that is linear in the load.
+        epsilon = discriminant / (4 * p * (p + abs(q)))
+        return cls(float(p / mean), float(epsilon), float(np.sqrt(mean)), right @ turn, left @ turn)
+
+    @property
+    def start(self) -> Floats:
+        """The unit displacement across the coalescing eigenvectors, mass-weighted, shape (n,)."""
+        return self.right @ ORTHOGONAL
 
     @property
     def nu(self) -> float:
@@ -100,7 +147,7 @@ class NormalForm:
     @property
     def tau_d(self) -> float:
         """1 / (delta epsilon^(1/2)), time that the response takes to build up; infinite where it never ends."""
-        return float(1 / (self.delta * np.sqrt(self.epsilon))) if self.epsilon > 0 else np.inf
+        return float(1 / (self.delta * np.sqrt(self.epsilon))) / self.frequency if self.epsilon > 0 else np.inf
 
     def solution(self, time: ArrayLike, damping_time: float | None = None) -> Floats:
         """The exact motion from rest at a displacement across v*, without forcing.
@@ -115,8 +162,12 @@ class NormalForm:
         Returns
         -------
         ndarray, shape (T, 2)
+            The coordinates x; the displacement of the packing is V x.
         """
-        t, gamma = np.asarray(time, dtype=float), _gamma(damping_time)
+        return self._solution(np.asarray(time, dtype=float) * self.frequency, self._gamma(damping_time))
+
+    def _solution(self, t: Floats, gamma: float) -> Floats:
+        """The motion in the unit of time of the equations."""
         s, d = self._rates(gamma)
         # The motion is exp(-gamma t) (cos(St) + gamma sin(St)/S), each as its parts along 1 and along N.
         # S = s + N/2s, and sin(N t/2s) = N q with q = sin(dt)/r, finite where r vanishes.
@@ -154,7 +205,7 @@ class NormalForm:
         """
         from scipy.optimize import minimize_scalar
 
-        gamma = _gamma(damping_time)
+        gamma = self._gamma(damping_time)
         s, d = self._rates(gamma)
         if not (s.imag == 0 and s.real > 0):
             raise ValueError(f"damping_time = {damping_time} damps the oscillation itself away: there is no beat.")
@@ -170,7 +221,7 @@ class NormalForm:
         time = time[time >= 0]
 
         def size(t: ArrayLike) -> Floats:
-            return np.linalg.norm(self.solution(np.atleast_1d(t), damping_time=damping_time), axis=1)
+            return np.linalg.norm(self._solution(np.atleast_1d(t), gamma), axis=1)
 
         best = time[np.argmax(size(time))]
         # Offsets from a late time keep their digits; at a flat maximum, half of them give all digits of the height.
@@ -206,10 +257,10 @@ class NormalForm:
         s = complex(0.5 * (np.emath.sqrt(c + r) + np.emath.sqrt(c - r)))
         return s, complex(0.5 * r / s)
 
-
-def _gamma(damping_time: float | None) -> float:
-    if damping_time is None:
-        return 0.0
-    if not 0 < damping_time < np.inf:
-        raise ValueError(f"damping_time = {damping_time} must be positive and finite.")
-    return 0.5 / damping_time
+    def _gamma(self, damping_time: float | None) -> float:
+        """gamma = 1/2 tau, in the unit of time of the equations."""
+        if damping_time is None:
+            return 0.0
+        if not 0 < damping_time < np.inf:
+            raise ValueError(f"damping_time = {damping_time} must be positive and finite.")
+        return 0.5 / (damping_time * self.frequency)

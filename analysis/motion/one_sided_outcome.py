@@ -10,10 +10,12 @@ each particle over a window, its *vibration* what is left: root mean squares ove
 to rise makes a packing vibrate that would follow a load which always rose, for as long as its dashpots need. So a drag
 takes this vibration away at first, and fades out; what vibrates later sustains itself. Vibration may grow slowly from
 next to nothing, so that no packing is said to follow the load before the whole time is over. A vibration was seen to be
-steady for four chunks and then to grow to another one; so half of the time at least is followed.
+steady for ten chunks and then to grow to another one; so half of the time at least is followed, and from two starts,
+which differ in whether the drag acts on rotations. One packing may vibrate in two ways, by its start.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from itertools import count, islice
 from typing import Any
 
 import numpy as np
@@ -76,6 +78,9 @@ FADE = 4
 
 DRAG = 20.0
 """That drag at first, 1/tau in units of 1/chunk: it takes exp(-DRAG FADE/6) = 2e-6 of the amplitude of a mode."""
+
+ONE_START = 6000
+"""Coordinates beyond which one start under a rising load stands for two: each takes a minute or more."""
 
 VANISHES = 1e-2
 """Vibration over drift of a packing that follows the load."""
@@ -229,42 +234,87 @@ def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = 
     time : float, optional
         How long; the vibration of the two last quarters is compared.
     """
-    state = system.start(np.zeros_like(direction))
     chunk, most = _chunks(system, 1, time)
-    windows: list[tuple[float, float]] = []
-    for number in range(most):
-        start = system.displacement(state.z)[..., 0]
+    windows: list[Floats] = []
+    for window in islice(windows_under_load(system, direction, chunk), most):
+        windows.append(window)
+        report_progress(f"under the rising load: t = {chunk * len(windows):.4g}, vibration {window[1].max():.3g}")
+        if time is None and 2 * len(windows) >= most and all(map(_vibrates, _of_starts(windows))):
+            break
+    found = []
+    for after in _of_starts(windows):
+        last = np.array(after[-(len(after) // 4 or 1) :])
+        drift, vibration = np.sqrt(np.mean(last**2, axis=0)).tolist()
+        found.append({"drift": drift, "vibration": vibration, "steady": _vibrates(after) or _vanishes(after)})
+    first, *others = found
+    return {**first, "time": chunk * len(windows), "other_start": others[0] if others else None}
+
+
+def windows_under_load(system: OneSidedSystem, direction: Floats, chunk: float) -> Iterator[Floats]:
+    """Drift and vibration in one window after the other under a load that rises, shape (2, S) of S starts.
+
+    Parameters
+    ----------
+    system : OneSidedSystem
+        Of the configuration.
+    direction : ndarray, shape (coordinates, 1)
+        Forces per unit of time.
+    chunk : float
+        Time of a window; the drag fades out in `FADE` of them.
+    """
+    drag = _drag_of_starts(system)
+    direction = np.repeat(direction, drag.shape[1], axis=1)
+    state = system.start(np.zeros_like(direction))
+    for number in count():
+        start = system.displacement(state.z)
         squares: NDArray[np.float64] = np.zeros_like(start)
         for sample in range(SAMPLES_OF_WINDOW):
             now = number + (sample + 1) / SAMPLES_OF_WINDOW
             system.advance(state, chunk * now, direction)
-            state.v *= np.exp(-DRAG / SAMPLES_OF_WINDOW * max(0.0, 1 - now / FADE) ** 2)
-            squares += system.displacement(state.v)[..., 0] ** 2 / SAMPLES_OF_WINDOW
-        mean = (system.displacement(state.z)[..., 0] - start) / chunk
-        windows.append((_root_mean(mean**2), _root_mean(np.maximum(squares - mean**2, 0.0))))
-        report_progress(f"under the rising load: t = {state.time:.4g}, vibration {windows[-1][1]:.3g}")
-        if time is None and 2 * (number + 1) >= most and _vibrates(windows[FADE:]):
-            break
-    after = windows[FADE:]
-    last = np.array(after[-(len(after) // 4 or 1) :])
-    drift, vibration = np.sqrt(np.mean(last**2, axis=0)).tolist()
-    steady = _vibrates(after) or _vanishes(after)
-    return {"drift": drift, "vibration": vibration, "time": state.time, "steady": steady}
+            state.v *= np.exp(-DRAG / SAMPLES_OF_WINDOW * max(0.0, 1 - now / FADE) ** 2 * drag)
+            squares += system.displacement(state.v) ** 2 / SAMPLES_OF_WINDOW
+        mean = (system.displacement(state.z) - start) / chunk
+        yield np.array([_root_mean(mean**2), _root_mean(np.maximum(squares - mean**2, 0.0))])
 
 
-def _vibrates(windows: list[tuple[float, float]]) -> bool:
+def _drag_of_starts(system: OneSidedSystem) -> Floats:
+    """Which coordinates the drag at the beginning acts on, shape (E, S): on all; and on all but rotations.
+
+    Large packings, and bodies, whose coordinates are of another kind, have one start.
+    """
+    configuration = system.motion.configuration
+    spins = system.motion.active >= configuration.dimension * len(configuration)
+    one = configuration.constraint is not None or configuration.coordinates > ONE_START or not spins.any()
+    every = np.ones((len(spins), 1))
+    return every if one else np.hstack([every, ~spins[:, None]])
+
+
+def _of_starts(windows: list[Floats]) -> list[list[Floats]]:
+    """Drift and vibration of each window once the drag has faded, each of shape (2,), of each start."""
+    after = windows[FADE:] or windows[-1:]
+    return [[window[:, start] for window in after] for start in range(after[0].shape[1])]
+
+
+def _vibrates(windows: list[Floats]) -> bool:
     """Whether the vibrations of the third and of the last quarter agree, and are more than what a start leaves."""
     before, after = _last_quarters(windows)
     return bool(abs(after[1] - before[1]) <= WINDOWS * after[1] and after[1] > VANISHES * after[0])
 
 
-def _vanishes(windows: list[tuple[float, float]]) -> bool:
+def vibrate_otherwise(first: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether the motions under a rising load from two starts differ: one is not steady, or vibrates more."""
+    least, most = sorted((first["vibration"], other["vibration"]))
+    alike = most - least <= WINDOWS * most or most <= VANISHES * first["drift"]
+    return first["steady"] is not other["steady"] or not alike
+
+
+def _vanishes(windows: list[Floats]) -> bool:
     """Whether there is next to no vibration, and none that grows: windows of so little are uneven."""
     before, after = _last_quarters(windows)
     return bool(after[1] <= VANISHES * after[0] and after[1] <= 2 * before[1])
 
 
-def _last_quarters(windows: list[tuple[float, float]]) -> tuple[Floats, Floats]:
+def _last_quarters(windows: list[Floats]) -> tuple[Floats, Floats]:
     """Mean drift and vibration of the third and of the last quarter, of two windows at least; otherwise not numbers."""
     quarter = len(windows) // 4
     if quarter < 2:
@@ -273,5 +323,6 @@ def _last_quarters(windows: list[tuple[float, float]]) -> tuple[Floats, Floats]:
     return np.mean(third, axis=0), np.mean(fourth, axis=0)
 
 
-def _root_mean(squares: Floats) -> float:
-    return float(np.sqrt(np.mean(squares)))
+def _root_mean(squares: Floats) -> Floats:
+    """Over particles and axes, shape (S,), of shape (N, d, S)."""
+    return np.asarray(np.sqrt(np.mean(squares, axis=(0, 1))))

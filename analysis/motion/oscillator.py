@@ -17,6 +17,9 @@ where the last form has no cancellation, neither in resonance nor at small times
 \tfrac12\sqrt\lambda\,dt` and with :math:`h \sin(Xt)/\sin(Xh)` for :math:`\sin(Xt)/X`, h = dt for a whole and dt/2 for a
 half angle. The formulas give the positions at the steps exactly, and also the velocities :math:`(x_{n+1} -
 x_{n-1})/2dt`.
+
+**First order.** A motion with dissipation is a function of the first-order matrix Z
+(:mod:`~faultgouge.analysis.motion.energy_norm`): `released_motion` or `driven_motion` of its eigenvalues s.
 """
 
 from dataclasses import dataclass
@@ -100,3 +103,25 @@ def _sine_over(frequency: Complexes, t: Floats, step: float | None) -> Complexes
     """sin(Xt)/X, or h sin(Xt)/sin(Xh) with a step h; t where X is zero."""
     below = frequency if step is None else np.sin(frequency * step) / step
     return np.where(below == 0, t, np.sin(frequency * t) / np.where(below == 0, 1, below))
+
+
+def released_motion(rate: Complexes, time: Floats) -> tuple[Complexes]:
+    """x' = s x from x = 1."""
+    return (np.exp(rate * time),)
+
+
+def driven_motion(omega: float, rate: Complexes, time: Floats) -> tuple[Complexes]:
+    """x' = s x + cos(omega t) from x = 0: the mean of (exp(i omega t) - exp(s t)) / (i omega - s) and its mirror."""
+    rate = np.asarray(rate, dtype=np.complex128)
+    return (0.5 * (_quotient(rate, 1j * omega, time) + _quotient(rate, -1j * omega, time)),)
+
+
+def _quotient(a: Complexes, b: complex, time: Floats) -> Complexes:
+    """(exp(a t) - exp(b t)) / (a - b), without cancellation near a = b and without overflow."""
+    first, second = np.broadcast_arrays(a, np.complex128(b))
+    swap = first.real < second.real
+    larger, smaller = np.where(swap, second, first), np.where(swap, first, second)
+    difference = smaller - larger  # exp(larger t) expm1(difference t) / difference
+    safe = np.where(difference == 0, 1, difference)
+    value = np.where(difference == 0, time, np.expm1(difference * time) / safe)
+    return np.asarray(np.exp(larger * time) * value)

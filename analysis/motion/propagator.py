@@ -13,9 +13,8 @@ from ..packing.packing import Floats, Indices
 from .eigenvalues import Complexes
 from .matrix_functions import WELL_CONDITIONED, BlockDiagonal, Function, second_order
 from .motion import Motion
-from .oscillator import Oscillator
+from .oscillator import Oscillator, released_motion
 from .response import LinearMotion
-from .state_space import released_motion
 
 Norm = Literal["displacement", "energy"]
 
@@ -84,19 +83,19 @@ class Propagator:
     def of(cls, motion: LinearMotion, norm: Norm) -> "Propagator":
         """That of a packing in one of the norms."""
         system, modes = motion.system, motion.modes
-        root, size = system.root_mass, len(system.active)
+        root, size, energy = system.root_mass, len(system.active), system.energy_norm
         if not motion.dissipative and norm == "displacement":
             outward, inward = modes.basis / root[:, None], modes.inverse * root
             return cls(modes, outward, inward, Oscillator().free_motion)
         if not motion.dissipative:
             modes = modes.oscillation_modes()
-            outward = np.concatenate([system.weight @ modes.basis[:size], modes.basis[size:]])
-            inward = np.concatenate([modes.inverse[:, :size] @ system.unweight, modes.inverse[:, size:]], axis=1)
+            outward = np.concatenate([energy.weight @ modes.basis[:size], modes.basis[size:]])
+            inward = np.concatenate([modes.inverse[:, :size] @ energy.unweight, modes.inverse[:, size:]], axis=1)
             return cls(modes, outward, inward, released_motion, is_mirrored=True)
         outward, inward = modes.basis, modes.inverse
         if norm == "displacement":
-            outward = (system.unweight / root[:, None]) @ outward[:size]
-            inward = inward[:, :size] @ (system.weight * root)
+            outward = (energy.unweight / root[:, None]) @ outward[:size]
+            inward = inward[:, :size] @ (energy.weight * root)
         return cls(modes, outward, inward, released_motion, norm == "displacement")
 
     @property

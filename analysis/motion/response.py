@@ -8,7 +8,7 @@ Without dissipation the motion is a function of one matrix, that of one oscillat
 (:mod:`~faultgouge.analysis.motion.oscillator`).
 
 **Dissipation** (:mod:`~faultgouge.analysis.operators.damping`): dashpots have no modes in common with K. The motion is
-then that of the first-order system of :mod:`~faultgouge.analysis.motion.state_space`, whose eigenvalues s give
+then that of the first-order system of :mod:`~faultgouge.analysis.motion.energy_norm`, whose eigenvalues s give
 :math:`e^{st}` and, under the force, :math:`(e^{i\omega t} - e^{st}) / (i\omega - s)`. If all Re s < 0, the motion
 finally is the stationary response with the transfer function :math:`H(\omega) = (K - \omega^2 M + i\omega C)^{-1}`
 (`transfer` in :mod:`~faultgouge.analysis.motion.forcing`).
@@ -29,8 +29,8 @@ from ..configuration import HasConfiguration
 from ..errors import BadInputError
 from ..packing.packing import Floats
 from .matrix_functions import BlockDiagonal, first_order
-from .oscillator import Oscillator
-from .state_space import StateSpace, driven_motion, released_motion
+from .motion import Motion
+from .oscillator import Oscillator, driven_motion, released_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,23 +76,23 @@ class LinearMotion:
     ----------
     packing : Packing
         The equilibrium.
-    system : StateSpace
-        Its matrices.
+    system : Motion
+        Its operators.
     modes : BlockDiagonal
         Of A without dissipation, of the first-order system with it.
     """
 
     packing: HasConfiguration
-    system: StateSpace
+    system: Motion
     modes: BlockDiagonal
 
     @classmethod
     def of(cls, packing: HasConfiguration) -> "LinearMotion":
         """Decompose a packing; errors as of `linear_response`."""
-        system = StateSpace.of(packing)
+        system = Motion.of(packing)
         if packing.damped:
-            return cls(packing, system, BlockDiagonal.of(system.matrix, first_order))
-        return cls(packing, system, BlockDiagonal.of(system.stiffness))
+            return cls(packing, system, BlockDiagonal.of(system.first_order, first_order))
+        return cls(packing, system, BlockDiagonal.of(system.stiffness.toarray()))
 
     @property
     def dissipative(self) -> bool:
@@ -131,9 +131,9 @@ class LinearMotion:
             second = oscillator.forced_motion if forced else oscillator.free_motion
             displacement, velocity = self.modes.apply(second, time, vector, observed)
             return displacement.real, velocity.real
-        system, rest, size = self.system, np.zeros_like(vector), len(observed)
-        start = system.state(rest, vector) if forced else system.state(vector, rest)
-        rows = np.block([[observed @ system.unweight, 0 * observed], [0 * observed, observed]])
+        norm, rest, size = self.system.energy_norm, np.zeros_like(vector), len(observed)
+        start = norm.state(rest, vector) if forced else norm.state(vector, rest)
+        rows = np.block([[observed @ norm.unweight, 0 * observed], [0 * observed, observed]])
         first = partial(driven_motion, oscillator.omega) if forced else released_motion
         (value,) = self.modes.apply(first, time, start, rows)
         return value[:, :size].real, value[:, size:].real

@@ -23,7 +23,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import trapezoid
 
 from ..arrays import Floats
 
@@ -199,6 +198,8 @@ class DrivenFriction:
 
 def friction_of(time: Floats, force: Floats, slips: list[Slip], fy: float) -> DrivenFriction:
     """Friction in a driven run; series of shape (S,), the load F_y on each disk of the layer."""
+    from scipy.integrate import trapezoid
+
     late = time >= (slips[0].begins if slips else time[0])
     mean = trapezoid(force[late], time[late]) / np.ptp(time[late]) if late.sum() > 1 else force[-1]
     return DrivenFriction(

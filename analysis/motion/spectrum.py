@@ -52,7 +52,7 @@ from ..packing.packing import Floats, Indices
 from ..progress import report_progress
 from ..table_display import TableDisplay
 from .all_eigenvalues import all_eigenvalues
-from .block_arnoldi import Marked, SpectrumError
+from .block_arnoldi import SpectrumError
 from .eigenvalues import (
     Complexes,
     active_coordinates,
@@ -62,6 +62,7 @@ from .eigenvalues import (
     operator_rounding,
     zero_uncertainty,
 )
+from .modes import Mode, Modes, growth_rate
 from .motion import SLICED, Motion, Rates
 
 DENSE_LARGEST = 900
@@ -75,48 +76,6 @@ LIMIT = 1e-4
 resolve the fastest modes of a crystal, which lie close together, takes ten times as long."""
 
 
-@dataclass(frozen=True)
-class ComplexPair:
-    """A pair of complex eigenvalues.
-
-    Attributes
-    ----------
-    eigenvalue : complex
-        The member with positive imaginary part, 1 / time^2.
-    overlap : float
-        |y^H x| of the unit left and right vectors; zero at the coalescence of the pair.
-    participation : float
-        Participation ratio of the mode, from 1/N for one disk that moves alone to 1 for disks that move alike.
-    rotation : float
-        Share of rotation in the mode's kinetic energy, from 0 to 1.
-    """
-
-    eigenvalue: complex
-    overlap: float
-    participation: float
-    rotation: float
-
-    @property
-    def condition(self) -> float:
-        """kappa = 1 / |y^H x|: change of the eigenvalue per change of the operator."""
-        return 1.0 / self.overlap if self.overlap > 0 else np.inf
-
-    @property
-    def frequency(self) -> float:
-        """|Re omega|, radian / time."""
-        return float(abs(np.sqrt(self.eigenvalue).real))
-
-    @property
-    def quality(self) -> float:
-        """|Re omega| / (2 |Im omega|): dissipation with a lower quality factor stops the growth."""
-        return self.frequency / self.growth_rate if self.growth_rate > 0 else np.inf
-
-    @property
-    def growth_rate(self) -> float:
-        """2 |Im omega|, 1 / time: the mean square displacement grows as exp(growth_rate t)."""
-        return growth_rate(self.eigenvalue)
-
-
 @dataclass(frozen=True, eq=False)
 class Spectrum(TableDisplay):
     """All eigenvalues of a packing's stability operator.
@@ -126,7 +85,7 @@ class Spectrum(TableDisplay):
     eigenvalues : ndarray of complex, shape (E,)
         Sorted by real part, then imaginary part; 1 / time^2. Rattlers and other coordinates on which no force acts are
         left out.
-    pairs : tuple of ComplexPair
+    pairs : tuple of Mode
         The complex pairs that exceed their own rounding uncertainty, fastest growing first.
     negative : ndarray, shape (B,)
         The real negative eigenvalues beyond their own uncertainty, the most negative first, 1 / time^2.
@@ -143,7 +102,7 @@ class Spectrum(TableDisplay):
     """
 
     eigenvalues: Complexes
-    pairs: tuple[ComplexPair, ...]
+    pairs: tuple[Mode, ...]
     negative: Floats
     noise_pairs: int
     rattlers: Indices
@@ -247,34 +206,6 @@ class Spectrum(TableDisplay):
         return float(2 * np.abs(omega.imag).max(initial=0.0))
 
 
-def participation_ratio(right: Complexes | Floats, axes: int = 3) -> Floats:
-    r"""How many of the disks take part in a mode, as a share.
-
-    With :math:`e_i` the kinetic energy of disk i, rotation included, the ratio is
-    :math:`(\sum_i e_i)^2 / (N \sum_i e_i^2)`: 1/N for one disk that moves alone, 1 for disks that move alike. Of a
-    complex mode :math:`e_i` is the mean over a period.
-
-    Parameters
-    ----------
-    right : ndarray, shape (axes N, k)
-        Right vectors in mass-weighted coordinates, in columns.
-    axes : int
-        Coordinates of a particle: 3 of disks, 6 of spheres.
-
-    Returns
-    -------
-    ndarray, shape (k,)
-    """
-    energy = (np.abs(right) ** 2).reshape(axes, -1, right.shape[1]).sum(axis=0)
-    return energy.sum(axis=0) ** 2 / (len(energy) * (energy**2).sum(axis=0))
-
-
-def rotation_share(right: Complexes | Floats, axes: int = 3) -> Floats:
-    """Share of rotation in the kinetic energy of modes, shape (k,); as of :func:`participation_ratio`."""
-    energy = (np.abs(right) ** 2).reshape(axes, -1, right.shape[1]).sum(axis=1)
-    return energy[axes // 2 + axes % 2 :].sum(axis=0) / energy.sum(axis=0)
-
-
 def dynamical_matrix(packing: HasConfiguration, form: Form = "consistent") -> tuple[csr_array, Indices]:
     """A = M^(-1/2) K M^(-1/2) without its zero rows.
 
@@ -355,16 +286,12 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     values, marked = _values_and_vectors(matrix, uncertainty)
     overlap = marked.overlap
     negative = np.sort(marked.values[is_negative(marked.values, overlap, uncertainty)].real)
-    pairs: list[ComplexPair] = []
+    pairs: list[Mode] = []
     noise = 0
     for k in np.flatnonzero(marked.values.imag > 0):
         vector = np.zeros((packing.coordinates, 1), dtype=np.complex128)
         vector[active, 0] = marked.right[:, k]
-        participation, rotation = (
-            float(participation_ratio(vector, packing.axes)[0]),
-            float(rotation_share(vector, packing.axes)[0]),
-        )
-        pair = ComplexPair(complex(marked.values[k]), float(overlap[k]), participation, rotation)
+        pair = Mode.of(complex(marked.values[k]), float(overlap[k]), vector, packing.axes)
         if exceeds_rounding(pair.eigenvalue, pair.overlap, rounding):
             pairs.append(pair)
         else:
@@ -382,7 +309,7 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     )
 
 
-def _values_and_vectors(matrix: csr_array, uncertainty: float) -> tuple[Complexes, Marked]:
+def _values_and_vectors(matrix: csr_array, uncertainty: float) -> tuple[Complexes, Modes]:
     """All eigenvalues, and those with vectors: at least the ones that are complex, or negative by more than that."""
     if matrix.shape[0] > SLICED:
         try:
@@ -398,15 +325,9 @@ def _values_and_vectors(matrix: csr_array, uncertainty: float) -> tuple[Complexe
     alone = len(dense) <= DENSE_LARGEST or (matrix != matrix.T).nnz == 0
     values = eigvals(dense) if len(dense) and alone else np.zeros(0, complex)
     if alone and not np.any(values.imag != 0) and values.real.min(initial=0.0) >= -uncertainty:
-        nothing = np.zeros((len(dense), 0), complex)
-        return values, Marked(np.zeros(0, complex), nothing, nothing)
+        return values, Modes.none(len(dense))
     values, left, right = eig(dense, left=True, right=True)
-    return values, Marked(values, right, left)
-
-
-def growth_rate(eigenvalue: complex) -> float:
-    """2 |Im sqrt(lambda)|, 1 / time: the mean square displacement D grows as exp(growth_rate t)."""
-    return float(2 * abs(np.sqrt(complex(eigenvalue)).imag))
+    return values, Modes(values, right, left)
 
 
 def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:

@@ -23,7 +23,14 @@ from ..operators.sliders import with_sticking_contacts
 from .eigenvalues import in_balance
 from .motion import Motion, Rates
 from .one_sided import OneSidedSystem, forces_on_coordinates
-from .one_sided_outcome import PUSHES, STEP_OF_LARGE, VERDICT_STEP, follow_load, follow_pushes
+from .one_sided_outcome import (
+    PUSHES,
+    STEP_OF_LARGE,
+    VERDICT_STEP,
+    follow_load,
+    follow_pushes,
+    vibrate_otherwise,
+)
 from .spectrum import Spectrum, spectrum
 
 LARGE = 6000
@@ -94,7 +101,8 @@ class Stability:
         the push along an axis, time^2), time (how long), pushes (how many), searched (slower growth of D might not have
         been seen in this motion, 1 / time); None without contacts that slide on one side.
     rising : dict or None
-        drift and vibration over the rate of loading, time, steady; None unless asked.
+        drift and vibration over the rate of loading, steady, time; other_start: the first three from another start, or
+        None; None unless asked.
     sticking, sliding : LinearNeighbour
         If all contacts at the bound stuck, and if all slid on; no bounds of what they do.
     asymmetry : dict
@@ -187,10 +195,10 @@ class Stability:
     @property
     def _under_the_load(self) -> Iterator[str]:
         if self.rising is not None:
-            yield (
-                f"under a load that rises at the rate 1: drift {self.rising['drift']:.3g}, vibration "
-                f"{self.rising['vibration']:.3g}{'' if self.rising['steady'] else ', not steady yet'}"
-            )
+            other = self.rising["other_start"]
+            starts = [self.rising, other] if other and vibrate_otherwise(self.rising, other) else [self.rising]
+            says = ", and from another start ".join(map(_drift_and_vibration, starts))
+            yield f"under a load that rises at the rate 1: {says}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
@@ -326,6 +334,11 @@ def _direction(configuration: Configuration, rise: str | ArrayLike) -> Floats:
     forces = np.zeros((len(configuration), configuration.dimension))
     forces[:, 0] = configuration.top
     return forces_on_coordinates(configuration, forces)
+
+
+def _drift_and_vibration(rising: dict[str, Any]) -> str:
+    steady = "" if rising["steady"] else ", not steady yet"
+    return f"drift {rising['drift']:.3g}, vibration {rising['vibration']:.3g}{steady}"
 
 
 def _number(count: int, name: str) -> str:

@@ -12,7 +12,7 @@ largest growth over all starts and over the time t,
 
 **Energy.** The start is any displacement and any velocity, and the norm is the energy :math:`\tfrac12 \dot q^T M \dot q
 + \tfrac12 q^T K_s q` with the symmetric part :math:`K_s` of K; P(t) is :math:`e^{Zt}` of
-:mod:`~faultgouge.analysis.motion.state_space`. If K were symmetric, both gains would be 1: only the antisymmetric part
+:mod:`~faultgouge.analysis.motion.energy_norm`. If K were symmetric, both gains would be 1: only the antisymmetric part
 of K makes them larger. (For properties of such matrices that eigenvalues do not show, see Trefethen and Embree,
 *Spectra and Pseudospectra*, 2005.)
 
@@ -147,7 +147,7 @@ def transient_gains(packing: HasConfiguration) -> tuple[TransientGain, Transient
 
 def _gain(motion: LinearMotion, norm: Norm) -> TransientGain:
     system, packing = motion.system, motion.packing
-    if norm == "energy" and not system.positive:
+    if norm == "energy" and not system.energy_norm.positive:
         raise NoGainError("the symmetric part of K is not positive: displacements have no energy to compare with")
     propagator = Propagator.of(motion, norm)
     bound, columns = propagator.bound(), propagator.sampled_modes()
@@ -162,7 +162,7 @@ def _gain(motion: LinearMotion, norm: Norm) -> TransientGain:
     if norm == "displacement":
         displacement[system.active] = start
     else:
-        displacement[system.active] = system.unweight @ start[:count] / root
+        displacement[system.active] = system.energy_norm.unweight @ start[:count] / root
         velocity[system.active] = start[count:] / root
     return TransientGain(size**2, time, displacement, velocity, norm, length, bound, packing.dimension)
 

@@ -16,13 +16,13 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats
 
-Pair = tuple[Floats, Floats]
+DoubleDouble = tuple[Floats, Floats]
 
 SPLITTER = 2.0**27 + 1
 """Splits a double into two halves of 26 bits each, whose products are exact."""
 
 
-def exact_sum(a: ArrayLike, b: ArrayLike) -> Pair:
+def exact_sum(a: ArrayLike, b: ArrayLike) -> DoubleDouble:
     """The sum of two doubles and its rounding error; of a pair, its sum with the closest double as the high part."""
     a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
     total = a + b
@@ -30,7 +30,7 @@ def exact_sum(a: ArrayLike, b: ArrayLike) -> Pair:
     return total, (a - (total - part)) + (b - part)
 
 
-def exact_product(a: ArrayLike, b: ArrayLike) -> Pair:
+def exact_product(a: ArrayLike, b: ArrayLike) -> DoubleDouble:
     """The product of two doubles and its rounding error; factors up to 1e290."""
     a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
     product = a * b
@@ -42,7 +42,7 @@ def exact_product(a: ArrayLike, b: ArrayLike) -> Pair:
 
 def separation(
     position: Floats, low: Floats | None, other: Floats, other_low: Floats | None, box_length: float | None
-) -> Pair:
+) -> DoubleDouble:
     """Vectors from other points to points, by the nearest periodic image along x.
 
     Parameters
@@ -74,7 +74,7 @@ def separation(
     return exact_sum(difference, error)
 
 
-def overlap_and_distance(branch: Pair, reach: Pair) -> tuple[Pair, Floats]:
+def overlap_and_distance(branch: DoubleDouble, reach: DoubleDouble) -> tuple[DoubleDouble, Floats]:
     """Overlap of disks and the distance of their centres.
 
     Parameters

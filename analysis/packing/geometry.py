@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats, floats
 from ..errors import BadInputError
-from .compensated import Pair, exact_sum, overlap_and_distance, separation
+from .compensated import DoubleDouble, exact_sum, overlap_and_distance, separation
 from .contacts import FLOOR, Contacts
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class ContactGeometry(NamedTuple):
 
 def contact_geometry(
     position: Floats, low: Floats | None, radius: Floats, contacts: Contacts, box_length: float | None
-) -> tuple[ContactGeometry, Pair, Pair]:
+) -> tuple[ContactGeometry, DoubleDouble, DoubleDouble]:
     """The geometry of contacts, and the branch vectors and overlaps with their low parts.
 
     Parameters

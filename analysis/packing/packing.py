@@ -37,7 +37,7 @@ from ..arrays import (
 from ..configuration import Configuration
 from ..counted import counted
 from ..errors import BadInputError
-from .compensated import Pair
+from .compensated import DoubleDouble
 from .contacts import Contacts
 from .geometry import ContactGeometry, check_box, contact_geometry
 from .law import MindlinLaw
@@ -244,7 +244,7 @@ class Packing:
         return self._exact_geometry[0]
 
     @cached_property
-    def _exact_geometry(self) -> tuple[ContactGeometry, Pair, Pair]:
+    def _exact_geometry(self) -> tuple[ContactGeometry, DoubleDouble, DoubleDouble]:
         """The geometry, and the branch vectors and overlaps with their low parts."""
         return contact_geometry(self.position, self.position_low, self.radius, self.contacts, self.box_length)
 

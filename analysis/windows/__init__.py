@@ -1,31 +1,25 @@
 """Windows of loads on which motion grows, solved for and not scanned, with dissipation and without: one search.
 
-- `onset`: what a user calls; `limits`: every size and tolerance, with its reason
+- `find_onset`, `find_windows`: what a user calls; `onset`: what the search finds, in numbers and in words
+- `limits`: every size and tolerance, with its reason
 - `system`: the matrix of small motion at one load; `space`: the modes that are followed from load to load
 - `edges`: windows, and their edges: where the growth of a motion goes through zero, or jumps
-- `modes`: all modes of one load, and which is which at the next; `between`: where a narrow window may hide
+- `system_modes`: all modes of one load, and which is which at the next; `between`: where a narrow window may hide
 - `search`: the walk along a ramp
 - `screens`: the few motions that may change, by perturbation theory
 - `slices`: large packings, in slices of the spectrum
-- `pair_form`: where a pair stands in the normal form
+- `pair_over_load`: one pair through many loads, its eigenvalues and its normal form
 """
 
-from .edges import Edge, LostPairError, Window
+from .edges import Edge, Increments, LostPairError, Window, follow_to, track
+from .find_onset import find_onset, takes_all_modes
+from .find_windows import complex_windows, find_windows, windows_up_to
 from .limits import LIMITS, Limits
-from .modes import Modes
-from .onset import (
-    Increments,
-    Onset,
-    OnsetError,
-    complex_windows,
-    find_onset,
-    find_windows,
-    takes_all_modes,
-    windows_up_to,
-)
+from .onset import Onset, OnsetError
 from .slices.ranks import Ranks
 from .space import Space
 from .system import System, force_bearing, full_operator
+from .system_modes import SystemModes
 
 __all__ = [
     "LIMITS",
@@ -33,18 +27,20 @@ __all__ = [
     "Increments",
     "Limits",
     "LostPairError",
-    "Modes",
     "Onset",
     "OnsetError",
     "Ranks",
     "Space",
     "System",
+    "SystemModes",
     "Window",
     "complex_windows",
     "find_onset",
     "find_windows",
+    "follow_to",
     "force_bearing",
     "full_operator",
     "takes_all_modes",
+    "track",
     "windows_up_to",
 ]

@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from ..packing.packing import Floats, Indices
 from .limits import LIMITS, Limits
-from .modes import Members, Modes, assign_modes
 from .space import Space
 from .system import System
+from .system_modes import Members, SystemModes, assign_modes
 
 Ends = tuple[list[Space], list[Space]]
 """Modes that nearly meet, at the lower and at the upper load: a pair, or two single modes."""
@@ -54,7 +54,7 @@ class LoadStep:
 
     Parameters
     ----------
-    here, there : Modes
+    here, there : SystemModes
         All modes at the lower and at the upper load.
     before : System, optional
         The load before the lower one.
@@ -65,7 +65,9 @@ class LoadStep:
         The mode there of each mode here, -1 where there is none.
     """
 
-    def __init__(self, here: Modes, there: Modes, before: System | None = None, limits: Limits = LIMITS) -> None:
+    def __init__(
+        self, here: SystemModes, there: SystemModes, before: System | None = None, limits: Limits = LIMITS
+    ) -> None:
         self.here, self.there, self._before, self.limits = here, there, before, limits
         self.span = there.fx - here.fx
         self.forward = assign_modes(here, there)
@@ -134,7 +136,7 @@ class LoadStep:
             for k in wide
         ]
 
-    def _both(self, known: Indices, image: Indices) -> tuple[tuple[Modes, Indices], tuple[Modes, Indices]]:
+    def _both(self, known: Indices, image: Indices) -> tuple[tuple[SystemModes, Indices], tuple[SystemModes, Indices]]:
         return (self.here, known), (self.there, image)
 
     def _pairs_hiding(self, narrowest: float) -> list[Ends] | None:

@@ -277,6 +277,9 @@ def _jump_width(here: float, there: float, limits: Limits) -> float:
 At = Callable[[float], System]
 """Load -> the system there."""
 
+Increments = tuple[tuple[float, float], ...]
+"""From load to load."""
+
 
 def follow_to(space: Space, system: System, limits: Limits = LIMITS) -> Space:
     """The same motion at another load; LostPairError if it cannot be followed there."""

@@ -25,9 +25,9 @@ from ..packing.packing import Floats
 from .between import Course, Ends, Few, LoadStep, stretch
 from .edges import At, DoubtError, Edge, LostPairError, LostTrackError, Window, locate_edge
 from .limits import LIMITS, Limits
-from .modes import Modes
 from .space import Space
 from .system import System
+from .system_modes import SystemModes
 
 Look = Callable[[float, float], Iterable[float]]
 """Two neighbouring loads of a ramp -> further loads between them that are to be looked at."""
@@ -75,7 +75,7 @@ class Search:
         self._first = first
         self.open: Open | None = None  # at the load reached so far
         self.closed: list[Window] = []
-        self._modes: dict[float, Modes] = {}
+        self._modes: dict[float, SystemModes] = {}
         self._before: System | None = None
 
     @property
@@ -277,15 +277,15 @@ class Search:
                 pass
         return Edge.between(here.fx, there.fx, last)
 
-    def modes_at(self, fx: float) -> Modes:
+    def modes_at(self, fx: float) -> SystemModes:
         """All modes at a load."""
         return self._modes[fx] if fx in self._modes else self.modes(self.at(fx))
 
-    def modes(self, system: System) -> Modes:
+    def modes(self, system: System) -> SystemModes:
         """All modes of a system, kept as long as its load is not passed."""
         known = self._modes.get(system.fx)
         if known is None or known.system is not system:
-            known = self._modes[system.fx] = Modes.of(system)
+            known = self._modes[system.fx] = SystemModes.of(system)
         return known
 
 

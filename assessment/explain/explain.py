@@ -28,7 +28,8 @@ from ...analysis.motion.spectrum import dynamical_matrix
 from ...pywrap import Engine, Equilibrium, Record, Scene
 from ...pywrap.lammps.dynamics import Dynamics, Weakening
 from ...pywrap.lammps.plain_file_names import temporary_folder
-from ...pywrap.runs.equilibrium_path import next_equilibrium, step_of
+from ...pywrap.runs.ramp import step_of
+from ...pywrap.runs.scene_path import next_equilibrium
 from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.sections import Ramp
 from ...pywrap.scenes.units import real_units

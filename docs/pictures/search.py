@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from faultgouge.analysis import complex_windows
-from faultgouge.analysis.windows import Modes, Space
+from faultgouge.analysis.windows import Space, SystemModes
 from faultgouge.analysis.windows.between import stretch
 from faultgouge.figures.style import INK, STYLE
 
@@ -44,7 +44,7 @@ def discriminant(operator: Operator, fx: float) -> float:
 
 def pair_at(operator: Operator, fx: float) -> Space:
     """The two modes next to 10."""
-    modes = Modes.of_operator(fx, operator(fx))
+    modes = SystemModes.of_operator(fx, operator(fx))
     return modes.space(modes.about(10.0))
 
 

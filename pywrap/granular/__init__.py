@@ -8,9 +8,8 @@ law, with those of a `force_probe` on particles of one of the `colours`, on the 
 move, bodies among them (`translating_bodies`), for `configuration_by_differences`. `balance` says whether a
 packing is at rest, and `moving_regions` whether its walls are. `motion_proof` compares a few of LAMMPS's own steps
 (`lammps_steps`) with those of the Configuration, and `acting_fixes` explains why they differ. `from_lammps` chooses
-among all of these; `compare_motion` compares a longer motion. `relax` brings an instance to rest,
-`lammps_equilibrium_path` makes a path along a load, and `run_deck` runs the deck of a user, once; `kept_state` keeps
-its state where it cannot be taken.
+among all of these; `compare_motion` compares a longer motion. `relax` brings an instance to rest, `lammps_path` makes
+its loading path, and `run_deck` runs the deck of a user, once; `kept_state` keeps its state where it cannot be taken.
 
-May import: lammps.
+May import: `lammps`, `load_path`.
 """

@@ -14,8 +14,9 @@ particles at once in random directions are then compared with K q and C v. The d
 which nothing is known would show in it.
 
 **One-sided derivatives.** A contact at Coulomb's bound, one that is about to open or close, and a law with two
-derivatives have another derivative forwards than backwards. K is the mean of both, and the jump between them is said. A displacement may also
-be too long for a contact that is far weaker than the others: where a force is not linear a finer one is tried.
+derivatives have another derivative forwards than backwards. K is the mean of both, and the jump between them is said. A
+displacement may also be too long for a contact that is far weaker than the others: where a force is not linear a finer
+one is tried.
 
 **Bodies.** q = P Q, where several coordinates move as one. The columns of K are displacements of Q, and its rows sums
 of forces on the coordinates that Q moves.

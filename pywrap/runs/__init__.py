@@ -1,4 +1,4 @@
-"""Runs of a scene: its path of equilibria, its undamped run, and run.h5, which stores both.
+"""Runs of a scene: its ramp, its loading path, its undamped run, and run.h5, which stores them.
 
-May import: `lammps`, `equilibria`, `scenes`, `settling`.
+May import: `lammps`, `load_path`, `equilibria`, `scenes`, `settling`.
 """

@@ -24,7 +24,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ...analysis import Contacts, FaultgougeError, Packing, dynamical_matrix, eigenpairs, layer_force
+from ...analysis import Contacts, FaultgougeError, Packing, dynamical_matrix, layer_force, nearest_modes
 from ...analysis.arrays import Floats
 from ...analysis.factors.sparse_lu import general_lu
 from ...analysis.motion.slips import Slip, SlipDetector
@@ -38,8 +38,10 @@ from ..scenes.validation import SceneError, require_section
 from ..settling.settle import law_of, settle
 from .undamped import Checkpoint, time_step
 
-STATES = 100
-"""Parts of a run whose scene does not say when states are stored."""
+LOADED, MOVED = 0.016, 0.01
+"""Where a scene does not say when states are stored: share of mu F_y by which the spring loads a layer that sticks from
+one to the next, and way of a rigid drive in smallest diameters. The length of the run has no part in it, so that a run
+is the same up to the end of a shorter one."""
 
 SAMPLES_A_PERIOD, SAMPLES_A_PART = 20, 10
 """Rows of the series: so many in a period of the layer on the spring, and at least so many in a part of the run."""
@@ -139,7 +141,7 @@ class Plan:
     def of(cls, settings: Drive, start: Packing, dt: float) -> Plan:
         """The plan of a run from an equilibrium with a time step."""
         length = settings.length(strength(start))
-        part = math.ceil((settings.states or length / STATES) / dt)
+        part = math.ceil((settings.states or _between_states(settings, start)) / dt)
         period = layer_period(settings, start)
         most = max(1, part // SAMPLES_A_PART)
         every = most if period is None else min(most, max(1, int(period / SAMPLES_A_PERIOD / dt)))
@@ -154,6 +156,13 @@ class Plan:
 def strength(packing: Packing) -> float:
     """mu F_y, the largest force along x that friction bears on each disk of the layer; F_y without friction."""
     return float((packing.law.mu or 1.0) * packing.fy)
+
+
+def _between_states(settings: Drive, start: Packing) -> float:
+    """Time between two stored states of a scene that does not say it."""
+    if settings.spring == "rigid":
+        return float(MOVED * 2 * start.radius.min() / settings.fastest)
+    return LOADED * strength(start) / (settings.spring * settings.fastest)
 
 
 def layer_period(settings: Drive, packing: Packing) -> float | None:
@@ -199,7 +208,7 @@ def check_drive(scene: Scene, start: Packing) -> list[str]:
     if settings.spring == "rigid":
         return warnings
     matrix, active = dynamical_matrix(start)
-    slowest = eigenpairs(start, 0.0, 1).values.real.min()
+    slowest = nearest_modes(start, 0.0, 1).values.real.min()
     period = 2 * math.pi / math.sqrt(max(slowest, np.finfo(float).tiny))
     loading = strength(start) / (settings.spring * settings.fastest)
     says = (

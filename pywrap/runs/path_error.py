@@ -41,12 +41,12 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, eigvals
 from scipy.sparse.linalg import ArpackError
 
-from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, dynamical_matrix, eigenpairs
+from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, dynamical_matrix, nearest_modes
 from ...analysis.arrays import Floats
 from ...analysis.windows import Space, System, Window, force_bearing
 from ...analysis.windows.nearby import nearest_mode
 from ..equilibria.quasistatic import Equilibrium
-from .equilibrium_path import EquilibriumPath
+from ..load_path import EquilibriumSolver, LoadPath
 from .nearby_root import nearby_root
 
 Vanishes = Callable[[Packing], float]
@@ -124,7 +124,7 @@ class PathError:
 
 
 def with_path_error(
-    onset: Onset, path: EquilibriumPath, with_dashpots: Callable[[Packing], Packing] = lambda packing: packing
+    onset: Onset, path: LoadPath[Equilibrium], with_dashpots: Callable[[Packing], Packing] = lambda packing: packing
 ) -> Onset:
     """An onset with the error of its path: extrapolated where that can be done, bounded where not.
 
@@ -132,7 +132,7 @@ def with_path_error(
     ----------
     onset : Onset
         As found on the path; the errors of its windows are those of rounding.
-    path : EquilibriumPath
+    path : LoadPath
         The ramp, at least up to the last window.
     with_dashpots : callable, optional
         A packing of the path -> the same with the dissipation with which the onset was found.
@@ -144,7 +144,7 @@ def with_path_error(
         keeps its own, and a `path_error` of None, where the ramp has no equilibrium at the onset that the search has
         found there.
     """
-    others = OtherPaths(path)
+    errors = PathErrors(path)
 
     def whole(window: Window) -> Window:
         if not window.fx_onset > path.equilibria[0].fx:
@@ -153,7 +153,7 @@ def with_path_error(
             growth_near(window.frequency, with_dashpots) if window.dissipative else squared_gap(window.eigenvalue)
         )
         try:
-            part = others.error(window.fx_onset, vanishes, window.rounding_error)
+            part = errors.error(window.fx_onset, vanishes, window.rounding_error)
         except FAILURES:
             return window
         edge = replace(window.onset, fx=window.fx_onset + part.correction)
@@ -165,16 +165,30 @@ def with_path_error(
     return replace(onset, windows=tuple(map(whole, onset.windows)), undamped=undamped)
 
 
-class OtherPaths:
-    """Paths of one ramp through other loads, which the onsets of the ramp have in common for the most part.
+@dataclass(frozen=True)
+class BranchSolver:
+    """A solver that takes no other way where the branch of equilibria ends, on the path through other loads."""
+
+    solver: EquilibriumSolver[Equilibrium]
+
+    def solve(self, load: float, below: Equilibrium | None, beside: Equilibrium | None, ahead: bool) -> Equilibrium:
+        """As of :class:`~faultgouge.pywrap.load_path.EquilibriumSolver`."""
+        return self.solver.solve(load, below, beside, ahead=False)
+
+    def close(self) -> None:
+        """The solver is that of the ramp."""
+
+
+class PathErrors:
+    """The errors of the onsets of one ramp, which have the paths through other loads in common for the most part.
 
     Parameters
     ----------
-    path : EquilibriumPath
+    path : LoadPath
         The ramp, at least up to the last onset.
     """
 
-    def __init__(self, path: EquilibriumPath) -> None:
+    def __init__(self, path: LoadPath[Equilibrium]) -> None:
         self.path = path
         self._states = [bearing_contacts(each.packing) for each in path.equilibria]
         self._coarser, self._finer, self._moved = (
@@ -237,13 +251,13 @@ class OtherPaths:
         states = [*before, bearing_contacts(self.path(fx))]
         return np.array([a != b for a, b in pairwise(states)])
 
-    def _along(self, through: Floats, known: list[Equilibrium]) -> EquilibriumPath:
+    def _along(self, through: Floats, known: list[Equilibrium]) -> LoadPath[Equilibrium]:
         """The path through the inner ones of some loads, beginning with what is known of it; what is new is kept."""
         inner = through[1:-1]
         common = 0
         while common < min(len(inner), len(known) - 1) and known[common + 1].fx == inner[common]:
             common += 1
-        path = EquilibriumPath(self.path.engine, known[0], self.path.scene, known[1 : common + 1])
+        path = LoadPath(BranchSolver(self.path.solver), known[: common + 1])
         try:
             for load in inner[common:]:
                 path(float(load))
@@ -292,7 +306,7 @@ def squared_gap(eigenvalue: float) -> Vanishes:
         values = (
             eigvals(dynamical_matrix(bare)[0].toarray())
             if len(bare) < DISKS_OF_ALL_MODES
-            else eigenpairs(bare, near, 4).values
+            else nearest_modes(bare, near, 4).values
         )
         one, other = values[np.argsort(np.abs(values - eigenvalue))[:2]]
         return float(((one - other) ** 2).real)

@@ -41,7 +41,8 @@ class Drive(Section):
     slips : int or None
         The run ends after so many slips. None: it goes on until `until`.
     states : float or None
-        Time between two stored states; a hundredth of the run by default.
+        Time between two stored states; by default that in which the spring loads the layer by 0.016 mu F_y, or a rigid
+        drive moves by 0.01 of the smallest diameter.
     signal : str or None
         A force, or a motion of the floor, that comes on the way: "pulse", or a file as in [perturb]. In a scene, a
         relative path counts from the folder of the scene's file.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -32,11 +33,15 @@ def to_si(text: str, unit: str) -> float:
     from pint import PintError
 
     try:
-        quantity = registry().Quantity(text)
-        return float(quantity.to(unit).magnitude)
+        return _magnitude(text, unit)
     except (PintError, ValueError, TypeError, AttributeError, AssertionError, OverflowError) as error:
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else "it is no quantity"
         raise ValueError(f"does not convert to {unit} ({reason})") from None
+
+
+@lru_cache  # the scenes of a sweep have the same texts, and pint reads each in milliseconds
+def _magnitude(text: str, unit: str) -> float:
+    return float(registry().Quantity(text).to(unit).magnitude)
 
 
 def quantity(place: str, text: str, unit: str) -> float:

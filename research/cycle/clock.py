@@ -16,22 +16,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from mpi4py import MPI
-
-from faultgouge.analysis import Packing
-from faultgouge.analysis.motion.slips import Slip
-from faultgouge.pywrap import Scene
-from faultgouge.pywrap.runs.drive import DriveSample, drive, settle_for_drive
+from faultgouge.analysis import Slip
+from faultgouge.pywrap import DriveStep, Scene
 from faultgouge.pywrap.runs.drive_recorder import COMPARABLE, advance_of
-from faultgouge.pywrap.runs.undamped import Checkpoint
 from faultgouge.pywrap.scenes.drive_section import PROBE_SCALE
-from faultgouge.studies.result_rows import append_row
 from research.cycle.compute import UNTIL, scene
-from research.tables import read_rows
+from research.driven_runs import DrivenRun
 
 LAW, PART = "coulomb", 4.0
 """Law, and time of a part of a run."""
@@ -48,15 +40,6 @@ NOISES = (1.0, 4.0)
 """Frequencies of the pulses that stand for noise."""
 
 
-@dataclass(frozen=True)
-class Moment:
-    """The end of a part of a run: how many rows of the series are known, and the state of LAMMPS."""
-
-    rows: int
-    time: float
-    checkpoint: Checkpoint
-
-
 def driven(seed: int, **signal: Any) -> Scene:
     """The scene of a run, with a pulse."""
     base = scene(seed, LAW)
@@ -68,31 +51,21 @@ def driven(seed: int, **signal: Any) -> Scene:
 def rows_of(seed: int) -> Iterator[dict[str, Any]]:
     """All rows of one seed: one of the slip, and one of each pulse."""
     begin = time.process_time()
-    wanted = driven(seed)
-    start = settle_for_drive(wanted, MPI.COMM_SELF)
-    known, moments, slips = list[DriveSample](), list[Moment](), list[Slip]()
-
-    def keep(reached: Checkpoint) -> None:
-        moments.append(Moment(len(known), known[-1].time, reached))
-
-    for step in drive(wanted, start, keep=keep, communicator=MPI.COMM_SELF):
-        known.append(step.sample)
-        slips += [step.slip] if step.slip else []
-        if len(slips) == SLIPS:
-            break
+    run = DrivenRun.of(driven(seed), SLIPS)
+    slips = run.slips
     for number, due in enumerate(slips):
         since = slips[number - 1].ends if number else 0.0
         wait = due.begins - since
         key = {"seed": seed, "slip": number}
         yield key | {"kind": "slip", "begins": due.begins, "wait": wait, "drop": due.force_drop, "moved": due.slip}
         for phase, height, omega in pulses():
-            reached = [each for each in moments if since <= each.time <= since + phase * wait]
+            reached = [each for each in run.moments if since <= each.time <= since + phase * wait]
             if not reached:
                 yield key | {"kind": "too short", "phase": phase, "height": height, "omega": omega}
                 continue
             moment = reached[-1]
             signal = {"signal": "pulse", "at": moment.time, "omega": omega, "scale": height}
-            found = next_slip(driven(seed, **signal), start, known, moment, due, wait)
+            found = next_slip(moment.go_on(driven(seed, **signal), run.start), due, wait)
             yield key | {
                 "kind": "noise" if height == PROBE_SCALE else "pulse",
                 "phase": phase,
@@ -112,13 +85,10 @@ def pulses() -> Iterator[tuple[float, float, float]]:
         yield from ((phase, PROBE_SCALE, omega) for omega in NOISES)
 
 
-def next_slip(
-    wanted: Scene, start: Packing, known: list[DriveSample], moment: Moment, due: Slip, wait: float
-) -> list[Slip]:
-    """The slips of a run after a moment, until one is comparable with the one that is due, or a wait after that."""
+def next_slip(run: Iterator[DriveStep], due: Slip, wait: float) -> list[Slip]:
+    """The slips of a run, until one is comparable with the one that is due, or a wait after that."""
     found = list[Slip]()
-    rows = known[: moment.rows]
-    for step in drive(wanted, start, rows, moment.checkpoint, communicator=MPI.COMM_SELF):
+    for step in run:
         if step.slip:
             found.append(step.slip)
             if abs(step.slip.force_drop) >= COMPARABLE * abs(due.force_drop):
@@ -126,13 +96,3 @@ def next_slip(
         if step.sample.time > min(due.begins + wait, UNTIL):
             break
     return found
-
-
-def compute(table: Path, seeds: range, watch: Any = print) -> None:
-    """Add the seeds that a table lacks, in their order; what is written is of whole seeds."""
-    known = {row["seed"] for row in read_rows(table)} if table.exists() else set()
-    for seed in seeds:
-        if seed not in known:
-            for row in list(rows_of(seed)):
-                append_row(table, row)
-            watch(f"seed {seed}", flush=True)

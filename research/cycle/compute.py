@@ -10,25 +10,31 @@ Of a run these states count:
 - `before`: the state in which a slip begins;
 - `control`: the stored state nearest to a third of the time from the end of the last slip, or from the beginning;
 - `even`: the stored states nearest to the multiples of `EVERY`, but for those within a slip.
+
+**400 disks.** The same scene with four times as many disks in a box of twice the width: the layer is as thick again,
+and one disk in ten is drawn by the spring, as before. The rule, written down before the first run: seeds 1 to 10 in
+this order with the standard law, then the same seeds with the smoothed law, as many runs as 90 minutes of one processor
+allow. All slips count for sizes and recurrence. The states `before` and `control` of the first `LOOKED_AT` slips of a
+run are looked at, half a minute each; none are `even`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import product
+from math import sqrt
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis import RunFile
-from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.slips import Slip
-from faultgouge.pywrap import Equilibrium, Scene
-from faultgouge.pywrap.runs.drive import settle_for_drive
+from faultgouge.analysis import Floats, RunFile, Slip
+from faultgouge.pywrap import Equilibrium, Scene, settle_for_drive
 from faultgouge.pywrap.runs.drive_recorder import DriveRecord, slips_in
-from faultgouge.studies.cycle.compute import cycle_state
+from faultgouge.studies.cycle import cycle_state
 from faultgouge.studies.result_rows import append_row
+from research.modes.sets import WIDTH
 from research.tables import read_rows
 
 LAWS = ("total", "coulomb")
@@ -41,12 +47,16 @@ UNTIL = 480.0
 EVERY = 24.0
 """Time between the even states."""
 
+DISKS, MANY = 100, 400
+LOOKED_AT = 3
+"""Slips of a run of `MANY` disks before which states are looked at."""
 
-def scene(seed: int, law: str, spring: float = SPRING) -> Scene:
+
+def scene(seed: int, law: str, spring: float = SPRING, disks: int = DISKS) -> Scene:
     """The scene of one run."""
     return Scene.from_mapping(
         {
-            "packing": {"seed": seed},
+            "packing": {"seed": seed, "disks": disks, "width": WIDTH * sqrt(disks / DISKS)},
             "law": {"kn": 2e5, "mu": 1.0, "history": law},
             "load": {"fy": 3.0},
             "damping": {"cn": 60.0, "ct": 17.0},
@@ -67,23 +77,35 @@ def run(path: Path, wanted: Scene) -> None:
 
 def compute(table: Path, runs: Path, seeds: range, laws: Sequence[str] = LAWS) -> None:
     """Rows of the table that are missing, one for each run; the files of the runs stay in a folder."""
-    runs.mkdir(parents=True, exist_ok=True)
-    known = {(row["seed"], row["law"]) for row in read_rows(table)} if table.exists() else set()
     for seed, law in product(seeds, laws):
-        if (seed, law) not in known:
-            path = runs / f"{law}_{seed}.h5"
-            run(path, scene(seed, law))
-            append_row(table, {"seed": seed, "law": law} | numbers(path))
+        _compute_run(table, runs, seed, law, DISKS)
 
 
-def numbers(path: Path) -> dict[str, Any]:
-    """The slips of a run, and the numbers of its chosen states by the rule."""
+def compute_many(table: Path, runs: Path, seeds: range) -> None:
+    """The same of runs of `MANY` disks, one law after the other."""
+    for law, seed in product(reversed(LAWS), seeds):
+        _compute_run(table, runs, seed, law, MANY)
+
+
+def _compute_run(table: Path, runs: Path, seed: int, law: str, disks: int) -> None:
+    if table.exists() and any((row["seed"], row["law"]) == (seed, law) for row in read_rows(table)):
+        return
+    runs.mkdir(parents=True, exist_ok=True)
+    begin, path = process_time(), runs / f"{law}_{seed}.h5"
+    run(path, scene(seed, law, disks=disks))
+    found = numbers(path, None if disks == DISKS else LOOKED_AT)
+    append_row(table, {"seed": seed, "law": law} | found | {"cpu_seconds": process_time() - begin})
+
+
+def numbers(path: Path, looked_at: int | None = None) -> dict[str, Any]:
+    """The slips of a run, and the numbers of its chosen states by the rule; only of those before the first slips."""
     with RunFile(path) as file:
         times, slips = file.observable("time"), slips_in(file)
         states = [
             where(kind, slip, float(times[frame]), float(file.fx[frame]), slips)
             | cycle_state(file.packing(frame), SPRING)
             for kind, slip, frame in chosen(times, slips)
+            if looked_at is None or (kind != "even" and slip is not None and slip < looked_at)
         ]
     return {"slips": [sizes_of(slip) for slip in slips], "states": states}
 

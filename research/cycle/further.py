@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis.files.atomic_write import write_text
-from faultgouge.figures.pages import render
+from faultgouge.figures import render
 from faultgouge.studies.statistics import median, share
+from research.cycle import clock
 from research.cycle.clock import FREQUENCIES, HEIGHTS, PHASES
 from research.cycle.compute import LAWS
-from research.cycle.springs import SHARES, SPRINGS
+from research.cycle.springs import SHARES, SPRINGS, row_of
 from research.statistics import interval
 from research.tables import read_rows
 
@@ -29,6 +29,12 @@ STAYS = 0.1
 
 ROW = 0.1
 """Time between two rows of a series, which no clock advance is better than; rounded up."""
+
+LONG = 0.05
+"""Length of a slip from which it is called long."""
+
+FULL, HALF = 0.9, 0.5
+"""Clock advance over the wait that was left when the pulse began: of a full one the slip comes with the pulse."""
 
 Row = dict[str, Any]
 
@@ -124,6 +130,28 @@ def advances(rows: Sequence[Row]) -> Row:
     }
 
 
+def long_slips(rows: Sequence[Row]) -> list[Row]:
+    """How many slips are long, of each spring."""
+    found = []
+    for spring in SPRINGS:
+        slips = [slip["slip"] for row in rows if row["spring"] == spring for slip in row["slips"]]
+        found.append({"spring": spring, "long": share(sum(each > LONG for each in slips), len(slips))})
+    return found
+
+
+def full_advances(rows: Sequence[Row]) -> list[Row]:
+    """How many pulses of each height advance the slip by all, or by half, of the wait that was left."""
+    begins = {(row["seed"], row["slip"]): row["begins"] for row in rows if row["kind"] == "slip"}
+    found = []
+    for height in HEIGHTS:
+        own = [row for row in rows if row["kind"] == "pulse" and row["height"] == height]
+        parts = [(row["advance"] or 0.0) / (begins[row["seed"], row["slip"]] - row["at"]) for row in own]
+        counts = {name: share(sum(part > least for part in parts), len(own)) for name, least in
+                  (("full", FULL), ("half", HALF))}  # fmt: skip
+        found.append({"height": height, "largest": max(parts)} | counts)
+    return found
+
+
 def moved(rows: Sequence[Row]) -> Row:
     """By how many pulses the next slip comes earlier or later than by any noise, or not at all; the median of all."""
     known = [(row["advance"], row["floor"]) for row in rows if row["advance"] is not None]
@@ -139,14 +167,42 @@ def moved(rows: Sequence[Row]) -> Row:
 def numbers(folder: Path = HERE) -> Row:
     """All numbers of the page."""
     springs = read_rows(folder / "tables" / SPRINGS_TABLE)
+    pulses = read_rows(folder / "tables" / CLOCK_TABLE)
     return {
         "sizes": sizes(springs),
+        "long": long_slips(springs),
+        "longer": LONG,
+        "full": full_advances(pulses),
         "seeds": sorted({row["seed"] for row in springs}),
         "verdicts": {spring: verdicts(springs, [spring]) for spring in SPRINGS},
         "all": verdicts(springs, SPRINGS),
-        "clock": advances(read_rows(folder / "tables" / CLOCK_TABLE)),
+        "clock": advances(pulses),
         "stays": STAYS,
     }
+
+
+def check() -> list[str]:
+    """What differs from both tables in the first run of a spring and the first twelfth of the pulses, done again."""
+    springs_known, clock_known = (read_rows(HERE / "tables" / name) for name in (SPRINGS_TABLE, CLOCK_TABLE))
+    run = springs_known[0]
+    again = row_of(run["seed"], run["law"], run["spring"])
+    wrong = [f"springs, seed {run['seed']}: {again['slips']}"] if not _agree(run["slips"], again["slips"]) else []
+    few = len(clock_known) // 12
+    for old, new in zip(clock_known[:few], clock.rows_of(clock_known[0]["seed"]), strict=False):
+        names = [name for name in ("begins", "advance") if name in old]
+        if not _agree([{name: old[name] for name in names}], [{name: new[name] for name in names}]):
+            wrong.append(f"pulses: {new}")
+    return wrong
+
+
+def _agree(known: Sequence[Row], again: Sequence[Row]) -> bool:
+    """Whether numbers are the same as before but for the last digits."""
+    return len(known) == len(again) and all(
+        old[name] == new[name]
+        or (None not in (old[name], new[name]) and bool(np.isclose(old[name], new[name], rtol=1e-6, atol=1e-9)))
+        for old, new in zip(known, again, strict=True)
+        for name in old
+    )
 
 
 def count(value: Row) -> str:
@@ -159,7 +215,7 @@ def count(value: Row) -> str:
 def write_further(folder: Path = HERE) -> Path:
     """Write further.md of a folder from its tables."""
     found = numbers(folder)
-    write_text(
-        folder / "further.md", render("research.cycle", "further.md.j2", **found, count=count, interval=interval)
+    (folder / "further.md").write_text(
+        render("research.cycle", "further.md.j2", **found, count=count, interval=interval)
     )
     return folder / "further.md"

@@ -2,10 +2,11 @@
 
 python -m research.cycle.make compute RUNS SEEDS   the runs of the seeds 1 to SEEDS that the table lacks; their files
                                                    go to the folder RUNS; half a minute a run
+python -m research.cycle.make many RUNS SEEDS      the same of 400 disks; three minutes a run
 python -m research.cycle.make springs SEEDS        what the table of three springs lacks; four minutes a seed
 python -m research.cycle.make clock SEEDS          what the table of clock advances lacks; a minute a seed
 python -m research.cycle.make page                 README.md and further.md from the tables
-python -m research.cycle.make check                the first run computed again, and compared
+python -m research.cycle.make check                a tenth of the tables of 100 disks once more, and compared
 
 From the folder of the repository.
 """
@@ -21,16 +22,15 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from faultgouge.analysis.files.atomic_write import write_text
-from faultgouge.figures.pages import render
+from faultgouge.figures import render
 from faultgouge.studies.statistics import share
 from research.cycle import clock, further, springs
-from research.cycle.compute import LAWS, UNTIL, compute
+from research.cycle.compute import DISKS, LAWS, LOOKED_AT, MANY, UNTIL, compute, compute_many
 from research.statistics import interval
-from research.tables import read_rows
+from research.tables import add_seeds, read_rows
 
 HERE = Path(__file__).parent
-TABLE = "cycles.jsonl"
+TABLE, MANY_TABLE = "cycles.jsonl", "cycles_400.jsonl"
 
 Row = dict[str, Any]
 
@@ -85,7 +85,7 @@ def before_or_control(rows: Sequence[Row], law: str) -> dict[str, dict[str, Any]
         alone = [0, 0]
         for row in (each for each in rows if each["law"] == law):
             state = {(each["kind"], each["slip"]): (begins_with(each) | each)[name] for each in row["states"]}
-            for number in range(len(row["slips"])):
+            for number in (each["slip"] for each in row["states"] if each["kind"] == "before"):
                 before, control = state["before", number], state["control", number]
                 alone[0] += before > control
                 alone[1] += control > before
@@ -163,7 +163,37 @@ def sizes(row: Row) -> dict[str, Any]:
     }
 
 
-def numbers(rows: Sequence[Row]) -> dict[str, Any]:
+def by_size(few: Sequence[Row], many: Sequence[Row]) -> list[dict[str, Any]]:
+    """Slips of both sizes: how many a run, and medians with intervals of their numbers."""
+    found = []
+    for law in LAWS:
+        for disks, rows in ((DISKS, few), (MANY, many)):
+            own = [row for row in rows if row["law"] == law]
+            slips = [slip for row in own for slip in row["slips"]]
+            apart = [gap for row in own for gap in np.diff([slip["begins"] for slip in row["slips"]])]
+            drops = [slip["force_before"] - slip["force_after"] for slip in slips]
+            found.append(
+                {"law": law, "disks": disks, "runs": len(own), "slips": len(slips)}
+                | {"before": further.middle([slip["force_before"] for slip in slips]), "drop": further.middle(drops)}
+                | {"slip": further.middle([slip["slip"] for slip in slips]), "apart": further.middle(apart)}
+                | {"largest": max(drops, default=None)}
+            )
+    return found
+
+
+def of_many(rows: Sequence[Row]) -> dict[str, Any]:
+    """Counts of the states of runs of `MANY` disks, by the law."""
+    laws = [law for law in LAWS if any(row["law"] == law for row in rows)]
+    return {
+        "laws": laws,
+        "seeds": {law: [row["seed"] for row in rows if row["law"] == law] for law in laws},
+        "before": {law: counts(rows, law, "before") for law in laws},
+        "control": {law: counts(rows, law, "control") for law in laws},
+        "paired": {law: before_or_control(rows, law) for law in laws},
+    }
+
+
+def numbers(rows: Sequence[Row], many: Sequence[Row] = ()) -> dict[str, Any]:
     """All numbers of the page."""
     laws = [law for law in LAWS if any(row["law"] == law for row in rows)]
     every = {law: [row for row in rows if row["law"] == law] for law in laws}
@@ -181,6 +211,10 @@ def numbers(rows: Sequence[Row]) -> dict[str, Any]:
         "resting": share(
             sum(state["rests"] for row in rows for state in row["states"]), sum(len(row["states"]) for row in rows)
         ),
+        "by_size": by_size(rows, many),
+        "many": of_many(many),
+        "disks": MANY,
+        "looked_at": LOOKED_AT,
         "residual": float(np.median([state["residual"] for row in rows for state in row["states"]])),
     }
 
@@ -194,9 +228,9 @@ def percent(part: dict[str, Any]) -> str:
 
 def write_page(folder: Path = HERE) -> Path:
     """Write README.md of a folder from its table."""
-    found = numbers(read_rows(folder / "tables" / TABLE))
-    write_text(
-        folder / "README.md", render("research.cycle", "README.md.j2", **found, percent=percent, interval=interval)
+    found = numbers(*(read_rows(folder / "tables" / name) for name in (TABLE, MANY_TABLE)))
+    (folder / "README.md").write_text(
+        render("research.cycle", "README.md.j2", **found, percent=percent, interval=interval)
     )
     return folder / "README.md"
 
@@ -222,13 +256,15 @@ if __name__ == "__main__":
     match sys.argv[1:]:
         case ["compute", runs, seeds]:
             compute(HERE / "tables" / TABLE, Path(runs), range(1, int(seeds) + 1))
+        case ["many", runs, seeds]:
+            compute_many(HERE / "tables" / MANY_TABLE, Path(runs), range(1, int(seeds) + 1))
         case ["springs", seeds]:
-            springs.compute(HERE / "tables" / further.SPRINGS_TABLE, range(1, int(seeds) + 1))
+            add_seeds(HERE / "tables" / further.SPRINGS_TABLE, range(1, int(seeds) + 1), springs.rows_of)
         case ["clock", seeds]:
-            clock.compute(HERE / "tables" / further.CLOCK_TABLE, range(1, int(seeds) + 1))
+            add_seeds(HERE / "tables" / further.CLOCK_TABLE, range(1, int(seeds) + 1), clock.rows_of)
         case ["page"]:
             print(write_page(), further.write_further())
         case ["check"]:
-            print(check() or "the same")
+            print([*check(), *further.check()] or "the same")
         case _:
             sys.exit(__doc__)

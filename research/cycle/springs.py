@@ -24,15 +24,11 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis import NoEquilibriumError, Packing, RunFile, stability
-from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.slips import Slip
+from faultgouge.analysis import Floats, NoEquilibriumError, Packing, RunFile, Slip, stability
+from faultgouge.pywrap import bring_to_rest
 from faultgouge.pywrap.runs.drive_recorder import slips_in
-from faultgouge.pywrap.settling.relax import bring_to_rest
-from faultgouge.studies.cycle.compute import cycle_state, drawn
-from faultgouge.studies.result_rows import append_row
+from faultgouge.studies.cycle import cycle_state, drawn
 from research.cycle.compute import LAWS, run, scene, sizes_of, where
-from research.tables import read_rows
 
 SPRINGS = (3.0, 10.0, 30.0)
 
@@ -41,16 +37,9 @@ SHARES = {"control": 1 / 3, "late": 0.9, "before": 1.0}
 """`before` is the last stored state until the slip begins, at the largest force."""
 
 
-def compute(table: Path, seeds: range, watch: Any = print) -> None:
-    """Add the seeds that a table lacks, in their order; what is written is of whole seeds."""
-    known = {row["seed"] for row in read_rows(table)} if table.exists() else set()
-    for seed in seeds:
-        if seed in known:
-            continue
-        rows = [row_of(seed, law, spring) for spring, law in product(SPRINGS, LAWS)]
-        for row in rows:
-            append_row(table, row)
-        watch(f"seed {seed}", flush=True)
+def rows_of(seed: int) -> Iterator[dict[str, Any]]:
+    """The rows of one seed."""
+    return (row_of(seed, law, spring) for spring, law in product(SPRINGS, LAWS))
 
 
 def row_of(seed: int, law: str, spring: float) -> dict[str, Any]:

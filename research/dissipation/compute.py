@@ -17,14 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from faultgouge.analysis import OnsetError, Packing, Window, find_onset
-from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.transient import NoGainError, transient_gain
+from faultgouge.analysis import Floats, NoGainError, OnsetError, Packing, Window, find_onset, transient_gain
 from faultgouge.analysis.windows import System, find_windows
-from faultgouge.pywrap import Scene, settle
-from faultgouge.pywrap.lammps.engine import Engine
-from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath, loads
-from faultgouge.pywrap.scenes.validation import require_section
+from faultgouge.pywrap import Engine, Equilibrium, LoadPath, Scene, ramp_loads, scene_path, settle
 from research.dissipation.weak_limit import drag_onset, weak_limit
 
 Row = dict[str, Any]
@@ -41,23 +36,23 @@ FEW = 3
 
 
 @contextmanager
-def ramped(scene: Scene) -> Iterator[EquilibriumPath]:
+def ramped(scene: Scene) -> Iterator[LoadPath[Equilibrium]]:
     """The path of a scene, climbed to the end of its ramp, or to where the packing flows."""
-    wanted = loads(require_section(scene.ramp, "ramp"))
+    wanted = ramp_loads(scene)
     start = settle(scene)
     with Engine(start.packing) as engine:
-        path = EquilibriumPath(engine, start, scene, onward=True)
+        path = scene_path(engine, start, scene, onward=True)
         for _ in path.climb(wanted[1:]):
             pass
         yield path
 
 
-def loads_of(path: EquilibriumPath) -> Floats:
+def loads_of(path: LoadPath[Equilibrium]) -> Floats:
     """The loads of the ramp that have an equilibrium, force per top disk."""
     return np.array([each.fx for each in path.equilibria])
 
 
-def first_undamped_window(path: EquilibriumPath) -> Window | None:
+def first_undamped_window(path: LoadPath[Equilibrium]) -> Window | None:
     """The first window without dissipation, as far as a few increments show it; None if there is none."""
     forces = loads_of(path)
     for k in range(0, len(forces) - 1, FEW):
@@ -69,7 +64,7 @@ def first_undamped_window(path: EquilibriumPath) -> Window | None:
 
 
 def windows_with(
-    path: EquilibriumPath, forces: ArrayLike, look: float | None = None, **dissipation: float | None
+    path: LoadPath[Equilibrium], forces: ArrayLike, look: float | None = None, **dissipation: float | None
 ) -> tuple[Window, ...]:
     """The first windows with dashpots or drag, as of `Packing.with_dissipation`; `look` is a load to be looked at."""
 
@@ -82,7 +77,7 @@ def windows_with(
     return find_windows(system, forces, look=between, first=look is not None)
 
 
-def weak_cases(path: EquilibriumPath, ratios: Iterable[tuple[float, float]] = RATIOS) -> Iterator[Row]:
+def weak_cases(path: LoadPath[Equilibrium], ratios: Iterable[tuple[float, float]] = RATIOS) -> Iterator[Row]:
     """The limit of weak dashpots for the first undamped pair of a ramp, for several ratios C_N : C_T.
 
     The damped onset is solved for among all modes, from the ramp's last load below the prediction to a little beyond
@@ -117,12 +112,14 @@ def _around(forces: ArrayLike, predicted: float, window: Window) -> list[float]:
     return [*below, window.fx_onset + 1e-3 * width]
 
 
-def over_strength(path: EquilibriumPath, kind: str, strengths: Iterable[float], start: float = 0.0) -> Iterator[Row]:
+def over_strength(
+    path: LoadPath[Equilibrium], kind: str, strengths: Iterable[float], start: float = 0.0
+) -> Iterator[Row]:
     """The damped onset over the strength of normal dashpots, or of drag.
 
     Parameters
     ----------
-    path : EquilibriumPath
+    path : LoadPath
         The packing along its loads, climbed.
     kind : {"cn", "drag"}
         Which dissipation.
@@ -153,7 +150,7 @@ def over_strength(path: EquilibriumPath, kind: str, strengths: Iterable[float], 
 
 
 def over_distance(
-    path: EquilibriumPath, distances: Iterable[float], dissipations: Iterable[tuple[float, float]]
+    path: LoadPath[Equilibrium], distances: Iterable[float], dissipations: Iterable[tuple[float, float]]
 ) -> Iterator[Row]:
     """The transient gain over the distance from the first undamped onset, for several (C_N, 1/tau).
 
@@ -178,7 +175,7 @@ def _gain(packing: Packing, cn: float, drag: float) -> Row:
     return {"gain": found.gain, "time": found.time, "bound": found.bound if np.isfinite(found.bound) else None}
 
 
-def _first_window(path: EquilibriumPath) -> Window:
+def _first_window(path: LoadPath[Equilibrium]) -> Window:
     window = first_undamped_window(path)
     if window is None:
         last = path.equilibria[-1].fx

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from faultgouge.figures.style import INK, styled
+from faultgouge.figures import INK, styled
 from faultgouge.studies.result_rows import row_columns
 from research.dissipation.compute import Row
 

@@ -6,8 +6,8 @@ python -m research.dissipation.picture
 from pathlib import Path
 from typing import Any
 
-from faultgouge.analysis.motion.power_law import fit_power_law
-from faultgouge.figures.style import save_as
+from faultgouge.analysis import fit_power_law
+from faultgouge.figures import save_as
 from research.dissipation.draw import dissipation_figure
 from research.tables import read_rows
 

@@ -33,11 +33,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from faultgouge.analysis import NoEquilibriumError, Packing, Window, damping_matrix
-from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.eigenvalues import mass_weighted
-from faultgouge.analysis.windows import LostPairError, Modes, Space, System, force_bearing
-from faultgouge.analysis.windows.edges import follow_to, track
+from faultgouge.analysis import Floats, NoEquilibriumError, Packing, Window, damping_matrix, mass_weighted
+from faultgouge.analysis.windows import LostPairError, Space, System, SystemModes, follow_to, force_bearing, track
 
 DIGITS = 1e-12
 """Width to which the limit is bracketed, in units of the load."""
@@ -184,5 +181,5 @@ def _follow_pair(equilibrium: Callable[[float], Packing], window: Window) -> Cal
         return System.of(equilibrium(fx))
 
     onset = system(window.fx_onset)
-    modes = Modes.of(onset)
+    modes = SystemModes.of(onset)
     return track(system, {onset.fx: follow_to(modes.space(modes.about(window.eigenvalue)), replace(onset))})

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from faultgouge.analysis.packing.packing import Floats
-from faultgouge.figures.style import INK, styled
+from faultgouge.analysis import Floats
+from faultgouge.figures import INK, styled
 from faultgouge.studies.result_rows import row_columns
 from faultgouge.studies.statistics import course
 from research.genericity.numbers import STEPS

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis.packing.packing import Floats
+from faultgouge.analysis import Floats
 from faultgouge.studies.statistics import Bools
 from research.statistics import bootstrap_interval, resample
 

@@ -43,14 +43,10 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
-from faultgouge.analysis import spectrum
-from faultgouge.analysis.motion.eigenvalues import active_coordinates
-from faultgouge.analysis.packing.packing import Floats, Indices
+from faultgouge.analysis import Floats, Indices, spectrum
 from faultgouge.analysis.windows import force_bearing, full_operator
-from faultgouge.pywrap import Equilibrium, Scene
-from faultgouge.pywrap.runs.equilibrium_path import loads
-from faultgouge.pywrap.scenes.validation import require_section
-from faultgouge.studies.packing_tools import path_from
+from faultgouge.pywrap import Equilibrium, Scene, ramp_loads
+from research.packing_tools import path_from
 
 AVERAGED_OVER = 21
 """Levels over which local densities and couplings are averaged: some 5 % of the level's statistics in error, and few
@@ -83,7 +79,7 @@ class Pencil:
     @classmethod
     def between(cls, rest: csr_array, there: csr_array, fx: float) -> Pencil:
         """From the operator at rest and at a small load."""
-        active: Indices = active_coordinates(rest)
+        active: Indices = np.flatnonzero(np.diff(rest.indptr))
         dense = rest[active][:, active].toarray()
         values, inner = eigh(0.5 * (dense + dense.T), driver="evd")
         change = inner.T @ ((there - rest)[active][:, active] @ inner) / fx
@@ -99,9 +95,9 @@ class Pencil:
 
 def pencil_of(scene: Scene, rest: Equilibrium) -> Pencil:
     """The operator of a scene's packing about rest, from a small load."""
-    settings = require_section(scene.ramp, "ramp")
+    step = float(ramp_loads(scene)[1])
     with path_from(rest, scene) as path:
-        there = path(SMALL * settings.step)
+        there = path(SMALL * step)
     return Pencil.between(full_operator(rest.packing), full_operator(there), there.fx)
 
 
@@ -166,10 +162,9 @@ def growth(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
         fx, pairs, rate : lists, one entry an equilibrium; rate in 1 / time, 0 where all eigenvalues are real. They end
         where the packing flows.
     """
-    settings = require_section(scene.ramp, "ramp")
     row: dict[str, Any] = {"fx": [], "pairs": [], "rate": []}
     with path_from(rest, scene) as path:
-        for equilibrium in path.climb(loads(settings)[1:]):
+        for equilibrium in path.climb(ramp_loads(scene)[1:]):
             modes = spectrum(force_bearing(equilibrium.packing))
             row["fx"].append(equilibrium.fx)
             row["pairs"].append(len(modes.pairs))

@@ -18,15 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis.files.atomic_write import write_json, write_text
-from faultgouge.figures.pages import render
-from faultgouge.studies.study import draw_all, save_png
-from faultgouge.studies.sweep.run_sweep import LINES, read_results, run_sweep
+from faultgouge.figures import render
+from faultgouge.studies.sweep import read_results, run_sweep
 from research.genericity.draw import mechanism_figure, modes_figure, onsets_figure, size_figure
 from research.genericity.numbers import LOADS, numbers, read_tables
 from research.genericity.sets import PACKINGS, SHARES, SIZES, sets
 from research.genericity.table import Table
+from research.pictures import draw_all
 from research.statistics import interval
+from research.tables import SWEEP_ROWS, write_json
 
 HERE = Path(__file__).parent
 TABLES = HERE / "tables"
@@ -43,7 +43,7 @@ def compute(folder: Path, share: float = 1.0) -> None:
 
 def record_cost(folder: Path) -> None:
     """made.json: with which version and at which commits the tables were made, and what they cost."""
-    rows = [row for path in folder.glob(f"*/{LINES}") for row in read_results(path).values()]
+    rows = [row for path in folder.glob(f"*/{SWEEP_ROWS}") for row in read_results(path).values()]
     path = folder / "made.json"
     before = json.loads(path.read_text()) if path.exists() else {}
     if len(rows) == before.get("rows"):
@@ -81,8 +81,8 @@ def write_page(folder: Path = HERE, tables: Path = TABLES) -> Path:
     formats = {"percent": percent, "median": median, "between": format_interval, "mean": mean}
     write_json(folder / "genericity.json", found)
     (folder / "pictures").mkdir(exist_ok=True)
-    draw_all(figures, folder / "pictures", print, save_png)
-    write_text(folder / "README.md", render("research.genericity", "README.md.j2", **found, **names, **formats))
+    draw_all(figures, folder / "pictures")
+    (folder / "README.md").write_text(render("research.genericity", "README.md.j2", **found, **names, **formats))
     return folder / "README.md"
 
 

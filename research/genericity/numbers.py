@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis.packing.packing import Floats
+from faultgouge.analysis import Floats
 from faultgouge.studies.statistics import median_interval, quartiles, share, sign_test
 from research.genericity.fits import shape, size_law
 from research.genericity.sets import FRICTION

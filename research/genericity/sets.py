@@ -15,8 +15,7 @@ from collections.abc import Mapping
 from math import ceil
 from typing import Any
 
-from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS
+from faultgouge.studies.sweep import TASKS, Sweep
 
 FRICTION = [0.2, 0.4, 0.6, 0.8, 1.0]
 FEW = [0.2, 0.6, 1.0]

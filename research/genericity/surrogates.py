@@ -27,15 +27,11 @@ from typing import Any
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from faultgouge.analysis import NoEquilibriumError, Packing
-from faultgouge.analysis.motion.eigenvalues import mass_weighted
-from faultgouge.analysis.operators.stiffness import stiffness_matrix
-from faultgouge.analysis.packing.packing import Floats
+from faultgouge.analysis import Floats, NoEquilibriumError, Packing, mass_weighted, stiffness_matrix
 from faultgouge.analysis.windows import complex_windows, force_bearing
-from faultgouge.pywrap import Equilibrium, Scene
-from faultgouge.pywrap.runs.equilibrium_path import loads
-from faultgouge.studies.packing_tools import path_from
+from faultgouge.pywrap import Equilibrium, Scene, ramp_loads
 from research.genericity.levels import Pencil, pencil_of
+from research.packing_tools import path_from
 
 BLOCK = 20
 """Levels among which spacings and couplings are permuted: their means change little over so many."""
@@ -47,7 +43,7 @@ def surrogates(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
     assert scene.ramp is not None
     seed = int(getattr(scene.packing, "seed", 0))
     drawn = randomise_pencil(pencil, np.random.default_rng(seed))
-    steps, narrowest = loads(scene.ramp), 1e-7 * scene.ramp.first
+    steps, narrowest = ramp_loads(scene), 1e-7 * scene.ramp.first
     row = {
         "linear": _first(lambda fx: csr_array(pencil.at(fx)), steps, narrowest),
         "random": _first(lambda fx: csr_array(drawn.at(fx)), steps, narrowest),

@@ -12,11 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import eig, eigvals
 
-from faultgouge.analysis import Configuration, damping_matrix, spectrum, stiffness_matrix
-from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.eigenvalues import active_coordinates, mass_weighted
-from faultgouge.pywrap import compare_motion, from_lammps
-from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
+from faultgouge.analysis import (
+    Configuration,
+    Floats,
+    damping_matrix,
+    dynamical_matrix,
+    mass_weighted,
+    spectrum,
+)
+from faultgouge.pywrap import compare_motion, from_lammps, in_a_copy
 
 KN, KT, GAMMA = 1e5, 2e5 / 7, 40.0
 MU = 0.5
@@ -97,7 +101,7 @@ def pour(law: str, d: int, count: int, mu: float, seed: int, log: Path, gamma: f
     """LAMMPS with a layer of particles of two sizes above a plane floor, five or six particles deep."""
     from mpi4py import MPI
 
-    from faultgouge.pywrap.lammps.instance import lammps_instance
+    from faultgouge.pywrap import lammps_instance
 
     rng = np.random.default_rng(seed)
     across = round((count / 5.5) ** (1 / (d - 1)))
@@ -191,9 +195,8 @@ def damping_needed(found: Configuration) -> dict[str, float] | None:
 
     And the restitution of a head-on collision of two particles with the mean stiffness and the mean dashpot.
     """
-    a = mass_weighted(stiffness_matrix(found), found)
-    active = active_coordinates(a)
-    a = a[active][:, active].toarray()
+    matrix, active = dynamical_matrix(found)
+    a = matrix.toarray()
     g = mass_weighted(damping_matrix(found), found)[active][:, active].toarray()
     size, omega = len(a), float(np.sqrt(np.abs(a).sum(axis=1).max()))
 
@@ -301,9 +304,8 @@ def linear_motion(found: Configuration, push: Floats, times: Floats) -> Floats:
     root = np.sqrt(found.coordinate_mass)
     start = np.zeros(found.coordinates)
     start[: 3 * count] = push.T.ravel()
-    a = mass_weighted(stiffness_matrix(found), found)
-    active = active_coordinates(a)
-    squares, vectors = eig(a[active][:, active].toarray())
+    a, active = dynamical_matrix(found)
+    squares, vectors = eig(a.toarray())
     omega = np.sqrt(squares.astype(complex))
     share = np.linalg.solve(vectors, (start * root)[active].astype(complex))
     motion = np.zeros((found.coordinates, len(times)))

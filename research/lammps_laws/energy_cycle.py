@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from faultgouge.pywrap.lammps.instance import lammps_instance
+from faultgouge.pywrap import lammps_instance
 from research.lammps_laws.compute import HOOKE, KT, LAWS, NONE
 
 SHALLOW, DEEP, SLIP, RADIUS = 1e-3, 4e-3, 1e-4, 0.5

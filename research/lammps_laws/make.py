@@ -17,8 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis.files.atomic_write import write_text
-from faultgouge.figures.pages import render
+from faultgouge.figures import render
 from faultgouge.studies.statistics import median, share
 from research.lammps_laws.compute import (
     CELLS,
@@ -227,8 +226,7 @@ def wall_alone() -> dict[str, Any]:
     from mpi4py import MPI
 
     from faultgouge.analysis import spectrum
-    from faultgouge.pywrap import from_lammps
-    from faultgouge.pywrap.lammps.instance import lammps_instance
+    from faultgouge.pywrap import from_lammps, lammps_instance
 
     with TemporaryDirectory() as folder:
         lmp = lammps_instance(MPI.COMM_SELF, Path(folder) / "log")
@@ -267,7 +265,7 @@ def write_page(folder: Path = HERE, tables: Path = TABLES) -> Path:
     """Write README.md of a folder from the tables."""
     formats = {"ranged": format_range, "three": three, "signed": format_signed}
     text = render("research.lammps_laws", "README.md.j2", **numbers(tables), **formats)
-    write_text(folder / "README.md", text)
+    (folder / "README.md").write_text(text)
     return folder / "README.md"
 
 

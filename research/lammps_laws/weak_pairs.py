@@ -23,11 +23,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig
 
-from faultgouge.analysis import Configuration, spectrum, stiffness_matrix
-from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.eigenvalues import active_coordinates, mass_weighted
+from faultgouge.analysis import Configuration, Floats, dynamical_matrix, spectrum
+from faultgouge.pywrap import in_a_copy
 from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of, set_velocity
-from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
 from research.lammps_laws.compute import MU, NONE, STEEP, STEP, TILTS, describe, pour, read, rest
 
 LAW, D = "granular hertz, mindlin/force", 3
@@ -81,9 +79,8 @@ def rows(sample: Sample, seed: int) -> list[dict[str, Any]]:
 
 def follow(lmp: Any, snapshot: Configuration, displacement: float) -> dict[str, float]:
     """Rates of D of the fastest pair: "predicted", and "grows" and "decays" as its two parts do in LAMMPS."""
-    a = mass_weighted(stiffness_matrix(snapshot), snapshot)
-    active, root = active_coordinates(a), np.sqrt(snapshot.coordinate_mass)
-    values, left, right = eig(a[active][:, active].toarray(), left=True)
+    (a, active), root = dynamical_matrix(snapshot), np.sqrt(snapshot.coordinate_mass)
+    values, left, right = eig(a.toarray(), left=True)
     number = int(np.argmin(np.abs(values - spectrum(snapshot).pairs[0].eigenvalue)))
     s = 1j * np.sqrt(values[number])
     s = s if s.real > 0 else -s

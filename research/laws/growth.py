@@ -19,9 +19,7 @@ import numpy as np
 from mpi4py import MPI
 
 from faultgouge.analysis import Packing
-from faultgouge.pywrap import Engine, Equilibrium, Scene
-from faultgouge.pywrap.runs.undamped import time_step
-from faultgouge.pywrap.scenes.units import dashpot
+from faultgouge.pywrap import Engine, Equilibrium, Scene, dashpot, time_step
 from research.laws.both_laws import as_slider, at_loads
 from research.modes.loss import fastest, impact_velocity, with_dashpots
 from research.packing_tools import distance_of_bearing_disks, shake_disks

@@ -11,9 +11,7 @@ import sys
 from math import ceil
 from pathlib import Path
 
-from faultgouge.studies.sweep.run_sweep import run_sweep
-from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS
+from faultgouge.studies.sweep import TASKS, Sweep, run_sweep
 from research.laws.page import write_page
 from research.laws.sets import sets
 from research.modes.make import different

@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis.files.atomic_write import write_json, write_text
-from faultgouge.figures.pages import render
+from faultgouge.figures import render
 from faultgouge.studies.statistics import median, median_interval, share
 from research.laws.both_laws import BRANCHES, RESTITUTIONS
 from research.laws.sets import sets as all_sets
 from research.modes.loss import GROWS
 from research.modes.page import finite, part
 from research.statistics import interval
-from research.tables import read_rows
+from research.tables import read_rows, write_json
 from research.yielding.page import SEEN_GROWTH, UNREST, rows_of
 
 Row = dict[str, Any]
@@ -56,7 +55,7 @@ def write_page(tables: Path, folder: Path) -> Path:
     write_json(folder / "laws.json", finite(found))
     formats = {"middle": interval, "quality": partial(interval, digits=".3g"), "part": part, "across": across}
     formats |= {"restitutions": RESTITUTIONS, "words": WORDS, "stock_words": STOCK, "asked": packings_by_set()}
-    write_text(folder / "README.md", render("research.laws", "README.md.j2", **found, **formats))
+    (folder / "README.md").write_text(render("research.laws", "README.md.j2", **found, **formats))
     return folder / "README.md"
 
 

@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError
-from faultgouge.pywrap import Scene
-from faultgouge.pywrap.onset import onset_run
+from faultgouge.pywrap import Scene, onset_run
 from faultgouge.studies.result_rows import append_row
-from faultgouge.studies.triggering.compute import sensitivity
+from faultgouge.studies.triggering import sensitivity
 from research.laws.sets import ONSETS, sets
 
 NEAR = -np.geomspace(1e-3, 1e-6, 10)

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS
+from faultgouge.studies.sweep import TASKS, Sweep
 from research.modes.sets import quartz
 from research.modes.sets import sets as sets_of_modes
 
@@ -38,13 +37,13 @@ ONSETS, REACH = 20, 0.1
 
 def sets() -> dict[str, Sweep]:
     """The sweeps by name, in the order in which they are computed."""
-    found = {}
+    found, modes = {}, sets_of_modes()
     for disks, (most, loads) in FORCE.items():
-        found[f"force {disks}"] = _sweep(sets_of_modes()[f"force {disks}"].scene, most, loads, LAWS)
+        found[f"force {disks}"] = _sweep(modes[f"force {disks}"].scene, most, loads, LAWS)
         if disks == 100:
-            found["growth 100"] = _sweep(sets_of_modes()["force 100"].scene, GROWING, GROWTH_LOADS, GROWTH)
+            found["growth 100"] = _sweep(modes["force 100"].scene, GROWING, GROWTH_LOADS, GROWTH)
             for history in ("total", "coulomb"):
-                found[f"onset {history}"] = _onset(sets_of_modes()["force 100"].scene, history)
+                found[f"onset {history}"] = _onset(modes["force 100"].scene, history)
             for depth, packings in QUARTZ.items():
                 found[f"quartz {depth}"] = _sweep(quartz(depth), packings, QUARTZ_LOADS, LAWS)
     return found

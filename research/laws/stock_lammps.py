@@ -36,14 +36,18 @@ import numpy as np
 from mpi4py import MPI
 from scipy.linalg import eigvals
 
-from faultgouge.analysis import Configuration, Packing, damping_matrix, spectrum, stiffness_matrix
-from faultgouge.analysis.arrays import Floats, Indices
+from faultgouge.analysis import (
+    Configuration,
+    Floats,
+    Indices,
+    Packing,
+    damping_matrix,
+    dynamical_matrix,
+    mass_weighted,
+    spectrum,
+)
 from faultgouge.analysis.files.formats.lammps_data import box_lines
-from faultgouge.analysis.motion.eigenvalues import active_coordinates, mass_weighted
-from faultgouge.pywrap import Scene, from_lammps, ramp, settle
-from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
-from faultgouge.pywrap.lammps.instance import lammps_instance
-from faultgouge.pywrap.scenes.units import dashpot
+from faultgouge.pywrap import Scene, dashpot, from_lammps, in_a_copy, lammps_instance, ramp, settle
 from faultgouge.studies.result_rows import append_row
 from research.laws.both_laws import as_slider
 from research.laws.growth import DRAWS, LOOK, TIME, TO, growth_of_course
@@ -213,10 +217,9 @@ def come_to_rest(lmp: Any, radii: Floats) -> float:
 
 def fastest_damped(found: Configuration) -> float:
     """Largest Re s of s^2 M + s C + K, 1 / time."""
-    a = mass_weighted(stiffness_matrix(found), found)
-    active = active_coordinates(a)
+    matrix, active = dynamical_matrix(found)
     g = mass_weighted(damping_matrix(found), found)[active][:, active].toarray()
-    a, size = a[active][:, active].toarray(), len(active)
+    a, size = matrix.toarray(), len(active)
     return float(eigvals(np.block([[np.zeros((size, size)), np.eye(size)], [-a, -g]])).real.max())
 
 

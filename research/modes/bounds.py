@@ -12,7 +12,7 @@ import numpy as np
 
 from faultgouge.analysis import NoEquilibriumError, Packing, eigenvalues
 from faultgouge.pywrap import Engine, Scene, equilibrate, settle
-from faultgouge.studies.modes.count_pairs import antisymmetric_norm
+from faultgouge.studies.modes import antisymmetric_norm
 from faultgouge.studies.result_rows import append_row
 
 PACKINGS = {50: 12, 100: 12, 200: 8, 400: 6, 1000: 3}

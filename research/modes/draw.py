@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from faultgouge.figures.style import styled
+from faultgouge.figures import styled
 from faultgouge.studies.modes.draw import LABELS, Course, draw_band
 
 

@@ -22,13 +22,10 @@ import numpy as np
 from scipy.linalg import eigvals
 from scipy.optimize import brentq
 
-from faultgouge.analysis import Packing, dynamical_matrix, eigenvalues
-from faultgouge.analysis.motion.eigenvalues import mass_weighted
-from faultgouge.analysis.operators.damping import damping_matrix
+from faultgouge.analysis import Packing, damping_matrix, dynamical_matrix, eigenvalues, mass_weighted
 from faultgouge.analysis.windows import force_bearing
-from faultgouge.pywrap import Equilibrium, Scene
-from faultgouge.pywrap.scenes.units import dashpot, real_units, restitution
-from faultgouge.studies.modes.count_pairs import along_ramp, count_pairs
+from faultgouge.pywrap import Equilibrium, Scene, dashpot, real_units, restitution
+from faultgouge.studies.modes import along_ramp, count_pairs
 
 RESTITUTIONS = (0.99, 0.97, 0.9, 0.8, 0.7, 0.5)
 """From weak loss to strong."""

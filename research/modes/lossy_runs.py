@@ -18,10 +18,8 @@ import numpy as np
 from mpi4py import MPI
 
 from faultgouge.analysis import Packing
-from faultgouge.pywrap import Engine, Equilibrium, Scene
-from faultgouge.pywrap.runs.undamped import time_step
-from faultgouge.pywrap.scenes.units import dashpot
-from faultgouge.studies.modes.count_pairs import along_ramp
+from faultgouge.pywrap import Engine, Equilibrium, Scene, dashpot, time_step
+from faultgouge.studies.modes import along_ramp
 from research.modes.loss import TANGENTIAL, fastest, impact_velocity, with_dashpots
 from research.packing_tools import distance_of_bearing_disks, shake_disks
 

@@ -13,9 +13,7 @@ from math import isclose
 from pathlib import Path
 from typing import Any
 
-from faultgouge.studies.sweep.run_sweep import run_sweep
-from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS
+from faultgouge.studies.sweep import TASKS, Sweep, run_sweep
 from research.modes.packing_rows import condense, read_known
 from research.modes.page import write_page
 from research.modes.sets import SHARES, sets

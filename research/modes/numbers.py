@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis.packing.packing import Floats
+from faultgouge.analysis import Floats
 from faultgouge.studies.modes.table import QUANTITIES, Table, medians_over_load
 from faultgouge.studies.statistics import median, share
 from research.modes.loss import GROWS, RESTITUTIONS

@@ -6,10 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.studies.modes.table import Table
-from faultgouge.studies.sweep.run_sweep import LINES, read_results
-from research.tables import read_rows
+from faultgouge.studies.sweep import read_results
+from research.tables import SWEEP_ROWS, read_rows
 
 TABLE_SUFFIX = ".jsonl"
 
@@ -31,11 +30,11 @@ def condense(results: Path, tables: Path) -> None:
         The folder of the tables.
     """
     tables.mkdir(parents=True, exist_ok=True)
-    for folder in sorted(path for path in results.iterdir() if (path / LINES).exists()):
+    for folder in sorted(path for path in results.iterdir() if (path / SWEEP_ROWS).exists()):
         rows = read_known(tables, folder.name) | {
-            row["seed"]: row for row in map(_line, read_results(folder / LINES).values())
+            row["seed"]: row for row in map(_line, read_results(folder / SWEEP_ROWS).values())
         }
-        write_text(table_of(tables, folder.name), "".join(json.dumps(rows[seed]) + "\n" for seed in sorted(rows)))
+        table_of(tables, folder.name).write_text("".join(json.dumps(rows[seed]) + "\n" for seed in sorted(rows)))
 
 
 def table_of(tables: Path, name: str) -> Path:

@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.analysis.files.atomic_write import write_json, write_text
-from faultgouge.figures.pages import render
+from faultgouge.figures import render
 from faultgouge.studies.modes.draw import over_load
-from faultgouge.studies.study import draw_all, save_png
 from research.modes.draw import collapse
 from research.modes.loss import EVERY, RESTITUTIONS
 from research.modes.numbers import COMPARISONS, QUALITIES, numbers
 from research.modes.packing_rows import read_tables
 from research.modes.sets import SIZES
+from research.pictures import draw_all
 from research.statistics import interval
+from research.tables import write_json
 
 GENERICITY = Path(__file__).parents[1] / "genericity" / "genericity.json"
 """The exponents of spacings and couplings."""
@@ -59,11 +59,11 @@ def write_page(tables: Path, folder: Path) -> Path:
     }
     formats = {"middle": interval, "exponent": partial(interval, digits=".2f"), "plain": plain, "part": part}
     page = found | names | formats | {"critical": critical}
-    write_text(folder / "tables.md", render(package, "tables.md.j2", **page))
+    (folder / "tables.md").write_text(render(package, "tables.md.j2", **page))
     write_json(folder / "modes.json", finite(found))
     (folder / "pictures").mkdir(exist_ok=True)
-    draw_all(figures, folder / "pictures", print, save_png)
-    write_text(folder / "README.md", render(package, "README.md.j2", **page))
+    draw_all(figures, folder / "pictures")
+    (folder / "README.md").write_text(render(package, "README.md.j2", **page))
     return folder / "README.md"
 
 

@@ -23,10 +23,9 @@ import numpy as np
 from scipy.linalg import eigh, eigvals
 from scipy.special import erf
 
-from faultgouge.analysis import Packing, dynamical_matrix
-from faultgouge.analysis.packing.packing import Floats
+from faultgouge.analysis import Floats, Packing, dynamical_matrix
 from faultgouge.pywrap import Equilibrium, Scene
-from faultgouge.studies.modes.count_pairs import PairCounts, along_ramp
+from faultgouge.studies.modes import PairCounts, along_ramp
 from research.genericity.levels import Pencil, local_mean
 from research.genericity.surrogates import randomise_pencil
 

@@ -17,8 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from faultgouge.pywrap.scenes.validation import read_toml
-from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS
+from faultgouge.studies.sweep import TASKS, Sweep
 
 SIZES = {50: 100, 100: 100, 200: 50, 400: 30, 1000: 15}
 """Packings by number of disks, with a fixed force on each disk of the layer and mu = 1."""

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from faultgouge.analysis import dynamical_matrix, eigenvalues
+from faultgouge.studies.modes import PairCounts
 from faultgouge.studies.modes.count_in_slices import count_in_slices
-from faultgouge.studies.modes.count_pairs import DENSE_DISKS, PairCounts
+from faultgouge.studies.modes.count_pairs import DENSE_DISKS
 from faultgouge.studies.result_rows import append_row
 from research.modes.bounds import at_loads
 

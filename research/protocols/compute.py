@@ -24,18 +24,12 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
-from faultgouge.analysis import Packing
-from faultgouge.pywrap import Scene
-from faultgouge.pywrap.runs.drive import DriveSample, drive, settle_for_drive
-from faultgouge.pywrap.runs.undamped import Checkpoint
-from faultgouge.studies.result_rows import append_row
-from research.tables import read_rows
+from faultgouge.pywrap import DriveSample, Scene
+from research.driven_runs import DrivenRun
 
 FY = 3.0
 VELOCITY = 1e-3
@@ -79,19 +73,9 @@ class Divided:
     def __init__(self, seed: int) -> None:
         self.seed = seed
         self.before = [(FAST, (SLID - LAST) / FAST), (VELOCITY, LAST / VELOCITY)]
-        first = scene(seed, self.before)
-        self.start: Packing = settle_for_drive(first, MPI.COMM_SELF)
-        self.known: list[DriveSample] = []
-        reached: list[tuple[int, Checkpoint]] = []
-
-        def keep(checkpoint: Checkpoint) -> None:
-            reached.append((len(self.known), checkpoint))
-
-        for step in drive(first, self.start, keep=keep, communicator=MPI.COMM_SELF):
-            self.known.append(step.sample)
-        rows, self.checkpoint = reached[-1]
-        del self.known[rows:]
-        self.time = self.known[-1].time
+        run = DrivenRun.of(scene(seed, self.before))
+        self.start, self.moment = run.start, run.moments[-1]
+        self.rows, self.time = self.moment.rows, self.moment.time
 
     def go_on(self, stages: list[tuple[float, float]], weaker: float = 1.0) -> list[DriveSample]:
         """Rows of the series after the run has divided, from then on with weaker dashpots."""
@@ -99,8 +83,7 @@ class Divided:
         wanted = scene(self.seed, [(fast, first), (VELOCITY, self.time - first), *stages])
         law = self.start.law
         start = replace(self.start, law=replace(law, cn=law.cn / weaker, ct=law.ct / weaker))
-        steps = drive(wanted, start, self.known, self.checkpoint, communicator=MPI.COMM_SELF)
-        return [step.sample for step in steps]
+        return [step.sample for step in self.moment.go_on(wanted, start)]
 
 
 def in_bins(rows: list[DriveSample], origin: float) -> dict[str, list[float]]:
@@ -123,8 +106,8 @@ def rows_of(seed: int) -> Iterator[dict[str, Any]]:
     """All rows of one seed."""
     begin = time.process_time()
     run = Divided(seed)
-    origin = run.known[-1].displacement
-    late = [row for row in run.known if row.displacement > origin - LAST]
+    origin = run.rows[-1].displacement
+    late = [row for row in run.rows if row.displacement > origin - LAST]
     base = {
         "friction": float(np.mean([row.force for row in late]) / FY),
         "spread": float(np.std([row.force for row in late]) / FY),
@@ -154,26 +137,7 @@ def rows_of(seed: int) -> Iterator[dict[str, Any]]:
 def weak_rows_of(seed: int) -> Iterator[dict[str, Any]]:
     """The first bin of the control and of the largest step, with weaker dashpots after the run has divided."""
     run = Divided(seed)
-    origin = run.known[-1].displacement
+    origin = run.rows[-1].displacement
     for kind, velocity in (("control", VELOCITY), ("step", FACTORS[0] * VELOCITY)):
         rows = run.go_on([(velocity, EDGES[1] / velocity)], WEAKER)
         yield {"seed": seed, "kind": f"weak {kind}"} | in_bins(rows, origin)
-
-
-def compute_weak(table: Path, seeds: range) -> None:
-    """Add the seeds that a table of weaker dashpots lacks, in their order."""
-    known = {row["seed"] for row in read_rows(table)} if table.exists() else set()
-    for seed in seeds:
-        if seed not in known:
-            for row in list(weak_rows_of(seed)):
-                append_row(table, row)
-
-
-def compute(table: Path, seeds: range, watch: Any = print) -> None:
-    """Add the seeds that a table lacks, in their order; what is written is of whole seeds."""
-    known = {row["seed"] for row in read_rows(table)} if table.exists() else set()
-    for seed in seeds:
-        if seed not in known:
-            for row in list(rows_of(seed)):
-                append_row(table, row)
-            watch(f"seed {seed}", flush=True)

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import t as student
 
-from faultgouge.analysis.files.atomic_write import write_text
-from faultgouge.figures.pages import render
+from faultgouge.figures import render
 from research.protocols.compute import (
     EDGES,
     ENDS,
@@ -29,12 +28,11 @@ from research.protocols.compute import (
     LAST,
     VELOCITY,
     WEAKER,
-    compute,
-    compute_weak,
     rows_of,
+    weak_rows_of,
 )
 from research.statistics import interval
-from research.tables import read_rows
+from research.tables import add_seeds, read_rows
 
 HERE = Path(__file__).parent
 TABLE, WEAK = "protocols.jsonl", "dashpots.jsonl"
@@ -126,7 +124,7 @@ def numbers(rows: Sequence[Row], weak: Sequence[Row]) -> Row:
 def write_page(folder: Path = HERE) -> Path:
     """Write README.md of a folder from its table."""
     found = numbers(*(read_rows(folder / "tables" / name) for name in (TABLE, WEAK)))
-    write_text(folder / "README.md", render("research.protocols", "README.md.j2", **found, interval=interval))
+    (folder / "README.md").write_text(render("research.protocols", "README.md.j2", **found, interval=interval))
     return folder / "README.md"
 
 
@@ -144,8 +142,8 @@ def check() -> list[str]:
 if __name__ == "__main__":
     match sys.argv[1:]:
         case ["compute", seeds]:
-            compute(HERE / "tables" / TABLE, range(1, int(seeds) + 1))
-            compute_weak(HERE / "tables" / WEAK, range(1, int(seeds) + 1))
+            for table, rows in ((TABLE, rows_of), (WEAK, weak_rows_of)):
+                add_seeds(HERE / "tables" / table, range(1, int(seeds) + 1), rows)
         case ["page"]:
             print(write_page())
         case ["check"]:

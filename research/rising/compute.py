@@ -7,7 +7,7 @@ under a load that rises.
 **Which packings.** *Ramps*: layers of 100 disks (k_n = 2e5, F_y = 3, mu = 1) that settle without friction and are then
 loaded in increments of 1e-3 F_y, either with the slider from the beginning (law "coulomb") or with the smoothed law
 ("total"), at 0.1, 0.2 and 0.3 F_y, with dashpots of the restitutions 0.9 and 0.97 (C_T = 2/7 C_N). *Poured*: layers of
-50 spheres under LAMMPS's own laws on slopes of 0.2 and 0.3, with two stiffnesses and dashpots of one restitution.
+50 spheres under LAMMPS's own laws on slopes of 0.2 and 0.3, with three stiffnesses and dashpots of one restitution.
 
 **The rule.** Packings are those of the seeds 1, 2, 3, ... in this order, all of them, with all that is asked of one
 seed before the next; the number of seeds is what the time allowed.
@@ -29,12 +29,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from faultgouge.analysis import Configuration, Packing, Stability, stability
+from faultgouge.analysis import Configuration, Packing, Signal, Stability, stability
 from faultgouge.analysis.motion.one_sided_outcome import DRAG, FADE
-from faultgouge.analysis.motion.signals import Signal
-from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.runs.undamped import time_step
-from faultgouge.pywrap.scenes.units import dashpot
+from faultgouge.pywrap import Engine, Scene, dashpot, settle, time_step
 from research.lammps_laws.compute import GAMMA, KN, MU, pour, rest
 from research.laws.both_laws import as_slider, at_loads
 from research.modes.loss import impact_velocity, with_dashpots
@@ -55,9 +52,9 @@ RATES = (3e-4, 3e-5, 3e-6)
 WINDOWS, STAGES, LOOKS = 24, 40, 400
 """Windows of a run, stages in which the drag fades, and looks at velocities in each of the last two windows."""
 
-POURED_LAWS = ("granular hertz, mindlin/force", "granular hertz, mindlin_rescale/force")
-STIFFNESSES = (KN, KN / 10**1.5)
-"""Overlaps go as k_n^(-2/3): some 1e-3 and 1e-2 of a diameter. Dashpots go as k_n^(2/3), with one restitution."""
+POURED_LAWS = tuple(f"granular hertz, {law}" for law in ("mindlin/force", "mindlin_rescale/force", "linear_history"))
+STIFFNESSES = (KN, KN / 10**1.5, KN / 10**2.25)
+"""Overlaps go as k_n^(-2/3): some 6e-4, 6e-3 and 2e-2 of a diameter. Dashpots go as k_n^(2/3), with one restitution."""
 
 SLOPES, POURED_SEEDS = (0.2, 0.3), 5
 
@@ -113,25 +110,36 @@ def verdict(found: Stability, configuration: Configuration) -> dict[str, Any]:
 
 
 def rise_in_lammps(packing: Packing, rate: float) -> dict[str, float]:
-    """Drift and vibration over the rate of a load that rises, as the plugin integrates it.
+    """Drift and vibration over the rate of a load that rises, as the plugin integrates it: the last two windows."""
+    drift, vibration = np.sqrt(np.mean(np.square(windows_in_lammps(packing, rate)[-2:]), axis=0)).tolist()
+    return {"drift": drift, "vibration": vibration}
 
-    The last two of `WINDOWS` windows are measured.
+
+def windows_in_lammps(packing: Packing, rate: float, spins: bool = False, windows: int = WINDOWS) -> list[list[float]]:
+    """Drift and vibration over the rate, as the plugin integrates it, in each window after the drag has faded out.
+
+    LAMMPS's fix viscous does not act on rotations; with `spins` they are slowed down, too, between parts of the run.
     """
     dt = time_step(packing)
     chunk = 300 * dt / 0.05  # as of one-sided motion: `time_step` is 0.05 of the stable one
     look = max(1, round(chunk / LOOKS / dt))
     steps = look * LOOKS
-    end = 2 * WINDOWS * chunk
+    parts = 10 if spins else 1
+    end = 2 * windows * chunk
     signal = Signal(np.array([0.0, end]), np.array([0.0, rate * end]))
     values = []
     with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(dt, signal=signal) as dynamics:
+        lmp, part = engine.lammps, FADE * steps // STAGES // parts
         for stage in range(STAGES):
             drag = DRAG / (steps * dt) * (1 - (stage + 0.5) / STAGES) ** 2
-            engine.lammps.command(f"fix fade all viscous {drag!r}")
-            engine.lammps.command(f"run {FADE * steps // STAGES} post no")
-        engine.lammps.command("unfix fade")
-        engine.lammps.command(f"run {(WINDOWS - FADE - 2) * steps} post no")
-        for _ in range(2):
+            lmp.command(f"fix fade all viscous {drag!r}")
+            for _ in range(parts):
+                lmp.command(f"run {part} post no")
+                if spins:
+                    lmp.numpy.extract_atom("omega")[: len(packing)] *= np.exp(-drag * part * dt)
+        lmp.command("unfix fade")
+        lmp.command("run 0 post no")
+        for _ in range(windows - FADE):
             start = dynamics.advance(1).position
             squares = np.zeros_like(start)
             for _ in range(LOOKS):
@@ -141,9 +149,8 @@ def rise_in_lammps(packing: Packing, rate: float) -> dict[str, float]:
             if packing.box_length is not None:
                 moved[:, 0] -= packing.box_length * np.round(moved[:, 0] / packing.box_length)
             mean = moved / (steps * dt)
-            values.append((np.mean(mean**2), np.mean(np.maximum(squares - mean**2, 0.0))))
-    drift, vibration = np.sqrt(np.mean(values, axis=0)) / rate
-    return {"drift": float(drift), "vibration": float(vibration)}
+            values.append([np.mean(mean**2), np.mean(np.maximum(squares - mean**2, 0.0))])
+    return (np.sqrt(values) / rate).tolist()
 
 
 def poured(law: str, kn: float, slope: float, seed: int) -> dict[str, Any]:
@@ -157,15 +164,6 @@ def poured(law: str, kn: float, slope: float, seed: int) -> dict[str, Any]:
         lmp.close()
     row = {"rests": False} if found is None else {"rests": True} | verdict(stability(found), found)
     return key | row | {"cpu_seconds": time.process_time() - begin}
-
-
-def compute_layers(table: Path, watch: Any = print) -> None:
-    """Add the seeds that a table lacks, in their order; what is written is of whole seeds."""
-    known = {row["seed"] for row in read(table)}
-    for seed in range(1, SEEDS + 1):
-        if seed not in known:
-            append(table, list(layers(seed)))
-            watch(f"seed {seed}", flush=True)
 
 
 def compute_poured(table: Path, watch: Any = print) -> None:

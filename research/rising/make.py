@@ -2,8 +2,10 @@
 
 python -m research.rising.make layers    what the table of layers lacks, on one core, resumable; an hour
 python -m research.rising.make poured    what the table of poured spheres lacks; ten minutes
+python -m research.rising.make starts SEEDS   what the table of two starts lacks; a minute a seed
+python -m research.rising.make onsets SEEDS   what the table of onsets lacks; ten seconds a seed
 python -m research.rising.make page      README.md from the tables
-python -m research.rising.make check     the first seed of the layers once more, compared
+python -m research.rising.make check     the first seed of the layers and a tenth of the spheres once more, compared
 
 From the folder of the repository.
 """
@@ -13,10 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from faultgouge.analysis.files.atomic_write import write_text
-from faultgouge.figures.pages import render
+from faultgouge.analysis.motion.one_sided_outcome import FADE, WINDOWS
+from faultgouge.figures import render, save, styled
 from faultgouge.studies.statistics import share
+from research.laws.both_laws import RESTITUTIONS as WEAKEST_FIRST
+from research.modes.loss import GROWS as LINEAR
+from research.rising import onsets
 from research.rising.compute import (
     COMPARED,
     HISTORIES,
@@ -28,14 +34,25 @@ from research.rising.compute import (
     SEEDS,
     SLOPES,
     STIFFNESSES,
-    compute_layers,
     compute_poured,
     layers,
+    poured,
     read,
 )
+from research.rising.starts import APART, order, rows_of
+from research.tables import add_seeds
 
 HERE = Path(__file__).parent
-LAYERS, POURED = (HERE / "tables" / f"{name}.jsonl" for name in ("layers", "poured"))
+LAYERS, POURED, STARTS, ONSETS = (
+    HERE / "tables" / f"{name}.jsonl" for name in ("layers", "poured", "starts", "onsets")
+)
+LAWS = HERE.parent / "laws" / "tables" / "force_100.jsonl"
+
+QUALITIES = (50, 100, 200, 300)
+"""Q of a loss that takes omega/Q of each mode; rock has 50 to 300."""
+
+LATEST = 8
+"""Windows over which the vibration of a start is a mean, and which are compared with as many before."""
 
 VIBRATES = 0.05
 """Vibration over drift of a layer that is said to vibrate; what a start leaves is a hundredth at the most."""
@@ -102,9 +119,97 @@ def beside_lammps(rows: list[Row]) -> dict[str, Any]:
     }
 
 
-def numbers(tables: tuple[Path, Path] = (LAYERS, POURED)) -> dict[str, Any]:
+def over_loss(laws: list[Row], cells: list[Row]) -> list[Row]:
+    """How many packings move by themselves, over load and restitution: both laws, contacts at the bound in three ways.
+
+    Sticking contacts, and both laws, are those of the tables of research/laws, each law on its own ramp.
+    """
+    found = []
+    for load in LOADS:
+        at = {name: [each[name] for row in laws for each in row["loads"] if each["fx_over_fy"] == load and name in each]
+              for name in ("smooth", "loaded")}  # fmt: skip
+        for restitution in WEAKEST_FIRST:
+            grown = {name: [dict(map(tuple, each["damped"]))[restitution] > LINEAR for each in states]
+                     for name, states in at.items()}  # fmt: skip
+            own = [c for c in cells if (c["law"], c["load"], c["restitution"]) == ("coulomb", load, restitution)]
+            found.append(
+                {"load": load, "restitution": restitution, "as_they_are": own[0] if own else None}
+                | {name: share(sum(values), len(values)) for name, values in grown.items()}
+            )
+    return found
+
+
+def over_quality(laws: list[Row]) -> list[Row]:
+    """How many packings have a pair that a loss of each Q does not stop, over the load, of both laws."""
+    found = []
+    for load in sorted({each["fx_over_fy"] for row in laws for each in row["loads"]}):
+        for name in ("smooth", "loaded"):
+            least = [each[name]["least_q"] or np.inf for row in laws for each in row["loads"]
+                     if each["fx_over_fy"] == load and name in each]  # fmt: skip
+            counts = {q: share(sum(each < q for each in least), len(least)) for q in QUALITIES}
+            found.append({"load": load, "law": name, "counts": counts, "none": sum(np.isinf(least))})
+    return found
+
+
+def onsets_over_undamped(rows: list[Row]) -> list[Row]:
+    """Damped over undamped onsets of each restitution: how many there are, their quartiles and range."""
+    found = []
+    for restitution in onsets.RESTITUTIONS:
+        both = [(row[str(restitution)], row["undamped"]) for row in rows if row["undamped"] is not None]
+        ratios = np.array([damped / undamped for damped, undamped in both if damped is not None])
+        found.append(
+            {
+                "restitution": restitution,
+                "found": share(len(ratios), len(both)),
+                "below": int(np.sum(ratios < 1)),
+                "quartiles": np.quantile(ratios, [0.25, 0.5, 0.75]).tolist() if len(ratios) else None,
+                "range": [float(ratios.min()), float(ratios.max())] if len(ratios) else None,
+            }
+        )
+    return found
+
+
+def of_two_starts(rows: list[Row]) -> list[Row]:
+    """Vibration of each start at the end, one-sided and in LAMMPS, and whether it is steady."""
+    found = []
+    for row in rows:
+        ends = {}
+        for name in ("one_sided", "lammps"):
+            windows = np.array(row[name]["vibration"])
+            last, before = (
+                windows[:, part].mean(axis=1) for part in (slice(-LATEST, None), slice(-2 * LATEST, -LATEST))
+            )
+            ends[name] = [
+                {"vibration": float(now), "steady": bool(abs(now - then) <= WINDOWS * now)}
+                for now, then in zip(last, before, strict=True)
+            ]
+        found.append({"seed": row["seed"], "time": row["chunk"] * (windows.shape[1] + FADE)} | ends)
+    return found
+
+
+@styled
+def figure_of_starts(rows: list[Row]) -> Figure:
+    """Vibration over the rate in one window after the other, of two starts, of the layers of `APART`."""
+    shown = [row for row in rows if row["seed"] in APART]
+    figure = Figure(figsize=(6.2, 2.6), layout="constrained")
+    panels = figure.subplots(1, len(shown), squeeze=False)[0]
+    for axes, row in zip(panels, shown, strict=True):
+        for start, (colour, words) in enumerate((("C0", "drag on all"), ("C3", "drag on translations"))):
+            one, lammps = (np.array(row[name]["vibration"][start]) for name in ("one_sided", "lammps"))
+            times = row["chunk"] * (FADE + 0.5 + np.arange(len(one)))
+            axes.plot(times, one, color=colour, linewidth=1.0, label=words)
+            axes.plot(times[::2], lammps[::2], ".", color=colour, markersize=4)
+        axes.set_yscale("log")
+        axes.set_title(f"seed {row['seed']}", fontsize=8)
+        axes.set_xlabel("$t$")
+    panels[0].set_ylabel("vibration over the rate")
+    panels[0].legend(fontsize=6, loc="lower right")
+    return figure
+
+
+def numbers() -> dict[str, Any]:
     """All numbers of the page."""
-    every, spheres = (read(table) for table in tables)
+    every, spheres, starts, laws, firsts = (read(table) for table in (LAYERS, POURED, STARTS, LAWS, ONSETS))
     rows = [row for row in every if "stable" in row]
     cells = []
     for load in LOADS:
@@ -115,7 +220,7 @@ def numbers(tables: tuple[Path, Path] = (LAYERS, POURED)) -> dict[str, Any]:
                 cells.append(dict(zip(("law", "load", "restitution"), key, strict=True)) | outcomes(own))
                 if law == "coulomb":
                     cells[-1]["rising"] = under_the_load(own)
-    poured = []
+    piles = []
     for law in POURED_LAWS:
         for kn in STIFFNESSES:
             for slope in SLOPES:
@@ -124,7 +229,7 @@ def numbers(tables: tuple[Path, Path] = (LAYERS, POURED)) -> dict[str, Any]:
                 cell: Row = {"law": law, "kn": kn, "slope": slope, "tried": len(tried)} | outcomes(good)
                 cell["overlap"] = float(np.median([row["overlap"] for row in good])) if good else None
                 cell["pairs"] = sum(row["pairs"] > 0 for row in good)
-                poured.append(cell)
+                piles.append(cell)
     return {
         "cells": cells,
         "usual": {cell["load"]: cell for cell in cells if (cell["law"], cell["restitution"]) == ("coulomb", 0.9)},
@@ -134,7 +239,14 @@ def numbers(tables: tuple[Path, Path] = (LAYERS, POURED)) -> dict[str, Any]:
         "ended": [row for row in every if "stable" not in row],
         "lammps": beside_lammps(rows),
         "rates": RATES,
-        "poured": poured,
+        "starts": of_two_starts(starts),
+        "over_loss": over_loss(laws, cells),
+        "over_quality": over_quality(laws),
+        "qualities": QUALITIES,
+        "onsets": onsets_over_undamped(firsts),
+        "onset_seeds": [row["seed"] for row in firsts],
+        "without_onset": sum(row["undamped"] is None for row in firsts),
+        "poured": piles,
         "poured_seeds": max((row["seed"] for row in spheres), default=0),
         "poured_rows": len(spheres),
         "poured_asked": POURED_SEEDS * len(POURED_LAWS) * len(STIFFNESSES) * len(SLOPES),
@@ -144,6 +256,11 @@ def numbers(tables: tuple[Path, Path] = (LAYERS, POURED)) -> dict[str, Any]:
 def count(value: dict[str, Any]) -> str:
     """A count of so many."""
     return f"{value['count']} of {value['of']}"
+
+
+def part(value: dict[str, Any]) -> str:
+    """A count with the interval of its share, in per cent."""
+    return f"{count(value)} ({100 * value['low']:.0f} to {100 * value['high']:.0f} %)"
 
 
 def spread(value: list[float] | None, digits: str = ".2g") -> str:
@@ -156,13 +273,20 @@ def spread(value: list[float] | None, digits: str = ".2g") -> str:
 
 def write_page(folder: Path = HERE) -> Path:
     """Write README.md of a folder from the tables."""
-    text = render("research.rising", "README.md.j2", **numbers(), count=count, spread=spread, at=COMPARED)
-    write_text(folder / "README.md", text)
+    found = numbers()
+    at = {each["law"]: each["counts"] for each in found["over_quality"] if each["load"] == COMPARED[0]}
+    contrast = [at[law][q] for q in (QUALITIES[0], QUALITIES[-1]) for law in ("smooth", "loaded")]
+    words = {"count": count, "spread": spread, "part": part, "contrast": contrast, "at": COMPARED}
+    text = render("research.rising", "README.md.j2", **found, **words)
+    (folder / "README.md").write_text(text)
+    (folder / "pictures").mkdir(exist_ok=True)
+    _, vectors = save(figure_of_starts(read(STARTS)), folder / "pictures" / "starts")
+    vectors.unlink()  # the page shows dots, and the lines of this file are many
     return folder / "README.md"
 
 
 def check() -> list[str]:
-    """The rows of the first seed computed again that differ from the table."""
+    """The rows of the first seed, and the first tenth of the spheres, computed again, that differ from the tables."""
     names = ("law", "fx_over_fy", "restitution")
     known = {tuple(row[name] for name in names): row for row in read(LAYERS) if row["seed"] == 1 and "stable" in row}
     wrong = []
@@ -173,15 +297,24 @@ def check() -> list[str]:
         )
         if not same:
             wrong.append(f"{key}: {row['stable']}, {row['sticking']:.6g}; before {known[key]['stable']}")
+    spheres = read(POURED)
+    for old in spheres[: len(spheres) // 10]:
+        new = poured(*(old[name] for name in ("law", "kn", "slope", "seed")))
+        if any(old[name] != new[name] for name in ("rests", "stable") if name in old):
+            wrong.append(f"{new}; before {old}")
     return wrong
 
 
 if __name__ == "__main__":
     match sys.argv[1:]:
         case ["layers"]:
-            compute_layers(LAYERS)
+            add_seeds(LAYERS, range(1, SEEDS + 1), layers)
         case ["poured"]:
             compute_poured(POURED)
+        case ["starts", seeds]:
+            add_seeds(STARTS, order(int(seeds)), rows_of)
+        case ["onsets", seeds]:
+            add_seeds(ONSETS, range(1, int(seeds) + 1), onsets.rows_of)
         case ["page"]:
             print(write_page())
         case ["check"]:

@@ -17,10 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError
-from faultgouge.pywrap import Scene, SceneError, reach
-from faultgouge.pywrap.onset import onset_run
+from faultgouge.pywrap import Scene, SceneError, onset_run, reach
 from faultgouge.pywrap.scenes.validation import require_section
-from faultgouge.studies.triggering.forecast import Forecast, forecast
+from faultgouge.studies.triggering import Forecast, forecast
 from research.packing_tools import with_seed
 
 SCENE = Path(__file__).parents[2] / "scenes" / "triggered.toml"

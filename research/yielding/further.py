@@ -17,10 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from faultgouge.pywrap import Engine, Equilibrium, Scene, settle
-from faultgouge.pywrap.runs.undamped import time_step
+from faultgouge.pywrap import Engine, Equilibrium, Scene, settle, time_step
+from faultgouge.pywrap.scenes.validation import read_toml
 from faultgouge.studies.result_rows import append_row
-from faultgouge.studies.sweep.sweep_plan import read_toml
 from research.laws.both_laws import as_slider
 from research.modes.loss import with_dashpots
 from research.packing_tools import distance_of_bearing_disks, shake_disks

@@ -14,9 +14,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import binomtest
 
-from faultgouge.analysis.packing.packing import Floats
-from faultgouge.figures.pages import render
-from faultgouge.figures.style import INK, save, styled
+from faultgouge.analysis import Floats
+from faultgouge.figures import INK, render, save, styled
 from faultgouge.studies.result_rows import row_columns
 from faultgouge.studies.statistics import median, share
 from research.modes.loss import GROWS

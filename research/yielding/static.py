@@ -20,9 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from faultgouge.analysis import NoEquilibriumError, Packing, nearest_image, negative_eigenvalues
-from faultgouge.pywrap import Engine, Equilibrium
-from faultgouge.pywrap.equilibria.quasistatic import equilibrate
-from faultgouge.pywrap.runs.undamped import time_step
+from faultgouge.pywrap import Engine, Equilibrium, equilibrate, time_step
 
 STEP = 0.01
 """Increment of F_x, in units of F_y."""

@@ -13,7 +13,7 @@ from ...analysis import NoEquilibriumError
 from ...analysis.counted import counted
 from ...analysis.motion.growth import ABOVE
 from ...pywrap import Scene, SceneError
-from ...pywrap.runs.equilibrium_path import loads
+from ...pywrap.runs.ramp_loads import ramp_loads
 from ...pywrap.scenes.study_sections import Eruptions
 from ...pywrap.scenes.validation import require_section
 from ...pywrap.settling.settle import settle
@@ -112,7 +112,7 @@ def _check_section(scene: Scene) -> Eruptions:
 
 def _starts(scene: Scene, wanted: list[float], time: float) -> tuple[list[Start], float | None]:
     """The equilibria at the loads that the packing bears, and the last load that it bears if there are more."""
-    steps = loads(require_section(scene.ramp, "ramp"))
+    steps = ramp_loads(scene)
     starts: list[Start] = []
     with path_from(settle(scene, communicator=MPI.COMM_SELF), scene) as path:
         for fx in wanted:

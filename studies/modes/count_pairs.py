@@ -50,9 +50,9 @@ from ...analysis import (
     NoEquilibriumError,
     Packing,
     dynamical_matrix,
-    eigenpairs,
     eigenvalues,
     growth_rate,
+    nearest_modes,
     negative_eigenvalues,
     stiffness_matrix,
 )
@@ -65,7 +65,7 @@ from ...analysis.motion.eigenvalues import (
     unit_rounding,
 )
 from ...pywrap import Equilibrium, Scene
-from ...pywrap.runs.equilibrium_path import EquilibriumPath
+from ...pywrap.load_path import LoadPath
 from ...pywrap.scenes.study_sections import ModesSection
 from ...pywrap.scenes.validation import require_section
 from ..packing_tools import Start, path_from
@@ -151,7 +151,7 @@ def count_pairs(packing: Packing) -> PairCounts:
 
 
 def _is_real(packing: Packing, value: complex, rounding: float) -> bool:
-    found = eigenpairs(packing, value * (1 + SHIFT_OFFSET), 2)
+    found = nearest_modes(packing, value * (1 + SHIFT_OFFSET), 2)
     nearest = int(np.argmin(np.abs(found.values - value)))
     return exceeds_rounding(value, float(found.overlap[nearest]), rounding)
 
@@ -235,7 +235,7 @@ def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[s
     return row | {"reach": path.equilibria[-1].fx, "contacts": len(rest.packing.contacts)}
 
 
-def _climb_to(path: EquilibriumPath, fx: float, step: float) -> Packing:
+def _climb_to(path: LoadPath[Equilibrium], fx: float, step: float) -> Packing:
     """The packing at fx, by multiples of the step up to there."""
     for k in range(round(path.equilibria[-1].fx / step), int(fx / step) + 1):
         if path.equilibria[-1].fx < k * step < fx:
@@ -258,7 +258,7 @@ def _load(packing: Packing) -> dict[str, Any]:
         row["pairs_error"] = found.error
     if len(found.omega):
         value = found.omega[0] ** 2
-        pair = eigenpairs(packing, value * (1 + SHIFT_OFFSET), 1)
+        pair = nearest_modes(packing, value * (1 + SHIFT_OFFSET), 1)
         row |= {"participation": float(pair.participation[0]), "rotation": float(pair.rotation[0])}
     if len(packing) <= SWITCH_DISKS:
         row["b_of"] = count_with_part_of_b(packing)

@@ -19,7 +19,7 @@ from ...analysis.counted import counted
 from ...analysis.motion.growth import growing_range
 from ...analysis.motion.growth_of_run import BELOW_TOP
 from ...analysis.packing.packing import Floats
-from ...analysis.windows.pair_form import pair_eigenvalues
+from ...analysis.windows.pair_over_load import pair_eigenvalues
 from ...figures.pair import PairCurve
 from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
 from ...pywrap.onset import onset_run

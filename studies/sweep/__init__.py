@@ -1,1 +1,7 @@
 """Sweeps: one task for every scene of a product of keys, distributed to workers, resumable, in shards."""
+
+from .run_sweep import merge, read_results, run_sweep
+from .sweep_plan import Sweep
+from .tasks import TASKS
+
+__all__ = ["TASKS", "Sweep", "merge", "read_results", "run_sweep"]

@@ -25,13 +25,15 @@ import numpy as np
 from scipy.linalg import eigh, eigvals
 
 from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
-from ...analysis.motion.eigenpairs import eigenpairs
 from ...analysis.motion.eigenvalues import active_coordinates
+from ...analysis.motion.nearest_modes import nearest_modes
 from ...analysis.packing.packing import Floats, Indices
 from ...analysis.windows import force_bearing, full_operator, takes_all_modes
 from ...pywrap import Scene, SceneError
-from ...pywrap.runs.equilibrium_path import EquilibriumPath, loads
+from ...pywrap.equilibria.quasistatic import Equilibrium
+from ...pywrap.load_path import LoadPath
 from ...pywrap.runs.path_error import with_path_error
+from ...pywrap.runs.ramp_loads import ramp_loads
 from ...pywrap.scenes.validation import require_section
 from ..packing_tools import Start, contact_pairs, path_from
 
@@ -69,10 +71,10 @@ def onset(scene: Scene, start: Start) -> dict[str, Any]:
     return row
 
 
-def first_window(path: EquilibriumPath, scene: Scene) -> tuple[Ends, float, Onset | None]:
+def first_window(path: LoadPath[Equilibrium], scene: Scene) -> tuple[Ends, float, Onset | None]:
     """How the ramp ends, the largest F_x up to which there is no window, and the onset if there is one."""
     try:
-        found = find_onset(path, loads(require_section(scene.ramp, "ramp")), first=True)
+        found = find_onset(path, ramp_loads(scene), first=True)
     except NoEquilibriumError:
         return "flows", path.equilibria[-1].fx, None
     except OnsetError:
@@ -85,7 +87,7 @@ def pair(packing: Packing, rest: Packing, eigenvalue: float) -> dict[str, Any]:
 
     The packing is just below the onset, and `rest` the one at F_x = 0.
     """
-    near = eigenpairs(force_bearing(packing), eigenvalue * (1 + 1e-6), 2)
+    near = nearest_modes(force_bearing(packing), eigenvalue * (1 + 1e-6), 2)
     vector = near.right[:, 0].real / np.linalg.norm(near.right[:, 0].real)
     axes = vector.reshape(3, -1) ** 2
     weight = axes.sum(axis=0)

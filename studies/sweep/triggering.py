@@ -26,8 +26,8 @@ from mpi4py import MPI
 from ...analysis import FaultgougeError
 from ...pywrap import Engine, Equilibrium, Scene
 from ...pywrap.lammps.dynamics import Weakening
-from ...pywrap.runs.equilibrium_path import EquilibriumPath
 from ...pywrap.runs.path_error import with_path_error
+from ...pywrap.runs.scene_path import scene_path
 from ...pywrap.runs.undamped import perturb
 from ...pywrap.scenes.sections import Friction, Perturb
 from ...pywrap.scenes.validation import require_section
@@ -120,7 +120,7 @@ def first_onset(scene: Scene, mu: float, start: Start) -> tuple[Row, tuple[Equil
     """
     rest = start(mu)
     with Engine(rest.packing, MPI.COMM_SELF) as engine:
-        path = EquilibriumPath(engine, rest, scene)
+        path = scene_path(engine, rest, scene)
         ends, reach, found = first_window(path, scene)
         error = None
         if found is not None:

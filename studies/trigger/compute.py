@@ -31,7 +31,7 @@ from ...analysis.motion.forcing import floor_force, impulse_response
 from ...analysis.motion.response import layer_force
 from ...analysis.packing.packing import Floats
 from ...pywrap import Engine, Scene, SceneError
-from ...pywrap.runs.equilibrium_path import loads
+from ...pywrap.runs.ramp_loads import ramp_loads
 from ...pywrap.runs.undamped import time_step
 from ...pywrap.scenes.study_sections import Trigger
 from ...pywrap.scenes.units import RealUnits
@@ -101,7 +101,7 @@ def equilibria(scene: Scene, fx: Iterable[float]) -> dict[float, Packing]:
     wanted = sorted(fx)
     start = settle(scene, communicator=MPI.COMM_SELF)
     with path_from(start, scene) as path:
-        for load in loads(scene.ramp):
+        for load in ramp_loads(scene):
             if start.fx < load <= wanted[-1]:
                 path(float(load))
         return {each: path(each) for each in wanted}

@@ -31,14 +31,14 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import Growth, Onset, Packing, RunFile, fit_growth, spectrum
-from ...analysis.motion.normal_form import LEAST_CROSSOVER
+from ...analysis.motion.normal_form import LEAST_CROSSOVER, NormalForm
 from ...analysis.motion.power_law import PowerLaw, fit_power_law
 from ...analysis.motion.response import Response, layer_force, linear_response
 from ...analysis.packing.packing import Floats
-from ...analysis.windows.pair_form import PairForm, pair_forms
+from ...analysis.windows.pair_over_load import normal_forms
 from ...pywrap import Engine, Equilibrium, Sample, Scene
 from ...pywrap.lammps.dynamics import Weakening
-from ...pywrap.runs.equilibrium_path import next_equilibrium
+from ...pywrap.runs.scene_path import next_equilibrium
 from ...pywrap.runs.undamped import perturb, time_step, weakening_of
 from ...pywrap.scenes.sections import Friction
 from ...pywrap.scenes.validation import require_section
@@ -124,14 +124,14 @@ class Sensitivity:
     ----------
     distance : ndarray, shape (n,)
         1 - F_x/F_x^c.
-    pairs : tuple of PairForm
+    pairs : tuple of NormalForm
         The pair at these distances.
     fit : PowerLaw
         Of the undamped amplitude over the distance.
     """
 
     distance: Floats
-    pairs: tuple[PairForm, ...]
+    pairs: tuple[NormalForm, ...]
     fit: PowerLaw
 
     @property
@@ -140,7 +140,7 @@ class Sensitivity:
         return np.array([pair.amplitude() for pair in self.pairs])
 
     @property
-    def near(self) -> tuple[PairForm, ...]:
+    def near(self) -> tuple[NormalForm, ...]:
         """The pairs of which damping may take half of the response."""
         return tuple(pair for pair in self.pairs if pair.amplitude() >= LEAST_CROSSOVER)
 
@@ -152,8 +152,8 @@ class Sensitivity:
         """
         if len(self.near) < 2:
             return None
-        near, far = sorted((self.near[0], self.near[-1]), key=lambda pair: pair.form.epsilon)
-        theory = float(np.sqrt(far.form.epsilon / near.form.epsilon))
+        near, far = sorted((self.near[0], self.near[-1]), key=lambda pair: pair.epsilon)
+        theory = float(np.sqrt(far.epsilon / near.epsilon))
         return {"measured": near.amplitude() / far.amplitude(), "theory": theory}
 
 
@@ -335,7 +335,7 @@ def sensitivity(run: Onset) -> Sensitivity:
     # nearer than a hundred times the onset's own error, the distance is not known
     nearest, furthest = 100 * first.error, SENSITIVE * first.fx_onset
     below = [fx for fx in below if nearest < first.fx_onset - fx < furthest]
-    pairs = tuple(pair_forms([run.between[fx] for fx in below], first.eigenvalue))
+    pairs = tuple(normal_forms([run.between[fx] for fx in below], first.eigenvalue))
     distance = 1 - np.array(below) / first.fx_onset
     return Sensitivity(distance, pairs, fit_power_law(distance, [pair.amplitude() for pair in pairs]))
 

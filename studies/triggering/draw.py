@@ -21,9 +21,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import ArrayLike
 
+from ...analysis.motion.normal_form import NormalForm
 from ...analysis.packing.packing import Floats
 from ...analysis.uncertain_digits import with_uncertainty
-from ...analysis.windows.pair_form import PairForm
 from ...figures.series import draw_series, few_decades, positive, scientific
 from ...figures.style import INK, styled
 from ...pywrap.lammps.dynamics import Weakening
@@ -205,7 +205,7 @@ def amplitude_figure(found: Sensitivity) -> Figure:
 
 
 @styled
-def damping_figure(pairs: Sequence[PairForm]) -> Figure:
+def damping_figure(pairs: Sequence[NormalForm]) -> Figure:
     """Response amplitude over the damping time, of a pair at several distances from its coalescence.
 
     Dotted lines are the undamped amplitudes, dots mark the crossover tau = tau_d, rings the damping that takes half of
@@ -223,7 +223,7 @@ def damping_figure(pairs: Sequence[PairForm]) -> Figure:
         at = np.exp(np.interp(np.log(pair.tau_d), np.log(damping), np.log(amplitude)))
         axes.plot([pair.tau_d], [at], "o", color=colour, label=r"$\tau = \tau_d$")
         axes.plot([pair.half_gain_time()], [0.5 * undamped], "o", color=colour, fillstyle="none", label="half")
-        words = rf"$\varepsilon = {scientific(pair.form.epsilon)}$"
+        words = rf"$\varepsilon = {scientific(pair.epsilon)}$"
         _note(axes, words, (last, undamped), (-2, 2), ha="right", va="bottom", color=colour)
     axes.set_xlim(min(pair.tau_d * DAMPING_TIMES[0] for pair in pairs), last)
     axes.set_ylim(top=3 * max(pair.amplitude() for pair in pairs))

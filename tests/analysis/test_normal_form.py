@@ -9,7 +9,7 @@ import pytest
 from faultgouge.analysis.motion.normal_form import ORTHOGONAL, NormalForm
 from faultgouge.analysis.motion.power_law import fit_power_law
 from faultgouge.analysis.motion.response import linear_response
-from faultgouge.analysis.windows.pair_form import pair_forms
+from faultgouge.analysis.windows.pair_over_load import normal_forms
 
 STAR = np.array([1.0, 1.0]) / np.sqrt(2)
 ONSET, DOUBLE_EIGENVALUE = 0.0218330564080, 2058.269
@@ -126,13 +126,13 @@ def packings(path):
 
 @pytest.fixture(scope="module")
 def pairs(packings):
-    return pair_forms(packings, DOUBLE_EIGENVALUE)
+    return normal_forms(packings, DOUBLE_EIGENVALUE)
 
 
 def test_amplitude_of_a_real_pair_diverges_with_exponent_one_half(pairs):
     """Five decades of the load's distance from the onset, and as many of the pair's own epsilon."""
     amplitude = np.array([pair.amplitude() for pair in pairs])
-    epsilon = np.array([pair.form.epsilon for pair in pairs])
+    epsilon = np.array([pair.epsilon for pair in pairs])
     assert epsilon.max() / epsilon.min() > 1e4
     for distance in (DISTANCES, epsilon):
         law = fit_power_law(distance, amplitude)
@@ -153,7 +153,7 @@ def test_whole_packing_follows_its_pair(packings, pairs, damped):
     beat = np.pi * np.sqrt(2) * pair.tau_d
     time = np.linspace(0, 0.6 * beat, 40001)[-8000 if not damped else 0 :: 8]
     response = linear_response(replace(packing, drag_time=tau), time, initial=pair.start)
-    scaled = pair.form.solution(time * pair.frequency, damping_time=None if tau is None else tau * pair.frequency)
+    scaled = pair.solution(time, damping_time=tau)
     expected = scaled @ pair.right.T
     # The rounding 3e-11 of the operator, over the splitting 0.12 and times the phase of a beat.
     np.testing.assert_allclose(response.displacement, expected, atol=1e-7 * np.abs(expected).max())

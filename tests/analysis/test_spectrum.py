@@ -12,15 +12,15 @@ from tiling import tile
 from faultgouge.analysis import (
     BadInputError,
     Contacts,
-    Eigenpairs,
     MindlinLaw,
+    Modes,
     Packing,
     closest_to_meeting,
     discrete_frequency,
     dynamical_matrix,
-    eigenpairs,
     eigenvalues,
     growth_rate,
+    nearest_modes,
     negative_eigenvalues,
     normal_modes,
     spectrum,
@@ -54,7 +54,7 @@ def test_eigenvalues_alone_are_those_of_the_spectrum(reference_packing):
     packing = reference_packing(0.2)
     whole, alone = spectrum(packing), eigenvalues(packing)
     # the same operator in two orders of its coordinates: a simple eigenvalue moves by kappa u |A|
-    kappa = 1 / eigenpairs(packing, 0.0, 1).overlap.min()
+    kappa = 1 / nearest_modes(packing, 0.0, 1).overlap.min()
     np.testing.assert_allclose(alone, whole.eigenvalues, rtol=0, atol=1e3 * kappa * whole.rounding)
     pairs = whole.eigenvalues[whole.eigenvalues.imag > 0]
     assert whole.least_q == min((abs(w.real) / abs(2 * w.imag) for w in np.sqrt(pairs)), default=np.inf)
@@ -80,7 +80,7 @@ def test_copies_of_a_packing_have_its_pairs_each_and_no_others(cluster):
 def test_shift_invert_finds_what_lapack_finds(path, near):
     packing = path(0.022)
     dense = spectrum(packing)
-    some = eigenpairs(packing, near, 6)
+    some = nearest_modes(packing, near, 6)
     nearest = dense.eigenvalues[np.argsort(np.abs(dense.eigenvalues - near))[:6]]
     # one by one: the order of a pair is that of its real parts, which rounding decides
     partner = np.abs(some.values[:, None] - nearest).argmin(axis=1)
@@ -102,7 +102,7 @@ def test_shift_invert_finds_what_lapack_finds(path, near):
 @pytest.mark.parametrize("count", [0, 284])
 def test_impossible_number_of_eigenpairs(reference_packing, count):
     with pytest.raises(ValueError, match="285"):
-        eigenpairs(reference_packing(1.0), 100.0, count)
+        nearest_modes(reference_packing(1.0), 100.0, count)
 
 
 @pytest.mark.parametrize("value", [1.0, 2.5e3, 2e3 + 1.5j, -30.0, 1e-8])
@@ -237,10 +237,10 @@ def test_imaginary_part_grows_as_the_root_of_the_distance(path):
 def test_motions_that_no_force_opposes_do_not_meet():
     """Two zeros of rounding with one vector, as LAPACK has them of three disks that roll on a floor, and two modes."""
     right = np.array([[1.0, 1.0, 0, 0], [0, 0, 1.0, 0.6], [0, 0, 0, 0.8]], dtype=complex)
-    modes = Eigenpairs(np.array([-1e-15, 2e-15, 1.0, 2.0], dtype=complex), right, right, 0)
+    modes = Modes(np.array([-1e-15, 2e-15, 1.0, 2.0], dtype=complex), right, right)
     assert closest_to_meeting(modes) == (2, 3, pytest.approx(0.6, abs=1e-15))
     with pytest.raises(ValueError, match="There are 1 real modes that a force opposes"):
-        closest_to_meeting(Eigenpairs(modes.values[:3], right[:, :3], right[:, :3], 0))
+        closest_to_meeting(Modes(modes.values[:3], right[:, :3], right[:, :3]))
 
 
 def test_modes_of_a_symmetric_operator_are_not_close_to_meeting(path):

@@ -1,6 +1,7 @@
 """The command line as a user types it: what it prints, what it leaves behind, and what it refuses in one sentence."""
 
 import json
+import re
 import time
 from dataclasses import replace
 from functools import partial
@@ -185,8 +186,8 @@ def test_spectrum_of_a_run_file_is_that_of_the_packing_and_says_how_far_it_moves
 @pytest.mark.slow
 def test_spectrum_of_a_large_packing(faultgouge_here, beyond, monkeypatch):
     pairs = json.loads(faultgouge_here("spectrum", beyond / "ramp.h5", "--json").stdout)["pair_count"]
-    monkeypatch.setattr("faultgouge.commands.eigenvalues.MOST_PAIRS", pairs - 1)
-    monkeypatch.setattr("faultgouge.commands.eigenvalues.SLOW_COORDINATES", 0)
+    monkeypatch.setattr("faultgouge.commands.spectrum.MOST_PAIRS", pairs - 1)
+    monkeypatch.setattr("faultgouge.commands.spectrum.SLOW_COORDINATES", 0)
     done = faultgouge_here("spectrum", beyond / "ramp.h5")
     assert "coordinates: their spectrum needs" in done.stderr
     said = done.stdout
@@ -276,7 +277,7 @@ def test_onset_as_json_and_among_some_modes(faultgouge_here, tmp_path):
 
 @pytest.mark.slow
 def test_results_go_to_standard_output_and_progress_to_standard_error(faultgouge, faultgouge_here, tmp_path):
-    """As two pipes of a shell see them; the onset of the reference packing is the first of its windows."""
+    """As two pipes of a shell see those of `onset`; the onset of the reference packing is the first of its windows."""
     scene = LAYER + toml({"ramp": {"step": 5.5e-3, "until": 0.022}, "perturb": {"fx": 0.022, "time": 0.1}})
     (tmp_path / "scene.toml").write_text(scene)
     first = faultgouge("onset", "scene.toml")
@@ -295,7 +296,7 @@ def test_results_go_to_standard_output_and_progress_to_standard_error(faultgouge
     assert (len(found["windows"]), found["fx_c"]) == (1, every["fx_c"])
     assert every["windows"] == sorted(every["windows"], key=lambda window: window["fx_onset"])
     for command, result in (("settle", "100 disks"), ("ramp", "F_x = 0.022 reached"), ("perturb", "F_x = 0.022, mu")):
-        done = faultgouge(command, "scene.toml", "-o", f"{command}.h5")
+        done = faultgouge_here(command, "scene.toml", "-o", f"{command}.h5")
         assert done.stdout.startswith(result)
         assert result not in done.stderr
 
@@ -421,6 +422,20 @@ def test_every_command_has_help_with_an_example(faultgouge, faultgouge_here):
         done = faultgouge_here(command, "--help")
         assert "Example" in done.stdout
         assert "\\" not in done.stdout  # plain text escapes no brackets
+
+
+def test_the_overview_has_the_whole_first_sentence_of_each_command(faultgouge_here, refusal):
+    from faultgouge.commands import program
+
+    _, table = faultgouge_here("--help").stdout.split("Commands:")
+    text = " ".join(table.split())
+    assert "ramp Raise F_x from equilibrium to equilibrium, and store each equilibrium. perturb Run" in text
+    assert "merge Join the shards of a sweep; the table is that of an undivided sweep. modes" in text
+    commands = program().commands
+    hidden = {name for name in commands if commands[name].hidden}
+    assert hidden == {"stability"}  # the name that `extremes` once had
+    assert set(re.findall(r"^  (\w+)  ", table, re.MULTILINE)) == set(commands) - hidden
+    assert "Did you mean 'onset'?" in refusal("onst")
 
 
 @pytest.mark.slow

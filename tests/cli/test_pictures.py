@@ -43,7 +43,7 @@ def test_films_of_a_run_a_ramp_and_a_mode(beyond, faultgouge_here_in):
 
 DRIVE = {
     "damping": {"cn": 60.0, "ct": 17.0},
-    "drive": {"spring": 10.0, "velocity": 2e-3, "until": 200.0, "states": 2.0, "slips": 1},
+    "drive": {"spring": 10.0, "velocity": 4e-3, "until": 200.0, "states": 2.0, "slips": 1},
 }
 """A layer that a fast spring draws until it slips."""
 

@@ -52,6 +52,7 @@ def test_own_law(printed):
     assert min(found) < 0  # the column falls over
 
 
+@pytest.mark.long
 def test_sweep_with_interval(printed):
     text = printed("sweep_interval")
     onsets = [float(each) for each in re.search(r"onsets:(.*)", text)[1].split()]
@@ -72,6 +73,7 @@ def test_deck(printed):
     assert number(text, "differs from that of K and C by") < 2e-3  # in proportion to the time step, with dashpots
 
 
+@pytest.mark.long
 def test_spheres(printed):
     """Nothing grows, and the packing follows a load that rises: what vibrates is a hundredth of the drift at most."""
     text = printed("spheres")
@@ -92,6 +94,7 @@ def test_wave(printed):
     assert number(printed("wave"), "moves the layer") == pytest.approx(10, abs=0.01)
 
 
+@pytest.mark.long
 def test_slip(printed):
     """The spring loses what the layer slips, less what its far end moves on: on another machine, too."""
     text = printed("slip")

@@ -19,7 +19,7 @@ def cells():
     return re.findall(r"^```\{code-cell\} ipython3\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_cells_compute_what_the_answers_say(faultgouge_here, tmp_path):
     facts = """
 import json

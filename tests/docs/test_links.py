@@ -230,6 +230,7 @@ def test_a_packing_of_ones_own(faultgouge, tmp_path):
     ("page", "package"),
     [
         ("analysis", "faultgouge.analysis"),
+        ("windows", "faultgouge.analysis.windows"),
         ("pywrap", "faultgouge.pywrap"),
         ("formats", "faultgouge.analysis.files.formats"),
         ("figures", "faultgouge.figures"),

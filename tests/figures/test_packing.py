@@ -21,9 +21,9 @@ from faultgouge.analysis import (
     touching,
 )
 from faultgouge.analysis.arrays import derive_frozen
-from faultgouge.analysis.motion.spectrum import participation_ratio, rotation_share
+from faultgouge.analysis.motion.modes import participation_ratio, rotation_share
 from faultgouge.figures import PairCurve, draw_packing, draw_pair, save
-from faultgouge.figures.mode import Mode, draw_modes
+from faultgouge.figures.mode import ModeShape, draw_modes
 from faultgouge.figures.packing import View
 
 
@@ -200,7 +200,7 @@ def test_normal_modes_are_those_of_the_spectrum_and_the_closest_have_the_largest
 def test_a_complex_mode_is_drawn_at_two_moments_with_arrows_and_the_colour_of_rotation(pyramid):
     moved = np.zeros((3, 3), dtype=complex)
     moved[0, 2], moved[1, 2], moved[2] = 1.0, 1j, [2.0, -1.0, 0.0]
-    figure = draw_modes(pyramid, [Mode(4, 10 + 2j, moved, 0.3, 0.1)], "a pair")
+    figure = draw_modes(pyramid, [ModeShape(4, 10 + 2j, moved, 0.3, 0.1)], "a pair")
     first, second = (axes.findobj(Quiver)[0] for axes in figure.axes[:2])
     at_top = np.argmax(np.abs(first.U))
     assert first.U[at_top] > 0
@@ -217,7 +217,7 @@ def test_the_second_moment_of_a_mode_is_magnified_and_says_so(pyramid):
     """Next to an onset a mode is nearly real: a quarter of a period later hardly anything moves."""
     moved = np.zeros((3, 3), dtype=complex)
     moved[0, 2], moved[1, 2], moved[2] = 1.0, 4e-4j, [2.0, -1.0, 0.0]
-    figure = draw_modes(pyramid, [Mode(4, 10 + 2j, moved, 0.3, 0.1)], "a pair")
+    figure = draw_modes(pyramid, [ModeShape(4, 10 + 2j, moved, 0.3, 0.1)], "a pair")
     first, second = (axes.findobj(Quiver)[0] for axes in figure.axes[:2])
     assert np.hypot(second.U, second.V).max() == pytest.approx(0.8 * np.hypot(first.U, first.V).max(), rel=1e-12)
     assert "arrows and colours times 2000" in figure.axes[1].get_title()
@@ -259,7 +259,7 @@ def test_most_arrows_of_a_mode_are_as_long_as_a_radius(pyramid):
     for far in (1.0, 0.1):
         moved = np.zeros((3, 3), dtype=complex)
         moved[0] = [far, far, 1.0]
-        (arrows,) = draw_modes(pyramid, [Mode(4, 10.0, moved, 0.3, 0.1)], "a mode").axes[0].findobj(Quiver)
+        (arrows,) = draw_modes(pyramid, [ModeShape(4, 10.0, moved, 0.3, 0.1)], "a mode").axes[0].findobj(Quiver)
         lengths = np.hypot(arrows.U, arrows.V) / pyramid.radius.mean()
         assert lengths.max() <= 4.0 + 1e-12
         assert np.quantile(lengths, 0.75) > 1.0

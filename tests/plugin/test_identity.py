@@ -32,7 +32,8 @@ KINDS = {
 }
 
 
-@pytest.fixture(params=KINDS)
+# the last kind is compensated, too
+@pytest.fixture(params=[pytest.param(kind, marks=[pytest.mark.long] * (kind == "compensated")) for kind in KINDS])
 def variables(request):
     return {"decks": DECKS, "fx": 3.0, "newton": "on", "sort": 1000, **KINDS[request.param]}
 

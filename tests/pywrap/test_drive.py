@@ -102,6 +102,26 @@ def test_deck_alone_is_the_same_to_the_bit(scene, lmp, tmp_path, precision):
     assert rows[-1, 4:] == pytest.approx([last["thickness"][-1], last["kinetic_energy"][-1]], rel=few)
 
 
+def series_of(scene, path):
+    """The series of a whole run."""
+    run_to_end(scene, path)
+    with RunFile(path) as file:
+        return file.series("drive")
+
+
+@pytest.mark.parametrize("spring", [10.0, "rigid"])
+def test_run_does_not_depend_on_where_it_ends(scene, tmp_path, spring):
+    """Rows and states of a shorter run are those of the longer one, but for the last row."""
+    wanted = {"spring": spring, "velocity": 2e-3}
+    short, long = (series_of(scene(**wanted, until=until), tmp_path / f"{until}.h5") for until in (6.0, 9.0))
+    for name, values in short.items():
+        np.testing.assert_array_equal(values[:-1], long[name][: len(values) - 1], err_msg=name)
+    with RunFile(tmp_path / "6.0.h5") as file, RunFile(tmp_path / "9.0.h5") as other:
+        times = file.observable("time")[:-1]
+        assert len(times) > 1
+        np.testing.assert_array_equal(times, other.observable("time")[: len(times)])
+
+
 def test_states_are_packings_under_the_force_of_the_spring(scene, tmp_path):
     """Slow driving: the force balances the contacts, but for vibrations, and the layer follows as it yields."""
     run_to_end(scene(spring=10.0, velocity=2e-3, until=40.0, states=10.0), tmp_path / "drive.h5")

@@ -8,7 +8,8 @@ from faultgouge.analysis import find_onset
 from faultgouge.analysis.motion.eigenvalues import unit_rounding
 from faultgouge.analysis.windows import full_operator
 from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath, loads
+from faultgouge.pywrap.runs.ramp_loads import ramp_loads
+from faultgouge.pywrap.runs.scene_path import scene_path
 
 
 @pytest.mark.long
@@ -19,7 +20,7 @@ def test_no_pair_is_complex_below_the_first_window():
     scene = Scene.from_mapping({"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": ramp})
     start = settle(scene)
     with Engine(start.packing) as engine:
-        path = EquilibriumPath(engine, start, scene)
+        path = scene_path(engine, start, scene)
         onset = find_onset(path, step * np.arange(4))
         assert not onset.complete
         assert onset.doubtful == ()
@@ -60,8 +61,8 @@ ACROSS_OTHER_LEVELS = {
 def test_a_window_is_found_between_loads_far_apart(keys, apart, window, known):
     scene = Scene.from_mapping({**keys, "load": {"fy": 3.0}})
     with Engine((start := settle(scene)).packing) as engine:
-        path = EquilibriumPath(engine, start, scene)
-        for fx in loads(scene.ramp)[1:]:
+        path = scene_path(engine, start, scene)
+        for fx in ramp_loads(scene)[1:]:
             path(float(fx))
-        (found,) = find_onset(path, loads(scene.ramp) if apart is None else apart).windows
+        (found,) = find_onset(path, ramp_loads(scene) if apart is None else apart).windows
     assert (found.fx_onset, found.fx_end) == pytest.approx(window, abs=known)

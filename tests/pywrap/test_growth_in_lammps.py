@@ -11,9 +11,9 @@ from faultgouge.analysis import (
     spectrum,
     transient_gain,
 )
-from faultgouge.analysis.windows import Modes, System
+from faultgouge.analysis.windows import System, SystemModes
 from faultgouge.pywrap import Engine, Scene, settle
-from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath
+from faultgouge.pywrap.runs.scene_path import scene_path
 from faultgouge.pywrap.runs.undamped import time_step
 
 
@@ -49,7 +49,7 @@ def test_growth_rate_and_frequency_are_those_of_the_spectrum(loaded):
     pair = max(spectrum(packing).pairs, key=lambda each: each.growth_rate)
     dt = time_step(packing)
     omega = complex(discrete_frequency(pair.eigenvalue, dt))
-    modes = Modes.of(System.of(packing))
+    modes = SystemModes.of(System.of(packing))
     mode = modes.right[:, np.argmin(np.abs(modes.values - pair.eigenvalue))].real
     # from far above the noise of 1e-25 to far below the square of the slip limits
     time, msd, velocity = run(displace(packing, mode, 1e-8), packing, 540.0, 12000, dt)
@@ -103,7 +103,7 @@ def path():
     )
     start = settle(scene)
     with Engine(start.packing) as engine:
-        found = EquilibriumPath(engine, start, scene)
+        found = scene_path(engine, start, scene)
         for k in range(1, 16):
             found(k * 1e-3)
         yield found
@@ -115,7 +115,7 @@ def test_growth_with_dashpots_is_that_of_the_eigenvalue(path, fx, cn, unstable):
     """Over six decades of D; at 0.015 it is the dashpots that make the packing unstable."""
     packing = path(fx).with_dissipation(cn=cn)
     assert len(spectrum(packing).pairs) == unstable
-    (mode,) = Modes.of(System.of(packing, dissipation=True)).growing
+    (mode,) = SystemModes.of(System.of(packing, dissipation=True)).growing
     # 0.15 of the limit: damped runs are of second order in the step, and 3e-4 off there
     rate, shape, dt = 2 * mode.mean.real, mode.shapes[0][:, 0], 3 * time_step(packing)
     # from rest, displaced along the mode at its largest

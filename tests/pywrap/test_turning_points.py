@@ -9,8 +9,8 @@ import pytest
 
 from faultgouge.analysis import RunFile
 from faultgouge.analysis.motion.hysteresis import hysteresis, layer_displacement, turning_points
-from faultgouge.pywrap import SceneError
-from faultgouge.pywrap.runs.equilibrium_path import all_loads, count_behind, loads
+from faultgouge.pywrap import Scene, SceneError
+from faultgouge.pywrap.runs.ramp_loads import all_loads, count_behind, ramp_loads
 from faultgouge.pywrap.scenes.sections import Ramp
 
 SCENE = """
@@ -60,9 +60,13 @@ def test_a_run_goes_on_where_it_was_on_the_way():
 
 
 def test_an_onset_is_sought_on_the_way_to_the_first_turning_point():
-    assert loads(Ramp(step=0.1, until=(0.2, -0.1))).tolist() == [0.0, 0.1, 0.2]
+    there, back = (
+        Scene.from_mapping({"packing": {}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": {"step": 0.1} | turns})
+        for turns in ({"until": [0.2, -0.1]}, {"until": [-0.2, 0.1]})
+    )
+    assert ramp_loads(there).tolist() == [0.0, 0.1, 0.2]
     with pytest.raises(SceneError, match="onsets are sought above 0"):
-        loads(Ramp(step=0.1, until=(-0.2, 0.1)))
+        ramp_loads(back)
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from research.cycle.compute import EVERY, LAWS, chosen
-from research.cycle.make import TABLE, concordance, numbers, ordered_pairs, write_page
+from research.cycle.compute import EVERY, LAWS, LOOKED_AT, chosen
+from research.cycle.make import MANY_TABLE, TABLE, concordance, numbers, ordered_pairs, write_page
 from research.tables import read_rows
 
 CYCLE = Path(__file__).parents[2] / "research" / "cycle"
-ROWS = read_rows(CYCLE / "tables" / TABLE)
+ROWS, LARGE = (read_rows(CYCLE / "tables" / name) for name in (TABLE, MANY_TABLE))
 
 
 def test_the_page_of_cycles_is_that_of_its_table(tmp_path):
@@ -22,6 +22,15 @@ def test_the_page_of_cycles_is_that_of_its_table(tmp_path):
 def test_the_runs_are_those_of_the_rule():
     expected = [(1 + k // 2, LAWS[k % 2]) for k in range(len(ROWS))]
     assert [(row["seed"], row["law"]) for row in ROWS] == expected
+
+
+def test_the_large_runs_are_those_of_the_rule():
+    expected = [(seed, law) for law in reversed(LAWS) for seed in range(1, 11)]
+    assert [(row["seed"], row["law"]) for row in LARGE] == expected[: len(LARGE)]
+    for row in LARGE:
+        slips = list(range(min(LOOKED_AT, len(row["slips"]))))
+        for kind in ("before", "control"):
+            assert [state["slip"] for state in row["states"] if state["kind"] == kind] == slips
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"{row['seed']}-{row['law']}")

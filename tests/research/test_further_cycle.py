@@ -84,3 +84,14 @@ def test_before_a_slip_fewer_states_have_an_equilibrium_near_by_than_long_before
     # neither growth nor vibration is in all states at nine tenths of the wait
     assert late["grows"]["high"] < 1
     assert late["vibrates"]["high"] < 1
+
+
+def test_large_slips_become_rare_for_stiff_springs_and_advances_grow_with_the_pulse():
+    assert [each["long"]["of"] for each in FOUND["long"]] == [
+        sum(len(row["slips"]) for row in DRIVEN if row["spring"] == spring) for spring in SPRINGS
+    ]
+    shares = [each["long"]["share"] for each in FOUND["long"]]
+    assert shares == sorted(shares, reverse=True)
+    halves = [each["half"]["count"] for each in FOUND["full"]]
+    assert halves == sorted(halves)
+    assert all(each["full"]["count"] <= each["half"]["count"] for each in FOUND["full"])

@@ -41,7 +41,17 @@ def test_the_page_comes_out_of_the_tables(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["force 50", "force 100", "force 200", "pressure 50", "friction 50", "harmonic"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "force 50",
+        "force 100",
+        pytest.param("force 200", marks=pytest.mark.long),
+        "pressure 50",
+        "friction 50",
+        "harmonic",
+    ],
+)
 def test_a_seed_is_the_packing_of_the_table(name, tmp_path):
     """At the first three loads. Settling is chaotic: with one other bit in a width the packing is another."""
     sweep = sets(0.01)[name]

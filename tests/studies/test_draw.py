@@ -8,7 +8,6 @@ import pytest
 from faultgouge.analysis import Growth
 from faultgouge.analysis.motion.normal_form import NormalForm
 from faultgouge.analysis.motion.power_law import PowerLaw
-from faultgouge.analysis.windows.pair_form import PairForm
 from faultgouge.figures.series import draw_growth
 from faultgouge.pywrap.lammps.dynamics import Weakening
 from faultgouge.studies.triggering.compute import Sensitivity
@@ -65,8 +64,7 @@ def test_weakening_draws_the_run_over_its_law():
 
 def normal_pairs(*epsilons):
     """Pairs of the normal form, whose unit of time is one."""
-    plane = np.eye(3, 2)
-    return tuple(PairForm(0.1, NormalForm(0.2, epsilon), 1.0, plane, plane) for epsilon in epsilons)
+    return tuple(NormalForm(0.2, epsilon) for epsilon in epsilons)
 
 
 def test_amplitudes_carry_their_exponent():
@@ -85,11 +83,11 @@ def test_damping_marks_its_crossover():
     for number, pair in enumerate(pairs):
         line, plateau, dot, ring = lines[4 * number : 4 * number + 4]
         np.testing.assert_array_equal(line.get_xdata(), pair.tau_d * DAMPING_TIMES)
-        np.testing.assert_array_equal(line.get_ydata(), [pair.form.amplitude(tau) for tau in line.get_xdata()])
-        assert set(plateau.get_ydata()) == {pair.form.amplitude()}
+        np.testing.assert_array_equal(line.get_ydata(), [pair.amplitude(tau) for tau in line.get_xdata()])
+        assert set(plateau.get_ydata()) == {pair.amplitude()}
         # between two points the curve bends by a few per cent
-        assert dot.get_xydata()[0] == pytest.approx((pair.tau_d, 0.4155 * pair.form.amplitude()), rel=0.05)
-        assert tuple(ring.get_xydata()[0]) == (pair.form.half_gain_time(), 0.5 * pair.form.amplitude())
+        assert dot.get_xydata()[0] == pytest.approx((pair.tau_d, 0.4155 * pair.amplitude()), rel=0.05)
+        assert tuple(ring.get_xydata()[0]) == (pair.half_gain_time(), 0.5 * pair.amplitude())
 
 
 def test_response_lies_over_the_run(runs):

@@ -2,6 +2,7 @@
 change before it, as a committed table says."""
 
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from importlib.resources import files
 
@@ -11,10 +12,9 @@ from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
 from faultgouge.assessment.work_precision.coverage.stated_errors import FINER, draw_scene, read, restate_case
-from faultgouge.pywrap import Engine, Scene, settle
+from faultgouge.pywrap import Engine, LoadPath, Scene, scene_path, settle
 from faultgouge.pywrap.onset import onset_run
-from faultgouge.pywrap.runs.equilibrium_path import EquilibriumPath
-from faultgouge.pywrap.runs.path_error import OtherPaths, PathError, squared_gap, with_path_error
+from faultgouge.pywrap.runs.path_error import PathError, PathErrors, squared_gap, with_path_error
 from faultgouge.studies.sweep.onset import onset
 
 PAPER = Scene.from_toml(files("faultgouge") / "scenes/paper.toml").resolved()
@@ -37,7 +37,7 @@ def path_of(scene, mu=None):
     """LAMMPS with the settled packing, and the path from there."""
     start = settle(scene, mu)
     with Engine(start.packing) as engine:
-        yield EquilibriumPath(engine, start, scene)
+        yield scene_path(engine, start, scene)
 
 
 @pytest.mark.parametrize(("coarser", "weight"), [(1.04, 3.0), (1.0025, -0.75)], ids=["doubled", "halved"])
@@ -80,7 +80,7 @@ def test_a_contact_that_slides_before_the_onset_is_covered():
         scene = scene_of(sections, precision, increment, 3e-3)
         with path_of(scene) as path:
             window, *_ = find_onset(path, increment * np.arange(round(3e-3 / increment) + 1)).windows
-            part = OtherPaths(path).error(window.fx_onset, squared_gap(window.eigenvalue), window.error)
+            part = PathErrors(path).error(window.fx_onset, squared_gap(window.eigenvalue), window.error)
         assert part.changes
         assert part.correction == 0
         found[precision, increment] = window.fx_onset, window.error + part.error
@@ -129,21 +129,20 @@ def test_an_onset_that_is_not_found_again_is_uncertain_by_the_increment():
     scene = scene_of(HUNDRED, "double", 1e-3, 0.02)
     with path_of(scene) as path:
         path(1e-3)
-        part = OtherPaths(path).error(0.0005, squared_gap(30.0), 1e-11)  # no pair coalesces there
+        part = PathErrors(path).error(0.0005, squared_gap(30.0), 1e-11)  # no pair coalesces there
     assert np.isnan(part.shift)
     assert part.correction == 0
     assert part.error == pytest.approx(5e-4)
 
 
-class OnceOnly(EquilibriumPath):
-    """A path that finds what it knows, and fails in between."""
+@dataclass(frozen=True)
+class FailingSolver:
+    """Whatever is asked for beside what a path knows fails."""
 
     failure: Exception
 
-    def __call__(self, fx):
-        if all(each.fx != fx for each in self.equilibria):
-            raise self.failure
-        return super().__call__(fx)
+    def solve(self, load, below, beside, ahead):
+        raise self.failure
 
 
 @pytest.mark.parametrize(
@@ -154,12 +153,9 @@ class OnceOnly(EquilibriumPath):
 def test_an_onset_is_kept_where_the_other_path_fails(failure):
     scene = scene_of(HUNDRED, "double", 5e-3, 0.02)
     with path_of(scene) as path:
-        start = path.equilibria[0]
         found = find_onset(path, np.array([0.0, 5e-3, 1e-2, 1.5e-2, 2e-2]))
         whole = with_path_error(found, path)
-        once = OnceOnly(path.engine, start, scene, path.equilibria[1:])
-        once.failure = failure
-        alone = with_path_error(found, once)
+        alone = with_path_error(found, LoadPath(FailingSolver(failure), path.equilibria))
     assert alone.windows == found.windows
     assert alone.as_dict()["error_of_path"] is None
     assert 0 < whole.as_dict()["error_of_path"] <= whole.error

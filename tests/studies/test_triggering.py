@@ -7,7 +7,6 @@ import pytest
 
 from faultgouge.analysis.motion.normal_form import NormalForm
 from faultgouge.analysis.motion.power_law import PowerLaw
-from faultgouge.analysis.windows.pair_form import PairForm
 from faultgouge.figures.pages import render
 from faultgouge.pywrap.lammps.dynamics import Weakening
 from faultgouge.studies.triggering.compute import Sensitivity, Triggering, judge, summary
@@ -66,7 +65,7 @@ CASES = {
 
 
 def triggering(run, foreseen, unperturbed):
-    pairs = tuple(PairForm(0.1, NormalForm(0.2, e), 1.0, np.eye(3, 2), np.eye(3, 2)) for e in (1e-6, 1e-2))
+    pairs = tuple(NormalForm(0.2, e) for e in (1e-6, 1e-2))
     packing = SimpleNamespace(law=SimpleNamespace(mu=0.6))
     settings = SimpleNamespace(time=LENGTH, amplitude=1e-12, omega=0.01)
     return Triggering(

@@ -39,11 +39,11 @@ from ...packing.packing import Floats, Indices
 from ..between import Few
 from ..edges import DoubtError
 from ..limits import LIMITS, Limits
-from ..modes import Modes
 from ..search import Search
 from ..slices.eigenbasis import Basis, Levels
 from ..space import Space
 from ..system import System
+from ..system_modes import SystemModes
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,13 +164,13 @@ class Cluster:
             pass
         return search
 
-    def nearly_growing(self, modes: Modes, limits: Limits = LIMITS) -> list[Space]:
+    def nearly_growing(self, modes: SystemModes, limits: Limits = LIMITS) -> list[Space]:
         """Those of its modes at the upper load that grow, nearly do so, or grow a little beyond."""
         near = np.flatnonzero(modes.values.real > limits.weak_damping * np.median(modes.values.real))
         found = [modes.space((int(k),)) for k in near if self.owns(modes.values[k].imag)]
         below, above = self.loads
         system = self.system(above + limits.overshoot * (above - below))
-        further = Modes.of(system)
+        further = SystemModes.of(system)
         if len(further.grows) <= len(modes.grows):
             return found
         return found + [further.space((int(k),)) for k in further.grows if self.owns(further.values[k].imag)]

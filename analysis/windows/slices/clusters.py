@@ -25,16 +25,13 @@ import numpy as np
 from ...errors import FaultgougeError, NoEquilibriumError
 from ...packing.packing import Floats
 from ...progress import report_progress
-from ..edges import At, DoubtError, Edge, LostPairError, Window, edge_from_inside, follow_to, leads_back
+from ..edges import At, DoubtError, Edge, Increments, LostPairError, Window, edge_from_inside, follow_to, leads_back
 from ..limits import LIMITS, Limits
 from ..space import Space
 from ..system import System
 from .eigenbasis import Bases, Basis, Levels
 from .ranks import ALONE, Ranks
 from .store import NEW_PASS, Candidate, SlicePass, SliceResult, pass_folder
-
-Increments = tuple[tuple[float, float], ...]
-"""From load to load."""
 
 
 class SliceSearch(ABC):

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from ...packing.packing import Floats
-from ..edges import At, Window
+from ..edges import At, Increments, Window
 from ..limits import LIMITS, Limits
 from ..system import System, unit_of
-from .clusters import Increments, SliceSearch
+from .clusters import SliceSearch
 from .growth import SlicedGrowth
 from .pairs import SlicedPairs
 from .ranks import ALONE, Ranks

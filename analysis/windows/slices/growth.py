@@ -29,15 +29,15 @@ from ...errors import FaultgougeError, NoEquilibriumError
 from ...motion.eigenvalues import active_coordinates
 from ...packing.packing import Floats
 from ...progress import report_progress
-from ..edges import DoubtError, LostPairError, Window, follow_to, track
+from ..edges import DoubtError, Increments, LostPairError, Window, follow_to, track
 from ..limits import LIMITS, Limits
-from ..modes import Modes
 from ..nearby import find_growing_near
 from ..screens.growth import Cluster, find_cores, group_clusters, may_grow, reduce_system, shift_load
 from ..space import Space
 from ..system import System
+from ..system_modes import SystemModes
 from .axis import growing_modes
-from .clusters import Increments, SliceSearch
+from .clusters import SliceSearch
 from .eigenbasis import Basis, Levels
 from .store import Border, Candidate, SliceResult
 
@@ -279,7 +279,7 @@ def find_growing(cluster: Cluster, limits: Limits = LIMITS) -> Iterator[Candidat
     for window in search.windows:
         if window.fx_end is not None and cluster.owns(window.frequency):
             inside = 0.5 * (window.fx_onset + window.fx_end)
-            growing = Modes.of(cluster.system(inside)).growing
+            growing = SystemModes.of(cluster.system(inside)).growing
             if growing:
                 mode = min(growing, key=lambda each: abs(each.mean.imag - window.frequency))
                 yield make_candidate(window.fx_onset, cluster, mode)

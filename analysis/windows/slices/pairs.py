@@ -16,11 +16,11 @@ from ...packing.packing import Floats
 from ...progress import report_progress
 from ..edges import At, DoubtError, LostPairError, follow_to
 from ..limits import LIMITS, Limits
-from ..modes import Modes
 from ..screens.pairs import PairScreen, may_meet
 from ..search import other_growth, windows_along
 from ..space import Space
 from ..system import System
+from ..system_modes import SystemModes
 from .clusters import SliceSearch
 from .eigenbasis import Basis, Levels, ModeCluster, width_and_mixing
 from .ranks import ALONE, Ranks
@@ -79,7 +79,7 @@ class SlicedPairs(SliceSearch):
         for window in windows:
             end = last if window.fx_end is None else window.fx_end
             inside = there[0] if window.fx_onset < there[0] <= end else 0.5 * (window.fx_onset + end)
-            modes = Modes.of(small(inside))
+            modes = SystemModes.of(small(inside))
             pair = modes.space(modes.about(window.eigenvalue, modes.complex_pairs))
             if cluster.owns(pair.right):
                 right, left = (basis.lift(cluster.modes, plane) for plane in (pair.right, pair.left))

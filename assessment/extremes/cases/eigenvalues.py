@@ -28,7 +28,7 @@ from scipy.linalg import eigvals
 
 from ....analysis import Onset, spectrum
 from ....analysis.motion.eigenvalues import SAFETY, unit_rounding
-from ....analysis.windows import Modes, System
+from ....analysis.windows import System, SystemModes
 from ....pywrap import Scene
 from ....pywrap.onset import onset_run
 from .case import Case, Outcome, failed_outcome, measured_outcome
@@ -59,7 +59,7 @@ def _near_defective(eps: float, sign: int) -> Outcome:
     matrix[:2, :2] = [[1 - SPLIT, coupling], [-coupling, 1 + SPLIT]]
     turn = np.linalg.qr(generator.standard_normal((SIZE, SIZE)))[0]
     matrix = turn @ matrix @ turn.T
-    modes = Modes.of_operator(0.0, matrix)
+    modes = SystemModes.of_operator(0.0, matrix)
     first, second = np.argsort(np.abs(modes.values - 1))[:2]
     found = modes.space((int(first), int(second))).discriminant
     rounding = unit_rounding(matrix)
@@ -88,7 +88,7 @@ def _near_an_onset(distance: float) -> Outcome:
     forces = sorted(run.between, key=lambda fx: abs(abs(fx - run.fx_c) / FX_C - distance))[:2]
     discriminants, split = [], 0.0
     for fx in sorted(forces):
-        modes = Modes.of(System.of(run.between[fx]))
+        modes = SystemModes.of(System.of(run.between[fx]))
         first, second = np.argsort(np.abs(modes.values - run.windows[0].eigenvalue))[:2]
         if (modes.partner[first] >= 0) != (fx > run.fx_c):
             return failed_outcome(f"the pair is real above the onset, or complex below it, at {fx!r}")

@@ -29,8 +29,10 @@ from ....analysis.files.atomic_write import write_text
 from ....analysis.packing.packing import Floats
 from ....analysis.windows import Window
 from ....pywrap import Engine, Equilibrium, Scene, settle
-from ....pywrap.runs.equilibrium_path import EquilibriumPath, loads
-from ....pywrap.runs.path_error import OtherPaths, with_path_error
+from ....pywrap.load_path import LoadPath
+from ....pywrap.runs.path_error import PathErrors, with_path_error
+from ....pywrap.runs.ramp_loads import ramp_loads
+from ....pywrap.runs.scene_path import scene_path
 from ....pywrap.scenes.validation import require_section
 
 Kind = Literal["undamped", "damped"]
@@ -160,14 +162,14 @@ class FirstOnset:
     def __init__(self, scene: Scene, engine: Engine, start: Equilibrium) -> None:
         self._engine, self._damping, self._start = engine, scene.damping, start
         self._scene = scene.model_copy(update={"damping": None})
-        self._wanted = loads(require_section(scene.ramp, "ramp"))
+        self._wanted = ramp_loads(scene)
 
-    def first_window(self, finer: int = 1, beyond: float = 0.0) -> tuple[EquilibriumPath, Window] | None:
+    def first_window(self, finer: int = 1, beyond: float = 0.0) -> tuple[LoadPath[Equilibrium], Window] | None:
         """The ramp with increments so many times smaller, and the first window on it, without the error of the path.
 
         None if there is no window beyond a given load and before the end of the ramp, or of the equilibria.
         """
-        path = EquilibriumPath(self._engine, self._start, self._scene, onward=True)
+        path = scene_path(self._engine, self._start, self._scene, onward=True)
         for first in range(0, len(self._wanted) - 1, AT_ONCE):
             part = self._wanted[first : first + AT_ONCE + 1]
             fine = np.concatenate([part[:1], *(np.linspace(a, b, finer + 1)[1:] for a, b in pairwise(part))])
@@ -181,7 +183,7 @@ class FirstOnset:
                 return path, window
         return None
 
-    def _window(self, path: EquilibriumPath, part: Floats) -> Window | None:
+    def _window(self, path: LoadPath[Equilibrium], part: Floats) -> Window | None:
         """The first window between some loads."""
 
         def equilibrium(fx: float) -> Packing:
@@ -196,11 +198,11 @@ class FirstOnset:
         assert self._damping is not None
         return packing.with_dissipation(self._damping.cn, self._damping.ct, self._damping.tau)
 
-    def changes(self, path: EquilibriumPath, fx: float) -> int:
+    def changes(self, path: LoadPath[Equilibrium], fx: float) -> int:
         """Number of the increments before a load in which contacts change."""
-        return int(OtherPaths(path).changes(fx).sum())
+        return int(PathErrors(path).changes(fx).sum())
 
-    def whole(self, path: EquilibriumPath, window: Window) -> tuple[float, float]:
+    def whole(self, path: LoadPath[Equilibrium], window: Window) -> tuple[float, float]:
         """The onset of a window, and the error that is stated: rounding and path together."""
         first, *_ = with_path_error(Onset((window,), complete=False), path, self._with_dashpots).windows
         return first.fx_onset, first.error

@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 from scipy.linalg import eig, eigvals
 
-from ....analysis import Packing, dynamical_matrix, eigenpairs
+from ....analysis import Packing, dynamical_matrix, nearest_modes
 from ....analysis.motion.eigenvalues import Complexes
 from ....pywrap import Engine, equilibrate
 from .extended import refined_near
@@ -102,7 +102,7 @@ class Target:
 
     def shift_invert(self, tolerance: float) -> tuple[Complexes, int | None]:
         """The nearest few by ARPACK, and the number of solves."""
-        found = eigenpairs(self.packing, self.shift, ARPACK_COUNT, tolerance=tolerance)
+        found = nearest_modes(self.packing, self.shift, ARPACK_COUNT, tolerance=tolerance)
         return found.values, found.solves
 
     def refine(self) -> tuple[Complexes, int | None]:

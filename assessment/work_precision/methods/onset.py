@@ -20,8 +20,9 @@ import numpy as np
 from ....analysis import Onset, Packing, find_onset, spectrum
 from ....analysis.motion.eigenvalues import SAFETY
 from ....pywrap import Engine, Equilibrium, Scene
-from ....pywrap.runs.equilibrium_path import EquilibriumPath
+from ....pywrap.load_path import LoadPath
 from ....pywrap.runs.path_error import with_path_error
+from ....pywrap.runs.scene_path import scene_path
 from ..coverage.stated_errors import read, restate_case
 from .work_precision_study import Run, Settings, StatedError, Study, Theory, compensate, study_of, timed_points
 
@@ -77,7 +78,7 @@ class OnsetMethods:
         found, _, computed = self.solve(increment, beyond)
         return found.fx_c, computed
 
-    def solve(self, increment: float, beyond: float) -> tuple[Onset, EquilibriumPath, int]:
+    def solve(self, increment: float, beyond: float) -> tuple[Onset, LoadPath[Equilibrium], int]:
         """The onset as in `root`, with its stated error, and the path."""
         path, asked = self._path("newton"), list[float]()
 
@@ -100,17 +101,17 @@ class OnsetMethods:
         pair = max(found.pairs, key=lambda each: each.overlap * each.eigenvalue.imag)
         return SAFETY * found.rounding * DISTANCE_BEYOND / (pair.overlap * pair.eigenvalue.imag), pair.overlap
 
-    def _up(self, increment: float, method: str) -> tuple[EquilibriumPath, int]:
+    def _up(self, increment: float, method: str) -> tuple[LoadPath[Equilibrium], int]:
         """The ramp up to the first equilibrium with a complex pair, and its number."""
         path, k = self._path(method), 1
         while not spectrum(path(k * increment)).pairs:
             k += 1
         return path, k
 
-    def _path(self, method: str) -> EquilibriumPath:
+    def _path(self, method: str) -> LoadPath[Equilibrium]:
         assert self._scene.ramp is not None  # it is the scene of a ramp
         scene = self._scene.model_copy(update={"ramp": self._scene.ramp.model_copy(update={"method": method})})
-        return EquilibriumPath(self._engine, self._start, scene)
+        return scene_path(self._engine, self._start, scene)
 
 
 def onset(settings: Settings) -> Study:

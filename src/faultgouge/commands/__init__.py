@@ -7,18 +7,22 @@ commands share: the options SCENE, -o and --json, and `say`, `status` and `progr
 only. Commands raise errors and never print them: :mod:`faultgouge.exit_status` prints errors.
 """
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import Annotated
 
 import typer
 
-FAMILIES = ("runs", "drive", "eigenvalues", "pictures", "exchange", "studies", "sweeps")
+from .on_demand import CommandGroup, CommandsByName
+
+FAMILIES = ("runs", "drive", "spectrum", "onset", "pictures", "exchange", "studies", "sweeps")
 """Modules with commands."""
 
 
-def program() -> typer.Typer:
+def program() -> Callable[..., object]:
     """The command ``faultgouge`` with all its commands."""
     app = typer.Typer(
+        cls=CommandGroup,
         invoke_without_command=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # Rich would double the time of --help
@@ -26,9 +30,11 @@ def program() -> typer.Typer:
         epilog="Example: faultgouge reproduce -o results",
     )
     app.callback()(_options)
-    for family in FAMILIES:
-        app.add_typer(import_module(f".{family}", __name__).app)
-    return app
+    group = typer.main.get_command(app)
+    assert isinstance(group, CommandGroup)
+    apps = [import_module(f".{family}", __name__).app for family in FAMILIES]
+    group.commands = CommandsByName([each for app in apps for each in app.registered_commands])
+    return group
 
 
 TO_TRY = """\

@@ -31,7 +31,7 @@ from .terminal import (
 if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
     from faultgouge.figures.film import Film
-    from faultgouge.figures.mode import Mode
+    from faultgouge.figures.mode import ModeShape
 
     from ..analysis.configuration import HasConfiguration
 
@@ -300,7 +300,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
     return RampFilm(packings, count, color, dots=dots, course=course)
 
 
-def modes_of(packing: HasConfiguration, which: str) -> tuple[list[Mode], str]:
+def modes_of(packing: HasConfiguration, which: str) -> tuple[list[ModeShape], str]:
     """The modes that --mode asks for, and what they are."""
     from faultgouge.figures.mode import modes_of as find_modes
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from importlib.resources import files
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -50,6 +49,8 @@ def init(
     """Write a scene with every section and key, commented."""
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
+    from importlib.resources import files
+
     from faultgouge.analysis.files.atomic_write import write_text
 
     lock_output(context, output)
@@ -82,7 +83,7 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
     """
     from faultgouge.pywrap import Record
     from faultgouge.pywrap import ramp as ramp_up
-    from faultgouge.pywrap.runs.equilibrium_path import all_loads, count_behind
+    from faultgouge.pywrap.runs.ramp_loads import all_loads, count_behind
     from faultgouge.pywrap.scenes.validation import require_section
 
     wanted = read_scene(scene, "ramp", "ramp")
@@ -131,7 +132,7 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     from faultgouge.analysis import RunFile
     from faultgouge.pywrap import Record, reach
     from faultgouge.pywrap.onset import load_at_onset
-    from faultgouge.pywrap.runs.equilibrium_path import step_of
+    from faultgouge.pywrap.runs.ramp import step_of
     from faultgouge.pywrap.scenes.validation import require_section
 
     wanted = read_scene(scene, "perturb", "perturb")

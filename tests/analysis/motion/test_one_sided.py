@@ -233,6 +233,22 @@ def test_what_follows_a_load_that_rises_does_not_vibrate():
     assert 0 < rising["vibration"] < 1e-2 * rising["drift"]
 
 
+def test_two_vibrations_of_one_packing_are_told_apart():
+    """What is said of two starts, whose motions are those of a layer that vibrates in two ways."""
+    lossy = replace(_three(), law=replace(_three().law, cn=0.02, ct=0.01)).configuration
+    at_rest = derive_frozen(lossy, load=-lossy.contact_force)
+    found = stability(at_rest, rise=np.tile([1.0, 0.0], (3, 1)), time=4.0)
+    one = {"drift": 3.75e-3, "vibration": 6.85e-4, "steady": True}
+    for other, says in (
+        ({"vibration": 1.05e-3}, "vibration 0.000685, and from another start drift 0.00375, vibration 0.00105"),
+        ({"steady": False}, "and from another start drift 0.00375, vibration 0.000685, not steady yet"),
+        ({"vibration": 6.8e-4}, "vibration 0.000685"),
+    ):
+        rising = {**one, "time": 4.0, "other_start": one | other}
+        assert replace(found, rising=rising).sentences[-1].endswith(says)
+    assert set(found.rising["other_start"]) == set(one)
+
+
 def test_a_rising_load_is_followed_where_pushes_have_not_settled():
     at_rest = _three().configuration
     at_rest = derive_frozen(at_rest, load=-at_rest.contact_force)
@@ -241,8 +257,12 @@ def test_a_rising_load_is_followed_where_pushes_have_not_settled():
     assert found.rising["drift"] > 0
 
 
+@pytest.mark.parametrize("cluster", [1.0], indirect=True)
 def test_a_body_moves_as_one(bound):
-    """Two disks that move as one along x on a spring: forces add up, both have the displacement, masses add up."""
+    """Two disks that move as one along x on a spring: forces add up, both have the displacement, masses add up.
+
+    No disk touches another, so that one law is enough.
+    """
     configuration, n = bound.configuration, len(bound)
     size, k, rate = configuration.coordinates, 3.0, 0.5
     lead = np.zeros((size, size))
@@ -267,3 +287,4 @@ def test_a_body_moves_as_one(bound):
     assert not found.displacement[:, 2:].any()
     moving = stability(body, rise=rise).rising
     assert moving["drift"] == pytest.approx(rate / k * np.sqrt(2 / (2 * n)), rel=1e-6)
+    assert moving["other_start"] is None

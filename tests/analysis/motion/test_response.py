@@ -11,10 +11,10 @@ from scipy.linalg import block_diag, expm
 from scipy.sparse import csr_array
 
 from faultgouge.analysis import mean_square_displacement
+from faultgouge.analysis.motion.energy_norm import EnergyNorm
 from faultgouge.analysis.motion.matrix_functions import BlockDiagonal, first_order
-from faultgouge.analysis.motion.oscillator import Oscillator
+from faultgouge.analysis.motion.oscillator import Oscillator, driven_motion, released_motion
 from faultgouge.analysis.motion.response import layer_force, linear_response
-from faultgouge.analysis.motion.state_space import StateSpace, driven_motion, released_motion
 
 OMEGA = 2.0
 """That of a motion of `oblique`: resonance."""
@@ -64,10 +64,10 @@ def motion_of(matrix, force, start, time, tau=None, dt=None):
         modes, oscillator = BlockDiagonal.of(matrix), Oscillator(OMEGA, dt)
         pairs = ((oscillator.forced_motion, force), (oscillator.free_motion, start))
         return np.sum([modes.apply(function, time, vector) for function, vector in pairs], axis=0)
-    system = StateSpace.of_matrices(csr_array(matrix), csr_array(np.eye(size) / tau), np.ones(size))
-    rows, rest = block_diag(system.unweight, np.eye(size)), np.zeros(size)
-    pairs = ((partial(driven_motion, OMEGA), system.state(rest, force)), (released_motion, system.state(start, rest)))
-    modes = BlockDiagonal.of(system.matrix, first_order)
+    norm = EnergyNorm.of(csr_array(matrix))
+    rows, rest = block_diag(norm.unweight, np.eye(size)), np.zeros(size)
+    pairs = ((partial(driven_motion, OMEGA), norm.state(rest, force)), (released_motion, norm.state(start, rest)))
+    modes = BlockDiagonal.of(norm.first_order(csr_array(matrix), csr_array(np.eye(size) / tau)), first_order)
     found = sum(modes.apply(function, time, vector, rows)[0] for function, vector in pairs)
     return found[:, :size], found[:, size:]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
-from faultgouge.analysis.windows import LostPairError, Modes, Space, System
+from faultgouge.analysis.windows import LostPairError, Space, System, SystemModes
 from faultgouge.analysis.windows.edges import edge_from_inside, locate_edge, sign_change
 
 BASIS = np.eye(12) + 0.1 * np.random.default_rng(2).normal(size=(12, 12))
@@ -31,7 +31,7 @@ def state(operator, fx):
 
 def others(operator, fx, *values):
     """The two modes closest to these eigenvalues."""
-    modes = Modes.of(operator(fx))
+    modes = SystemModes.of(operator(fx))
     first, second = (int(np.argmin(np.abs(modes.values - value))) for value in values)
     return modes.space((first, second))
 

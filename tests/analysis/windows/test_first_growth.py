@@ -11,16 +11,16 @@ from test_found import PASSING, cut_off
 from test_slicing import FEW, on_ranks
 
 from faultgouge.analysis import NoEquilibriumError
-from faultgouge.analysis.motion.state_space import StateSpace
+from faultgouge.analysis.motion.energy_norm import EnergyNorm
 from faultgouge.analysis.progress import show_progress
-from faultgouge.analysis.windows import LIMITS, Edge, Modes, System, Window, find_onset, find_windows
+from faultgouge.analysis.windows import LIMITS, Edge, System, SystemModes, Window, find_onset, find_windows
 from faultgouge.analysis.windows.nearby import find_growing_near, nearest_mode
 from faultgouge.analysis.windows.slices.axis import growing_modes
 from faultgouge.analysis.windows.slices.first_window import first_window
 from faultgouge.analysis.windows.slices.growth import SlicedGrowth
 from faultgouge.analysis.windows.slices.store import Candidate
 from faultgouge.pywrap import Scene, settle
-from faultgouge.pywrap.runs.equilibrium_path import loads
+from faultgouge.pywrap.runs.ramp_loads import ramp_loads
 from faultgouge.studies.packing_tools import path_from
 
 KINDS = {"weak": {"cn": 0.1}, "medium": {"cn": 10.0}, "drag": {"drag_time": 100.0}}
@@ -100,8 +100,8 @@ def test_windows_are_the_same_to_the_bit_in_another_unit_of_time(path):
 
 def first_order(system):
     """The first-order matrix in coordinates of the energy."""
-    masses = np.ones(system.stiffness.shape[0])
-    return StateSpace.of_matrices(system.stiffness, system.damping, masses).matrix
+    a, g = csr_array(system.stiffness), csr_array(system.damping)
+    return EnergyNorm.of(a).first_order(a, g)
 
 
 def oscillators(feed):
@@ -170,7 +170,7 @@ def test_a_motion_that_grows_where_another_one_begins_to_is_found():
     )
     with path_from(settle(scene), scene) as path:
         damped = with_dissipation(path, drag_time=100.0)
-        window, doubtful = first_window(lambda fx: System.of(damped(fx), dissipation=True), loads(scene.ramp))
+        window, doubtful = first_window(lambda fx: System.of(damped(fx), dissipation=True), ramp_loads(scene))
         assert doubtful == ()
         among_all = find_windows(lambda fx: System.of(damped(fx), dissipation=True), [0.01, 0.012], first=True)
         assert window.fx_onset == pytest.approx(min(each.fx_onset for each in among_all), abs=1e-9)
@@ -207,7 +207,7 @@ def test_what_cannot_be_followed_back_is_in_doubt_and_ends_the_search():
 @pytest.mark.slow
 def test_modes_near_a_frequency_are_those_of_all(path):
     damped = with_dissipation(path, cn=0.1)
-    modes = Modes.of(System.of(damped(0.023), dissipation=True))
+    modes = SystemModes.of(System.of(damped(0.023), dissipation=True))
     for rate in modes.values[[3, 100, 200]]:
         found = nearest_mode(modes.system, float(rate.imag) * (1 + 1e-6))
         assert found.mean == pytest.approx(rate, rel=1e-9)
@@ -242,7 +242,7 @@ def test_packings_against_all_eigenvalues(disks, seed, kind, grows):
         def fastest(fx):
             return np.linalg.eigvals(first_order(System.of(path(fx), dissipation=True))).real.max()
 
-        window, doubtful = first_window(lambda fx: System.of(path(fx), dissipation=True), loads(scene.ramp), limits=FEW)
+        window, doubtful = first_window(lambda fx: System.of(path(fx), dissipation=True), ramp_loads(scene), limits=FEW)
         assert doubtful == ()
         if grows:
             assert fastest(window.fx_onset * (1 - 1e-6)) < 1e-11 < fastest(window.fx_onset * (1 + 1e-6))

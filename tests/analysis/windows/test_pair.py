@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 
-from faultgouge.analysis.windows import LIMITS, Limits, Modes, System, full_operator
+from faultgouge.analysis.windows import LIMITS, Limits, System, SystemModes, full_operator
 from faultgouge.analysis.windows.screens.pairs import may_meet
 from faultgouge.analysis.windows.slices.eigenbasis import Basis
 
@@ -20,12 +20,12 @@ def at(path, fx):
 
 def dense_pair(system, reference):
     """The pair of the two modes that lie closest to the planes of another one, from all eigenvectors."""
-    modes = Modes.of(system)
+    modes = SystemModes.of(system)
     return modes.space(modes.nearest(reference))
 
 
 def complex_pair(system):
-    (pair,) = (modes := Modes.of(system)).complex_pairs
+    (pair,) = (modes := SystemModes.of(system)).complex_pairs
     return modes.space(pair)
 
 
@@ -55,13 +55,13 @@ def test_continued_pair_is_that_of_lapack(path, fx, factors):
 def test_continuation_is_refused_rather_than_wrong(path):
     """Planes of two unrelated modes belong to no pair that inverse iteration can reach."""
     system = at(path, 0.022)
-    apart = Modes.of(system).space((30, 200))
+    apart = SystemModes.of(system).space((30, 200))
     wrong = replace(apart, right=np.eye(300)[:, [7, 107]], left=np.eye(300)[:, [7, 107]])
     assert wrong.at(system) is None
 
 
 def test_overlap_of_a_block_is_that_of_the_eigenvectors(path):
-    modes = Modes.of(at(path, 0.022))
+    modes = SystemModes.of(at(path, 0.022))
     (pair,) = modes.complex_pairs
     expected = abs(np.vdot(modes.left[:, pair[0]], modes.right[:, pair[0]]))
     assert modes.space(pair).overlap == pytest.approx(expected, rel=1e-8)
@@ -96,7 +96,7 @@ def test_a_single_mode_is_that_of_lapack(ramp, fx):
     def damped(load):
         return System.of(path(load).with_dissipation(cn=1.0), dissipation=True)
 
-    here, there, modes = Modes.of(damped(0.023)), damped(fx), Modes.of(damped(fx))
+    here, there, modes = SystemModes.of(damped(0.023)), damped(fx), SystemModes.of(damped(fx))
     for k in (3, 100, 200, *here.grows.tolist()):
         found = here.space((k,)).follow(there)
         expected = min(modes.values, key=lambda s: abs(s - found.mean))
@@ -135,7 +135,7 @@ def test_meetings_are_those_of_the_eigenvalues(path, base):
         named = {tuple(pair) for pair in may_meet(basis.levels(here), basis.levels(there), SLACK)}
         assert len(named) <= most
         for matrix in (here, there):
-            modes = Modes.of_operator(0.0, matrix)
+            modes = SystemModes.of_operator(0.0, matrix)
             for pair in modes.complex_pairs:
                 # the two modes of the basis that carry the plane
                 weight = np.linalg.norm(basis.vectors.T @ modes.space(pair).right[basis.active], axis=1)

@@ -1,5 +1,6 @@
 """The windows of random families against all eigenvalues at many loads."""
 
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -41,6 +42,13 @@ def count_growing(system):
     return int(np.sum(values.real > 0)), np.abs(values.real).min(initial=np.inf)
 
 
+@cache
+def growing_at_loads(seed, size, feed, dissipation):
+    """What `count_growing` has at each of `LOADS`: the same for all increments of a search."""
+    system = family(seed, size, feed, dissipation)
+    return [count_growing(system(fx)) for fx in LOADS]
+
+
 def look_inside(windows):
     """Loads inside undamped windows, where growth without dissipation is largest; `onset_run` looks there, too."""
     ends = [0.5 * (each.fx_onset + each.fx_end) for each in windows if each.fx_end is not None]
@@ -61,8 +69,7 @@ def test_as_many_windows_are_open_at_each_load_as_motions_grow(increments, dissi
             windows = find_windows(family(seed, size, feed, dissipation), loads, look=look_inside(undamped))
         found += len(windows)
         edges = np.array([edge for each in windows for edge in (each.fx_onset, each.fx_end) if edge is not None])
-        for fx in LOADS:
-            growing, doubt = count_growing(family(seed, size, feed, dissipation)(fx))
+        for fx, (growing, doubt) in zip(LOADS, growing_at_loads(seed, size, feed, dissipation), strict=True):
             # LAPACK cannot tell next to an edge, or where two modes cross: Re s is known to the root of rounding there
             if np.abs(edges - fx).min(initial=np.inf) < 1e-6 or doubt < 1e-6:
                 continue

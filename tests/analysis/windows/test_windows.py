@@ -17,11 +17,11 @@ from faultgouge.analysis import (
     find_onset,
 )
 from faultgouge.analysis.uncertain_digits import with_uncertainty
-from faultgouge.analysis.windows import Limits, Modes, System, force_bearing, full_operator
+from faultgouge.analysis.windows import Limits, System, SystemModes, force_bearing, full_operator
 from faultgouge.analysis.windows.between import Few, deepest_dip
-from faultgouge.analysis.windows.modes import assign_modes
 from faultgouge.analysis.windows.screens.pairs import PairScreen
 from faultgouge.analysis.windows.search import windows_along
+from faultgouge.analysis.windows.system_modes import assign_modes
 
 
 @pytest.mark.parametrize("d", [0.01, 0.3])
@@ -144,9 +144,9 @@ def test_noise_loses_its_imaginary_part():
         inner[0, 1] = 1.0
         matrix = basis @ inner @ basis.T
         split += np.iscomplex(np.linalg.eigvals(matrix)).any()
-        assert not Modes.of_operator(0.0, matrix).complex_pairs
+        assert not SystemModes.of_operator(0.0, matrix).complex_pairs
         inner[1, 0] = -1e-8  # imaginary parts of 1e-4
-        assert len(Modes.of_operator(0.0, basis @ inner @ basis.T).complex_pairs) == 1
+        assert len(SystemModes.of_operator(0.0, basis @ inner @ basis.T).complex_pairs) == 1
     assert split > 0
 
 
@@ -172,7 +172,7 @@ def test_no_onset_is_said_so(path, disks):
 @pytest.mark.slow
 def test_what_nothing_happens_on_is_not_decomposed(ramp, mu, monkeypatch):
     """The same windows as from all modes at every load, which are computed next to the edges alone."""
-    path, decomposed, decompose = ramp(mu, 1e-3, 22), [], Modes.of
+    path, decomposed, decompose = ramp(mu, 1e-3, 22), [], SystemModes.of
 
     def count_decompositions(system):
         decomposed.append(system.fx)
@@ -181,7 +181,7 @@ def test_what_nothing_happens_on_is_not_decomposed(ramp, mu, monkeypatch):
     def operator(fx):
         return full_operator(path(fx))
 
-    monkeypatch.setattr(Modes, "of", count_decompositions)
+    monkeypatch.setattr(SystemModes, "of", count_decompositions)
     quick = searched(operator, path.grid, PairScreen())
     few, decomposed[:] = len(decomposed), []
     every = searched(operator, path.grid)
@@ -234,11 +234,11 @@ def test_a_complex_pair_is_not_torn_by_a_level_beside_it():
     """A level mixes with one direction of the pair's plane; the nearest two are still conjugates."""
     operator = np.diag([2.0, 2.0, 2.1, 5.0])
     operator[0, 1], operator[1, 0] = 1.0, -1.0
-    modes = Modes.of_operator(0.0, operator)
+    modes = SystemModes.of_operator(0.0, operator)
     pair = modes.space(modes.complex_pairs[0])
     turn, angle = np.eye(4), np.radians(65)
     turn[1:3, 1:3] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    turned = Modes.of_operator(1.0, turn @ operator @ turn.T)
+    turned = SystemModes.of_operator(1.0, turn @ operator @ turn.T)
     first, second = turned.nearest(pair)
     assert turned.partner[first] == second
 
@@ -247,7 +247,7 @@ def test_modes_that_cross_keep_their_names():
     """Coupled so weakly that the levels pass each other within the increment, and strongly enough not to."""
     for product, exchanged in ((1e-6, True), (-1e-6, True), (4.0, False)):
         operator = crossing(0.37, product)
-        here, there = Modes.of_operator(0.0, operator(0.0)), Modes.of_operator(1.0, operator(1.0))
+        here, there = SystemModes.of_operator(0.0, operator(0.0)), SystemModes.of_operator(1.0, operator(1.0))
         expected = np.arange(12)
         if exchanged:
             expected[:2] = 1, 0

@@ -165,7 +165,7 @@ region box block -9 9 -9 9 -1 26 units box
 create_box 1 box
 region cone cone z 0 0 0.6 8 0 25 side in units box
 region pour cylinder z 0 0 2.4 9.5 24 units box
-create_atoms 1 random 126 4711 pour overlap 0.9 maxtry 2000
+create_atoms 1 random {number} 4711 pour overlap 0.9 maxtry 2000
 set group all diameter 1.0
 set group all density 1.0
 neighbor 0.1 bin
@@ -181,15 +181,15 @@ run 20000
 """
 
 
-@pytest.fixture(scope="module")
-def cone(tmp_path_factory):
-    """126 spheres with cohesion, rolling and twisting friction, at rest, and their configuration."""
+@pytest.fixture(scope="module", params=[50, pytest.param(126, marks=pytest.mark.long)])
+def cone(request, tmp_path_factory):
+    """Spheres with cohesion, rolling and twisting friction, at rest, and their configuration."""
     from faultgouge import relax
     from faultgouge.pywrap import from_lammps
 
     lmp = instance(tmp_path_factory.mktemp("cone") / "log.lammps")
     model = "jkr 1e5 0.3 0.3 20.0 tangential mindlin NULL 1.0 0.5 rolling sds 2e3 20 0.3 twisting marshall"
-    command(lmp, CONE.format(model=model))
+    command(lmp, CONE.format(number=request.param, model=model))
     relax(lmp)
     yield lmp, from_lammps(lmp)
     lmp.close()
@@ -202,7 +202,7 @@ def test_cohesive_spheres_in_a_cone(cone, tmp_path):
     lmp, found = cone
     assert found.operators == "differences"
     assert "K and C by differences of forces" in repr(found)
-    assert len(found.contacts) > 100  # of pairs; the region hands out none
+    assert len(found.contacts) > 0.7 * len(found)  # of pairs; the region hands out none
     assert found.contacts.normal_force.min() < 0  # cohesion
     assert found.operator_error < 1e-5
     assert found.proof < 1e-5  # ten steps of Verlet, so that no error of the step is in it

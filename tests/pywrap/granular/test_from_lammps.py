@@ -11,10 +11,11 @@ from packing_snapshot import snapshot_of
 
 from faultgouge.analysis import damping_matrix, largest_frequency, spectrum, stable_timestep, stiffness_matrix
 
+FAST = ("gran/hertz/history", True, 3), ("gran/hertz/history", False, 2), ("mindlin", False, 2)
 CASES = [
     pytest.param(
         law, damped, d, id=f"{law}-{'dashpots' if damped else 'elastic'}-{d}",
-        marks=pytest.mark.slow if law in ("gran/hertz/history", "mindlin") and damped == (d == 3) else pytest.mark.long,
+        marks=pytest.mark.slow if (law, damped, d) in FAST else pytest.mark.long,
     )
     for law in LAWS for damped in (False, True) for d in (2, 3) if damped or law != "tsuji"
 ]  # fmt: skip

@@ -2,7 +2,7 @@ r"""All modes at one load, and which of them is which at the next.
 
 Without dissipation these are the eigenvalues of A, with right vectors x and left vectors y; with dissipation the
 eigenvalues s of the first-order matrix with :math:`\mathrm{Im}\, s \ge 0`, from LAPACK in coordinates of the energy
-(:mod:`~faultgouge.analysis.motion.state_space`), with displacements x and y. Modes at neighbouring loads a, b are
+(:mod:`~faultgouge.analysis.motion.energy_norm`), with displacements x and y. Modes at neighbouring loads a, b are
 assigned by :math:`|x_a^H x_b|\,|y_a^H y_b|` over unit vectors, so modes that cross do not swap names.
 (:math:`|y_a^H x_b|`, the obvious weight, vanishes at an exceptional point, where it is needed most.) For shapes that
 two overdamped motions share the eigenvalues decide.
@@ -15,13 +15,15 @@ A load that changes A and G by dA and dG moves an eigenvalue by
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import eig
 from scipy.sparse import csr_array
 
-from ..motion.eigenvalues import Complexes, all_modes, exceeds_rounding, growing
-from ..motion.state_space import StateSpace
+from ..motion.eigenvalues import Complexes, exceeds_rounding, growing
+from ..motion.energy_norm import EnergyNorm
+from ..motion.modes import Modes
 from ..packing.packing import Floats, Indices
 from .space import Space
 from .system import Operator, System
@@ -29,40 +31,43 @@ from .system import Operator, System
 Members = tuple[int, int]  # the numbers of the two modes of a pair
 
 
-@dataclass(frozen=True, eq=False)
-class Modes:
-    """The modes of a system.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SystemModes(Modes):
+    """All modes of a system, on n coordinates.
+
+    Without dissipation `values` are eigenvalues of A by real part, then imaginary part, 1 / time^2; complex pairs that
+    are rounding noise have lost their imaginary parts. With dissipation they are s by imaginary part, then real part,
+    1 / time.
 
     Attributes
     ----------
     system : System
-        Whose modes they are, on n coordinates.
-    values : ndarray of complex, shape (E,)
-        Without dissipation eigenvalues of A by real part, then imaginary part, 1 / time^2; complex pairs that are
-        rounding noise have lost their imaginary parts. With it s by imaginary part, then real part, 1 / time.
-    right, left : ndarray of complex, shape (n, E)
-        Unit vectors in columns.
+        Whose modes they are.
     partner : ndarray of int, shape (E,)
         Index of the complex conjugate without dissipation; -1 for a real eigenvalue, and with dissipation.
-    overlap : ndarray, shape (E,)
-        |y^H x| of the vectors; with dissipation of those of the first-order matrix.
+    first_order_overlap : ndarray, shape (E,), or None
+        With dissipation |y^H x| of the vectors of the first-order matrix.
     """
 
     system: System
-    values: Complexes
-    right: Complexes
-    left: Complexes
     partner: Indices
-    overlap: Floats
+    first_order_overlap: Floats | None = None
     _spaces: dict[tuple[int, ...], Space] = field(default_factory=dict, repr=False)
 
+    @cached_property
+    def overlap(self) -> Floats:
+        """|y^H x| of the vectors; with dissipation of those of the first-order matrix, shape (E,)."""
+        if self.first_order_overlap is not None:
+            return self.first_order_overlap
+        return super().overlap
+
     @classmethod
-    def of(cls, system: System) -> "Modes":
+    def of(cls, system: System) -> "SystemModes":
         """Solve the dense eigenproblem, without the coordinates whose rows are zero."""
         return _with_dissipation(system) if system.dissipative else _without(system)
 
     @classmethod
-    def of_operator(cls, fx: float, matrix: Operator) -> "Modes":
+    def of_operator(cls, fx: float, matrix: Operator) -> "SystemModes":
         """The modes of A at a load, shape (n, n), without dissipation."""
         return cls.of(System(fx, csr_array(matrix)))
 
@@ -70,9 +75,6 @@ class Modes:
     def fx(self) -> float:
         """The load, force per top disk."""
         return self.system.fx
-
-    def __len__(self) -> int:
-        return len(self.values)
 
     @property
     def grows(self) -> Indices:
@@ -138,39 +140,45 @@ class Modes:
             return np.asarray(np.sum(y * force, axis=0) / np.sum(y * slant, axis=0))
 
 
-def _without(system: System) -> Modes:
-    values, right, left = all_modes(csr_array(system.stiffness))
-    partner, overlap = np.full(len(values), -1), np.abs(np.sum(left.conj() * right, axis=0))
+def _without(system: System) -> SystemModes:
+    modes = Modes.of_matrix(csr_array(system.stiffness))
+    values, overlap, partner = modes.values.copy(), modes.overlap, np.full(len(modes), -1)
     for k in (int(each) for each in np.flatnonzero(values.imag > 0)):
         conjugate = int(np.argmin(np.abs(values - values[k].conj())))
         if exceeds_rounding(values[k], overlap[k], system.rounding):
             partner[k], partner[conjugate] = conjugate, k
         else:
             values[[k, conjugate]] = values[k].real
-    return Modes(system, values, right, left, partner, overlap)
+    return SystemModes(values=values, right=modes.right, left=modes.left, system=system, partner=partner)
 
 
-def _with_dissipation(system: System) -> Modes:
+def _with_dissipation(system: System) -> SystemModes:
     assert system.damping is not None
-    first_order = StateSpace.of_matrices(
-        csr_array(system.stiffness), csr_array(system.damping), np.ones(system.stiffness.shape[0])
-    )
-    active, size = first_order.active, len(first_order.active)
-    values, left, right = eig(first_order.matrix, left=True, check_finite=False)
+    a, g = csr_array(system.stiffness), csr_array(system.damping)
+    norm = EnergyNorm.of(a)
+    active, size = norm.active, len(norm.active)
+    values, left, right = eig(norm.first_order(a, g), left=True, check_finite=False)
     kept = np.flatnonzero(values.imag >= 0)
     kept = kept[np.lexsort((values[kept].real, values[kept].imag))]
     overlap = np.abs(np.sum(left[:, kept].conj() * right[:, kept], axis=0))
     x, y = np.zeros((2, system.stiffness.shape[0], len(kept)), complex)
-    x[active] = _normalise(first_order.unweight @ right[:size, kept])
+    x[active] = _normalise(norm.unweight @ right[:size, kept])
     y[active] = _normalise(left[size:, kept])
-    return Modes(system, np.asarray(values[kept], complex), x, y, np.full(len(kept), -1), overlap)
+    return SystemModes(
+        values=np.asarray(values[kept], complex),
+        right=x,
+        left=y,
+        system=system,
+        partner=np.full(len(kept), -1),
+        first_order_overlap=overlap,
+    )
 
 
 def _normalise(vectors: Complexes) -> Complexes:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=0))
 
 
-def assign_modes(here: Modes, there: Modes) -> Indices:
+def assign_modes(here: SystemModes, there: SystemModes) -> Indices:
     """Which mode there each mode here has become, shape (E,); -1 where there are fewer modes there.
 
     The assignment maximises the sum of |x^H x'| |y^H y'|.

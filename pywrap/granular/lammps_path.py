@@ -1,9 +1,7 @@
-"""A path of equilibria of a live LAMMPS: at each load its own dynamics relax the packing, with drag.
+"""The loading path of a live LAMMPS: at each load its own dynamics relax the packing, with drag.
 
-Equilibria with friction depend on how they were reached. Each load is therefore reached from the nearest smaller load
-that is known, and what was reached beyond the largest one is kept: as a copy of the process (`fork`), which waits with
-LAMMPS in it. Contact histories stay what they are, to the bit; a restart file of LAMMPS may lose some. The instance of
-the user stays as it was.
+An equilibrium that the path keeps is a copy of the process (`fork`), which waits with LAMMPS in it. Contact histories
+stay what they are, to the bit; a restart file of LAMMPS may lose some. The instance of the user stays as it was.
 
 **Newton's method.** A step of the load in which no contact slides moves particles by :math:`K^{-1}` times what is out
 of balance. LAMMPS moves them in one long step, in which slips advance, and gives the forces; some iterations with the K
@@ -38,6 +36,7 @@ from ...analysis.arrays import derive_frozen
 from ...analysis.errors import FaultgougeError, place_in_user_code
 from ...analysis.factors.sparse_lu import general_lu
 from ...parent_death import end_with
+from ..load_path import LoadPath
 from .balance import check_balance
 from .configuration_by_laws import KnownLaws
 from .from_lammps import take_configuration
@@ -53,9 +52,6 @@ ITERATIONS = 10
 LONG = 1e6
 """Length of a step in which particles are displaced, in time steps: so slow that dashpots have no share in forces."""
 
-Kept = tuple[float, Connection, Configuration | None]
-"""A load, the copy of the process that is there, and its packing; the first has none."""
-
 
 def lammps_path(
     lmp: Any,
@@ -65,11 +61,13 @@ def lammps_path(
     slides: bool = False,
     balance: float = REST,
     steps: int = 1_000_000,
-) -> "LammpsPath":
-    """Equilibria of LAMMPS's own packing as a function of a load, for :func:`~faultgouge.analysis.find_onset`.
+) -> "LoadPath[RelaxedCopy]":
+    """The loading path of LAMMPS's own packing, for :func:`~faultgouge.analysis.find_onset`.
 
     ``path(value)`` is the Configuration in equilibrium at a value, with `fx` the value and `load_error` the shift of
-    the value that sets as much out of balance as the relaxation has left.
+    the value that sets as much out of balance as the relaxation has left. ``path.climb(values)`` yields the equilibria
+    at increasing values, up to the last one before the packing flows. The end of a ``with`` block, ``path.close()`` or
+    the end of the program ends the copies of the process.
 
     Parameters
     ----------
@@ -100,58 +98,62 @@ def lammps_path(
         raise NotTakenError("lammps_path keeps copies of the process: use one rank and one thread.")
     check_balance(balance)
     given = None if commands is None else list(commands)
-    return LammpsPath(_Relaxation(lmp, apply, given, slides, balance, steps))
+    return LoadPath(CopiesSolver(_Relaxation(lmp, apply, given, slides, balance, steps)))
 
 
-class LammpsPath:
-    """See :func:`lammps_path`; `close`, the end of a with block or of the program ends the copies of the process."""
+@dataclass(frozen=True)
+class RelaxedCopy:
+    """An equilibrium, and the copy of the process that is there."""
+
+    packing: Configuration
+    process: Connection
+
+    @property
+    def fx(self) -> float:
+        """The load."""
+        return self.packing.fx
+
+
+class CopiesSolver:
+    """LAMMPS's own equilibria, each in a copy of the process; `close` or the end of the program ends the copies."""
 
     def __init__(self, relaxation: "_Relaxation") -> None:
         folder = TemporaryDirectory(prefix="faultgouge")
-        here, there = Pipe()
+        self._first, there = Pipe()
+        self._ahead: list[Connection] = []
         files = open_files()
-        self._kept: list[Kept] = [(-np.inf, here, None)]
         with interrupts_wait():
             first = silent_copy()
             if first == 0:
-                here.close()
+                self._first.close()
                 _wait_for_loads(relaxation, there, Path(folder.name), files)
-            self._end = weakref.finalize(self, _end, self._kept, first, os.getpid(), folder)
+            self._end = weakref.finalize(self, _end, self._first, self._ahead, first, os.getpid(), folder)
         there.close()
 
-    def __call__(self, value: float) -> Configuration:
-        """The packing in equilibrium at a value."""
+    def solve(self, load: float, below: RelaxedCopy | None, beside: RelaxedCopy | None, ahead: bool) -> RelaxedCopy:
+        """As of :class:`~faultgouge.pywrap.load_path.EquilibriumSolver`: only a copy that is `ahead` waits for more."""
         if not self._end.alive:
             raise NotTakenError("The path is closed: ask it inside of its `with` block, or make a new one.")
-        value = float(value)
-        below, there, snapshot = next(each for each in reversed(self._kept) if each[0] <= value or each[0] == -np.inf)
-        if snapshot is not None and below == value:
-            return snapshot
-        here, found = _ask(there, value, relaxes=False)
+        there = self._first if below is None else below.process
+        here, found = _ask(there, load, relaxes=False)
         if found is None:
             here.close()
-            here, found = _ask(there, value, relaxes=True)
+            here, found = _ask(there, load, relaxes=True)
         if isinstance(found, FaultgougeError):
             here.close()
             try:
                 raise found
             finally:
-                del found  # its traceback has this frame, and so this path
-        if value > self._kept[-1][0]:
-            self._kept.append((value, here, found))
+                del found  # its traceback has this frame, and so this solver
+        if ahead:
+            self._ahead.append(here)
         else:
             here.close()
-        return found
+        return RelaxedCopy(found, here)
 
     def close(self) -> None:
         """End all copies of the process."""
         self._end()
-
-    def __enter__(self) -> "LammpsPath":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
 
 def _ask(there: Connection, value: float, *, relaxes: bool) -> tuple[Connection, Any]:
@@ -173,15 +175,14 @@ def _ask(there: Connection, value: float, *, relaxes: bool) -> tuple[Connection,
         return here, NotTakenError(f"LAMMPS ended without a word while it relaxed at {value:g}.")
 
 
-def _end(kept: list[Kept], first: int, owner: int, folder: "TemporaryDirectory[str]") -> None:
-    """End the copies of this process, which have this path, too, and must not end it."""
+def _end(begin: Connection, ahead: list[Connection], first: int, owner: int, folder: "TemporaryDirectory[str]") -> None:
+    """End the copies of this process, which have this solver, too, and must not end it."""
     if os.getpid() != owner:
         return
-    for _, copy, _ in kept:
+    for copy in (begin, *ahead):
         with suppress(OSError):
             copy.send(None)  # another copy of this process may keep the connection open
         copy.close()
-    kept.clear()
     os.waitpid(first, 0)
     folder.cleanup()
 

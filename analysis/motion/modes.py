@@ -1,0 +1,213 @@
+r"""Modes: eigenvalues with their right and left vectors.
+
+Vectors are in mass-weighted coordinates :math:`M^{1/2} q`, in which the stability operator is
+:math:`A = M^{-1/2} K M^{-1/2}`. A mode has :math:`A x = \lambda x` and :math:`y^H A = \lambda y^H` with unit vectors;
+:math:`\kappa = 1/|y^H x|` is the condition of its eigenvalue. `normal_modes` has all modes of a packing by LAPACK,
+:mod:`~faultgouge.analysis.motion.nearest_modes` those nearest to a shift by ARPACK, and
+:mod:`~faultgouge.analysis.motion.all_eigenvalues` those in slices of a large spectrum that are complex or negative.
+Each solver has its own rounding, so that the same mode differs in its last digits.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import eig
+from scipy.sparse import csr_array
+
+from ..arrays import Complexes, Floats
+from ..configuration import HasConfiguration
+from ..operators.stiffness import stiffness_matrix
+from .eigenvalues import SAFETY, active_coordinates, mass_weighted, unit_rounding
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One mode of a packing; of a complex pair the one with the positive imaginary part stands for both.
+
+    Attributes
+    ----------
+    eigenvalue : complex
+        lambda, 1 / time^2.
+    overlap : float
+        |y^H x| of the unit left and right vectors; zero at the coalescence of a pair.
+    participation : float
+        Participation ratio of the mode, from 1/N for one disk that moves alone to 1 for disks that move alike.
+    rotation : float
+        Share of rotation in the mode's kinetic energy, from 0 to 1.
+    """
+
+    eigenvalue: complex
+    overlap: float
+    participation: float
+    rotation: float
+
+    @classmethod
+    def of(cls, eigenvalue: complex, overlap: float, right: Complexes, axes: int) -> "Mode":
+        """The mode of a right vector, shape (axes N, 1), in mass-weighted coordinates."""
+        participation, rotation = participation_ratio(right, axes)[0], rotation_share(right, axes)[0]
+        return cls(eigenvalue, overlap, float(participation), float(rotation))
+
+    @property
+    def condition(self) -> float:
+        """kappa = 1 / |y^H x|: change of the eigenvalue per change of the operator."""
+        return 1.0 / self.overlap if self.overlap > 0 else np.inf
+
+    @property
+    def frequency(self) -> float:
+        """|Re omega|, radian / time."""
+        return float(abs(np.sqrt(self.eigenvalue).real))
+
+    @property
+    def quality(self) -> float:
+        """|Re omega| / (2 |Im omega|): dissipation with a lower quality factor stops the growth."""
+        return self.frequency / self.growth_rate if self.growth_rate > 0 else np.inf
+
+    @property
+    def growth_rate(self) -> float:
+        """2 |Im omega|, 1 / time: the mean square displacement grows as exp(growth_rate t)."""
+        return growth_rate(self.eigenvalue)
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Some modes, in mass-weighted coordinates M^(1/2) q.
+
+    Attributes
+    ----------
+    values : ndarray of complex, shape (k,)
+        Eigenvalues, 1 / time^2.
+    right, left : ndarray of complex, shape (n, k)
+        Unit vectors A x = lambda x and y^H A = lambda y^H in columns; of a packing in the order (x.., y.., R theta..),
+        and zero for coordinates on which no force acts.
+    axes : int
+        Coordinates per particle: 3 for disks, 6 for spheres.
+    solves : int
+        Number of sparse solves; 0 for the dense solver.
+    """
+
+    values: Complexes
+    right: Complexes
+    left: Complexes
+    axes: int = 3
+    solves: int = 0
+
+    @classmethod
+    def none(cls, size: int) -> "Modes":
+        """No mode of an operator of so many coordinates."""
+        return cls(np.zeros(0, complex), np.zeros((size, 0), complex), np.zeros((size, 0), complex))
+
+    @classmethod
+    def of_matrix(cls, matrix: csr_array, axes: int = 3) -> "Modes":
+        """All modes by LAPACK, sorted by real part, then imaginary part, without coordinates that feel no force."""
+        active = active_coordinates(matrix)
+        right, left = np.zeros((2, matrix.shape[0], len(active)), dtype=np.complex128)
+        if len(active) == 0:
+            return cls(np.zeros(0, dtype=np.complex128), right, left, axes)
+        inner = matrix[active][:, active].toarray()
+        values, y, x = eig(inner, left=True, right=True, overwrite_a=True, check_finite=False)
+        order = np.lexsort((values.imag, values.real))
+        right[active], left[active] = x[:, order], y[:, order]
+        return cls(values[order], right, left, axes)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @cached_property
+    def overlap(self) -> Floats:
+        """|y^H x| of each eigenvalue, shape (k,)."""
+        return np.abs(np.sum(self.left.conj() * self.right, axis=0))
+
+    @property
+    def participation(self) -> Floats:
+        """Participation ratio of each mode, shape (k,)."""
+        return participation_ratio(self.right, self.axes)
+
+    @property
+    def rotation(self) -> Floats:
+        """Share of rotation in the kinetic energy of each mode, shape (k,)."""
+        return rotation_share(self.right, self.axes)
+
+
+def normal_modes(packing: HasConfiguration) -> Modes:
+    """Compute every mode with its left and right vectors, by LAPACK's dense solver.
+
+    Parameters
+    ----------
+    packing : Packing
+        The configuration.
+
+    Returns
+    -------
+    Modes
+        Sorted by real part, then imaginary part, as in :func:`~faultgouge.analysis.spectrum`.
+    """
+    return Modes.of_matrix(mass_weighted(stiffness_matrix(packing), packing), packing.axes)
+
+
+def closest_to_meeting(modes: Modes) -> tuple[int, int, float]:
+    r"""Find the two real modes that are closest to a coalescence.
+
+    At a coalescence of two real eigenvalues the vectors become one. In the normal form of two modes the cosine between
+    the right vectors is :math:`\eta/\delta = 1 - \epsilon`, and :math:`\epsilon` is the distance from the coalescence.
+    The two modes are therefore the real modes whose mass-weighted right vectors are most nearly parallel. Motions
+    that no force opposes, whose eigenvalue is zero within rounding, do not count: LAPACK's vectors of several of them
+    may be parallel by rounding alone.
+
+    Parameters
+    ----------
+    modes : Modes
+        All modes of a packing, from :func:`normal_modes`.
+
+    Returns
+    -------
+    tuple of (int, int, float)
+        Indices of the two modes, the lower eigenvalue first, and the cosine. The cosine is 0, up to rounding, for the
+        modes of a symmetric operator.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two such modes.
+    """
+    zero = np.abs(modes.values) <= SAFETY * unit_rounding(modes.values)
+    real = np.flatnonzero((modes.values.imag == 0) & ~zero)
+    if len(real) < 2:
+        raise ValueError(f"There are {len(real)} real modes that a force opposes; two are needed to meet.")
+    cosine = np.abs(modes.right[:, real].real.T @ modes.right[:, real].real)
+    np.fill_diagonal(cosine, 0.0)
+    first, second = sorted(np.unravel_index(np.argmax(cosine), cosine.shape))
+    return int(real[first]), int(real[second]), float(cosine[first, second])
+
+
+def growth_rate(eigenvalue: complex) -> float:
+    """2 |Im sqrt(lambda)|, 1 / time: the mean square displacement D grows as exp(growth_rate t)."""
+    return float(2 * abs(np.sqrt(complex(eigenvalue)).imag))
+
+
+def participation_ratio(right: Complexes | Floats, axes: int = 3) -> Floats:
+    r"""How many of the disks take part in a mode, as a share.
+
+    With :math:`e_i` the kinetic energy of disk i, rotation included, the ratio is
+    :math:`(\sum_i e_i)^2 / (N \sum_i e_i^2)`: 1/N for one disk that moves alone, 1 for disks that move alike. Of a
+    complex mode :math:`e_i` is the mean over a period.
+
+    Parameters
+    ----------
+    right : ndarray, shape (axes N, k)
+        Right vectors in mass-weighted coordinates, in columns.
+    axes : int
+        Coordinates of a particle: 3 of disks, 6 of spheres.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+    """
+    energy = (np.abs(right) ** 2).reshape(axes, -1, right.shape[1]).sum(axis=0)
+    return energy.sum(axis=0) ** 2 / (len(energy) * (energy**2).sum(axis=0))
+
+
+def rotation_share(right: Complexes | Floats, axes: int = 3) -> Floats:
+    """Share of rotation in the kinetic energy of modes, shape (k,); as of :func:`participation_ratio`."""
+    energy = (np.abs(right) ** 2).reshape(axes, -1, right.shape[1]).sum(axis=1)
+    return energy[axes // 2 + axes % 2 :].sum(axis=0) / energy.sum(axis=0)

@@ -1,0 +1,302 @@
+"""The search for the onset of a packing along a ramp: with dissipation or without, all windows or the first."""
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
+
+from ..configuration import HasConfiguration
+from ..errors import NoEquilibriumError, TurningPointError
+from ..motion.buckling import negative_eigenvalues
+from ..motion.spectrum import Spectrum, spectrum
+from ..packing.packing import Floats, Packing
+from ..progress import Watch, report_progress, show_progress
+from .edges import At, Edge, Window
+from .find_windows import Known, check_increasing, find_windows, windows_up_to
+from .limits import LIMITS, Limits
+from .onset import Increments, Onset, OnsetError
+from .search import Look
+from .slices.ranks import ALONE, Ranks
+from .system import System, force_bearing, full_operator
+
+
+def takes_all_modes(packing: HasConfiguration, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
+    """Whether a packing is small enough for all of its modes to be searched, and for all windows to be found."""
+    return modes is None and packing.coordinates <= 3 * limits.all_windows
+
+
+def find_onset(
+    equilibrium: Callable[[float], HasConfiguration],
+    forces: ArrayLike,
+    *,
+    dissipation: bool = False,
+    narrowest: float | None = None,
+    modes: tuple[int, int] | None = None,
+    first: bool = False,
+    known: Callable[[Onset, float], None] = lambda onset, fx: None,
+    watch: Watch | None = None,
+    ranks: Ranks = ALONE,
+    folder: Path | None = None,
+    limits: Limits = LIMITS,
+) -> Onset:
+    """The windows of growing motion between the smallest and the largest load.
+
+    Without dissipation these are windows of complex eigenvalues.
+
+    Of a packing of up to `Limits.all_windows` disks these are all, unless the first alone is asked for; of a larger one
+    it is the first. They end where the branch of equilibria does: where an equilibrium at one of the given loads has a
+    negative eigenvalue, so that a static instability lies before it.
+
+    Parameters
+    ----------
+    equilibrium : callable
+        fx -> Packing or Configuration in equilibrium. It is called with the given loads in increasing order, and
+        between calls for the loads a and b with loads between these, in any order. There it may raise a
+        NoEquilibriumError, and the search goes around it. All other errors reach the caller.
+    forces : array_like, shape (S,)
+        The increasing loads of the ramp, force per top disk.
+    dissipation : bool
+        Whether the packing's own dashpots and drag count. The onset without them is found as well, `Onset.undamped`.
+    narrowest : float, optional
+        Windows narrower than this are not looked for, force; by default as in `Limits`, `narrowest` and `finest`.
+    modes : tuple of (int, int), optional
+        Search these modes alone, and for their first window: numbers of the first one and of the first one beyond, by
+        frequency, the lowest being 0, of the symmetric part at the load where the search stands. Parts that are
+        searched apart, on machines of their own, have together the same first window as all.
+    first : bool
+        Seek the first window alone. No equilibrium beyond the increment in which it begins is then asked for, and its
+        end is None where it ends beyond that increment.
+    known : callable, optional
+        With dissipation, given what is known, and the load up to which that is all, as soon as there is a window, and
+        after each increment from there on.
+    watch : callable, optional
+        Told in words what is being looked at in a large packing.
+    ranks : Ranks, optional
+        The processes that search a large packing together. Each makes the same call, and is told the same by
+        `equilibrium`.
+    folder : Path, optional
+        Where a search whose bases are too large to be kept in memory leaves what it finds, slice by slice. A search of
+        the same loads, operators and modes goes on from there, to the bit. All ranks write to it.
+
+    Raises
+    ------
+    OnsetError
+        If no motion grows at any load.
+    TurningPointError
+        If one is negative before any is complex.
+    LostPairError, SliceError
+        Of a large packing, if a pair cannot be followed, or a part of the spectrum is not found.
+    OutputError, DamagedSliceError
+        If a file in the folder cannot be written, or read.
+    ValueError
+        If the loads are not at least two increasing numbers, the packing has none of the modes, or no
+        dissipation that could count.
+    """
+    loads = check_increasing(forces)
+    start = equilibrium(float(loads[0]))
+    if dissipation and not start.damped:
+        raise ValueError("The packing has no dissipation: find_onset without it is what it needs.")
+    search = _OnsetSearch(equilibrium, start, loads, narrowest, modes, first, ranks, folder, limits)
+    with show_progress(watch):
+        if not dissipation:
+            return search.undamped_onset()
+        return search.damped_onset(known) if search.takes_all else search.damped_onset_in_slices(known)
+
+
+@dataclass(frozen=True, eq=False)
+class _OnsetSearch:
+    """What is searched, and how; fields as of `find_onset`, and the packing at the smallest load."""
+
+    equilibrium: Callable[[float], HasConfiguration]
+    start: HasConfiguration
+    loads: Floats
+    narrowest: float | None
+    modes: tuple[int, int] | None
+    first: bool
+    ranks: Ranks
+    folder: Path | None
+    limits: Limits
+
+    @property
+    def takes_all(self) -> bool:
+        """Whether all modes are searched, and all windows can be found."""
+        return takes_all_modes(self.start, self.modes, self.limits)
+
+    def undamped(self, fx: float) -> System:
+        """The system at a load, without dissipation."""
+        return System.of(self.equilibrium(fx), limits=self.limits)
+
+    def damped(self, fx: float) -> System:
+        """The system at a load, with dissipation."""
+        packing = self.start if fx == self.loads[0] else self.equilibrium(fx)
+        return System.of(packing, True, self.limits)
+
+    def windows_of(
+        self, system: At, look: Look = lambda below, above: (), known: Known = lambda windows, fx: None
+    ) -> tuple[tuple[Window, ...], Increments]:
+        """The windows of a family of systems, and increments in doubt."""
+        if self.takes_all:
+            found = find_windows(
+                system,
+                self.loads,
+                narrowest=self.narrowest,
+                look=look,
+                first=self.first,
+                known=known,
+                limits=self.limits,
+            )
+            return found[:1] if self.first else found, ()
+        from .slices.first_window import first_window  # with libraries that nothing else needs
+
+        narrowest = self.narrowest or 0.0
+        one, doubtful = first_window(system, self.loads, self.modes, self.ranks, self.folder, narrowest, self.limits)
+        return (one,) if one else (), doubtful
+
+    def undamped_onset(self) -> Onset:
+        """The onset without dissipation."""
+        windows, doubtful, at_start, ends = self._undamped_windows()
+        if not windows:
+            raise OnsetError.among(self.modes, float(self.loads[-1]), doubtful)
+        opens = windows[0].kind == "start"
+        if opens and self.takes_all:
+            at_start = at_start or spectrum(force_bearing(self.start))
+        complete = self.takes_all and not self.first and not windows[0].eigenvalue < 0
+        return Onset(windows, complete, doubtful, self.modes, at_start if opens else None, ends)
+
+    def undamped_onset_or_none(self) -> Onset | None:
+        """The onset without dissipation beside the one with it; None if there is none."""
+        with suppress(OnsetError, NoEquilibriumError):
+            return self.undamped_onset()
+        return None
+
+    def damped_onset(self, known: Callable[[Onset, float], None]) -> Onset:
+        """The onset with dissipation among all modes: growth is looked for inside of the undamped windows, too."""
+        report_progress(f"pairs that become complex without dissipation, up to F_x = {self.loads[-1]:.6g}")
+        undamped = self.undamped_onset_or_none()
+        inside = _Inside(self.undamped, self.loads, undamped, self.limits)
+
+        def known_windows(windows: tuple[Window, ...], fx: float) -> None:
+            if windows and not self.first:
+                known(Onset(windows, undamped=undamped), fx)
+
+        windows, doubtful = self.windows_of(self.damped, inside.look, known_windows)
+        self._check_growth(windows)
+        return Onset(windows, not self.first, doubtful, self.modes, undamped=undamped)
+
+    def damped_onset_in_slices(self, known: Callable[[Onset, float], None]) -> Onset:
+        """The first onset with dissipation of a large packing."""
+        with show_progress(what="with dissipation, "):
+            windows, doubtful = self.windows_of(self.damped)
+        self._check_growth(windows)
+        known(Onset(windows, False, doubtful), windows[0].fx_onset)
+        with show_progress(what="without dissipation, "):
+            undamped = self.undamped_onset_or_none()
+        return Onset(windows, False, doubtful, self.modes, undamped=undamped)
+
+    def _check_growth(self, windows: tuple[Window, ...]) -> None:
+        if not windows:
+            raise OnsetError(f"No motion grows up to F_x = {self.loads[-1]:.10g}: raise the largest load.")
+
+    def _undamped_windows(self) -> tuple[tuple[Window, ...], Increments, Spectrum | None, float | None]:
+        """Windows without dissipation, increments in doubt, the spectrum at the smallest load if that is known, and the
+        load before which the branch of equilibria ends."""
+        start, limits = self.start, self.limits
+        negative = negative_eigenvalues(force_bearing(start, limits))
+        if len(negative):
+            return (_at_start(start, float(negative[0]), 1.0),), (), None, start.fx
+        branch = _Branch(self.equilibrium, start, self.loads, limits)
+        # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
+        if self.modes is None and (not self.takes_all or (self.first and not isinstance(start, Packing))):
+            found = _complex_at_start(start, limits)
+            if found is not None:
+                return (_fastest(start, found),), (), found, None
+        try:
+            return *self.windows_of(branch), None, branch.ends
+        except NoEquilibriumError:  # beyond the first increment, which the search asks for in any case
+            found = _complex_at_start(start, limits) if self.takes_all else None
+            if found is None:
+                raise
+            return (_fastest(start, found),), (), found, branch.ends
+
+
+class _Inside:
+    """Loads inside the undamped windows of a ramp: growth without dissipation is largest there.
+
+    Where the first window alone is known, the others are sought as far as the ramp is walked.
+    """
+
+    def __init__(self, undamped: At, loads: Floats, known: Onset | None, limits: Limits) -> None:
+        self._windows: tuple[Window, ...] = () if known is None else known.windows
+        self._reached = np.inf
+        self._along: Iterator[tuple[float, tuple[Window, ...]]] = iter(())
+        if known is not None and not known.complete:
+            begin = max(0, int(np.searchsorted(loads, known.fx_c, side="right")) - 1)
+            if begin < len(loads) - 1:
+                self._reached = float(loads[begin])
+                self._along = windows_up_to(undamped, loads[begin:], limits=limits)
+
+    def look(self, below: float, above: float) -> list[float]:
+        """Onsets between two neighbouring loads, and of windows that end there the middle of what they have there."""
+        if not self._windows or above <= self._windows[0].fx_onset:
+            return []
+        while self._reached < above:
+            try:
+                self._reached, self._windows = next(self._along)
+            except (StopIteration, NoEquilibriumError):
+                self._reached = np.inf
+        onsets = [each.fx_onset for each in self._windows if below < each.fx_onset < above]
+        ends = [(each.fx_onset, each.fx_end) for each in self._windows if each.fx_end is not None]
+        return onsets + [0.5 * (max(begin, below) + end) for begin, end in ends if below < end < above]
+
+
+class _Branch:
+    """The systems of a branch of stable equilibria; it ends where one at a given load has a negative eigenvalue."""
+
+    def __init__(
+        self, equilibrium: Callable[[float], HasConfiguration], start: HasConfiguration, loads: Floats, limits: Limits
+    ) -> None:
+        self._equilibrium, self._start, self._limits = equilibrium, start, limits
+        self._first, self._given = float(loads[0]), set(loads[1:].tolist())
+        self.ends: float | None = None
+
+    def __call__(self, fx: float) -> System:
+        packing = self._start if fx == self._first else self._equilibrium(fx)
+        if fx in self._given and len(negative_eigenvalues(force_bearing(packing, self._limits))):
+            self.ends = fx if self.ends is None else min(self.ends, fx)
+            raise TurningPointError(
+                f"no pair of eigenvalues becomes complex before F_x = {fx:.10g}, where one is negative: the branch of "
+                "stable equilibria ends before, at a turning point, and the packing leaves it without oscillation"
+            )
+        return System.of(packing, limits=self._limits)
+
+
+def _complex_at_start(start: HasConfiguration, limits: Limits) -> Spectrum | None:
+    """The spectrum of a packing at the smallest load, if it has a complex pair.
+
+    None if it has none, or if the packing is too large for all eigenvalues to be asked for. Of a symmetric operator,
+    as without tangential forces, nothing is computed.
+    """
+    if start.coordinates > limits.lapack or _symmetric(full_operator(start, limits)):
+        return None
+    found = spectrum(force_bearing(start, limits))
+    return found if found.pairs else None
+
+
+def _symmetric(matrix: csr_array) -> bool:
+    """Whether an operator is its transpose, but for the rounding of its entries, which are sums over contacts."""
+    return bool(abs(matrix - matrix.T).max() <= 1e-14 * abs(matrix).max())
+
+
+def _fastest(start: HasConfiguration, found: Spectrum) -> Window:
+    """The window of the complex pair that grows fastest at the smallest load."""
+    pair = max(found.pairs, key=lambda each: each.growth_rate)
+    return _at_start(start, pair.eigenvalue.real, pair.overlap)
+
+
+def _at_start(start: HasConfiguration, eigenvalue: float, overlap: float) -> Window:
+    """A window that is open at the smallest load."""
+    return Window(Edge(start.fx, 0.0, float(eigenvalue), overlap, "start"), None)

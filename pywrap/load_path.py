@@ -1,0 +1,97 @@
+"""A loading path: equilibria as a function of a load, computed when they are asked for.
+
+Equilibria with friction depend on how they were reached. An equilibrium beyond the largest load so far follows from
+the last one, and is kept. Between two loads an equilibrium follows from the kept one just below, and is not kept: what
+is asked for in between does not change the path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Generic, Protocol, TypeVar
+
+from ..analysis import NoEquilibriumError
+
+P = TypeVar("P", covariant=True)
+
+
+class AtLoad(Protocol[P]):
+    """An equilibrium: its load and its packing."""
+
+    @property
+    def fx(self) -> float: ...
+
+    @property
+    def packing(self) -> P: ...
+
+
+E = TypeVar("E", bound=AtLoad[object], covariant=True)
+S = TypeVar("S", bound=AtLoad[object])
+
+
+class EquilibriumSolver(Protocol[S]):
+    """Finds the equilibrium at one load after the other."""
+
+    def solve(self, load: float, below: S | None, beside: S | None, ahead: bool) -> S:
+        """The equilibrium at a load that follows from the one `below`; None for where the path begins.
+
+        `beside` is another one near `below`, for an initial guess. `ahead` says that the load is larger than all so
+        far, so that the path goes on from the result; it raises a NoEquilibriumError where the packing flows.
+        """
+
+    def close(self) -> None:
+        """End whatever the solver alone uses."""
+
+
+class LoadPath(Generic[E]):
+    """Equilibria as a function of a load; the end of a `with` block, or `close`, closes the solver.
+
+    Parameters
+    ----------
+    solver : EquilibriumSolver
+        Finds each equilibrium.
+    equilibria : sequence
+        Those of the path that are known already, by increasing load.
+    """
+
+    def __init__(self, solver: EquilibriumSolver[E], equilibria: Sequence[E] = ()) -> None:
+        self.solver = solver
+        self.equilibria = list(equilibria)
+        self._between: tuple[E | None, E] | None = None  # a kept one, and the last one found above it
+
+    def __call__(self: LoadPath[AtLoad[P]], load: float) -> P:
+        """The packing in equilibrium at a load."""
+        load, kept = float(load), self.equilibria
+        below = next((each for each in reversed(kept) if each.fx <= load), None)
+        if below is not None and below.fx == load:
+            return below.packing
+        if not kept or load > kept[-1].fx:
+            # from the kept ones alone, so that it does not depend on what is asked for in between
+            found = self.solver.solve(load, below, kept[-2] if len(kept) > 1 else None, ahead=True)
+            kept.append(found)
+            return found.packing
+        beside = self._between[1] if self._between and self._between[0] is below else None
+        found = self.solver.solve(load, below, beside, ahead=False)
+        self._between = below, found
+        return found.packing
+
+    def climb(self, loads: Iterable[float]) -> Iterator[E]:
+        """The equilibria at increasing loads, up to the last one that the packing bears."""
+        for load in loads:
+            try:
+                self(load)
+            except NoEquilibriumError:
+                if len(self.equilibria) < 2:
+                    raise
+                return
+            yield self.equilibria[-1]
+
+    def close(self) -> None:
+        """Close the solver."""
+        self.solver.close()
+
+    def __enter__(self) -> LoadPath[E]:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()

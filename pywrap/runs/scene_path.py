@@ -1,0 +1,78 @@
+"""The loading path of a scene: each equilibrium follows from another one by the scene's method, in LAMMPS.
+
+All functions are collective over the ranks of the engine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...analysis import NoEquilibriumError
+from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
+from ..lammps.engine import Engine
+from ..load_path import LoadPath
+from ..scenes.scene import Scene
+from ..scenes.validation import require_section
+
+
+def next_equilibrium(
+    engine: Engine,
+    last: Equilibrium,
+    fx: float,
+    scene: Scene,
+    beside: Equilibrium | None = None,
+    onward: bool = True,
+) -> Equilibrium:
+    """The equilibrium at fx that follows from the last one, by the scene's method; the others as in `equilibrate`."""
+    settings = require_section(scene.ramp, "ramp")
+    if settings.method == "newton":
+        return equilibrate(engine, last, fx, settings.force_tolerance, beside, onward)
+    floor = rounding_floor(last.packing)
+    engine.restore(last.packing)
+    engine.set_fx(fx)
+    relaxation = engine.relax(
+        settings.force_tolerance if settings.force_tolerance is not None else 1.5 * floor,
+        scene.relax.damping,
+        scene.relax.time_step,
+    )
+    if relaxation.status == "no":
+        raise NoEquilibriumError(
+            f"the relaxation at F_x = {fx:.10g} did not come to rest in {relaxation.steps} steps (a disk feels "
+            f"{relaxation.residual:.2g}); the last equilibrium is at F_x = {last.fx:.10g}"
+        )
+    packing = engine.packing
+    return Equilibrium(packing, relaxation.residual, rounding_floor(packing), relaxation.steps)
+
+
+@dataclass(frozen=True)
+class EngineSolver:
+    """The equilibria of a scene.
+
+    Attributes
+    ----------
+    engine : Engine
+        LAMMPS with the packing of `start`; the caller closes it.
+    scene : Scene
+        With a section [ramp], for its method and force tolerance.
+    start : Equilibrium
+        Where the path begins.
+    onward : bool
+        Whether the path goes on by other ways where Newton's branch of equilibria ends, as in `ramp`.
+    """
+
+    engine: Engine
+    scene: Scene
+    start: Equilibrium
+    onward: bool = False
+
+    def solve(self, load: float, below: Equilibrium | None, beside: Equilibrium | None, ahead: bool) -> Equilibrium:
+        """As of :class:`~faultgouge.pywrap.load_path.EquilibriumSolver`."""
+        return next_equilibrium(self.engine, below or self.start, load, self.scene, beside, self.onward and ahead)
+
+    def close(self) -> None:
+        """The engine is the caller's."""
+
+
+def scene_path(engine: Engine, start: Equilibrium, scene: Scene, *, onward: bool = False) -> LoadPath[Equilibrium]:
+    """The path of a scene from a settled packing on; fields as of `EngineSolver`."""
+    return LoadPath(EngineSolver(engine, scene, start, onward), [start])

@@ -1,0 +1,31 @@
+"""The page about JSON names every key that commands print."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from reference_layer import LAYER, toml
+
+PAGE = Path(__file__).parents[2] / "docs" / "json.md"
+
+
+def named(command):
+    """The keys that the section of a command names, in backticks or in quotes."""
+    section = re.search(rf"^## {command}\n(.*?)(?=^## |\Z)", PAGE.read_text(), re.MULTILINE | re.DOTALL)[1]
+    return set(re.findall(r"[`\"](\w+)[`\"]", section))
+
+
+@pytest.mark.slow
+def test_keys_of_commands(faultgouge_here, tmp_path):
+    scene = LAYER + toml({"ramp": {"step": 5.5e-3, "until": 0.022}})
+    (tmp_path / "scene.toml").write_text(scene)
+    ramp = json.loads(faultgouge_here("ramp", "scene.toml", "--json").stdout)
+    spectrum = json.loads(faultgouge_here("spectrum", "run.h5", "--json").stdout)
+    onset = json.loads(faultgouge_here("onset", "scene.toml", "--all", "--json").stdout)
+    assert len(ramp["equilibria"]) == 5
+    assert len(onset["windows"]) >= 1
+    assert {*ramp, *ramp["equilibria"][0]} <= named("ramp")
+    inner = [spectrum["stability"], spectrum["stability"]["undamped"], *spectrum["pairs"]]
+    assert {key for each in (spectrum, *inner) for key in each} - named("spectrum") == set()
+    assert {key for each in (onset, *onset["windows"]) for key in each} - named("onset") == set()

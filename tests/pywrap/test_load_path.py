@@ -1,0 +1,91 @@
+"""A loading path keeps what lies beyond the largest load, and nothing of what is asked for in between."""
+
+from dataclasses import dataclass, field
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from faultgouge.analysis import NoEquilibriumError
+from faultgouge.pywrap import LoadPath
+
+BOUND, HARDENING, ULTIMATE = 1.0, 0.5, 3.0
+
+
+@dataclass(frozen=True)
+class Slider:
+    """A slider at rest under a load: how far it has slipped, which depends on the steps that have led here."""
+
+    fx: float
+    slip: float
+
+    @property
+    def packing(self):
+        return self.slip
+
+
+@dataclass
+class SliderSolver:
+    """The slip of a step is that of the bound at its beginning; friction hardens as one over one plus the slip."""
+
+    asked: list = field(default_factory=list)
+    closed: bool = False
+
+    def solve(self, load, below, beside, ahead):
+        self.asked.append((load, below, beside, ahead))
+        if load > ULTIMATE:
+            raise NoEquilibriumError(f"the slider runs away at {load}")
+        slip = below.slip if below else 0.0
+        rise = load - max(below.fx if below else 0.0, BOUND)
+        return Slider(load, slip + max(0.0, rise) / (HARDENING * (1 + slip)))
+
+    def close(self):
+        self.closed = True
+
+
+@given(st.lists(st.floats(0, ULTIMATE), min_size=1, max_size=8))
+def test_what_is_asked_in_between_changes_nothing(between):
+    loads, alone, asked = [0.5, 1.5, 2.0, 3.0], LoadPath(SliderSolver()), LoadPath(SliderSolver())
+    list(alone.climb(loads))
+    for load in loads:
+        asked(load)
+        for each in between:
+            if each <= load:
+                asked(each)
+    assert asked.equilibria == alone.equilibria
+    assert [each.fx for each in asked.equilibria] == loads
+
+
+def test_each_equilibrium_follows_from_the_kept_one_below():
+    path = LoadPath(SliderSolver(), [Slider(0.5, 0.0)])
+    assert path(0.5) == 0.0  # known, and nothing is solved
+    path(2.0)
+    path(1.6)
+    path(1.8)
+    path(3.0)
+    path(0.2)
+    start, top = path.equilibria[:2]
+    kept, one, other, last, before = path.solver.asked
+    assert kept == (2.0, start, None, True)
+    assert one == (1.6, start, None, False)
+    assert other[:2] == (1.8, start)
+    assert (other[2].fx, other[3]) == (1.6, False)  # near the last one that was asked for
+    assert last == (3.0, top, start, True)
+    assert before == (0.2, None, None, False)
+    assert path(2.0) == top.packing
+
+
+def test_a_climb_ends_where_the_packing_flows():
+    path = LoadPath(SliderSolver())
+    assert [each.fx for each in path.climb([0.0, 2.0, 4.0, 1.0])] == [0.0, 2.0]
+    with pytest.raises(NoEquilibriumError, match="runs away at 4"):
+        path(4.0)
+    with pytest.raises(NoEquilibriumError):  # at the first load: no path at all
+        next(LoadPath(SliderSolver(), [Slider(0.0, 0.0)]).climb([4.0]))
+
+
+def test_the_end_of_a_with_block_closes_the_solver():
+    with LoadPath(SliderSolver()) as path:
+        path(1.0)
+        assert not path.solver.closed
+    assert path.solver.closed
