@@ -61,9 +61,10 @@ SIDES = 1e-3
 """Jump of a derivative, as a share of the largest entry, from which on two sides are said to differ; the extrapolation
 leaves 1e-5 of one."""
 
-FINER = 0.03
-"""A finer displacement, where sides differ: a contact whose force is far below the mean one slides within the first,
-as those of cohesive particles do that pull about as much as they push."""
+SHORTER = 0.03
+"""Size of a shorter displacement, as a share of the first one, where a force is not linear: a contact whose force is
+far below the mean one slides within the first, as those of cohesive particles do that pull about as much as they
+push."""
 
 TOO_LARGE = 0.1
 """Error, relative to the largest entry, beyond which the differences describe nothing."""
@@ -231,8 +232,8 @@ def _slopes(probe: Probe, directions: list[Floats], owners: list[Indices], step:
     largest = max(np.abs(each.mean).max() for each in found)
     uneven = [k for k, each in enumerate(found) if each.uneven.max() > SIDES * largest]
     if uneven:
-        for k, each in zip(uneven, probe.each([FINER * directions[k] for k in uneven]), strict=True):
-            found[k] = _more_linear(found[k], _slope(each, probe.sizes, FINER * step), owners[k])
+        for k, each in zip(uneven, probe.each([SHORTER * directions[k] for k in uneven]), strict=True):
+            found[k] = _more_linear(found[k], _slope(each, probe.sizes, SHORTER * step), owners[k])
     return found
 
 
