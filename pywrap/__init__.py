@@ -37,6 +37,9 @@ from .scenes.validation import SceneError
 from .settling.relax import bring_to_rest
 from .settling.settle import settle
 
+SnapshotError = NotTakenError
+"""The name of `NotTakenError` in earlier states of this version, for scripts that catch it."""
+
 __all__ = [
     "Checkpoint",
     "DriveSample",
@@ -53,6 +56,7 @@ __all__ = [
     "Sample",
     "Scene",
     "SceneError",
+    "SnapshotError",
     "bring_to_rest",
     "compare_motion",
     "dashpot",
