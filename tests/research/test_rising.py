@@ -84,9 +84,8 @@ def test_a_stronger_loss_raises_the_onset_more():
 
 def test_readme_has_the_counts_of_a_weak_loss():
     at = {row["law"]: row["counts"][300] for row in FOUND["over_quality"] if row["load"] == 0.2}
-    said = "Q = 300 motion grows in {} and in {} of {}".format(
-        at["smooth"]["count"], at["loaded"]["count"], at["smooth"]["of"]
-    )
+    counts = at["smooth"]["count"], at["loaded"]["count"], at["smooth"]["of"]
+    said = "Q = 300, motion grows in {} and {} of {}".format(*counts)
     assert said in " ".join((HERE.parents[1] / "README.md").read_text().split())
 
 
