@@ -13,9 +13,9 @@ Of a run these states count:
 
 **400 disks.** The same scene with four times as many disks in a box of twice the width: the layer is as thick again,
 and one disk in ten is drawn by the spring, as before. The rule, written down before the first run: seeds 1 to 10 in
-this order with the standard law, then the same seeds with the smoothed law, as many runs as 90 minutes of one processor
-allow. All slips count for sizes and recurrence. The states `before` and `control` of the first `LOOKED_AT` slips of a
-run are looked at, half a minute each; none are `even`.
+this order with the standard law, then the same seeds with the smoothed law, as many runs as the time allowed. All slips
+count for sizes and recurrence. The states `before` and `control` of the first `LOOKED_AT` slips of a run are looked at,
+half a minute each; none are `even`.
 """
 
 from __future__ import annotations

@@ -52,9 +52,14 @@ RATES = (3e-4, 3e-5, 3e-6)
 WINDOWS, STAGES, LOOKS = 24, 40, 400
 """Windows of a run, stages in which the drag fades, and looks at velocities in each of the last two windows."""
 
-POURED_LAWS = tuple(f"granular hertz, {law}" for law in ("mindlin/force", "mindlin_rescale/force", "linear_history"))
+POURED_LAWS = (
+    "granular hertz, mindlin/force",
+    "granular hertz, mindlin_rescale/force",
+    "granular hooke, linear_history",
+)
 STIFFNESSES = (KN, KN / 10**1.5, KN / 10**2.25)
-"""Overlaps go as k_n^(-2/3): some 6e-4, 6e-3 and 2e-2 of a diameter. Dashpots go as k_n^(2/3), with one restitution."""
+"""Overlaps of Hertz's laws go as k_n^(-2/3): some 6e-4, 6e-3 and 2e-2 of a diameter; dashpots go as k_n^(2/3), with one
+restitution. Those of the linear law go as 1/k_n, and dashpots as its root."""
 
 SLOPES, POURED_SEEDS = (0.2, 0.3), 5
 
@@ -158,7 +163,8 @@ def poured(law: str, kn: float, slope: float, seed: int) -> dict[str, Any]:
     begin = time.process_time()
     key = {"law": law, "kn": kn, "slope": slope, "seed": seed}
     with TemporaryDirectory() as folder:
-        lmp = pour(law, 3, 50, MU, seed, Path(folder) / "log", GAMMA * (kn / KN) ** (2 / 3), kn)
+        gamma = GAMMA * (kn / KN) ** (1 / 2 if "hooke" in law else 2 / 3)
+        lmp = pour(law, 3, 50, MU, seed, Path(folder) / "log", gamma, kn)
         lmp.command(f"variable slope equal {slope}")
         found = rest(lmp)
         lmp.close()

@@ -22,6 +22,7 @@ from faultgouge.figures import render, save, styled
 from faultgouge.studies.statistics import share
 from research.laws.both_laws import RESTITUTIONS as WEAKEST_FIRST
 from research.modes.loss import GROWS as LINEAR
+from research.modes.sets import sets
 from research.rising import onsets
 from research.rising.compute import (
     COMPARED,
@@ -50,6 +51,8 @@ LAWS = HERE.parent / "laws" / "tables" / "force_100.jsonl"
 
 QUALITIES = (50, 100, 200, 300)
 """Q of a loss that takes omega/Q of each mode; rock has 50 to 300."""
+
+FY = float(sets()["force 100"].scene["load"]["fy"])
 
 LATEST = 8
 """Windows over which the vibration of a start is a mean, and which are compared with as many before."""
@@ -164,6 +167,7 @@ def onsets_over_undamped(rows: list[Row]) -> list[Row]:
                 "below": int(np.sum(ratios < 1)),
                 "quartiles": np.quantile(ratios, [0.25, 0.5, 0.75]).tolist() if len(ratios) else None,
                 "range": [float(ratios.min()), float(ratios.max())] if len(ratios) else None,
+                "largest": max((damped for damped, _ in both if damped is not None), default=0.0) / FY,
             }
         )
     return found

@@ -3,7 +3,7 @@
 import pytest
 
 from research.rising.compute import RATES, RESTITUTIONS
-from research.rising.make import HERE, STARTS, VIBRATES, check, numbers, write_page
+from research.rising.make import HERE, ONSETS, STARTS, VIBRATES, check, numbers, write_page
 from research.rising.starts import APART, order
 from research.tables import read_rows
 
@@ -74,11 +74,18 @@ def test_pages_have_the_count_of_the_tables():
         assert said in " ".join((HERE.parents[1] / page).read_text().split()), page
 
 
+def test_a_stronger_loss_raises_the_onset_more():
+    rows = read_rows(ONSETS)
+    assert [row["seed"] for row in rows] == list(range(1, len(rows) + 1)) == FOUND["onset_seeds"]
+    for row in rows:
+        if row["0.99"] is not None and row["0.9"] is not None:
+            assert row["undamped"] < row["0.99"] < row["0.9"]
+
+
 def test_readme_has_the_counts_of_a_weak_loss():
     at = {row["law"]: row["counts"][300] for row in FOUND["over_quality"] if row["load"] == 0.2}
-    said = "Q = 300 motion grows in {} and in {} of {}".format(
-        at["smooth"]["count"], at["loaded"]["count"], at["smooth"]["of"]
-    )
+    counts = at["smooth"]["count"], at["loaded"]["count"], at["smooth"]["of"]
+    said = "Q = 300, motion grows in {} and {} of {}".format(*counts)
     assert said in " ".join((HERE.parents[1] / "README.md").read_text().split())
 
 
