@@ -229,6 +229,37 @@ def test_the_rate_without_contacts_at_the_bound_is_that_of_lammps_over_ten_decad
     assert np.polyfit(times, np.log(found), 1)[0] == pytest.approx(told.growth_rate, rel=0.03)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("dashpot", "seed", "rests"), [(120.0, 4, True), (60.0, 7, False)])
+def test_the_verdict_on_a_random_state_is_that_of_lammps(tmp_path, monkeypatch, dashpot, seed, rests):
+    """Spheres as if there were too many for eigenvalues: they rest, or grow so slowly that a search does not see it."""
+    from faultgouge.analysis.motion import motion as motion_module
+    from faultgouge.analysis.motion import stability as stability_module
+    from faultgouge.pywrap import from_lammps
+    from research.lammps_laws.compute import pour, rest
+
+    lmp = pour("gran/hertz/history", 3, 50, 0.5, seed, tmp_path / "log.lammps", dashpot)
+    lmp.command("variable slope equal 0.1")
+    assert rest(lmp) is not None
+    lmp.command("run 20000 post no")
+    here = from_lammps(lmp)
+    assert not here.contacts.one_sided.any()
+    slowest = stability(here).growth_rate
+    monkeypatch.setattr(stability_module, "LARGE", 0)
+    for name, value in {"SLICED": 0, "DENSE_DAMPED": 0, "DISCS_UP_TO": 0, "PERIODS_OF_LARGE": 2e4}.items():
+        monkeypatch.setattr(motion_module, name, value)
+    told = stability(here)
+    assert told.decay.grows is not rests
+    assert told.stable is rests
+    times = np.linspace(100.0, 200.0, 21)
+    found = pushed(lmp, here, random_pushes(here, 1)[:, :1], times, 1e-3, 1e-11)[:, 0]
+    lmp.close()
+    rate = np.polyfit(times, np.log(found), 1)[0]
+    # D of one motion oscillates, by a factor of two or so; and one in fifteen decades
+    assert rate == pytest.approx(slowest, abs=5e-3)
+    assert rate == pytest.approx(told.growth_rate, abs=5e-3)
+
+
 def spheres_under_a_rising_load(lmp, here, slope, rate, chunk, count):
     """Drift and vibration over the rate of the slope, of the last two of `count` chunks; a drag fades out in four."""
     from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of
