@@ -76,7 +76,7 @@ def contact_derivatives(c: LinearisedContacts, parting: ArrayLike = 0.5) -> Cont
 
 def assembled_stiffness(configuration: Configuration, parting: ArrayLike = 0.5) -> csr_array:
     """K = -dF/dq of a configuration; see :func:`~faultgouge.analysis.stiffness_matrix`."""
-    return _Blocks.of(configuration).matrix(configuration.contacts, parting)
+    return configuration.project(_Blocks.of(configuration).matrix(configuration.contacts, parting))
 
 
 def assembled_damping(configuration: Configuration) -> csr_array:
@@ -87,7 +87,7 @@ def assembled_damping(configuration: Configuration) -> csr_array:
 def assembled_operators(configuration: Configuration) -> tuple[csr_array, csr_array]:
     """K and C, whose pattern is the same: it is found once."""
     blocks = _Blocks.of(configuration)
-    return blocks.matrix(configuration.contacts), _damping(configuration, blocks)
+    return configuration.project(blocks.matrix(configuration.contacts)), _damping(configuration, blocks)
 
 
 def _damping(configuration: Configuration, blocks: "_Blocks") -> csr_array:
@@ -98,10 +98,11 @@ def _damping(configuration: Configuration, blocks: "_Blocks") -> csr_array:
         c, normal_force=none, closing=still, parting=still, distance=np.full(len(c), np.inf), lever_slope=none,
         normal_stiffness=c.normal_dashpot, tangential_stiffness=c.tangential_dashpot,
     )  # fmt: skip
-    matrix = blocks.matrix(dashpots)
+    matrix = configuration.project(blocks.matrix(dashpots))
     if not configuration.drag_rate:
         return matrix
-    return csr_array(matrix + diags_array(configuration.drag_rate * configuration.coordinate_mass))
+    moves = np.ones(matrix.shape[0]) if configuration.constraint is None else configuration.coordinate_free
+    return csr_array(matrix + diags_array(configuration.drag_rate * configuration.coordinate_mass * moves))
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,14 +218,18 @@ def rescaling_operators(configuration: Configuration) -> tuple[csr_array, csr_ar
 
 
 def unit_forces(configuration: Configuration, force: Floats) -> csr_array:
-    """Forces on all coordinates, (F, T/R), of a tangential force of each contact, shape (C, 3) on i; one row each."""
+    """Forces on all coordinates, (F, T/R), of a tangential force of each contact, shape (C, 3) on i; one row each, with
+    sums where coordinates move as one."""
     c = configuration.contacts
     turn = np.cross(c.normal, force)
     rows = [
         np.hstack([sign * force, -(c.lever_arm[:, p] / configuration.radius[partner])[:, None] * turn])
         for p, (partner, sign) in enumerate(((c.i, 1.0), (c.j, -1.0)))
     ]
-    return contact_rows(configuration, np.array(rows))
+    on_particles = _rows_of_particles(configuration, np.array(rows))
+    if configuration.constraint is None:
+        return on_particles
+    return csr_array(on_particles @ (configuration.constraint != 0).astype(np.float64))
 
 
 def contact_rows(configuration: Configuration, rows: Floats) -> csr_array:
@@ -235,6 +240,12 @@ def contact_rows(configuration: Configuration, rows: Floats) -> csr_array:
     rows : ndarray, shape (2, C, 6)
         Numbers of the partner i, and of the partner j. Those of walls and of fixed particles are left out.
     """
+    by_particles = _rows_of_particles(configuration, rows)
+    return by_particles if configuration.constraint is None else csr_array(by_particles @ configuration.constraint)
+
+
+def _rows_of_particles(configuration: Configuration, rows: Floats) -> csr_array:
+    """The same by the particles' own coordinates."""
     c, count = configuration.contacts, len(configuration)
     in_plane = np.arange(6) if configuration.dimension == 3 else np.array([0, 1, 5])
     contact = np.tile(np.arange(len(c)), len(in_plane))

@@ -49,6 +49,7 @@ from .granular_commands import GIVE_LINES, OWN, Commands, NotLinearisedError, Sn
 from .lammps_arrays import Arrays
 from .law_remarks import remark_on
 from .looks import box_of, particles_of
+from .mobility import mobility
 
 AGREES = 1e-6
 """Relative difference of the normal forces of LAMMPS from those of its commands, besides that of roundings."""
@@ -65,9 +66,16 @@ def configuration_by_laws(lmp: Any, commands: Commands, found: Arrays, laws: Kno
     """The configuration of the arrays of a look; laws that are known are not measured, and new ones are added."""
     if not len(found["id"]):
         raise SnapshotError("This LAMMPS has no particles.")
-    free, frozen, factor = _free_particles(commands, found)
+    lines = {name: line for name, line in commands.fixes.items() if f"group {name}" in found}
+    members = {name: found[f"group {name}"] for name in lines}
+    moved = mobility(lines, members, found["rmass"], lmp.extract_setting("dimension"))
+    free, frozen = moved.free, np.zeros(len(found["id"]), bool)
+    for name, line in lines.items():
+        frozen |= members[name] & (without_suffix(line.split()[3]) == "freeze")
     contacts, remarks = _linearised_contacts(lmp, commands, found, frozen, laws, box_of(lmp)[0])
-    made = Configuration(**particles_of(lmp, found, free, factor), contacts=contacts, remarks=remarks)
+    made = Configuration(
+        **particles_of(lmp, found, free, moved.factor), contacts=contacts, constraint=moved.needed, remarks=remarks
+    )
     total = np.stack([found["f"], found["torque"]], axis=1)
     load = np.where(free[:, None, None], total - made.contact_force, -made.contact_force)
     _check_torques(load[free, 1] / made.radius[free, None], commands, made.contacts)
@@ -104,31 +112,6 @@ def _check_torques(others: Floats, commands: Commands, contacts: LinearisedConta
         raise (SnapshotError if known else NotLinearisedError)(
             f"The torques on particles are not those of their contacts: {reason}."
         )
-
-
-def _free_particles(commands: Commands, found: Arrays) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
-    """Which particles are free, which are frozen, and I/(m R^2) of each."""
-    count = len(found["id"])
-    frozen, free, factor = np.zeros(count, bool), np.zeros(count, bool), np.full(count, 0.4)
-    for name, line in commands.fixes.items():
-        if f"group {name}" not in found:
-            continue
-        members, words = found[f"group {name}"], line.split()
-        style = without_suffix(words[3])
-        if style == "freeze":
-            frozen |= members
-        elif style == "nve/sphere":
-            factor[members] = 0.5 if "disc" in words else 0.4
-        else:
-            factor[members] = float(words[4 if style == "nve/disc" else 5])
-        free |= members
-    free &= ~frozen
-    if not free.any():
-        raise SnapshotError(
-            "Nothing moves the particles: give the line of fix nve/sphere, or set it up, so that it is known which of "
-            "them are free and what their moments of inertia are."
-        )
-    return free, frozen, factor
 
 
 def _linearised_contacts(

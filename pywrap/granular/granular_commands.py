@@ -21,6 +21,9 @@ WALLS = ("wall/gran", "wall/mindlin/smooth")
 INTEGRATORS = ("nve/sphere", "nve/disc", "overdamped/disc")
 """Fixes that move particles and turn them."""
 
+MOBILE = (*INTEGRATORS, "nve", "freeze", "setforce", "aveforce")
+"""Fixes that move or hold coordinates as is known here."""
+
 GIVE_LINES = (
     "give the lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the deck as "
     "from_lammps(lmp, commands=[...])"
@@ -200,11 +203,11 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
         plain = without_suffix(style)
         if plain.startswith("wall/") and plain not in WALLS:
             raise NotLinearisedError(f"fix {name} {style} is no wall of contacts: use planes of fix wall/gran.")
-        if plain.startswith("nve") and plain not in INTEGRATORS:
+        if plain.startswith("nve") and plain not in MOBILE:
             raise NotLinearisedError(
                 f"fix {name} {style} does not turn particles by their contacts: use fix nve/sphere."
             )
-        if plain not in (*WALLS, *INTEGRATORS, "freeze"):
+        if plain not in (*WALLS, *MOBILE):
             continue
         line = commands.fixes.get(name)
         if line is None or without_suffix(line.split()[3]) != plain:

@@ -10,13 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
 from ...analysis.arrays import Floats
 from .granular_commands import SnapshotError, without_suffix
-
-MOBILE = ("nve", "nve/sphere", "nve/disc", "overdamped/disc", "freeze", "setforce", "aveforce")
-"""Fixes that move or hold coordinates as is known here."""
 
 
 class Mobility(NamedTuple):
@@ -24,6 +21,17 @@ class Mobility(NamedTuple):
 
     constraint: csr_array
     factor: Floats
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Which particles move, shape (N,)."""
+        return np.asarray(np.diff(self.constraint.indptr).reshape(-1, len(self.factor)).any(axis=0))
+
+    @property
+    def needed(self) -> csr_array | None:
+        """P where it says more than which particles move; otherwise None."""
+        free = np.tile(self.free, self.constraint.shape[0] // len(self.factor)).astype(np.float64)
+        return self.constraint if abs(self.constraint - diags_array(free)).nnz else None
 
 
 class _Coordinates:
