@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..configuration import Configuration
 from ..progress import report_progress
-from .one_sided import OneSidedState, OneSidedSystem
+from .one_sided import OneSidedState, OneSidedSystem, Reach
 
 PUSHES = 2
 """Random pushes; the opposite of each is followed, too, since one-sided motion is not odd."""
@@ -112,7 +112,7 @@ def follow_pushes(
     """
     state = system.start(random_pushes(system.motion.configuration, pushes))
     chunk, most = _chunks(system, 2 * pushes, time)
-    times, sizes, slid = [], [], [state.p.copy()]
+    times, sizes, slid, reach = [], [], [state.p.copy()], Reach(system)
     grows: bool | None = None
     for number in range(most):
         for look in range(LOOKS_PER_CHUNK):
@@ -120,6 +120,7 @@ def follow_pushes(
             times.append(state.time)
             sizes.append(_mean_square(system, state))
             slid.append(state.p.copy())
+            reach.look(state)
         seen = np.array(times), np.array(sizes)
         report_progress(f"one-sided motion: t = {state.time:.4g}, D = {seen[1][-1].max():.3g} push^2")
         grows = _outcome(*seen, slid, sticking_grows)
@@ -136,6 +137,7 @@ def follow_pushes(
         "amplification": float(d.max()),
         "time": float(t[-1]),
         "pushes": 2 * pushes,
+        "scales": reach.scales,
     }
 
 

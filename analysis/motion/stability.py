@@ -103,8 +103,9 @@ class Stability:
         Contacts at Coulomb's bound.
     one_sided : dict or None
         grows (True, False, None), growth_rate and its error, amplification (largest D over the mean square velocity of
-        the push along an axis, time^2), time (how long), pushes (how many); None without contacts that slide on one
-        side.
+        the push along an axis, time^2), time (how long), pushes (how many), scales (between which velocities of the
+        push along an axis this holds: with smaller ones contacts that count as at the bound do not reach it, with
+        larger ones others do, or open); None without contacts that slide on one side.
     decay : Decay or None
         What became of a random state with sticking contacts; None where eigenvalues decide.
     rising : dict or None
@@ -150,7 +151,7 @@ class Stability:
     @property
     def sentences(self) -> tuple[str, ...]:
         """The verdict, what holds without dissipation, and what contacts at the bound do."""
-        return tuple([self._verdict, *self._without_loss, *self._at_the_bound, *self._under_the_load])
+        return tuple([self._verdict, *self._without_loss, *self._at_the_bound, *self._scales, *self._under_the_load])
 
     @property
     def _verdict(self) -> str:
@@ -202,6 +203,16 @@ class Stability:
             yield (
                 f"neither of two linear motions decides: if all of them stuck, {self.sticking}; if all slid on, "
                 f"{self.sliding}"
+            )
+
+    @property
+    def _scales(self) -> Iterator[str]:
+        if self.one_sided is not None and self.one_sided["grows"] is False:
+            least, most = self.one_sided["scales"]
+            holds = f"pushes from {least:.1g} to {most:.1g}" if least < most else "a push of no size"
+            yield (
+                f"this is the motion after {holds} (velocity along an axis): below {least:.1g} contacts that count as "
+                f"at the bound do not reach it, and above {most:.1g} others do, or open"
             )
 
     @property
