@@ -34,32 +34,32 @@ from .fastest_growing import CHANCE
 from .motion import Motion
 from .stable_timestep import stable_timestep
 
-STEP = 0.6
+DECAY_STEP = 0.6
 """Time step as a share of the largest stable one. Of fifty spheres growth at 82 of 190, the largest frequency, is 0.169
 in place of 0.122, and slow decay is right to a hundredth."""
 
 REFERENCE = 0.1
 """omega_0 as a share of the largest frequency: about the slowest motions that are left in the end."""
 
-LOOK = 100
+STEPS_OF_LOOK = 100
 """Steps between two looks."""
 
-BETWEEN = 7
+STEPS_BETWEEN_SQUARES = 7
 """Steps between two values of |u|^2 of which a look has the mean; the number divides no period of a motion for long."""
 
-WORK = 2e11
+WORK_OF_DECAY = 2e11
 """Multiplications with entries of A and G: three minutes."""
 
 GROWN = 5.0
 """Decades of |u|^2 above its least from which growth is looked at."""
 
-FINER = 4
+FINER_STEP = 4
 """Share of the steps in which growth is measured once more."""
 
 FOLDS = 4.0
 """For how many e-folds of |u|^2 this is done."""
 
-ROUNDING = 1e-12
+FREE_FORCE = 1e-12
 """Force on a common displacement, as a share of the largest entry of A, that is no force."""
 
 
@@ -115,23 +115,23 @@ def follow_decay(motion: Motion, time: float | None = None) -> Decay:
     """
     limit = float(stable_timestep(motion.configuration))
     state = _State.of(motion, REFERENCE * 2 / limit)
-    dt = STEP * limit
-    most = WORK / state.entries if time is None else time / dt
+    dt = DECAY_STEP * limit
+    most = WORK_OF_DECAY / state.entries if time is None else time / dt
     wanted, now, logs = 2 * np.log(CHANCE), 0.0, [float(np.log(state.square))]
-    for look in range(max(int(np.ceil(most / LOOK)), 8)):
+    for look in range(max(int(np.ceil(most / STEPS_OF_LOOK)), 8)):
         logs.append(state.look(dt))
-        now += LOOK * dt
+        now += STEPS_OF_LOOK * dt
         if look % 10 == 9:
             decades = (logs[-1] - wanted) / np.log(10)
             report_progress(f"decay of a random state: t = {now:.4g}, {decades:.1f} decades to go")
         if logs[-1] <= wanted:
-            return Decay(False, _slope(logs, LOOK * dt), now, 0.0, now)
+            return Decay(False, _slope(logs, STEPS_OF_LOOK * dt), now, 0.0, now)
         if _passes_its_least(logs):
             rate, error = _growth(state, logs, dt)
             if rate > error:
                 return Decay(True, rate, now, 0.0, None)
             break
-    slope, missing = _slope(logs, LOOK * dt), logs[-1] - wanted
+    slope, missing = _slope(logs, STEPS_OF_LOOK * dt), logs[-1] - wanted
     return Decay(None, slope, now, missing / now, now - missing / slope if slope * now < -1 else None)
 
 
@@ -163,15 +163,15 @@ class _State:
         return float(self.reference**2 * (self.z @ self.z) + self.v @ self.v)
 
     def look(self, dt: float) -> float:
-        """Take `LOOK` steps: the logarithm of the mean |u|^2 on the way, since |u|^2 of one motion oscillates."""
+        """Take `STEPS_OF_LOOK` steps: the logarithm of the mean |u|^2 on the way, since |u|^2 of one motion oscillates."""
         squares = []
-        for step in range(LOOK):
+        for step in range(STEPS_OF_LOOK):
             self.z += dt * self.v
             force = self.stiffness @ self.z
             if self.damping is not None:
                 force += self.damping @ self.v
             self.v -= dt * force
-            if step % BETWEEN == BETWEEN - 1:
+            if step % STEPS_BETWEEN_SQUARES == STEPS_BETWEEN_SQUARES - 1:
                 squares.append(self.square)
         return float(np.log(np.mean(squares)))
 
@@ -193,7 +193,7 @@ def free_translations(motion: Motion) -> list[Floats]:
         along = (motion.active // count == axis) * motion.root_mass
         if along.any():
             common = along / np.linalg.norm(along)
-            if np.abs(motion.stiffness @ common).max() <= ROUNDING * largest:
+            if np.abs(motion.stiffness @ common).max() <= FREE_FORCE * largest:
                 found.append(common)
     return found
 
@@ -212,12 +212,12 @@ def _passes_its_least(logs: list[float]) -> bool:
 
 def _growth(state: _State, logs: list[float], dt: float) -> tuple[float, float]:
     """2 Re s of what grows, and its error: by the rate so far, and by that of shorter steps, from where it has come."""
-    coarse = _slope(logs[int(np.argmin(logs)) :], LOOK * dt)
-    short = dt / FINER
-    count = int(np.ceil(FOLDS / max(coarse, 1 / (LOOK * dt * len(logs))) / short / LOOK)) + 1
+    coarse = _slope(logs[int(np.argmin(logs)) :], STEPS_OF_LOOK * dt)
+    short = dt / FINER_STEP
+    count = int(np.ceil(FOLDS / max(coarse, 1 / (STEPS_OF_LOOK * dt * len(logs))) / short / STEPS_OF_LOOK)) + 1
     finer = []
     for _ in range(2 * count):
         finer.append(state.look(short))
-    fine = _slope(finer, LOOK * short)
-    error = (fine - coarse) / (FINER**2 - 1)
+    fine = _slope(finer, STEPS_OF_LOOK * short)
+    error = (fine - coarse) / (FINER_STEP**2 - 1)
     return fine + error, abs(error)

@@ -90,7 +90,7 @@ class OneSidedState:
 
 
 @dataclass(eq=False)
-class Reach:
+class ContactReach:
     """How far a motion takes contacts: the largest products of margins with displacements that were seen, shape (R, P),
     and p of sliders, shape (B, P)."""
 
@@ -338,7 +338,7 @@ def one_sided_motion(
     system = OneSidedSystem.of(configuration)
     state = system.start(_of_all_coordinates(configuration, "velocity", velocity))
     load = None if rise is None else forces_on_coordinates(configuration, rise)
-    seen, reach = [], Reach(system)
+    seen, reach = [], ContactReach(system)
     advance = system.advance_exactly if system.remembers_nothing else system.advance
     for each in time:
         advance(state, float(each), load)

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..configuration import Configuration
 from ..progress import report_progress
-from .one_sided import OneSidedState, OneSidedSystem, Reach
+from .one_sided import ContactReach, OneSidedState, OneSidedSystem
 
 PUSHES = 2
 """Random pushes; the opposite of each is followed, too, since one-sided motion is not odd."""
@@ -112,7 +112,7 @@ def follow_pushes(
     """
     state = system.start(random_pushes(system.motion.configuration, pushes))
     chunk, most = _chunks(system, 2 * pushes, time)
-    times, sizes, slid, reach = [], [], [state.p.copy()], Reach(system)
+    times, sizes, slid, reach = [], [], [state.p.copy()], ContactReach(system)
     grows: bool | None = None
     for number in range(most):
         for look in range(LOOKS_PER_CHUNK):
