@@ -163,7 +163,7 @@ class _State:
         return float(self.reference**2 * (self.z @ self.z) + self.v @ self.v)
 
     def look(self, dt: float) -> float:
-        """Take `STEPS_OF_LOOK` steps: the logarithm of the mean |u|^2 on the way, since |u|^2 of one motion oscillates."""
+        """Take `STEPS_OF_LOOK` steps: the logarithm of the mean |u|^2 on the way, as |u|^2 of one motion oscillates."""
         squares = []
         for step in range(STEPS_OF_LOOK):
             self.z += dt * self.v
