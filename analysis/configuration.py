@@ -88,7 +88,7 @@ class Configuration:
         Difference of the one-sided derivatives of the force on each particle, of which K and C have the mean, as a
         share of the largest entry; zero by default.
     constraint : scipy.sparse.csr_array, shape (coordinates, coordinates), optional
-        P of q = P Q; the identity by default, and only where `stiffness` is given.
+        P of q = P Q; by default the identity, but for particles that are not free.
     spring : float
         Stiffness k of a spring that draws the layer `top`, force / length: each of its particles feels the force
         k (X_0 - X) along x, X their mean displacement. None by default. X_0 is part of the load.
@@ -163,8 +163,8 @@ class Configuration:
         n = len(np.atleast_1d(np.asarray(radius)))
         if dimension not in (2, 3) or n == 0:
             raise ValueError(f"A configuration has particles in two or three dimensions, not {n} in {dimension}.")
-        if (stiffness is None) != (damping is None) or (stiffness is None and constraint is not None):
-            raise ValueError("stiffness and damping are given together, and a constraint with them.")
+        if (stiffness is None) != (damping is None):
+            raise ValueError("stiffness and damping are given together.")
         sizes = {"radius": radius, "mass": mass, "inertia": inertia}
         size = n * (3 if dimension == 2 else 6)
         matrices = {"stiffness": stiffness, "damping": damping, "constraint": constraint}
@@ -278,12 +278,29 @@ class Configuration:
 
     @cached_property
     def rattlers(self) -> Indices:
-        """Indices of the particles that touch nothing; where K is given, of those that move and feel nothing."""
+        """Indices of the particles that touch nothing and belong to no body; where K is given, of those that move and
+        feel nothing."""
         if self.stiffness is None:
-            return frozen(np.setdiff1d(np.arange(len(self)), [self.contacts.i, self.contacts.j]))
+            touch = np.union1d(self.contacts.i, self.contacts.j)
+            return frozen(np.setdiff1d(np.arange(len(self)), np.union1d(touch, self.joined)))
         feels = (np.diff(self.stiffness.indptr) > 0).astype(np.float64)
         feels = feels if self.constraint is None else self.constraint @ feels
         return frozen(np.flatnonzero(self.free & ~feels.reshape(self.axes, -1).any(axis=0)))
+
+    @property
+    def joined(self) -> Indices:
+        """Indices of the particles that move as one with others."""
+        if self.constraint is None:
+            return np.zeros(0, dtype=np.intp)
+        moved = self.constraint.tocoo()
+        shared = np.bincount(moved.col, minlength=moved.shape[1])[moved.col] > 1
+        return np.unique(moved.row[shared] % len(self))
+
+    def project(self, matrix: csr_array) -> csr_array:
+        """P_1^T A P of a matrix of the particles' own coordinates."""
+        if self.constraint is None:
+            return matrix
+        return csr_array((self.constraint != 0).astype(np.float64).T @ matrix @ self.constraint)
 
     @cached_property
     def net_force(self) -> Floats:

@@ -44,6 +44,7 @@ BENCHMARKS = {
     "size": Benchmark("python benchmarks/scale.py", None),
     "spectra": Benchmark("python benchmarks/spectra.py", None),
     "verdict": Benchmark("python benchmarks/verdict.py", None),
+    "look": Benchmark("python benchmarks/look.py", "python benchmarks/look.py --turns 3"),
 }
 """Commands by their names in the template."""
 

@@ -4,7 +4,7 @@ Fifty spheres are poured on a slope in LAMMPS, come to rest, and are copied side
 from that of the fifty, which are followed in smaller steps from more pushes. One of the two beds rests, and the other
 one grows. Beds of as many spheres as one likes are poured, too. The columns are: contacts at the bound; the verdict;
 the growth rate of D, or the largest D over the square of the push; how long the motion was followed; the rate below
-which linear growth was not sought; seconds of the processor; and memory.
+which linear growth may not have been seen; seconds of the processor; and memory.
 
     python benchmarks/verdict.py [--copies 15 16] [--poured 2000]
 """
@@ -91,7 +91,8 @@ def show(name: str, configuration: Configuration) -> None:
     """Print a row."""
     found, seconds, memory = measured(configuration)
     verdict = {True: "rests", False: "grows", None: "not known"}[found.stable]
-    told = found.one_sided or {"growth_rate": found.growth_rate, "amplification": np.nan, "time": 0.0}
+    followed = found.decay.time if found.decay else 0.0
+    told = found.one_sided or {"growth_rate": found.growth_rate, "amplification": np.nan, "time": followed}
     size = f"exp({told['growth_rate']:.3g} t)" if found.stable is False else f"{told['amplification']:.3g}"
     print(
         f"{name:24s}{len(configuration):8d}{found.at_bound:9d}{verdict:>11s}{size:>14s}{told['time']:8.3g}"

@@ -25,7 +25,7 @@ from scipy.sparse import bsr_array, csr_array
 
 from ..arrays import Floats, Indices
 from ..configuration import Configuration, HasConfiguration
-from ..operators.damping import damping_matrix
+from ..operators.damping import operators
 from ..operators.sliders import sliders_of, with_sticking_contacts
 from ..operators.stiffness import stiffness_matrix
 from .eigenvalues import (
@@ -141,13 +141,21 @@ class Motion:
             Whether dashpots and drag count.
         """
         configuration = packing.configuration if sliding is None else with_sticking_contacts(packing.configuration)
-        k = stiffness_matrix(configuration)
-        c = damping_matrix(configuration) if dissipation and configuration.damped else csr_array(k.shape)
+        if dissipation and configuration.damped:
+            k, c = operators(configuration)
+        else:
+            k = stiffness_matrix(configuration)
+            c = csr_array(k.shape)
         if sliding:
             sliders = sliders_of(configuration)
             k = csr_array(k + sliders.force @ sliders.excess)
             if c.nnz:
                 c = csr_array(c + sliders.force @ sliders.viscous_excess)
+        return cls.of_matrices(configuration, k, c)
+
+    @classmethod
+    def of_matrices(cls, configuration: Configuration, k: csr_array, c: csr_array) -> "Motion":
+        """Of K and C of all coordinates, which are assembled already."""
         a, g = (mass_weighted(matrix, configuration) for matrix in (k, c))
         active = active_coordinates(a)
         active = active[np.argsort(active % len(configuration), kind="stable")]

@@ -35,13 +35,17 @@ from scipy.sparse.linalg import expm_multiply
 from ..arrays import Floats, floats
 from ..configuration import Configuration, HasConfiguration
 from ..operators.linearised_contacts import rescaling_operators
-from ..operators.sliders import sliders_of
+from ..operators.sliders import margins, sliders_of
 from .motion import Motion
 from .stable_timestep import stable_timestep
 
 MOTION_STEP = 0.05
 """Time step, as a share of the largest stable one. Beside LAMMPS D is right to some per cent after growth by twelve
 decades; with twice the step, to some 8 per cent."""
+
+
+SLIPS = 0.1
+"""Slip of a contact as a share of the largest, from which on it counts that the contact reaches the bound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +60,16 @@ class OneSidedMotion:
         Length, and length / time.
     slid : ndarray, shape (T, B)
         p of each contact at the bound: the tangential force that its slider has taken away, force.
+    scales : tuple of float
+        Between which multiples of the push, or of the rate, the motion holds as it was seen at these times: with
+        smaller ones contacts that count as at the bound do not reach it, and with larger ones others do, or open.
     """
 
     times: Floats
     displacement: Floats
     velocity: Floats
     slid: Floats
+    scales: tuple[float, float]
 
     @property
     def mean_square_displacement(self) -> Floats:
@@ -79,6 +87,37 @@ class OneSidedState:
     v: Floats
     p: Floats
     r: Floats
+
+
+@dataclass(eq=False)
+class ContactReach:
+    """How far a motion takes contacts: the largest products of margins with displacements that were seen, shape (R, P),
+    and p of sliders, shape (B, P)."""
+
+    system: "OneSidedSystem"
+    farthest: Floats | None = None
+    slid: Floats | None = None
+
+    def look(self, state: OneSidedState) -> None:
+        """Look at the motion once more."""
+        now = self.system.margins[0] @ state.z
+        self.farthest = now if self.farthest is None else np.maximum(self.farthest, now)
+        self.slid = state.p.copy()
+
+    @property
+    def scales(self) -> tuple[float, float]:
+        """Multiples of the motion from which on sliders have slipped by more than was missing to the bound, and up to
+        which no other contact reaches the bound or opens."""
+        if self.farthest is None or self.slid is None:
+            return 0.0, np.inf
+        with np.errstate(divide="ignore", invalid="ignore"):
+            limit = self.system.margins[1][:, None] / self.farthest
+        most = float(limit[self.farthest > 0].min(initial=np.inf))
+        c = self.system.motion.configuration.contacts
+        missing = np.maximum(c.friction - np.linalg.norm(c.tangential_force, axis=1), 0.0)[c.one_sided, None]
+        missing = np.broadcast_to(missing, self.slid.shape)
+        counts = self.slid > SLIPS * self.slid.max(axis=0, initial=0.0)
+        return float((missing[counts] / self.slid[counts]).max(initial=0.0)), most
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +160,12 @@ class OneSidedSystem:
             s.viscous_excess.data[:] = 0.0
         grip, excess, viscous = self._weight.T @ s.force, s.excess @ self._weight, s.viscous_excess @ self._weight
         return csr_array(grip), csr_array(excess), csr_array(viscous), s.rectified[:, None], s.viscous[:, None]
+
+    @cached_property
+    def margins(self) -> tuple[csr_array, Floats]:
+        """Rows, shape (R, E), and limits, shape (R,), see :func:`~faultgouge.analysis.operators.sliders.margins`."""
+        rows, limits = margins(self.motion.configuration)
+        return csr_array(rows @ self._weight), limits
 
     @cached_property
     def rescaled(self) -> tuple[csr_array, csr_array, csr_array]:
@@ -293,13 +338,14 @@ def one_sided_motion(
     system = OneSidedSystem.of(configuration)
     state = system.start(_of_all_coordinates(configuration, "velocity", velocity))
     load = None if rise is None else forces_on_coordinates(configuration, rise)
-    seen = []
+    seen, reach = [], ContactReach(system)
     advance = system.advance_exactly if system.remembers_nothing else system.advance
     for each in time:
         advance(state, float(each), load)
+        reach.look(state)
         seen.append((system.displacement(state.z)[..., 0], system.displacement(state.v)[..., 0], state.p[:, 0].copy()))
     displacement, speed, slid = (np.array(each) for each in zip(*seen, strict=True))
-    return OneSidedMotion(time, displacement, speed, slid)
+    return OneSidedMotion(time, displacement, speed, slid, reach.scales)
 
 
 def forces_on_coordinates(configuration: Configuration, forces: ArrayLike) -> Floats:

@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..configuration import Configuration
 from ..progress import report_progress
-from .fastest_growing import CHANCE
-from .one_sided import OneSidedState, OneSidedSystem
+from .one_sided import ContactReach, OneSidedState, OneSidedSystem
 
 PUSHES = 2
 """Random pushes; the opposite of each is followed, too, since one-sided motion is not odd."""
@@ -105,7 +104,7 @@ def follow_pushes(
     system : OneSidedSystem
         Of the configuration.
     sticking, sticking_grows : float, bool
-        Growth rate with sticking contacts, 1 / time, and whether they grow.
+        Growth rate with sticking contacts, 1 / time, and whether they are known to grow.
     time : float, optional
         How long; until the motion has settled by default.
     pushes : int
@@ -113,7 +112,7 @@ def follow_pushes(
     """
     state = system.start(random_pushes(system.motion.configuration, pushes))
     chunk, most = _chunks(system, 2 * pushes, time)
-    times, sizes, slid, speeds = [0.0], [np.zeros(2 * pushes)], [state.p.copy()], [np.sum(state.v**2, axis=0)]
+    times, sizes, slid, reach = [], [], [state.p.copy()], ContactReach(system)
     grows: bool | None = None
     for number in range(most):
         for look in range(LOOKS_PER_CHUNK):
@@ -121,8 +120,8 @@ def follow_pushes(
             times.append(state.time)
             sizes.append(_mean_square(system, state))
             slid.append(state.p.copy())
-            speeds.append(np.sum(state.v**2, axis=0))
-        seen = np.array(times[1:]), np.array(sizes[1:])
+            reach.look(state)
+        seen = np.array(times), np.array(sizes)
         report_progress(f"one-sided motion: t = {state.time:.4g}, D = {seen[1][-1].max():.3g} push^2")
         grows = _outcome(*seen, slid, sticking_grows)
         if time is None and grows is not None:
@@ -138,7 +137,7 @@ def follow_pushes(
         "amplification": float(d.max()),
         "time": float(t[-1]),
         "pushes": 2 * pushes,
-        "searched": _unseen_growth(np.array(times), np.array(speeds), 2 * len(state.z)) if grows is False else 0.0,
+        "scales": reach.scales,
     }
 
 
@@ -194,20 +193,6 @@ def _still_grows(time: Floats, gained: Floats) -> bool:
         [(gained[part[-1]] - gained[part[0] - 1]) / (time[part[-1]] - time[part[0] - 1]) for part in parts]
     )
     return bool(steps.min() > STEADY * mean and steps[2:].sum() > EXPONENTIAL * steps[:2].sum())
-
-
-def _unseen_growth(time: Floats, energy: Floats, states: int) -> float:
-    r"""Growth rate of D up to which linear motion may have grown unseen since the sliders came to rest.
-
-    If D grows at the rate g, and the growing motion has a share of :math:`\delta^2/n` of the kinetic energy E or more
-    when the second half of the time begins, then :math:`g T/2 < \ln(n/\delta^2) + \ln(E_{end}/E_{half})`.
-    """
-    half, few = len(time) // 2, LOOKS_PER_CHUNK // 2
-    before, after = energy[half : half + few].mean(axis=0), energy[-few:].mean(axis=0)
-    span = time[-few:].mean() - time[half : half + few].mean()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        gained = np.nan_to_num(np.log(after / before), nan=0.0)
-    return float(np.maximum(0.0, 2 * np.log(np.sqrt(states) / CHANCE) + gained).min() / span)
 
 
 def _rate(time: Floats, size: Floats) -> tuple[float, float]:

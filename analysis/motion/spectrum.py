@@ -99,6 +99,8 @@ class Spectrum(TableDisplay):
         That of an eigenvalue of zero, 1 / time^2, by rounding and by forces that are out of balance.
     packing : Configuration or Packing
         Whose eigenvalues they are.
+    remark : str
+        Why LAPACK computed the eigenvalues of a large packing; empty otherwise.
     """
 
     eigenvalues: Complexes
@@ -109,12 +111,14 @@ class Spectrum(TableDisplay):
     rounding: float
     uncertainty: float
     packing: HasConfiguration
+    remark: str = ""
 
     def __repr__(self) -> str:
         real = self.eigenvalues.real
         span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
         numbers = f"{counted(len(real), 'eigenvalue')} of K{span}, {counted(len(self.rattlers), 'rattler')}"
-        return f"<Spectrum: {self._verdict}; {numbers}>"
+        remark = f"; {self.remark}" if self.remark else ""
+        return f"<Spectrum: {self._verdict}; {numbers}{remark}>"
 
     @property
     def _verdict(self) -> str:
@@ -259,7 +263,7 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
 
     LAPACK's dense solver serves up to `SLICED` coordinates. Beyond, :mod:`~faultgouge.analysis.motion.all_eigenvalues`
     takes one slice of the spectrum after the other. If these are found to be incomplete, LAPACK serves up to
-    `LAPACK_UP_TO` coordinates, and `show_progress` is told.
+    `LAPACK_UP_TO` coordinates, and the result says so in its `remark`.
 
     Parameters
     ----------
@@ -283,7 +287,7 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     if not np.isfinite(rounding):
         raise BadInputError("Stiffnesses overflow, and nothing can be said: take units in which numbers are smaller.")
     uncertainty = zero_uncertainty(packing, rounding)
-    values, marked = _values_and_vectors(matrix, uncertainty)
+    values, marked, remark = _values_and_vectors(matrix, uncertainty)
     overlap = marked.overlap
     negative = np.sort(marked.values[is_negative(marked.values, overlap, uncertainty)].real)
     pairs: list[Mode] = []
@@ -306,28 +310,32 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
         rounding=rounding,
         uncertainty=uncertainty,
         packing=packing,
+        remark=remark,
     )
 
 
-def _values_and_vectors(matrix: csr_array, uncertainty: float) -> tuple[Complexes, Modes]:
-    """All eigenvalues, and those with vectors: at least the ones that are complex, or negative by more than that."""
+def _values_and_vectors(matrix: csr_array, uncertainty: float) -> tuple[Complexes, Modes, str]:
+    """All eigenvalues, and those with vectors: at least the ones that are complex, or negative by more than that;
+    and why LAPACK took over."""
+    remark = ""
     if matrix.shape[0] > SLICED:
         try:
             found = all_eigenvalues(matrix)
         except SpectrumError as error:
             if matrix.shape[0] > LAPACK_UP_TO:
                 raise
+            remark = f"by LAPACK, as slices were incomplete: {str(error).rstrip('.')}"
             report_progress(f"{error} LAPACK takes over, which needs {32e-9 * matrix.shape[0] ** 2:.2g} GB")
         else:
-            return found.values, found.marked
+            return found.values, found.marked, remark
     dense = matrix.toarray()
     # vectors take three times as long as eigenvalues: a large packing under a load has complex pairs, and needs both
     alone = len(dense) <= DENSE_LARGEST or (matrix != matrix.T).nnz == 0
     values = eigvals(dense) if len(dense) and alone else np.zeros(0, complex)
     if alone and not np.any(values.imag != 0) and values.real.min(initial=0.0) >= -uncertainty:
-        return values, Modes.none(len(dense))
+        return values, Modes.none(len(dense)), remark
     values, left, right = eig(dense, left=True, right=True)
-    return values, Modes(values, right, left)
+    return values, Modes(values, right, left), remark
 
 
 def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:

@@ -7,7 +7,11 @@ dashpots and drag. Complex pairs of K alone are the answer without loss, and no 
 **Contacts at the bound** slide on ahead and stick on the way back, and no eigenvalue decides
 (:mod:`~faultgouge.analysis.motion.one_sided`). The one-sided motion is followed from random pushes until it grows, or
 rests, and so is the motion under a load that rises (:mod:`~faultgouge.analysis.motion.one_sided_outcome`). If it has
-not settled in the time that was followed, the verdict is unknown."""
+not settled in the time that was followed, the verdict is unknown.
+
+**Large packings.** Where not all eigenvalues are known and the fastest motions do not grow, the motion from a random
+state is followed (:mod:`~faultgouge.analysis.motion.decay`). Sticking contacts are stable only if this motion has
+decayed so far that a motion that grows, however slowly, would be seen. Otherwise there is no verdict."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -20,6 +24,7 @@ from ..arrays import Floats
 from ..configuration import Configuration, HasConfiguration
 from ..operators.asymmetry import asymmetry
 from ..operators.sliders import with_sticking_contacts
+from .decay import Decay, follow_decay
 from .eigenvalues import in_balance
 from .motion import Motion, Rates
 from .one_sided import OneSidedSystem, forces_on_coordinates
@@ -98,8 +103,11 @@ class Stability:
         Contacts at Coulomb's bound.
     one_sided : dict or None
         grows (True, False, None), growth_rate and its error, amplification (largest D over the mean square velocity of
-        the push along an axis, time^2), time (how long), pushes (how many), searched (slower growth of D might not have
-        been seen in this motion, 1 / time); None without contacts that slide on one side.
+        the push along an axis, time^2), time (how long), pushes (how many), scales (between which velocities of the
+        push along an axis this holds: with smaller ones contacts that count as at the bound do not reach it, with
+        larger ones others do, or open); None without contacts that slide on one side.
+    decay : Decay or None
+        What became of a random state with sticking contacts; None where eigenvalues decide.
     rising : dict or None
         drift and vibration over the rate of loading, steady, time; other_start: the first three from another start, or
         None; None unless asked.
@@ -112,7 +120,8 @@ class Stability:
     free : int
         Motions that no force opposes.
     searched : float
-        Growth rate of D, 1 / time, below which linear growth was not looked for; 0 if all eigenvalues are known.
+        Growth rate of D, 1 / time, below which linear growth may not have been seen; 0 if all eigenvalues are known, or
+        if a random state has decayed so far that nothing grows.
     contacts : int
         Number of contacts; where K is given, and walls hand out no contacts, of particles that feel something.
     reasons : tuple of str
@@ -124,6 +133,7 @@ class Stability:
     undamped: WithoutDissipation
     at_bound: int
     one_sided: dict[str, Any] | None
+    decay: Decay | None
     rising: dict[str, Any] | None
     sticking: LinearNeighbour
     sliding: LinearNeighbour
@@ -141,7 +151,7 @@ class Stability:
     @property
     def sentences(self) -> tuple[str, ...]:
         """The verdict, what holds without dissipation, and what contacts at the bound do."""
-        return tuple([self._verdict, *self._without_loss, *self._at_the_bound, *self._under_the_load])
+        return tuple([self._verdict, *self._without_loss, *self._at_the_bound, *self._scales, *self._under_the_load])
 
     @property
     def _verdict(self) -> str:
@@ -152,14 +162,17 @@ class Stability:
             return f"not known whether the packing is stable: {'; '.join(self.reasons)}"
         if not self.stable:
             how = " in spite of the dissipation" if self.dissipative else ""
+            if self.decay is not None and self.decay.grows:
+                return f"unstable: small motion grows{how}: {self.decay}"
             return f"unstable: small motion grows{how}, D as exp({self.growth_rate:.6g} t)"
         if self.one_sided is not None:
             return (
                 f"stable: each of {self.one_sided['pushes']} pushes comes to rest{free}; D reaches "
                 f"{self.one_sided['amplification']:.3g} times the mean square velocity of the push (followed for t = "
-                f"{self.one_sided['time']:.4g})"
-                + (f"; growth of D slower than exp({self.searched:.2g} t) was not sought" if self.searched else "")
+                f"{self.one_sided['time']:.4g})" + (f"; with sticking contacts {self.decay}" if self.decay else "")
             )
+        if self.decay is not None:
+            return f"stable: {self.decay}{free}"
         if self.dissipative and self.growth_rate < 0:
             return f"stable: every motion decays, the slowest with D as exp({self.growth_rate:.6g} t){free}"
         return f"stable: no motion grows{free}"
@@ -193,6 +206,16 @@ class Stability:
             )
 
     @property
+    def _scales(self) -> Iterator[str]:
+        if self.one_sided is not None and self.one_sided["grows"] is False:
+            least, most = self.one_sided["scales"]
+            holds = f"pushes from {least:.1g} to {most:.1g}" if least < most else "a push of no size"
+            yield (
+                f"this is the motion after {holds} (velocity along an axis): below {least:.1g} contacts that count as "
+                f"at the bound do not reach it, and above {most:.1g} others do, or open"
+            )
+
+    @property
     def _under_the_load(self) -> Iterator[str]:
         if self.rising is not None:
             other = self.rising["other_start"]
@@ -208,6 +231,7 @@ class Stability:
             "undamped": vars(self.undamped),
             "at_bound": self.at_bound,
             "one_sided": self.one_sided,
+            "decay": None if self.decay is None else vars(self.decay),
             "rising": self.rising,
             "sticking": vars(self.sticking),
             "sliding": vars(self.sliding),
@@ -261,39 +285,39 @@ def stability(
     undamped, own = _without_dissipation(configuration, found)
     if damped:
         own = Motion.of(configuration).rates
-    sticking, grows = LinearNeighbour.of(own), bool(own.grows.any())
+    sticking = LinearNeighbour.of(own)
     why = [*reasons, *_what_is_wrong(configuration)]
     small_motion = not why
-    sliding, one_sided, rising = sticking, None, None
+    sliding, one_sided, rising, decay = sticking, None, None, None
+    grows: bool | None = bool(own.grows.any())
+    rate = sticking.growth_rate
     if contacts.one_sided.any():
         sliding = LinearNeighbour.of(Motion.of(configuration, sliding=True).rates)
         if small_motion:
             system = OneSidedSystem.of(configuration, share)
-            one_sided = follow_pushes(system, sticking.growth_rate, grows, time, 1 if large else PUSHES)
-            if one_sided["grows"] is None:
+            one_sided = follow_pushes(system, rate, bool(grows), time, 1 if large else PUSHES)
+            grows = one_sided["grows"]
+            if grows is None:
                 why.append(
                     f"the motion of contacts at Coulomb's bound has not settled within t = {one_sided['time']:.4g}, "
                     f"where D is {one_sided['amplification']:.3g} times the mean square velocity of the push"
                 )
-            grows = one_sided["grows"]
-    elif small_motion and not grows and own.searched:
-        why.append(
-            f"no motion was found to grow, and D that grows more slowly than exp({own.searched:.2g} t) was not looked "
-            "for everywhere"
-        )
+            elif grows:
+                rate = one_sided["growth_rate"]
+    if small_motion and own.searched and grows is False:
+        decay = follow_decay(Motion.of(configuration), time)
+        grows, rate, sticking = decay.grows, decay.growth_rate, LinearNeighbour(decay.growth_rate, decay.searched)
+        if grows is None:
+            why.append(f"{'with sticking contacts ' if one_sided else ''}{decay}")
     if direction is not None and small_motion:
         rising = follow_load(OneSidedSystem.of(configuration, share), direction, time)
-    searched = own.searched
-    if one_sided is not None and one_sided["grows"] is False:
-        searched = min(searched, one_sided["searched"])
     given = configuration.stiffness is not None  # and contacts, as far as they are known, have no derivatives
     shares = {} if given else asymmetry(configuration)
     touching = max(len(contacts), len(configuration) - len(configuration.rattlers)) if given else len(contacts)
-    rate = one_sided["growth_rate"] if one_sided is not None and one_sided["grows"] else sticking.growth_rate
     return Stability(
         stable=None if why or not touching else not grows, growth_rate=rate, undamped=undamped,
-        at_bound=int(contacts.at_bound.sum()), one_sided=one_sided, rising=rising, sticking=sticking, sliding=sliding,
-        asymmetry=shares, dissipative=damped, free=own.free, searched=searched,
+        at_bound=int(contacts.at_bound.sum()), one_sided=one_sided, decay=decay, rising=rising, sticking=sticking,
+        sliding=sliding, asymmetry=shares, dissipative=damped, free=own.free, searched=sticking.searched,
         contacts=touching, reasons=tuple(why),
     )  # fmt: skip
 

@@ -30,6 +30,7 @@ law in three dimensions.)
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,38 +41,56 @@ from ..configuration import Configuration
 from ..contacts import LinearisedContacts
 
 
-def contact_derivatives(contacts: LinearisedContacts, parting: ArrayLike = 0.5) -> tuple[Floats, Floats, Floats]:
-    """Derivatives of force and torque by u and w, and what the arms of torques add.
+class ContactDerivatives(NamedTuple):
+    """Derivatives of a contact's force and torque, shape (3, 3, C) each: all that follows walks along contacts.
 
-    Returns
-    -------
-    force, torque : ndarray, shape (C, 2, 3, 3)
-        d F_i, and d (n x f_t), by u and by w: force / length.
-    growth : ndarray, shape (C, 3, 3)
-        (n x f_t) d delta by u: what a lever arm that shrinks with the overlap adds.
+    `force_by_u`, `force_by_w`, `torque_by_u` and `torque_by_w` are those of F_i and of n x f_t; `growth`, (n x f_t)
+    d delta by u, is what a lever arm that shrinks with the overlap adds.
     """
-    c, one = contacts, np.eye(3)
-    n, ft, b = c.normal, c.tangential_force, c.overlap_derivative(parting)
-    plane = one - _outer(n, n)
-    size = np.linalg.norm(ft, axis=1, keepdims=True)
-    along = np.divide(ft, size, out=np.zeros_like(ft), where=size > 0) * c.sliding[:, None]
-    resisting = c.tangential_stiffness[:, None, None] * (plane - _outer(along, along))
-    overlap, turn, cross = -n, plane / c.distance[:, None, None], _cross_matrix(n)
-    ft_by_u = -resisting @ plane + _outer(b, overlap) - _outer(n, np.einsum("ca,cab->cb", ft, turn))
-    ft_by_w = -resisting @ cross
-    force_by_u = _outer(c.normal_stiffness[:, None] * n, overlap) + c.normal_force[:, None, None] * turn + ft_by_u
-    torque_by_u = cross @ ft_by_u - _cross_matrix(ft) @ turn
-    force = np.stack([force_by_u, ft_by_w], axis=1)
-    return force, np.stack([torque_by_u, cross @ ft_by_w], axis=1), _outer(np.cross(n, ft), overlap)
+
+    force_by_u: Floats
+    force_by_w: Floats
+    torque_by_u: Floats
+    torque_by_w: Floats
+    growth: Floats
+
+
+def contact_derivatives(c: LinearisedContacts, parting: ArrayLike = 0.5) -> ContactDerivatives:
+    """The derivatives of each contact by u and w."""
+    n, ft, b = (np.ascontiguousarray(each.T) for each in (c.normal, c.tangential_force, c.overlap_derivative(parting)))
+    size = np.sqrt(_dot(ft, ft))
+    along = np.divide(ft, size, out=np.zeros_like(ft), where=size > 0) * c.sliding
+    nn, curvature, stiff = _outer(n, n), 1.0 / c.distance, c.tangential_stiffness
+    plane = np.eye(3)[:, :, None] - nn
+    # d f_t, with the resistance k_t' S of the slip u + n x w
+    in_plane = along - _dot(along, n) * n
+    ft_by_u = stiff * (_outer(along, in_plane) - plane)
+    ft_by_u -= _outer(b, n) + _outer(n, curvature * (ft - _dot(ft, n) * n))
+    ft_by_w = -stiff * (_cross_matrix(n) + _outer(along, _cross(n, along)))
+    force_by_u = ft_by_u + (c.normal_force * curvature) * plane - c.normal_stiffness * nn
+    tilted = curvature * (_cross_matrix(ft) + _outer(_cross(n, ft), n))
+    return ContactDerivatives(
+        force_by_u, ft_by_w, _cross(n, ft_by_u) - tilted, _cross(n, ft_by_w), -_outer(_cross(n, ft), n)
+    )
 
 
 def assembled_stiffness(configuration: Configuration, parting: ArrayLike = 0.5) -> csr_array:
     """K = -dF/dq of a configuration; see :func:`~faultgouge.analysis.stiffness_matrix`."""
-    return _Blocks.of(configuration).matrix(configuration.contacts, parting)
+    return configuration.project(_Blocks.of(configuration).matrix(configuration.contacts, parting))
 
 
 def assembled_damping(configuration: Configuration) -> csr_array:
     """C = -dF/d(dq/dt) of a configuration; see :func:`~faultgouge.analysis.damping_matrix`."""
+    return _damping(configuration, _Blocks.of(configuration))
+
+
+def assembled_operators(configuration: Configuration) -> tuple[csr_array, csr_array]:
+    """K and C, whose pattern is the same: it is found once."""
+    blocks = _Blocks.of(configuration)
+    return configuration.project(blocks.matrix(configuration.contacts)), _damping(configuration, blocks)
+
+
+def _damping(configuration: Configuration, blocks: "_Blocks") -> csr_array:
     c = configuration.contacts
     none, still = np.zeros(len(c)), np.zeros((len(c), 3))
     # where no normal rotates the tangential force is but the direction in which a contact slides
@@ -79,10 +98,11 @@ def assembled_damping(configuration: Configuration) -> csr_array:
         c, normal_force=none, closing=still, parting=still, distance=np.full(len(c), np.inf), lever_slope=none,
         normal_stiffness=c.normal_dashpot, tangential_stiffness=c.tangential_dashpot,
     )  # fmt: skip
-    matrix = _Blocks.of(configuration).matrix(dashpots)
+    matrix = configuration.project(blocks.matrix(dashpots))
     if not configuration.drag_rate:
         return matrix
-    return csr_array(matrix + diags_array(configuration.drag_rate * configuration.coordinate_mass))
+    moves = np.ones(matrix.shape[0]) if configuration.constraint is None else configuration.coordinate_free
+    return csr_array(matrix + diags_array(configuration.drag_rate * configuration.coordinate_mass * moves))
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,31 +167,35 @@ class _Blocks:
     def _numbers(self, c: LinearisedContacts, parting: ArrayLike) -> tuple[Floats, Floats]:
         """The diagonal blocks, shape (axes, axes, N), and (i, j) and (j, i) of contacts of pairs, (axes, axes, 2P)."""
         configuration, pair = self.configuration, ~c.wall
-        force, torque, growth = contact_derivatives(c, parting)
+        d = contact_derivatives(c, parting)
         partners = np.stack([c.i, np.where(pair, c.j, 0)])
         radius = configuration.radius[partners]
-        rolling, lever = c.slip_arm.T / radius, c.lever_arm.T / radius
-        takes_part = configuration.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
-        # axes first: all that follows walks along contacts
-        force, torque, growth = (np.ascontiguousarray(np.moveaxis(each, 0, -1)) for each in (force, torque, growth))
-        blocks = np.empty((2, 2, 6, 6, len(c)))
-        for p, of in enumerate((-1.0, 1.0)):  # the partner whose force changes, and the sign of -F
-            for q, by in enumerate((1.0, -1.0)):  # the partner that moves
-                both = (takes_part[p] & takes_part[q]).astype(np.float64)
-                blocks[p, q, :3, :3] = (of * by * both) * force[0]
-                blocks[p, q, :3, 3:] = (of * both * rolling[q]) * force[1]
-                # -T/R = (l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
-                turning = (by * both * lever[p]) * torque[0]
-                blocks[p, q, 3:, :3] = turning - (by * both * c.lever_slope / radius[p]) * growth
-                blocks[p, q, 3:, 3:] = (both * lever[p] * rolling[q]) * torque[1]
-        if configuration.dimension == 2:
-            in_plane = np.array([0, 1, 5])
-            blocks = blocks[:, :, in_plane[:, None], in_plane]
-        diagonal = np.zeros((*blocks.shape[2:4], len(configuration)))
-        for row, column in np.ndindex(*diagonal.shape[:2]):
+        moves = configuration.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
+        rolling, lever, shrinks = (each / radius for each in (c.slip_arm.T, c.lever_arm.T, c.lever_slope))
+
+        def block(p: int, q: int, row: int, column: int) -> Floats:
+            """-dF of partner p by partner q: +-1 for the sides of forces and translations, arms for rotations."""
+            by = (1.0, -1.0)[q] if column < 3 else rolling[q]
+            if row < 3:
+                number = (-1.0, 1.0)[p] * by * (d.force_by_u if column < 3 else d.force_by_w)[row, column % 3]
+            else:  # -T/R = (l/R) n x f_t, with l that falls by `lever_slope` as the overlap grows
+                number = by * lever[p] * (d.torque_by_u if column < 3 else d.torque_by_w)[row - 3, column % 3]
+                if column < 3:
+                    number -= by * shrinks[p] * d.growth[row - 3, column]
+            return number
+
+        count, between = len(configuration), int(pair.sum())
+        shares = [None if np.all(each) else each for each in (moves[0], moves[1], (moves[0] & moves[1])[pair])]
+        axes = range(6) if configuration.dimension == 3 else (0, 1, 5)
+        diagonal = np.zeros((len(axes), len(axes), count))
+        off = np.empty((len(axes), len(axes), 2, between))
+        for place in np.ndindex(*diagonal.shape[:2]):
+            row, column = (axes[k] for k in place)
             for p in (0, 1):
-                diagonal[row, column] += np.bincount(partners[p], blocks[p, p, row, column], len(configuration))
-        return diagonal, np.concatenate([blocks[0, 1][..., pair], blocks[1, 0][..., pair]], axis=2)
+                own, other = block(p, p, row, column), block(p, 1 - p, row, column)
+                diagonal[place] += np.bincount(partners[p], _part(own, shares[p]), count)
+                off[place][p] = _part(other if between == len(pair) else other[pair], shares[2])
+        return diagonal, off.reshape(*diagonal.shape[:2], -1)
 
 
 def rescaling_operators(configuration: Configuration) -> tuple[csr_array, csr_array]:
@@ -194,14 +218,18 @@ def rescaling_operators(configuration: Configuration) -> tuple[csr_array, csr_ar
 
 
 def unit_forces(configuration: Configuration, force: Floats) -> csr_array:
-    """Forces on all coordinates, (F, T/R), of a tangential force of each contact, shape (C, 3) on i; one row each."""
+    """Forces on all coordinates, (F, T/R), of a tangential force of each contact, shape (C, 3) on i; one row each, with
+    sums where coordinates move as one."""
     c = configuration.contacts
     turn = np.cross(c.normal, force)
     rows = [
         np.hstack([sign * force, -(c.lever_arm[:, p] / configuration.radius[partner])[:, None] * turn])
         for p, (partner, sign) in enumerate(((c.i, 1.0), (c.j, -1.0)))
     ]
-    return contact_rows(configuration, np.array(rows))
+    on_particles = _rows_of_particles(configuration, np.array(rows))
+    if configuration.constraint is None:
+        return on_particles
+    return csr_array(on_particles @ (configuration.constraint != 0).astype(np.float64))
 
 
 def contact_rows(configuration: Configuration, rows: Floats) -> csr_array:
@@ -212,6 +240,12 @@ def contact_rows(configuration: Configuration, rows: Floats) -> csr_array:
     rows : ndarray, shape (2, C, 6)
         Numbers of the partner i, and of the partner j. Those of walls and of fixed particles are left out.
     """
+    by_particles = _rows_of_particles(configuration, rows)
+    return by_particles if configuration.constraint is None else csr_array(by_particles @ configuration.constraint)
+
+
+def _rows_of_particles(configuration: Configuration, rows: Floats) -> csr_array:
+    """The same by the particles' own coordinates."""
     c, count = configuration.contacts, len(configuration)
     in_plane = np.arange(6) if configuration.dimension == 3 else np.array([0, 1, 5])
     contact = np.tile(np.arange(len(c)), len(in_plane))
@@ -224,10 +258,26 @@ def contact_rows(configuration: Configuration, rows: Floats) -> csr_array:
     return csr_array(matrix)
 
 
+def _part(numbers: Floats, share: NDArray[np.bool_] | None) -> Floats:
+    """The numbers of those that move; None if all do."""
+    return numbers if share is None else numbers * share
+
+
 def _outer(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[:, :, None] * b[:, None, :])
+    """Of vectors in columns, shape (3, 3, C)."""
+    return np.asarray(a[:, None] * b[None])
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.einsum("kc,kc->c", a, b))
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """a x b of vectors in columns, or of a with each column of matrices, shape (3, C) or (3, 3, C)."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def _cross_matrix(a: Floats) -> Floats:
-    """[a] with [a] x = a x x, shape (C, 3, 3)."""
-    return np.asarray(np.cross(np.eye(3), a[:, None, :]))
+    """[a] with [a] x = a x x, shape (3, 3, C)."""
+    zero = np.zeros_like(a[0])
+    return np.array([[zero, -a[2], a[1]], [a[2], zero, -a[0]], [-a[1], a[0], zero]])

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 
 from ..arrays import Floats, Indices, derive_frozen
 from ..configuration import Configuration
@@ -79,20 +79,45 @@ def with_sticking_contacts(configuration: Configuration) -> Configuration:
 def sliders_of(configuration: Configuration) -> Sliders:
     """The one-sided contacts of a configuration; see :class:`Sliders`."""
     which = np.flatnonzero(configuration.contacts.one_sided)
-    c = configuration.contacts.chosen(which)
-    here = derive_frozen(configuration, contacts=c)
-    along = c.tangential_force / np.linalg.norm(c.tangential_force, axis=1, keepdims=True)
-    mu = c.friction / c.normal_force
-    stiff = np.einsum("ca,ca->c", 0.5 * (c.closing + c.parting), along) - mu * c.normal_stiffness
-    bound = -mu * c.normal_dashpot * c.viscous_slider
+    here, along, excess = _springs(configuration, which)
+    c = here.contacts
+    bound = -c.friction / c.normal_force * c.normal_dashpot * c.viscous_slider
     return Sliders(
         contact=which,
         force=csr_array(unit_forces(here, along).T),
-        excess=_excess(here, along, c.tangential_stiffness, stiff),
+        excess=excess,
         viscous_excess=_excess(here, along, c.tangential_dashpot, bound),
         rectified=0.5 * np.einsum("ca,ca->c", c.closing - c.parting, along),
         viscous=c.viscous_slider,
     )
+
+
+def margins(configuration: Configuration) -> tuple[csr_array, Floats]:
+    """How far contacts are from another state: rows, shape (R, coordinates), whose products with a displacement reach
+    the limits, shape (R,), where a contact that is not at Coulomb's bound reaches the bound, or where one opens.
+
+    To first order, springs alone. A contact whose tangential force points nowhere is far from the bound.
+    """
+    c = configuration.contacts
+    size = np.linalg.norm(c.tangential_force, axis=1)
+    below = np.flatnonzero(c.slider & ~c.at_bound & (size > 0) & np.isfinite(c.friction) & (c.normal_force > 0))
+    _, _, excess = _springs(configuration, below)
+    touching = np.flatnonzero((c.overlap > 0) & (c.normal_force > 0))
+    here = derive_frozen(configuration, contacts=c.chosen(touching))
+    parting = np.hstack([here.contacts.normal, np.zeros((len(touching), 3))])
+    opens = contact_rows(here, np.array([parting, -parting]))
+    limits = np.concatenate([c.friction[below] - size[below], c.overlap[touching]])
+    return csr_array(vstack([excess, opens])), limits
+
+
+def _springs(configuration: Configuration, which: Indices) -> tuple[Configuration, Floats, csr_array]:
+    """The configuration with some of its contacts, the directions of their tangential forces, and Y."""
+    c = configuration.contacts.chosen(which)
+    here = derive_frozen(configuration, contacts=c)
+    along = c.tangential_force / np.linalg.norm(c.tangential_force, axis=1, keepdims=True)
+    coupling = np.einsum("ca,ca->c", 0.5 * (c.closing + c.parting), along)
+    stiff = coupling - c.friction / c.normal_force * c.normal_stiffness
+    return here, along, _excess(here, along, c.tangential_stiffness, stiff)
 
 
 def _excess(here: Configuration, along: Floats, tangential: Floats, normal: Floats) -> csr_array:

@@ -104,7 +104,9 @@ def stiffness_matrix(
         configuration = packing.configuration
         if configuration.stiffness is None:
             stiffness = assembled_stiffness(configuration, parting)
-            return csr_array(stiffness + spring_stiffness(configuration)) if configuration.spring else stiffness
+            if not configuration.spring:
+                return stiffness
+            return csr_array(stiffness + configuration.project(spring_stiffness(configuration)))
         if np.any(np.asarray(parting) != 0.5) or np.any(sliding):
             raise ValueError(
                 "K of this configuration is a difference of forces, the mean of closing and parting, and of both "

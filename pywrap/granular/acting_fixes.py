@@ -4,20 +4,16 @@ Whether they do in a given packing is shown by its motion (:mod:`~faultgouge.pyw
 only explain.
 """
 
-from .granular_commands import INTEGRATORS, WALLS, NotLinearisedError, without_suffix
+from .granular_commands import MOBILE, WALLS, NotLinearisedError, without_suffix
 from .look_in_a_copy import DRAG, INSERTS, PER_STEP
 
 PASSIVE = (
-    *WALLS, *INTEGRATORS, *PER_STEP, *DRAG, *INSERTS, "freeze", "gravity", "enforce2d", "NEIGH_HISTORY", "slip/history",
+    *WALLS, *PER_STEP, *DRAG, *INSERTS, *MOBILE, "gravity", "enforce2d", "NEIGH_HISTORY", "slip/history",
     "low/parts", "dashpot/velocities", "keep/histories", "store", "STORE", "DUMMY", "property/atom",
 )  # fmt: skip
 """Fixes, by the beginnings of their styles, whose action is in K, or constant, or none."""
 
 HOLDING = {
-    "setforce": "holds some coordinates: use fix freeze, or leave the particles out of fix nve/sphere",
-    "lineforce": "holds some coordinates: leave it out",
-    "planeforce": "holds some coordinates: leave it out",
-    "aveforce": "shares forces among particles: leave it out",
     "spring": "pulls at particles as contacts do not tell: leave it out",
     "indent": "pushes particles as contacts do not tell: leave it out",
 }

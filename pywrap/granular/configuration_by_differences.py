@@ -4,7 +4,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array
 
 from ...analysis import Configuration, LinearisedContacts
 from ...analysis.arrays import Floats, derive_frozen
@@ -75,21 +75,18 @@ def still_particles(lmp: Any, given: Commands | None) -> Still:
     if count == 0:
         raise NotTakenError("This LAMMPS has no particles.")
     lines = {name: line for name, line in commands.fixes.items() if name in members}
-    constraint, factor = mobility(lines, members, found["rmass"], dimension)
-    axes = 6 if dimension == 3 else 3
-    free = np.diff(constraint.indptr).reshape(axes, count).any(axis=0)
-    alone = diags_array(np.tile(free, axes).astype(np.float64))
-    empty = csr_array(constraint.shape)
+    moved = mobility(lines, members, found["rmass"], dimension)
+    empty = csr_array(moved.constraint.shape)
     made = Configuration(
-        **particles_of(lmp, found, free, factor),
+        **particles_of(lmp, found, moved.free, moved.factor),
         contacts=_forces_of_pairs(found, box_of(lmp)[0], commands.style),
         stiffness=empty,
         damping=empty,
-        constraint=constraint if abs(constraint - alone).nnz else None,
+        constraint=moved.needed,
     )
     total = np.stack([found["f"], found["torque"]], axis=1)
-    load = np.where(free[:, None, None], total, 0.0) - made.contact_force
-    return Still(derive_frozen(made, load=load), constraint, commands, fixes, found["at walls"])
+    load = np.where(made.free[:, None, None], total, 0.0) - made.contact_force
+    return Still(derive_frozen(made, load=load), moved.constraint, commands, fixes, found["at walls"])
 
 
 def _forces_of_pairs(found: Arrays, box: Floats, style: str) -> LinearisedContacts:

@@ -49,7 +49,7 @@ from .granular_commands import GIVE_LINES, OWN, Commands, NotLinearisedError, No
 from .lammps_arrays import Arrays
 from .law_remarks import remark_on
 from .looks import box_of, particles_of
-from .mobility import refuse_two_integrators
+from .mobility import mobility
 
 AGREES = 1e-6
 """Relative difference of the normal forces of LAMMPS from those of its commands, besides that of roundings."""
@@ -66,9 +66,16 @@ def configuration_by_laws(lmp: Any, commands: Commands, found: Arrays, laws: Kno
     """The configuration of the arrays of a look; laws that are known are not measured, and new ones are added."""
     if not len(found["id"]):
         raise NotTakenError("This LAMMPS has no particles.")
-    free, frozen, factor = _free_particles(commands, found)
+    lines = {name: line for name, line in commands.fixes.items() if f"group {name}" in found}
+    members = {name: found[f"group {name}"] for name in lines}
+    moved = mobility(lines, members, found["rmass"], lmp.extract_setting("dimension"))
+    free, frozen = moved.free, np.zeros(len(found["id"]), bool)
+    for name, line in lines.items():
+        frozen |= members[name] & (without_suffix(line.split()[3]) == "freeze")
     contacts, remarks = _linearised_contacts(lmp, commands, found, frozen, laws, box_of(lmp)[0])
-    made = Configuration(**particles_of(lmp, found, free, factor), contacts=contacts, remarks=remarks)
+    made = Configuration(
+        **particles_of(lmp, found, free, moved.factor), contacts=contacts, constraint=moved.needed, remarks=remarks
+    )
     total = np.stack([found["f"], found["torque"]], axis=1)
     load = np.where(free[:, None, None], total - made.contact_force, -made.contact_force)
     _check_torques(load[free, 1] / made.radius[free, None], commands, made.contacts)
@@ -105,31 +112,6 @@ def _check_torques(others: Floats, commands: Commands, contacts: LinearisedConta
         raise (NotTakenError if known else NotLinearisedError)(
             f"The torques on particles are not those of their contacts: {reason}."
         )
-
-
-def _free_particles(commands: Commands, found: Arrays) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Floats]:
-    """Which particles are free, which are frozen, and I/(m R^2) of each."""
-    count = len(found["id"])
-    frozen, free, factor = np.zeros(count, bool), np.zeros(count, bool), np.full(count, 0.4)
-    members = {name: found[f"group {name}"] for name in commands.fixes if f"group {name}" in found}
-    refuse_two_integrators({name: commands.fixes[name] for name in members}, members)
-    for name, moved in members.items():
-        words = commands.fixes[name].split()
-        style = without_suffix(words[3])
-        if style == "freeze":
-            frozen |= moved
-        elif style == "nve/sphere":
-            factor[moved] = 0.5 if "disc" in words else 0.4
-        else:
-            factor[moved] = float(words[4 if style == "nve/disc" else 5])
-        free |= moved
-    free &= ~frozen
-    if not free.any():
-        raise NotTakenError(
-            "Nothing moves the particles: give the line of fix nve/sphere, or set it up, so that it is known which of "
-            "them are free and what their moments of inertia are."
-        )
-    return free, frozen, factor
 
 
 def _linearised_contacts(

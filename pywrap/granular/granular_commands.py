@@ -21,6 +21,14 @@ WALLS = ("wall/gran", "wall/mindlin/smooth")
 INTEGRATORS = ("nve/sphere", "nve/disc", "overdamped/disc")
 """Fixes that move particles and turn them."""
 
+BODIES = ("rigid", "rigid/nve")
+"""Fixes whose bodies may be kept from rotating (:mod:`~faultgouge.pywrap.granular.translating_bodies`)."""
+
+MOBILE = (
+    *INTEGRATORS, *BODIES, "nve", "freeze", "setforce", "aveforce", "lineforce", "planeforce",
+)  # fmt: skip
+"""Fixes that move or hold coordinates as is known here."""
+
 GIVE_LINES = (
     "give the lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the deck as "
     "from_lammps(lmp, commands=[...])"
@@ -184,9 +192,6 @@ MOVING = {
 }
 """Fixes, by the beginnings of their styles, with which no packing of particles rests."""
 
-BODIES = ("rigid", "rigid/nve")
-"""Fixes whose bodies may be kept from rotating (:mod:`~faultgouge.pywrap.granular.translating_bodies`)."""
-
 
 def check_rest(styles: dict[str, str], commands: Commands) -> None:
     """Refuse fixes, by ID and style, with which no packing rests, however K is found."""
@@ -206,11 +211,11 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
         plain = without_suffix(style)
         if plain.startswith("wall/") and plain not in WALLS:
             raise NotLinearisedError(f"fix {name} {style} is no wall of contacts: use planes of fix wall/gran.")
-        if plain.startswith("nve") and plain not in INTEGRATORS:
+        if plain.startswith("nve") and plain not in MOBILE:
             raise NotLinearisedError(
                 f"fix {name} {style} does not turn particles by their contacts: use fix nve/sphere."
             )
-        if plain not in (*WALLS, *INTEGRATORS, *BODIES, "freeze"):
+        if plain not in (*WALLS, *MOBILE):
             continue
         line = commands.fixes.get(name)
         if line is None or without_suffix(line.split()[3]) != plain:

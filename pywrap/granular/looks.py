@@ -11,7 +11,7 @@ from .force_probe import HOLDS, MOVES
 from .granular_commands import (
     BODIES,
     GIVE_LINES,
-    INTEGRATORS,
+    MOBILE,
     OWN,
     WALLS,
     Commands,
@@ -26,7 +26,6 @@ from .granular_commands import (
 from .instance_queries import OpenFile, Styles, communicator, log_of, only_log, styles_of
 from .lammps_arrays import Arrays, arrays_at_rest, contacts_of_plane, forces_in_order, given_back
 from .look_in_a_copy import can_copy, quieten
-from .mobility import MOBILE
 from .moving_regions import refuse_moving_regions
 from .translating_bodies import translating_bodies
 
@@ -53,7 +52,7 @@ def look_at_contacts(
     styles = styles_of(lmp)
     check_instance(lmp, styles, given)
     plain = {name: without_suffix(style) for name, style in styles.fixes.items()}
-    groups = {name: given.fixes[name].split()[2] for name in plain if plain[name] in (*INTEGRATORS, "freeze")}
+    groups = {name: given.fixes[name].split()[2] for name in plain if plain[name] in MOBILE}
     walls = [name for name in plain if plain[name] in WALLS]
     columns = "dx dy dz force p3" if given.style == OWN else "dx dy dz force p1 p2 p3"
     if copied:

@@ -12,22 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
 from .granular_commands import BODIES, NotTakenError, without_suffix
 from .translating_bodies import translating_bodies
 
-MOBILE = (
-    "nve", "nve/sphere", "nve/disc", "overdamped/disc", "freeze", "setforce", "aveforce", "lineforce", "planeforce",
-    *BODIES,
-)  # fmt: skip
-"""Fixes that move or hold coordinates as is known here."""
-
-
 INTEGRATES = ("nve", "nve/sphere", "nve/disc", "overdamped/disc", *BODIES)
-"""Those of them that move particles."""
+"""Fixes that move particles."""
 
 
 def refuse_two_integrators(lines: dict[str, str], members: dict[str, NDArray[np.bool_]]) -> None:
@@ -58,6 +51,17 @@ class Mobility(NamedTuple):
 
     constraint: csr_array
     factor: Floats
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Which particles move, shape (N,)."""
+        return np.asarray(np.diff(self.constraint.indptr).reshape(-1, len(self.factor)).any(axis=0))
+
+    @property
+    def needed(self) -> csr_array | None:
+        """P where it says more than which particles move; otherwise None."""
+        free = np.tile(self.free, self.constraint.shape[0] // len(self.factor)).astype(np.float64)
+        return self.constraint if abs(self.constraint - diags_array(free)).nnz else None
 
 
 class _Coordinates:

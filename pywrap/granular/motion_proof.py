@@ -26,9 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ...analysis import Configuration, damping_matrix, stiffness_matrix
+from ...analysis import Configuration
 from ...analysis.arrays import Floats, Indices
+from ...analysis.motion.motion import Motion
 from ...analysis.motion.one_sided import OneSidedSystem
+from ...analysis.operators.damping import operators
 from .acting_fixes import acting_fixes
 from .granular_commands import GIVE_LINES, NotLinearisedError, NotTakenError
 from .lammps_steps import steps_in_a_copy
@@ -170,7 +172,7 @@ class _Comparison:
     @classmethod
     def of(cls, configuration: Configuration, *, extrapolates: bool) -> "_Comparison | None":
         """None if nothing that moves has a contact."""
-        stiffness, damping = stiffness_matrix(configuration), damping_matrix(configuration)
+        stiffness, damping = operators(configuration)
         if not stiffness.nnz:
             return None
         k, c = (_largest_row(matrix, configuration) for matrix in (stiffness, damping))
@@ -275,7 +277,7 @@ class _Comparison:
         c = self.configuration.contacts
         if not c.one_sided.any() and np.array_equal(c.closing, c.parting):
             return self._linear_velocities(sizes)
-        system = OneSidedSystem.of(self.configuration)
+        system = OneSidedSystem(Motion.of_matrices(self.configuration, self.stiffness, self.damping))
         motion, velocity = system.motion, self.start[:, None] * sizes
         state = system.start(velocity)
         constant = (self.configuration.coordinate_force[motion.active] / motion.root_mass)[:, None]

@@ -153,6 +153,9 @@ def test_lapack_takes_over_from_incomplete_slices_and_this_is_told(reference_pac
     with show_progress(told.append):
         found = spectrum(packing)
     assert told == ["All eigenvalues: one was not found. LAPACK takes over, which needs 0.0026 GB"]
+    assert found.remark == "by LAPACK, as slices were incomplete: All eigenvalues: one was not found"
+    assert repr(found).endswith(f"{found.remark}>")
+    assert expected.remark == ""
     assert nearest(found.eigenvalues, expected.eigenvalues).max() < 50 * expected.rounding
     monkeypatch.setattr(spectrum_module, "LAPACK_UP_TO", 100)
     with pytest.raises(SpectrumError, match="one was not found"):

@@ -194,34 +194,64 @@ def test_the_verdict_says_what_contacts_of_a_smoothed_law_do_at_the_bound(count,
 
 
 def test_large_packings_have_the_verdict_of_small_ones(monkeypatch):
-    """By searches and one push in longer steps; and what these have not looked for is said."""
-    at_rest = _three().configuration
-    at_rest = derive_frozen(at_rest, load=-at_rest.contact_force)
+    """By searches, and one push in longer steps that is followed until nothing that grows is left."""
+    lossy = replace(_three(), law=replace(_three().law, cn=40.0, ct=20.0)).configuration
+    at_rest = derive_frozen(lossy, load=-lossy.contact_force)
     expected = stability(at_rest)
-    monkeypatch.setattr(stability_module, "LARGE", 0)
-    for name, value in {"SLICED": 0, "DENSE_DAMPED": 0, "DISCS_UP_TO": 0, "PERIODS_OF_LARGE": 9 * 30.0}.items():
-        monkeypatch.setattr(motion_module, name, value)
-    found = stability(at_rest)
+    with monkeypatch.context() as patch:
+        like_a_large_one(patch)
+        found = stability(at_rest)
     assert found.stable is True
     assert found.one_sided["pushes"] == 2
-    assert 0 < found.one_sided["amplification"] < 1.1 * expected.one_sided["amplification"]  # half of the pushes
-    assert found.searched == min(found.one_sided["searched"], found.sticking.searched) > 0
+    as_long = stability(at_rest, time=found.one_sided["time"])
+    assert as_long.one_sided["pushes"] == 4
+    assert 0 < found.one_sided["amplification"] < 1.1 * as_long.one_sided["amplification"]
+    assert found.decay.grows is False
+    assert found.searched == 0
     assert found.sliding.growth_rate == pytest.approx(expected.sliding.growth_rate, rel=1e-6)
-    assert "if all of them stuck, no growth of D faster than" in str(found)
     assert expected.searched == 0.0
 
 
-def test_a_search_that_finds_no_growth_is_no_proof_that_a_packing_is_stable(monkeypatch):
-    stuck = derive_frozen(replace(_three(), law=replace(_three().law, mu=50.0, cn=0.02)).configuration)
-    at_rest = derive_frozen(stuck, load=-stuck.contact_force)
-    assert stability(at_rest).stable is True
+def like_a_large_one(monkeypatch):
+    """No eigenvalue is computed, and the search sees fast growth alone."""
     monkeypatch.setattr(stability_module, "LARGE", 0)
     for name, value in {"SLICED": 0, "DENSE_DAMPED": 0, "DISCS_UP_TO": 0, "PERIODS_OF_LARGE": 9 * 30.0}.items():
         monkeypatch.setattr(motion_module, name, value)
+
+
+def stuck_at_rest(**law):
+    stuck = replace(_three(), law=replace(_three().law, mu=50.0, **law)).configuration
+    return derive_frozen(stuck, load=-stuck.contact_force)
+
+
+def test_a_large_packing_is_stable_if_a_push_decays_so_far_that_growth_would_be_seen(monkeypatch):
+    at_rest = stuck_at_rest(cn=0.02)
+    slowest = stability(at_rest).growth_rate
+    assert slowest < 0
+    like_a_large_one(monkeypatch)
     found = stability(at_rest)
+    assert found.stable is True
+    assert found.decay.grows is False
+    assert found.searched == 0
+    # |u|^2 of 18 coordinates falls from 36 to 1e-6: by exp(-17.4)
+    assert -slowest * found.decay.time == pytest.approx(17.4, rel=0.3)
+    assert found.growth_rate == pytest.approx(slowest, rel=0.05)
+    assert str(found).startswith("stable: motion from a random state decayed in t = ")
+    short = stability(at_rest, time=0.5 * found.decay.time)
+    assert short.stable is None
+    assert 0 < short.searched == short.decay.searched
+    assert short.decay.needed == pytest.approx(found.decay.time, rel=0.3)
+    assert "D that grows more slowly than exp(" in str(short)
+    assert "would do" in str(short)
+
+
+def test_a_large_packing_in_which_nothing_decays_is_not_called_stable(monkeypatch):
+    at_rest = stuck_at_rest(cn=0.0, ct=0.0)
+    like_a_large_one(monkeypatch)
+    found = stability(at_rest, time=20.0)
     assert found.stable is None
-    assert found.searched > 0
-    assert "D that grows more slowly than exp(" in str(found)
+    assert found.decay.needed is None
+    assert str(found).splitlines()[0].endswith("in which motion did not decay")
 
 
 def test_what_follows_a_load_that_rises_does_not_vibrate():
