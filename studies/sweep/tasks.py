@@ -15,10 +15,10 @@ from ...pywrap import Scene
 from ..eruptions.study import eruptions_of
 from ..modes.count_pairs import modes
 from ..packing_tools import Start
-from ..trigger.study import trigger
 from .onset import onset
 from .sweep_plan import SweepPoint
 from .table import Row
+from .trigger import trigger
 from .triggering import triggering
 from .user_function import is_user_function, user_function
 

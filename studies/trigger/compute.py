@@ -18,7 +18,7 @@ The user gives v_0. The paper uses the largest velocity of the unperturbed run, 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -145,6 +145,16 @@ def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats)
     columns = {"omega": omegas, "predicted": v0 / velocity, "stationary": v0 / stationary, "reached": when}
     rows = (dict(zip(columns, row, strict=True)) for row in np.column_stack([*columns.values()]).tolist())
     return [{"fx": packing.fx, "distance": distance} | row for row in rows]
+
+
+def map_predictions(
+    scene: Scene, packings: Mapping[float, Packing], fx_c: float, distances: Iterable[float]
+) -> Iterator[tuple[float, list[Row]]]:
+    """The predictions at each distance, the largest first; frequencies are those of the largest distance of all."""
+    if packings:
+        omegas = frequencies(packings[min(packings)], settings(scene))
+        for distance in sorted(distances, reverse=True):
+            yield distance, predictions(scene, packings[fx_c * (1 - distance)], distance, omegas)
 
 
 def spread_over_map(predicted: list[Row], runs: int) -> list[Row]:

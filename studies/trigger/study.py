@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-
-from ...analysis import Packing
 from ...analysis.uncertain_digits import with_uncertainty
 from ...pywrap import Scene
 from ...pywrap.onset import onset_run
 from ...pywrap.scenes.units import real_units
 from ...pywrap.scenes.validation import require_section
-from ..packing_tools import Start
 from ..study import Result, SceneStudy, Work
-from ..sweep.onset import onset
 from .compute import (
     Row,
     Wave,
     bisect_amplitude,
     equilibria,
-    frequencies,
     in_si,
+    map_predictions,
     middle,
-    predictions,
     settings,
     spread_over_map,
     threshold,
@@ -99,7 +93,7 @@ def _predict_map(scene: Scene, fx_c: float, work: Work) -> list[Row]:
     distances = sorted(settings(scene).distance, reverse=True)
     missing = [d for d in distances if work.rows.find(kind="predicted", distance=d) is None]
     packings = equilibria(scene, [fx_c * (1 - d) for d in distances]) if missing else {}
-    for distance, found in _map_predictions(scene, packings, fx_c, missing):
+    for distance, found in map_predictions(scene, packings, fx_c, missing):
         work.rows.append(kind="predicted", distance=distance, found=found)
         least = min(found, key=lambda each: each["predicted"])
         work.say(
@@ -107,16 +101,6 @@ def _predict_map(scene: Scene, fx_c: float, work: Work) -> list[Row]:
         )
     known = [row for row in work.rows.rows if row["kind"] == "predicted" and row["distance"] in distances]
     return [each for row in known for each in row["found"]]
-
-
-def _map_predictions(
-    scene: Scene, packings: Mapping[float, Packing], fx_c: float, distances: Iterable[float]
-) -> Iterator[tuple[float, list[Row]]]:
-    """The predictions at each distance, the largest first; frequencies are those of the largest distance of all."""
-    if packings:
-        omegas = frequencies(packings[min(packings)], settings(scene))
-        for distance in sorted(distances, reverse=True):
-            yield distance, predictions(scene, packings[fx_c * (1 - distance)], distance, omegas)
 
 
 def _bisect_map(scene: Scene, predicted: list[Row], work: Work) -> list[Row]:
@@ -137,31 +121,6 @@ def _bisect_map(scene: Scene, predicted: list[Row], work: Work) -> list[Row]:
             at = f"omega = {found['omega']:.4g} at {found['distance']:g}"
             work.say(f"{at}: triggers from {middle(found['below'], found['above']):.4g} on in LAMMPS")
     return [row for each in wanted if (row := row_of(each)) is not None]
-
-
-def trigger(scene: Scene, start: Start) -> Row:
-    """The task "trigger" of a sweep: the map of one scene, with the bisections that [trigger] asks for.
-
-    Raises
-    ------
-    SceneError
-        If the scene has no section [ramp], or no v_0.
-    """
-    threshold(scene)
-    wave, first = settings(scene), onset(scene, start)
-    if first["ends"] != "onset":
-        return {"ends": first["ends"], "fx_c": None, "map": [], "measured": []}
-    packings = equilibria(scene, [first["fx_c"] * (1 - each) for each in wave.distance])
-    predicted = [row for _, rows in _map_predictions(scene, packings, first["fx_c"], wave.distance) for row in rows]
-    measured = [
-        bisect_amplitude(Wave(scene, packings[each["fx"]], each)) for each in spread_over_map(predicted, wave.runs)
-    ]
-    return {
-        "ends": "onset",
-        "fx_c": first["fx_c"],
-        "map": predicted,
-        "measured": [each | {"amplitude": middle(each["below"], each["above"])} for each in measured],
-    }
 
 
 trigger_map = SceneStudy(
