@@ -43,6 +43,12 @@ from .arrays import (
 )
 from .contacts import UNIT, LinearisedContacts, refuse_first
 
+UNKNOWN_SLIPS = (
+    "the tangential forces were not given, and the slips began at zero: K depends on both (`faultgouge import --contacts` "
+    "takes slips)"
+)
+"""Why no verdict is possible where slips are not known."""
+
 
 @dataclass(frozen=True, init=False, eq=False)
 class Configuration:
@@ -92,6 +98,8 @@ class Configuration:
     spring : float
         Stiffness k of a spring that draws the layer `top`, force / length: each of its particles feels the force
         k (X_0 - X) along x, X their mean displacement. None by default. X_0 is part of the load.
+    slips_known : bool
+        Whether the tangential forces are known, or were taken as zero. Without them no stability is known.
     proof : float, optional
         Relative difference of a short motion of the other code from that of this configuration; None without such a
         motion. The proof is no property of the packing, and does not count when two configurations are compared.
@@ -128,6 +136,7 @@ class Configuration:
     jump: Floats
     constraint: csr_array | None
     spring: float
+    slips_known: bool
     proof: float | None = field(compare=False)
     remarks: tuple[str, ...] = field(compare=False)
 
@@ -157,6 +166,7 @@ class Configuration:
         jump: ArrayLike | None = None,
         constraint: csr_array | None = None,
         spring: float = 0.0,
+        slips_known: bool = True,
         proof: float | None = None,
         remarks: Iterable[str] = (),
     ) -> None:
@@ -189,6 +199,7 @@ class Configuration:
             jump=floats("jump", np.zeros(n) if jump is None else jump, (n,)),
             **{name: None if each is None else square(name, each, size) for name, each in matrices.items()},
             spring=number("spring", spring),
+            slips_known=bool(slips_known),
             proof=None if proof is None else number("proof", proof),
             remarks=tuple(remarks),
         )

@@ -85,7 +85,6 @@ def write_view(
     series: dict[str, Any] | None = None,
     progress: Progress = iter,
     axis: Axis | None = None,
-    reasons: Sequence[str] = (),
 ) -> None:
     """Write the page.
 
@@ -103,11 +102,9 @@ def write_view(
         Wraps the packings while their eigenvalues are computed.
     axis : Axis, optional
         What changes from packing to packing; the load by default.
-    reasons : sequence of str
-        Why the stability of the packings cannot be known, if it cannot.
     """
     axis = Axis.of_loads(packings) if axis is None else axis
-    followed = follow_eigenvalues(packings, progress, reasons)
+    followed = follow_eigenvalues(packings, progress)
     opens = _best_frame(followed.verdicts)
     room = BYTES_OF_MODES / (2 * packings[0].coordinates * len(packings))
     pairs = followed.pairs[: int(np.clip(room, FEWEST_ON_PAGE, MOST_ON_PAGE))]
@@ -231,6 +228,7 @@ def sentences_of(verdict: Stability) -> list[str]:
         says[1] = f"without dissipation {says[1]}, D would grow as exp({undamped.growth_rate:.3g} t)"
     if contacts:
         says.append(f"{counted(contacts, 'contact')} {_is(contacts)} at Coulomb's bound")
+    says += verdict.remarks
     return [f"{each[0].upper()}{each[1:]}." for each in says]
 
 

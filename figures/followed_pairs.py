@@ -20,6 +20,7 @@ from faultgouge.analysis import (
     stability,
 )
 from faultgouge.analysis.configuration import HasConfiguration
+from faultgouge.analysis.counted import counted
 from faultgouge.analysis.motion.eigenvalues import is_negative, zero_uncertainty
 from faultgouge.analysis.windows import Space, System, SystemModes, force_bearing
 
@@ -77,7 +78,7 @@ class RampEigenvalues:
 
 
 def follow_eigenvalues(
-    packings: Sequence[HasConfiguration], progress: Progress = iter, reasons: Sequence[str] = ()
+    packings: Sequence[HasConfiguration], progress: Progress = iter
 ) -> RampEigenvalues:
     """Eigenvalues of equilibria in the order of their path.
 
@@ -89,15 +90,13 @@ def follow_eigenvalues(
         The equilibria, all with the same particles.
     progress : callable
         Wraps the packings while their eigenvalues are computed.
-    reasons : sequence of str
-        Why the stability of the packings cannot be known, if it cannot.
     """
     followed = _Followed(packings)
     values, verdicts = [], []
     for k, packing in enumerate(progress(packings)):
         modes = SystemModes.of(System.of(packing))
         values.append(modes.values)
-        verdicts.append(_verdict_on(force_bearing(packing), modes, reasons, alone=len(packings) == 1))
+        verdicts.append(_verdict_on(force_bearing(packing), modes, alone=len(packings) == 1))
         followed.add(k, modes)
     followed.close()
     pairs = [_along(packings, each) for each in followed.pairs]
@@ -159,13 +158,14 @@ class _Followed:
         return image if image is not None and image.like(pair) else None
 
 
-def _verdict_on(packing: HasConfiguration, modes: SystemModes, reasons: Sequence[str], alone: bool) -> Stability:
+def _verdict_on(packing: HasConfiguration, modes: SystemModes, alone: bool) -> Stability:
     """Whether a packing moves; of one among many the motion of contacts at Coulomb's bound is not followed."""
     slide = int(packing.configuration.contacts.one_sided.sum())
+    reasons = []
     if slide and not alone:
-        contacts = "1 contact" if slide == 1 else f"{slide} contacts"
+        contacts = counted(slide, "contact")
         how = "this page does not follow, and `faultgouge spectrum --frame` does"
-        reasons = [*reasons, f"{contacts} at Coulomb's bound may slide on, which {how}"]
+        reasons.append(f"{contacts} at Coulomb's bound may slide on, which {how}")
     return stability(packing, spectrum_of_stiffness=_spectrum_of(packing, modes), reasons=reasons)
 
 

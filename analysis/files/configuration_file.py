@@ -29,11 +29,11 @@ from .runfile_validation import check_places, dataset
 if TYPE_CHECKING:
     import h5py
 
-SCALARS = ("dimension", "fx", "load_error", "drag_rate", "spring", "operator_error")
+SCALARS = ("dimension", "fx", "load_error", "drag_rate", "spring", "operator_error", "slips_known")
 ARRAYS = (
     "position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind", "top", "jump",
 )  # fmt: skip
-LATER = ("slider", "viscous_slider", "top", "drag_rate", "spring", "operator_error", "jump")
+LATER = ("slider", "viscous_slider", "top", "drag_rate", "spring", "operator_error", "jump", "slips_known")
 """Fields that files of version 1 do not have."""
 
 MATRICES = ("stiffness", "damping", "constraint")

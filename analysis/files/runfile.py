@@ -54,6 +54,10 @@ if TYPE_CHECKING:
     import h5py
 
 
+NONE_GIVEN = "none were given"
+"""What the attribute tangential_forces of older files says of slips that are not known."""
+
+
 class RunFile(SealedFile):
     """A run.h5, open for reading or for appending; a context manager.
 
@@ -248,6 +252,7 @@ class RunFile(SealedFile):
             fx=self._file["observables/fx/value"][frame],
             fy=self._file["observables/fy/value"][frame],
             position_low=low["value"][frame] if low is not None else None,
+            slips_known="slips_known" not in parameters and self.attributes.get("tangential_forces") != NONE_GIVEN,
         )
 
     def append_trajectory(self, time: ArrayLike, position: ArrayLike, position_low: ArrayLike | None = None) -> None:

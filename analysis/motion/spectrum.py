@@ -44,7 +44,7 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
-from ..configuration import HasConfiguration
+from ..configuration import UNKNOWN_SLIPS, HasConfiguration
 from ..counted import counted
 from ..errors import BadInputError
 from ..operators.stiffness import Form, stiffness_matrix
@@ -124,14 +124,17 @@ class Spectrum(TableDisplay):
     def _verdict(self) -> str:
         """Growth with dissipation first, without it second; with contacts at the bound the rates of both neighbours."""
         contacts = self.packing.configuration.contacts
-        pairs, negative = f"{len(self.pairs)} complex pairs", f"{len(self.negative)} negative eigenvalues"
+        pairs, negative = counted(len(self.pairs), "complex pair"), counted(len(self.negative), "negative eigenvalue")
         counts = f"{pairs} and {negative}" if len(self.negative) else pairs
         alone = f"K alone has {counts}, D as exp({self.growth_rate():.6g} t)"
+        if not self.packing.configuration.slips_known:
+            return f"not known whether the packing is stable: {UNKNOWN_SLIPS}; {alone}"
         if contacts.one_sided.any():
             stick, slide = (Motion.of(self.packing, sliding=slides).rates.growth_rate for slides in (False, True))
             count = int(contacts.one_sided.sum())
+            slide_on, stick_on = ("slides", "sticks") if count == 1 else ("slide", "stick")
             return (
-                f"{count} contacts at Coulomb's bound slide on ahead and stick on the way back: "
+                f"{counted(count, 'contact')} at Coulomb's bound {slide_on} on ahead and {stick_on} on the way back: "
                 f"neither linear motion decides: D as exp({stick:.4g} t) if all stuck, exp({slide:.4g} t) if all "
                 f"slid (`stability` follows them); {alone}"
             )
@@ -156,9 +159,10 @@ class Spectrum(TableDisplay):
         """Whether no motion grows beyond rounding, with the packing's dissipation.
 
         None where contacts at Coulomb's bound slide on ahead and stick on the way back: no eigenvalue decides, and
-        :func:`~faultgouge.analysis.stability` follows their motion.
+        :func:`~faultgouge.analysis.stability` follows their motion. None, too, where the slips are not known.
         """
-        if self.packing.configuration.contacts.one_sided.any():
+        configuration = self.packing.configuration
+        if configuration.contacts.one_sided.any() or not configuration.slips_known:
             return None
         if self._damped is not None:
             return not self._damped.grows.any()

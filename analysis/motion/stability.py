@@ -15,13 +15,14 @@ decayed so far that a motion that grows, however slowly, would be seen. Otherwis
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
-from ..configuration import Configuration, HasConfiguration
+from ..configuration import UNKNOWN_SLIPS, Configuration, HasConfiguration
 from ..operators.asymmetry import asymmetry
 from ..operators.sliders import with_sticking_contacts
 from .decay import Decay, follow_decay
@@ -126,6 +127,8 @@ class Stability:
         Number of contacts; where K is given, and walls hand out no contacts, of particles that feel something.
     reasons : tuple of str
         Why the verdict is unknown.
+    remarks : tuple of str
+        Those of the Configuration: what of its origin is left out, or other than it seems.
     """
 
     stable: bool | None
@@ -143,6 +146,7 @@ class Stability:
     searched: float
     contacts: int
     reasons: tuple[str, ...] = field(default=())
+    remarks: tuple[str, ...] = field(default=())
 
     def __str__(self) -> str:
         """The verdict in sentences, the verdict first."""
@@ -150,8 +154,9 @@ class Stability:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """The verdict, what holds without dissipation, and what contacts at the bound do."""
-        return tuple([self._verdict, *self._without_loss, *self._at_the_bound, *self._scales, *self._under_the_load])
+        """The verdict, what holds without dissipation, what contacts at the bound do, and remarks on the origin."""
+        parts = self._without_loss, self._at_the_bound, self._scales, self._under_the_load, self.remarks
+        return (self._verdict, *chain.from_iterable(parts))
 
     @property
     def _verdict(self) -> str:
@@ -239,6 +244,7 @@ class Stability:
             "free": self.free,
             "searched": self.searched,
             "reasons": list(self.reasons),
+            "remarks": list(self.remarks),
         }
 
 
@@ -318,12 +324,14 @@ def stability(
         stable=None if why or not touching else not grows, growth_rate=rate, undamped=undamped,
         at_bound=int(contacts.at_bound.sum()), one_sided=one_sided, decay=decay, rising=rising, sticking=sticking,
         sliding=sliding, asymmetry=shares, dissipative=damped, free=own.free, searched=sticking.searched,
-        contacts=touching, reasons=tuple(why),
+        contacts=touching, reasons=tuple(why), remarks=configuration.remarks,
     )  # fmt: skip
 
 
 def _what_is_wrong(configuration: Configuration) -> Iterator[str]:
     """Why no verdict is possible."""
+    if not configuration.slips_known:
+        yield UNKNOWN_SLIPS
     sided = configuration.one_sided_particles
     if len(sided):
         named = ", ".join(map(str, configuration.ids[sided[:5]])) + (", ..." if len(sided) > 5 else "")

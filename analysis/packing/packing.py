@@ -74,6 +74,9 @@ class Packing:
         Low parts of the coordinates, length, of a packing in compensated arithmetic; none by default.
     drag_time : float, optional
         tau of the drag -(m/tau) v and -(I/tau) omega on every disk, time, positive; no drag by default.
+    slips_known : bool
+        Whether the slips are known, or were taken as zero because nothing is known of the tangential forces. Whether a
+        packing of unknown slips is stable is not known either.
 
     Raises
     ------
@@ -95,6 +98,7 @@ class Packing:
     fy: float
     position_low: Floats | None
     drag_time: float | None
+    slips_known: bool
 
     def __init__(
         self,
@@ -112,6 +116,7 @@ class Packing:
         fy: float = 0.0,
         position_low: ArrayLike | None = None,
         drag_time: float | None = None,
+        slips_known: bool = True,
     ) -> None:
         n = len(np.atleast_1d(np.asarray(radius)))
         if n == 0:
@@ -131,6 +136,7 @@ class Packing:
             fy=number("fy", fy),
             position_low=None if position_low is None else floats("position_low", position_low, (n, 2)),
             drag_time=None if drag_time is None else number("drag_time", drag_time, positive=True),
+            slips_known=bool(slips_known),
         )
         check_box(self.radius, self.box_length)
         _check_partners(contacts, n)
@@ -236,6 +242,7 @@ class Packing:
             box=np.diag([self.box_length or 0.0, 0.0, 0.0]), origin=np.zeros(3),
             periodic=np.array([self.box_length is not None, False, False]), load=load, fx=self.fx,
             load_error=self.load_error, top=self.top, drag_rate=1 / self.drag_time if self.drag_time else 0.0,
+            slips_known=self.slips_known or not self.law.frictional,
         )  # fmt: skip
 
     @cached_property

@@ -45,6 +45,12 @@ def acting_fixes(styles: dict[str, str]) -> dict[str, str]:
     return found
 
 
+def drag_remarks(styles: dict[str, str]) -> tuple[str, ...]:
+    """A sentence on each fix, by ID, that takes energy away, and has no part in K and C."""
+    drags = ((name, style) for name, style in styles.items() if without_suffix(style).startswith(DRAG))
+    return tuple(f"drag of fix {name} ({style}) is left out" for name, style in drags)
+
+
 def check_holding(styles: dict[str, str]) -> None:
     """Refuse fixes that hold, push or pull particles, where no motion shows whether they do."""
     held = {name: style for name, style in styles.items() if style.startswith(tuple(HOLDING))}

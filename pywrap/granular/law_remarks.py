@@ -34,7 +34,7 @@ def remark_on(law: MeasuredLaw, commands: Commands, name: tuple[int, int] | str,
         given = said if isinstance(said, float) else float(said.at(radius, overlap))
         if given > 0 and abs(measured / given - 1) > DIFFERENT:
             says.append(f"{WORDS[what]} {measured / given:.3g} times that of the line")
-    return f"{who}: LAMMPS has {' and '.join(says)} {' '.join(line)!r}, and K has LAMMPS's." if says else None
+    return f"{who}: LAMMPS has {' and '.join(says)} {' '.join(line)!r}, and K has LAMMPS's" if says else None
 
 
 def _line_of(commands: Commands, name: tuple[int, int] | str) -> list[str] | None:

@@ -11,7 +11,7 @@ from .analysis.configuration import HasConfiguration
 from .analysis.motion.hysteresis import turning_points
 from .figures.browser_page import Axis, equally_spaced, loads_shown, write_view
 from .figures.followed_pairs import seconds
-from .stored_files import doubts_about, load
+from .stored_files import load
 
 Progress = Callable[[Sequence[HasConfiguration]], Iterable[HasConfiguration]]
 
@@ -64,7 +64,7 @@ def view(
             series = run.series("undamped") if "undamped" in run.names_of_series else None
     if seconds(packings) > 5:
         say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
-    write_view(packings, output, title, series, progress, axis, doubts_about(path))
+    write_view(packings, output, title, series, progress, axis)
     return len(packings)
 
 

@@ -9,9 +9,6 @@ from .analysis import BadInputError, Configuration, MindlinLaw, Packing, RunFile
 from .analysis.files.configuration_file import holds_configuration, read_configuration
 from .analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
 
-NONE_GIVEN = "none were given"
-"""Attribute tangential_forces of a file whose contacts began with slips of zero, as nothing was known of them."""
-
 
 def load(
     file: str | Path,
@@ -82,13 +79,3 @@ def _read_disks(path: Path, frame: int) -> Disks:
     from .pywrap.lammps.restart_file import read_disks
 
     return read_disks(path, None if frame == -1 else frame)
-
-
-def doubts_about(path: Path) -> list[str]:
-    """Why the stability of the packings of a file cannot be known, if it cannot."""
-    if path.suffix == ".disks" or holds_configuration(path):
-        return []
-    with RunFile(path) as run:
-        unknown = run.attributes.get("tangential_forces") == NONE_GIVEN
-    why = "the tangential forces were not given, and were taken as zero: K is then symmetric, whatever they are"
-    return [why] if unknown else []

@@ -93,7 +93,7 @@ def triggering_run(scene: Scene, runs: list[Onset], path: Path) -> Triggering | 
         )
     *_, start = reach(scene, fx)  # to the bit the one of `perturb`, and so is v_0
     modes = spectrum(start.packing)
-    if not modes.is_stable:
+    if modes.is_stable is False:
         what = f"{counted(len(modes.pairs), 'complex pair')} and {counted(len(modes.negative), 'negative eigenvalue')}"
         return f"At F_x = {fx:g} the packing has {what} already: nothing is stable there to be triggered."
     lower = max(0.0, 2 * weakened[0].fx_c - fx) if weakened else None

@@ -12,7 +12,16 @@ import numpy as np
 import pytest
 from reference_layer import BIN
 
-from faultgouge.analysis import BadInputError, PackingFileError, RunFile, nearest_image
+from faultgouge import load
+from faultgouge.analysis import (
+    BadInputError,
+    MindlinLaw,
+    PackingFileError,
+    RunFile,
+    nearest_image,
+    spectrum,
+    stability,
+)
 from faultgouge.analysis.files.atomic_write import SEAL
 from faultgouge.analysis.files.formats import read_disks, upper_layer, write_packing
 from faultgouge.pywrap import Scene, SceneError, settle
@@ -323,3 +332,53 @@ def test_from_a_pour_to_the_film_of_the_mode(tmp_path):
     assert "complex pair" in said["faultgouge draw"]
     assert (tmp_path / "mode.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "mode.gif").read_bytes().startswith(b"GIF89a")
+
+
+@pytest.fixture
+def heap(tmp_path):
+    """The table of a disk that rests on another, which stands on the floor; without tangential forces."""
+    overlap = np.array([(6.0 / 2e5), (3.0 / 2e5)]) ** (2 / 3)
+    y = np.cumsum([0.5, 1.0]) - np.cumsum(overlap)
+    path = tmp_path / "heap.csv"
+    path.write_text(f"x,y,radius,top\n1.0,{y[0]:.17g},0.5,1\n1.0,{y[1]:.17g},0.5,1\n")
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".h5", ".xyz", ".data", ".gsd"])
+def test_that_slips_are_not_known_goes_wherever_the_packing_goes(heap, tmp_path, suffix):
+    if suffix == ".gsd":
+        pytest.importorskip("gsd", reason="needs the extra export: pip install 'faultgouge[export]'")
+    given = {"law": MindlinLaw(2e5, 5e4, 1.0), "fy": 3.0}
+    packing, file = load(heap, **given), tmp_path / f"stored{suffix}"
+    if suffix == ".h5":
+        with RunFile.create(file, packing) as run:
+            run.append(packing)
+            run.complete = True
+    elif suffix != ".csv":
+        write_packing(file, packing)
+    again = load(file if file.exists() else heap, **given)
+    for found in (again, again.configuration, again.moved(again.position, again.angle, again.contacts)):
+        assert not found.slips_known
+    assert stability(again).stable is spectrum(again).is_stable is None
+    assert "tangential forces were not given" in str(stability(again))
+    assert "tangential forces were not given" in repr(spectrum(again))
+    stored = {"file": str(file if file.exists() else heap)}
+    scene = Scene.from_mapping({"packing": stored, "law": {"kn": 2e5}, "load": {"fy": 3.0}})
+    assert not settle(scene).packing.slips_known
+    without = load(heap, law=replace(given["law"], kt=0.0, mu=0.0), fy=3.0)
+    assert stability(without).stable is not None
+    known = replace(again, slips_known=True)
+    assert stability(known).reasons == ()
+
+
+def test_a_packing_that_came_to_rest_without_friction_says_so(heap, tmp_path):
+    packing = load(heap, law=MindlinLaw(2e5, 0.0, 0.0), fy=3.0)
+    x, y = packing.position.T.tolist()
+    disks = {"x": x, "y": y, "radius": packing.radius.tolist(), "top": [0, 1]}
+    for known in (True, False):
+        path = tmp_path / f"{known}.json"
+        path.write_text(json.dumps(disks | ({"slip": 0} if known else {})))
+        assert load(path, law=MindlinLaw(2e5, 5e4, 1.0), fy=3.0).slips_known is known
+    path.write_text(json.dumps(disks | {"slip": 1e-3}))
+    with pytest.raises(PackingFileError, match="slip can only be 0"):
+        load(path, law=MindlinLaw(2e5, 5e4, 1.0), fy=3.0)

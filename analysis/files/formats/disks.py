@@ -82,7 +82,7 @@ class Disks:
         None if the file has none.
     given : mapping
         Law, load and inertia, as far as the file gives them: kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau,
-        fx, fy, inertia_factor.
+        fx, fy, inertia_factor; and slips_known, 0 where the file says that the slips are not known.
     groups : mapping
         Groups of disks by name, as booleans.
     remark : str
@@ -116,6 +116,11 @@ class Disks:
     def above(self, floor: float) -> Disks:
         """The disks, shifted so that a floor at another height is at y = 0."""
         return self if floor == 0 else replace(self, position=self.position - (0.0, floor))
+
+    @property
+    def slips_known(self) -> bool:
+        """Whether the file gives slips that are known."""
+        return self.slips is not None and bool(self.given.get("slips_known", True))
 
 
 def of_columns(source: str, columns: Mapping[str, Floats], type_names: Sequence[str] = (), **more: Any) -> Disks:
@@ -203,6 +208,11 @@ def packing_of(
     fx, fy, inertia_factor, drag_time : float
         As for :class:`~faultgouge.analysis.Packing`.
 
+    Returns
+    -------
+    Packing
+        With slips that are not known, if there are contacts with friction, and the file does not give their slips.
+
     Raises
     ------
     PackingFileError
@@ -210,10 +220,11 @@ def packing_of(
     """
     _check_places(disks)
     try:
+        contacts = _contacts(disks, law)
         return Packing(
             position=disks.position,
             radius=disks.radius,
-            contacts=_contacts(disks, law),
+            contacts=contacts,
             law=law,
             angle=disks.angle,
             mass=disks.mass,
@@ -224,6 +235,7 @@ def packing_of(
             fy=fy,
             position_low=disks.position_low,
             drag_time=drag_time,
+            slips_known=disks.slips_known or not law.frictional or len(contacts) == 0,
         )
     except ValueError as error:
         raise PackingFileError(f"{disks.source} describes no possible packing: {error}") from error

@@ -19,8 +19,11 @@ from ...packing.packing import Packing
 from ..runfile_header import differing_parameters
 from .disks import Slips
 
-PARAMETER_NAMES = ("kn", "kt", "mu", "exponent", "rescaled", "coulomb", "cn", "ct", "tau", "fx", "fy", "inertia_factor")
-"""Names of law, load and inertia in files."""
+PARAMETER_NAMES = (
+    "kn", "kt", "mu", "exponent", "rescaled", "coulomb", "cn", "ct", "tau", "fx", "fy", "inertia_factor",
+    "slips_known",
+)  # fmt: skip
+"""Names of law, load and inertia in files; and slips_known, 0 where the slips are not known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +89,8 @@ def scalars(packing: Packing) -> dict[str, float]:
     values |= differing_parameters(law)
     if packing.drag_time is not None:
         values["tau"] = packing.drag_time
+    if not packing.slips_known:
+        values["slips_known"] = 0.0
     return {**values, "fx": packing.fx, "fy": packing.fy, "inertia_factor": packing.inertia_factor}
 
 

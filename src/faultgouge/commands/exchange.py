@@ -131,10 +131,9 @@ def import_(
             say(f"{file}: {remark}")
     keeps(f"nothing has been written to {output} yet")
     packing = _in_balance(file, packing, relax)
-    assumed = disks.slips is None and packing.law.frictional
     if is_root():
-        _store(output, packing, assumed)
-    if assumed:
+        _store(output, packing)
+    if not packing.slips_known:
         say(f"{file} gives no tangential forces: they are taken as zero, and nothing can be said of the stability")
     contacts_of = f"{counted(len(packing.contacts), 'contact')}, {counted(len(packing.rattlers), 'rattler')}"
     print_line(
@@ -156,8 +155,6 @@ def _import_deck(file: Path, output: Path, slides: bool, balance: float | None, 
     if is_root():
         write_configuration(output, configuration, {"deck": file.read_text(errors="replace")})
     keeps(f"{output} has been written; whether the packing is stable says `faultgouge spectrum {output}`", output)
-    for remark in configuration.remarks:
-        print_line(remark)
     print_line(f"{repr(configuration).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
     print_line(_time_steps(configuration))
     print_line(_verdict(configuration, output))
@@ -171,7 +168,7 @@ def _verdict(configuration: Configuration, output: Path) -> str:
 
     moves = len(configuration.rattlers) < len(configuration)
     if not is_root() or (moves and configuration.coordinates > LARGE // 4):
-        return f"whether the packing is stable says `faultgouge spectrum {output}`"
+        return "\n".join([*configuration.remarks, f"whether the packing is stable says `faultgouge spectrum {output}`"])
     with status("stability") as show, show_progress(show):
         return str(stability(configuration))
 
@@ -271,7 +268,10 @@ def _place_disks(file: Path, frame: int | None, floor: float, width: str | None,
     disks = read_disks(file, frame).above(floor)
     if width is not None:
         disks = replace(disks, box_length=_width(width))
-    return disks if contacts is None else replace(disks, slips=read_slips(contacts, disks.length_unit))
+    if contacts is None:
+        return disks
+    given = {key: value for key, value in disks.given.items() if key != "slips_known"}
+    return replace(disks, slips=read_slips(contacts, disks.length_unit), given=given)
 
 
 def _width(text: str) -> float | None:
@@ -361,13 +361,11 @@ def _in_balance(file: Path, packing: Packing, relax: bool) -> Packing:
     return found.packing
 
 
-def _store(output: Path, packing: Packing, assumed: bool) -> None:
+def _store(output: Path, packing: Packing) -> None:
     from faultgouge.analysis import RunFile
     from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
-    from faultgouge.stored_files import NONE_GIVEN
 
-    attributes = {"task": "import"} | ({"tangential_forces": NONE_GIVEN} if assumed else {})
-    with RunFile.create(output, packing, attributes) as file:
+    with RunFile.create(output, packing, {"task": "import"}) as file:
         file.append(packing, floor=rounding_floor(packing), evaluations=0)
         with file.change():
             file.complete = True

@@ -66,7 +66,6 @@ def spectrum(
     from faultgouge.analysis import spectrum as eigenvalues_of
     from faultgouge.analysis.arrays import derive_frozen
     from faultgouge.analysis.progress import show_progress
-    from faultgouge.stored_files import doubts_about
 
     if values and (gain or rise or verbose):
         raise typer.BadParameter("--values computes nothing but eigenvalues: leave --gain, --rise and --verbose out")
@@ -85,7 +84,7 @@ def spectrum(
         return
     result = eigenvalues_of(packing)
     with status("stability") as show, show_progress(show):
-        verdict = stability(packing, "fx" if rise else None, spectrum_of_stiffness=result, reasons=doubts_about(file))
+        verdict = stability(packing, "fx" if rise else None, spectrum_of_stiffness=result)
     gains = _gain_of(packing) if gain else None
     if not as_json:
         _print_spectrum(stored, result, verdict, gains, verbose)
