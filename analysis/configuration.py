@@ -44,8 +44,8 @@ from .arrays import (
 from .contacts import UNIT, LinearisedContacts, refuse_first
 
 UNKNOWN_SLIPS = (
-    "the tangential forces were not given, and the slips began at zero: K depends on both (`faultgouge import --contacts` "
-    "takes slips)"
+    "the tangential forces were not given, and the slips began at zero: K depends on both (`faultgouge import "
+    "--contacts` takes slips)"
 )
 """Why no verdict is possible where slips are not known."""
 

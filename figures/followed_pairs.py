@@ -77,9 +77,7 @@ class RampEigenvalues:
     pairs: list[FollowedPair]
 
 
-def follow_eigenvalues(
-    packings: Sequence[HasConfiguration], progress: Progress = iter
-) -> RampEigenvalues:
+def follow_eigenvalues(packings: Sequence[HasConfiguration], progress: Progress = iter) -> RampEigenvalues:
     """Eigenvalues of equilibria in the order of their path.
 
     The motion of contacts at Coulomb's bound, which takes seconds to minutes, is followed in a single packing alone.

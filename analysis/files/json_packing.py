@@ -54,7 +54,7 @@ def read_packing(
         top = _upper_layer(data.get("top", []), len(radius))
         box_length, mass = data.get("box_length"), data.get("mass")
         if data.get("slip", 0) != 0:
-            raise ValueError('slip can only be 0: leave the key out, and give slips by `faultgouge import --contacts`.')
+            raise ValueError("slip can only be 0: leave the key out, and give slips by `faultgouge import --contacts`.")
         contacts = touching(position, radius, box_length)
         return Packing(
             position=position,

@@ -252,6 +252,7 @@ class RunFile(SealedFile):
             fx=self._file["observables/fx/value"][frame],
             fy=self._file["observables/fy/value"][frame],
             position_low=low["value"][frame] if low is not None else None,
+            spring=parameters["spring"][()] if "spring" in parameters else 0.0,
             slips_known="slips_known" not in parameters and self.attributes.get("tangential_forces") != NONE_GIVEN,
         )
 

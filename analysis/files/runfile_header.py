@@ -50,6 +50,8 @@ def parameters_of(packing: Packing) -> dict[str, Any]:
     values |= differing_parameters(law)
     if packing.drag_time is not None:
         values["drag_time"] = packing.drag_time
+    if packing.spring:
+        values["spring"] = packing.spring
     if not packing.slips_known:
         values["slips_known"] = 0.0
     if packing.box_length is not None:

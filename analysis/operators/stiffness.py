@@ -46,7 +46,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array, csr_array
 
-from ..configuration import Configuration, HasConfiguration
+from ..configuration import HasConfiguration
 from ..packing.law import Derivatives
 from ..packing.packing import Floats, Indices, Packing
 from .linearised_contacts import assembled_stiffness
@@ -103,10 +103,7 @@ def stiffness_matrix(
             raise ValueError("The operator of a Configuration is the consistent one, of all of its contacts.")
         configuration = packing.configuration
         if configuration.stiffness is None:
-            stiffness = assembled_stiffness(configuration, parting)
-            if not configuration.spring:
-                return stiffness
-            return csr_array(stiffness + configuration.project(spring_stiffness(configuration)))
+            return _with_spring(assembled_stiffness(configuration, parting), configuration, configuration.spring)
         if np.any(np.asarray(parting) != 0.5) or np.any(sliding):
             raise ValueError(
                 "K of this configuration is a difference of forces, the mean of closing and parting, and of both "
@@ -119,20 +116,24 @@ def stiffness_matrix(
     law = packing.law.derivatives(overlap, contacts.slip, parting, sliding)
     if coupled is not None:
         law = law._replace(overlap_derivative=np.where(coupled, law.overlap_derivative, 0.0))
-    return assemble_stiffness(
-        contact_terms(law, normal.T, distance, pairs, form), contacts.i, contacts.j[:pairs], len(packing)
+    terms = contact_terms(law, normal.T, distance, pairs, form)
+    return _with_spring(
+        assemble_stiffness(terms, contacts.i, contacts.j[:pairs], len(packing)), packing, packing.spring
     )
 
 
-def spring_stiffness(configuration: Configuration) -> csr_array:
-    """The part of K of the spring that draws the layer: k/n between all pairs of its n particles, along x.
+def _with_spring(stiffness: csr_array, packing: HasConfiguration, spring: float) -> csr_array:
+    """K with the spring that draws the layer: k/n between all pairs of its n particles, along x.
 
     Each particle feels -k X for the mean displacement X of the layer.
     """
-    layer = np.flatnonzero(configuration.top)
+    if not spring:
+        return stiffness
+    layer = np.flatnonzero(packing.top)
     rows, columns = np.repeat(layer, len(layer)), np.tile(layer, len(layer))
-    values = np.full(len(rows), configuration.spring / max(1, len(layer)))
-    return csr_array((values, (rows, columns)), shape=(configuration.coordinates,) * 2)
+    values = np.full(len(rows), spring / max(1, len(layer)))
+    of_layer = csr_array((values, (rows, columns)), shape=stiffness.shape)
+    return csr_array(stiffness + packing.configuration.project(of_layer))
 
 
 def assemble_stiffness(terms: Floats, i: Indices, j: Indices, disks: int) -> csr_array:

@@ -77,6 +77,9 @@ class Packing:
     slips_known : bool
         Whether the slips are known, or were taken as zero because nothing is known of the tangential forces. Whether a
         packing of unknown slips is stable is not known either.
+    spring : float
+        Stiffness of a spring that draws the upper layer, force / length on each of its disks, as of a
+        :class:`~faultgouge.analysis.Configuration`; its force is fx. None by default.
 
     Raises
     ------
@@ -99,6 +102,7 @@ class Packing:
     position_low: Floats | None
     drag_time: float | None
     slips_known: bool
+    spring: float
 
     def __init__(
         self,
@@ -117,6 +121,7 @@ class Packing:
         position_low: ArrayLike | None = None,
         drag_time: float | None = None,
         slips_known: bool = True,
+        spring: float = 0.0,
     ) -> None:
         n = len(np.atleast_1d(np.asarray(radius)))
         if n == 0:
@@ -137,6 +142,7 @@ class Packing:
             position_low=None if position_low is None else floats("position_low", position_low, (n, 2)),
             drag_time=None if drag_time is None else number("drag_time", drag_time, positive=True),
             slips_known=bool(slips_known),
+            spring=number("spring", spring),
         )
         check_box(self.radius, self.box_length)
         _check_partners(contacts, n)
@@ -242,7 +248,7 @@ class Packing:
             box=np.diag([self.box_length or 0.0, 0.0, 0.0]), origin=np.zeros(3),
             periodic=np.array([self.box_length is not None, False, False]), load=load, fx=self.fx,
             load_error=self.load_error, top=self.top, drag_rate=1 / self.drag_time if self.drag_time else 0.0,
-            slips_known=self.slips_known or not self.law.frictional,
+            slips_known=self.slips_known or not self.law.frictional, spring=self.spring,
         )  # fmt: skip
 
     @cached_property

@@ -192,7 +192,7 @@ class StoredPacking(Section):
         with RunFile(self.file) as run:
             if len(run) == 0:
                 raise PackingFileError(f"{self.file} has no equilibrium in it")
-            return replace(run.packing(0), law=law, **more)
+            return replace(run.packing(0), law=law, spring=0.0, **more)
 
     @property
     def disks(self) -> int:

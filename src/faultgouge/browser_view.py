@@ -11,7 +11,7 @@ from .analysis.configuration import HasConfiguration
 from .analysis.motion.hysteresis import turning_points
 from .figures.browser_page import Axis, equally_spaced, loads_shown, write_view
 from .figures.followed_pairs import seconds
-from .stored_files import load
+from .stored_files import load, packing_in
 
 Progress = Callable[[Sequence[HasConfiguration]], Iterable[HasConfiguration]]
 
@@ -73,7 +73,7 @@ def _of_run(run: RunFile, most: int) -> tuple[list[Any], Axis | None, str]:
     driven = "time" in run.observables
     turns = [] if driven else turning_points(run.fx)
     chosen = sorted({*equally_spaced(len(run), most), *turns})
-    packings = [run.packing(k) for k in chosen]
+    packings = [packing_in(run, k) for k in chosen]
     axis = Axis("t", "time of the run", run.observable("time")[chosen]) if driven else None
     ends = [run.fx[k] for k in sorted({0, *turns, len(run) - 1})]
     span = f", Fₓ = {' to '.join(f'{fx:g}' for fx in ends)}" if not driven else ""

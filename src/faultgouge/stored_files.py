@@ -62,7 +62,7 @@ def load(
         return read_configuration(path)
     if path.suffix == ".h5" or (path.is_file() and is_hdf5(path)):
         with RunFile(path) as run:
-            return run.packing(frame)
+            return packing_in(run, frame)
     disks = _read_disks(path, frame)
     if width is not None:
         disks = replace(disks, box_length=width)
@@ -73,6 +73,17 @@ def load(
             "top=10) takes the disks as they stand, and `faultgouge import` brings them to rest."
         )
     return packing_of(disks, law, upper_layer(disks, top), fx=fx, fy=fy)
+
+
+def packing_in(run: RunFile, frame: int = -1) -> Packing:
+    """The packing of a frame; of a drive.h5 with the spring that draws its layer."""
+    packing = run.packing(frame)
+    if run.attributes.get("task") != "drive":
+        return packing
+    from .pywrap.runs.drive_recorder import drive_of
+
+    settings = drive_of(run)
+    return packing if settings is None or settings.spring == "rigid" else replace(packing, spring=settings.spring)
 
 
 def _read_disks(path: Path, frame: int) -> Disks:

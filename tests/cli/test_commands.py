@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from reference_layer import LAYER, SMALL, toml
 
+from faultgouge import load
 from faultgouge.analysis import (
     Contacts,
     MindlinLaw,
@@ -21,6 +22,7 @@ from faultgouge.analysis import (
     mean_square_displacement,
     read_dump,
     spectrum,
+    stiffness_matrix,
 )
 from faultgouge.analysis.motion.transient import transient_gains
 from faultgouge.commands import terminal
@@ -193,6 +195,25 @@ def test_spectrum_of_a_large_packing(faultgouge_here, beyond, monkeypatch):
     said = done.stdout
     assert said.count("D grows as") == pairs - 1
     assert f"and 1 more: --json has all {pairs}" in said
+
+
+def test_a_driven_packing_has_its_spring_in_command_and_python_alike(faultgouge_here, tmp_path, reference_packing):
+    packing = reference_packing(1.0)
+    for spring in (20.0, "rigid"):
+        drive = {"spring": spring, "velocity": 1e-3, "until": 1.0}
+        with RunFile.create(
+            tmp_path / "drive.h5", packing, {"task": "drive", "scene": json.dumps({"drive": drive})}
+        ) as file:
+            file.append(packing, time=0.0)
+            file.complete = True
+        told = json.loads(faultgouge_here("spectrum", "drive.h5", "--json").stdout)
+        drawn = load(tmp_path / "drive.h5")
+        assert told["spring"] == drawn.spring == drawn.configuration.spring == (0.0 if spring == "rigid" else spring)
+        found = spectrum(drawn)
+        assert [complex(*each) for each in told["eigenvalues"]] == found.eigenvalues.tolist()
+        assert np.array_equal(spectrum(packing).eigenvalues, found.eigenvalues) is (spring == "rigid")
+        difference = stiffness_matrix(drawn) - stiffness_matrix(drawn.configuration)
+        assert abs(difference).max() < 1e-9 * abs(stiffness_matrix(drawn)).max()
 
 
 def test_spectrum_says_what_contacts_at_the_bound_do(faultgouge_here, tmp_path):

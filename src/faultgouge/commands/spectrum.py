@@ -15,7 +15,6 @@ from .terminal import (
     frame_at,
     print_json,
     say,
-    spring_in,
     status,
     stored_configuration,
     stored_packing,
@@ -64,17 +63,15 @@ def spectrum(
     """
     from faultgouge.analysis import Packing, solid_fraction, stability
     from faultgouge.analysis import spectrum as eigenvalues_of
-    from faultgouge.analysis.arrays import derive_frozen
     from faultgouge.analysis.progress import show_progress
 
     if values and (gain or rise or verbose):
         raise typer.BadParameter("--values computes nothing but eigenvalues: leave --gain, --rise and --verbose out")
     number = frame_at(file, frame, time)
-    stored = stored_configuration(file, number) or stored_packing(file, number)
-    if rise and not stored.configuration.top.any():
+    packing = stored_configuration(file, number) or stored_packing(file, number)
+    if rise and not packing.configuration.top.any():
         raise typer.BadParameter(f"--rise: {file} has no upper layer that a load could push; leave it out")
-    spring = spring_in(file)
-    packing = derive_frozen(stored.configuration, spring=spring) if spring else stored
+    spring = packing.configuration.spring
     size = packing.configuration.coordinates
     if size > SLOW_COORDINATES:
         # four matrices of doubles; 18000 coordinates took 10.2 GB
@@ -87,7 +84,7 @@ def spectrum(
         verdict = stability(packing, "fx" if rise else None, spectrum_of_stiffness=result)
     gains = _gain_of(packing) if gain else None
     if not as_json:
-        _print_spectrum(stored, result, verdict, gains, verbose)
+        _print_spectrum(packing, result, verdict, gains, verbose)
         if spring:
             print(f"K has the stiffness of the spring that draws the layer, {spring:g} on each of its disks")
         return
@@ -110,7 +107,7 @@ def spectrum(
             "fx": packing.configuration.fx,
             "spring": spring,
             "residual": packing.residual,
-            "solid_fraction": solid_fraction(stored) if isinstance(stored, Packing) else None,
+            "solid_fraction": solid_fraction(packing) if isinstance(packing, Packing) else None,
             "noise_pairs": result.noise_pairs,
             "transient_gain": gains,
         }

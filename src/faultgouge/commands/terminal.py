@@ -107,6 +107,7 @@ def counted(number: int, noun: str, plural: str | None = None) -> str:
 def stored_packing(file: Path, frame: int = -1) -> Packing:
     """A packing of a run.h5, or of the dumps that decks write."""
     from faultgouge.analysis import RunFile, read_dump
+    from faultgouge.stored_files import packing_in
 
     if file.suffix == ".disks":
         return read_dump(file, frame=frame)
@@ -115,7 +116,7 @@ def stored_packing(file: Path, frame: int = -1) -> Packing:
             names = ("state",) if run.attributes.get("task") == "drive" else ("equilibrium", "equilibria")
             stored = counted(len(run), *names)
             say(f"{file} is of a run that is not finished: {stored}, up to F_x = {run.fx[-1]:g}")
-        return run.packing(frame)
+        return packing_in(run, frame)
 
 
 def stored_series(file: Path) -> dict[str, Any] | None:
@@ -141,21 +142,6 @@ def stored_drive(file: Path) -> tuple[dict[str, Any], list[Slip]] | None:
         if drive_of(run) is None or SERIES not in run.names_of_series:
             return None
         return run.series(SERIES), slips_in(run)
-
-
-def spring_in(file: Path) -> float:
-    """Stiffness of the spring of a drive.h5, force / length on each disk of the layer; 0 of all other files."""
-    from faultgouge.analysis import RunFile
-
-    if file.suffix == ".disks" or stored_configuration(file) is not None:
-        return 0.0
-    with RunFile(file) as run:
-        if run.attributes.get("task") != "drive":
-            return 0.0
-        from faultgouge.pywrap.runs.drive_recorder import drive_of
-
-        settings = drive_of(run)
-    return 0.0 if settings is None or settings.spring == "rigid" else float(settings.spring)
 
 
 def frame_at(file: Path, frame: int, time: float | None) -> int:
