@@ -15,7 +15,7 @@ from ..analysis.arrays import Floats
 from ..analysis.errors import TurningPointError
 from ..analysis.motion.eigenvalues import active_coordinates
 from ..analysis.progress import Watch, report_progress, show_progress
-from ..analysis.windows import Ranks, full_operator, takes_all_modes
+from ..analysis.windows import HIGHER, NoGrowthError, Ranks, full_operator, takes_all_modes
 from .equilibria.quasistatic import Equilibrium
 from .lammps.engine import Engine
 from .runs.path_error import with_path_error
@@ -108,7 +108,7 @@ def onset_run(
     SceneError
         If the scene has no section [ramp], or the packing has none of the modes.
     OnsetError
-        If no motion grows up to the ramp's end.
+        If no motion grows up to the ramp's end; a NoGrowthError, if there is an onset without dissipation.
     NoEquilibriumError
         If the packing flows from the first increment on, or before an onset; a TurningPointError if an eigenvalue is
         negative before any is complex.
@@ -155,14 +155,17 @@ def onset_run(
         except TurningPointError:
             raise
         except (OnsetError, NoEquilibriumError) as error:
-            if not flows and isinstance(error, OnsetError):
-                if damping is None:
-                    raise
-                raise OnsetError(f"No motion grows up to F_x = {forces[-1]:.10g}: raise ramp.until.") from error
-            raise NoEquilibriumError(
-                f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond: the packing "
-                "flows before an onset"
-            ) from error
+            says = str(error).replace(HIGHER, "raise ramp.until")
+            if flows or not isinstance(error, OnsetError):
+                says = (
+                    f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond: the "
+                    "packing flows before an onset"
+                )
+            undamped = error.undamped if isinstance(error, NoGrowthError) else None
+            if undamped is not None:
+                raise NoGrowthError(says, with_path_error(undamped, path)) from error
+            failed = OnsetError if isinstance(error, OnsetError) and not flows else NoEquilibriumError
+            raise failed(says) from error
         last = path.equilibria[-1].fx
         extra = [] if near_onset is None else [fx for fx in found.fx_c + near_onset if 0 <= fx <= last]
         between = {float(fx): path(float(fx)) for fx in extra}

@@ -18,7 +18,7 @@ from ..progress import Watch, report_progress, show_progress
 from .edges import At, Edge, Window
 from .find_windows import Known, check_increasing, find_windows, windows_up_to
 from .limits import LIMITS, Limits
-from .onset import Increments, Onset, OnsetError
+from .onset import HIGHER, Increments, NoGrowthError, Onset, OnsetError
 from .search import Look
 from .slices.ranks import ALONE, Ranks
 from .system import System, force_bearing, full_operator
@@ -85,7 +85,7 @@ def find_onset(
     Raises
     ------
     OnsetError
-        If no motion grows at any load.
+        If no motion grows at any load; with dissipation a NoGrowthError, which has the onset without.
     TurningPointError
         If one is negative before any is complex.
     LostPairError, SliceError
@@ -184,22 +184,23 @@ class _OnsetSearch:
                 known(Onset(windows, undamped=undamped), fx)
 
         windows, doubtful = self.windows_of(self.damped, inside.look, known_windows)
-        self._check_growth(windows)
+        self._check_growth(windows, undamped)
         return Onset(windows, not self.first, doubtful, self.modes, undamped=undamped)
 
     def damped_onset_in_slices(self, known: Callable[[Onset, float], None]) -> Onset:
         """The first onset with dissipation of a large packing."""
         with show_progress(what="with dissipation, "):
             windows, doubtful = self.windows_of(self.damped)
-        self._check_growth(windows)
-        known(Onset(windows, False, doubtful), windows[0].fx_onset)
+        if windows:
+            known(Onset(windows, False, doubtful), windows[0].fx_onset)
         with show_progress(what="without dissipation, "):
             undamped = self.undamped_onset_or_none()
+        self._check_growth(windows, undamped)
         return Onset(windows, False, doubtful, self.modes, undamped=undamped)
 
-    def _check_growth(self, windows: tuple[Window, ...]) -> None:
+    def _check_growth(self, windows: tuple[Window, ...], undamped: Onset | None) -> None:
         if not windows:
-            raise OnsetError(f"No motion grows up to F_x = {self.loads[-1]:.10g}: raise the largest load.")
+            raise NoGrowthError(f"No motion grows up to F_x = {self.loads[-1]:.10g}: {HIGHER}.", undamped)
 
     def _undamped_windows(self) -> tuple[tuple[Window, ...], Increments, Spectrum | None, float | None]:
         """Windows without dissipation, increments in doubt, the spectrum at the smallest load if that is known, and the

@@ -14,6 +14,9 @@ from ..table_display import TableDisplay
 from ..uncertain_digits import with_uncertainty
 from .edges import Increments, Window
 
+HIGHER = "raise the largest load"
+"""What a sentence advises where nothing grows up to the last load."""
+
 
 class OnsetError(FaultgougeError):
     """No complex pair appears on the given loads."""
@@ -23,12 +26,28 @@ class OnsetError(FaultgougeError):
         """The sentence for some modes, or all, up to the last load."""
         which = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
         if not doubtful:
-            return cls(f"No pair of eigenvalues{which} is complex up to F_x = {last:.10g}: raise the largest load.")
+            return cls(f"No pair of eigenvalues{which} is complex up to F_x = {last:.10g}: {HIGHER}.")
         below, above = doubtful[0]
         return cls(
             f"No pair of eigenvalues{which} was found to become complex up to F_x = {last:.10g}, but one was expected "
-            f"between {below:.10g} and {above:.10g}: take smaller increments, or raise the largest load."
+            f"between {below:.10g} and {above:.10g}: take smaller increments, or {HIGHER}."
         )
+
+
+class NoGrowthError(OnsetError):
+    """No motion grows on the given loads in spite of the dissipation.
+
+    Parameters
+    ----------
+    says : str
+        The sentence.
+    undamped : Onset or None
+        The onset without dissipation on the same loads.
+    """
+
+    def __init__(self, says: str, undamped: "Onset | None") -> None:
+        super().__init__(says)
+        self.undamped = undamped
 
 
 def windows_rows(windows: Sequence[Window]) -> dict[str, str]:

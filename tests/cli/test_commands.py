@@ -379,7 +379,7 @@ def test_onset_names_the_friction_coefficients_without_one(faultgouge_here, tmp_
     small = SMALL | {"packing": SMALL["packing"] | {"seed": 2}, "ramp": {"step": 5e-3, "until": 0.015}}
     (tmp_path / "scene.toml").write_text(toml(small | {"law": {"kn": 2e5, "mu": [1.0, 0.3, 0.8]}}))
     said = faultgouge_here("onset", "scene.toml").stdout.splitlines()
-    none = "no onset: No pair of eigenvalues is complex up to F_x = 0.015: raise the largest load."
+    none = "no onset: No pair of eigenvalues is complex up to F_x = 0.015: raise ramp.until."
     assert said[0] == f"mu = 1: {none}"
     assert said[1].startswith("mu = 0.3: F_x^c = 0.01394557")
     assert said[-2] == f"mu = 0.8: {none}"
@@ -403,6 +403,19 @@ def ramps_that_end(beds):
         return SimpleNamespace(describe=lambda: "none")
 
     return ramp
+
+
+def test_the_undamped_onset_of_a_ramp_on_which_the_dissipation_stops_all_growth(faultgouge_here, tmp_path):
+    small = SMALL | {"packing": SMALL["packing"] | {"seed": 2}, "ramp": {"step": 7e-3, "until": 0.014}}
+    (tmp_path / "scene.toml").write_text(toml(small | {"law": {"kn": 2e5, "mu": 0.3}, "damping": {"cn": 500.0}}))
+    done = faultgouge_here("onset", "scene.toml", "-o", "onset.json", "--json", code=1)
+    result = json.loads(done.stdout)
+    assert json.loads((tmp_path / "onset.json").read_text()) == result
+    assert (result["fx_c"], result["windows"]) == (None, [])
+    assert result["undamped"]["fx_c"] == pytest.approx(0.01394557, abs=1e-7)
+    assert result["undamped"]["error"] > 0
+    assert "mu = 0.3: without dissipation F_x^c = 0.01394" in done.stderr
+    assert "Error: No motion grows up to F_x = 0.014: raise ramp.until." in done.stderr
 
 
 @pytest.mark.slow

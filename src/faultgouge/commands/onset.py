@@ -98,18 +98,44 @@ def onset(
             else:
                 found.append(_undamped_onset(part, folder, wanted, mu, bed, not every, tell))
         except (OnsetError, NoEquilibriumError) as error:
-            if len(wanted.law.mus) == 1:
-                raise
-            tell(f"mu = {mu:g}: no onset: {error}")
-            found.append({"mu": mu, "fx_c": None, "no_onset": str(error)})
-    if all(each["fx_c"] is None for each in found):
-        raise OnsetError(f"None of the {len(found)} friction coefficients has an onset on this ramp.")
+            found.append({"mu": mu, "fx_c": None, "no_onset": str(error)} | _only_undamped(mu, error, tell))
+            failed: Exception = error
+            if len(wanted.law.mus) > 1:
+                tell(f"mu = {mu:g}: no onset: {error}")
+                failed = OnsetError(
+                    f"None of the {len(wanted.law.mus)} friction coefficients has an onset on this ramp."
+                )
+    none = all(each["fx_c"] is None for each in found)
+    if none and not any("undamped" in each for each in found):
+        raise failed
     tell(f'law of friction: {wanted.law.in_words} (history = "{wanted.law.history}")')
     result = _write_result(output, found)
     if is_root() and folder is not None and not slices:
         shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
     if as_json:
         print_json(result)
+    if none:
+        raise failed
+
+
+def _only_undamped(mu: float, error: Exception, tell: Tell) -> dict[str, Any]:
+    """What JSON and user are told of a ramp on which motion grows without dissipation alone; nothing of others."""
+    from faultgouge.analysis.windows import NoGrowthError
+
+    if not isinstance(error, NoGrowthError) or error.undamped is None:
+        return {}
+    return {"windows": [], "undamped": _tell_undamped(mu, error.undamped, tell)}
+
+
+def _tell_undamped(mu: float, undamped: Onset | None, tell: Tell) -> dict[str, float] | None:
+    """The onset without dissipation, in words and for JSON."""
+    from faultgouge.analysis.uncertain_digits import with_uncertainty
+
+    if undamped is None:
+        tell(f"mu = {mu:g}: without dissipation none on this ramp")
+        return None
+    tell(f"mu = {mu:g}: without dissipation F_x^c = {with_uncertainty(undamped.fx_c, undamped.error)}")
+    return {"fx_c": undamped.fx_c, "error": undamped.error}
 
 
 def _check_all_windows(scene: Scene, modes: tuple[int, int] | None) -> None:
@@ -225,9 +251,7 @@ def _damped_onset(
             f"mu = {mu:g}: with dissipation F_x^c = {with_uncertainty(run.fx_c, run.error)} ({opening.kind}, "
             f"omega = {opening.frequency:.6g})"
         )
-    undamped = run.undamped
-    without = "none on this ramp" if undamped is None else f"F_x^c = {with_uncertainty(undamped.fx_c, undamped.error)}"
-    tell(f"mu = {mu:g}: without dissipation {without}")
+    _tell_undamped(mu, run.undamped, tell)
     real = _in_si(scene, [(each.fx_onset, each.frequency) for each in run.windows])
     _tell_in_si(mu, real.get("si", []), tell)
     _say_what_is_uncertain(run.equilibria, run.doubtful, "a motion was expected to grow", run.windows)
