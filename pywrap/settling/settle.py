@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from ..equilibria.rattlers import clear_rattlers
 from ..lammps.engine import Engine
 from ..scenes.packing_section import GeneratedPacking
 from ..scenes.quantities import DIGITS
-from ..scenes.scene import Scene
+from ..scenes.scene import Scene, scene_of
 from ..scenes.validation import SceneError
 from .change_load import change_load
 from .minimize_energy import settle_loose
@@ -44,7 +45,7 @@ load it sinks from one start in a hundred."""
 
 
 def settle(
-    scene: Scene,
+    scene: Scene | str | Path,
     mu: float | None = None,
     communicator: MPI.Comm | None = None,
     watch: Watch | None = None,
@@ -61,8 +62,8 @@ def settle(
 
     Parameters
     ----------
-    scene : Scene
-        The scene.
+    scene : Scene, str or Path
+        The scene, or its file.
     mu : float, optional
         Friction coefficient; by default the scene's first.
     communicator : mpi4py.MPI.Comm, optional
@@ -84,6 +85,7 @@ def settle(
     NoEquilibriumError
         If the packing does not come to rest.
     """
+    scene = scene_of(scene, "settle")
     if bed is None:
         with show_progress(watch):
             packing = settle_bed(scene, mu, communicator)

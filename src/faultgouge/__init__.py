@@ -8,7 +8,18 @@ and limits.
 
 import sys
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # what `OFFERS` imports when it is used
+    from .browser_view import view
+    from .drawing import draw
+    from .pywrap import Scene, from_lammps, perturb, ramp, relax, settle
+    from .pywrap.onset import onset
+    from .pywrap.runs.drive import drive
+    from .stored_files import load, spectrum, stability
+    from .studies.sweep.run_sweep import sweep
+
+    __version__: str
 
 if "IPython" in sys.modules:
     from .notebook import show_pictures
@@ -18,16 +29,20 @@ if "IPython" in sys.modules:
 OFFERS = {
     "Scene": "pywrap", "settle": "pywrap", "ramp": "pywrap", "perturb": "pywrap", "drive": "pywrap.runs.drive",
     "onset": "pywrap.onset", "from_lammps": "pywrap", "relax": "pywrap", "load": "stored_files",
-    "stability": "analysis", "spectrum": "analysis", "draw": "figures:draw_packing", "view": "browser_view",
+    "stability": "stored_files", "spectrum": "stored_files", "draw": "drawing", "view": "browser_view",
     "sweep": "studies.sweep.run_sweep",
 }  # fmt: skip
-"""Names of this package, and the modules that have them; behind a colon the name there, where that is another."""
+"""Names of this package, and the modules that have them."""
+
+__all__ = [
+    "Scene", "__version__", "draw", "drive", "from_lammps", "load", "onset", "perturb", "ramp", "relax", "settle",
+    "spectrum", "stability", "sweep", "view",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
     if name in OFFERS:
-        module, _, other = OFFERS[name].partition(":")
-        return getattr(import_module(f"{__name__}.{module}"), other or name)
+        return getattr(import_module(f"{__name__}.{OFFERS[name]}"), name)
     # the version when it is asked for: importlib.metadata takes as long to import as all that --help needs
     if name == "__version__":
         from importlib.metadata import version

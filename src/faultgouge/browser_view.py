@@ -11,7 +11,7 @@ from .analysis.configuration import HasConfiguration
 from .analysis.motion.hysteresis import turning_points
 from .figures.browser_page import Axis, equally_spaced, loads_shown, write_view
 from .figures.followed_pairs import seconds
-from .stored_files import load, packing_in
+from .stored_files import load, packing_in, path_of
 
 Progress = Callable[[Sequence[HasConfiguration]], Iterable[HasConfiguration]]
 
@@ -22,7 +22,7 @@ def view(
     loads: int | None = None,
     say: Callable[[str], Any] = print,
     progress: Progress = iter,
-) -> int:
+) -> Path:
     """Write a page of a stored packing, ramp, undamped run or driven run.
 
     Parameters
@@ -38,8 +38,8 @@ def view(
 
     Returns
     -------
-    int
-        Number of the packings on the page.
+    Path
+        The page.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def view(
     PackingFileError
         If the file is missing or damaged.
     """
-    path, output = Path(file), Path(output)
+    path, output = path_of(file, "view"), Path(output)
     if output.suffix.lower() != ".html":
         raise BadInputError(f"-o {output}: a page is an .html")
     last = load(path)
@@ -65,7 +65,7 @@ def view(
     if seconds(packings) > 5:
         say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
     write_view(packings, output, title, series, progress, axis)
-    return len(packings)
+    return output
 
 
 def _of_run(run: RunFile, most: int) -> tuple[list[Any], Axis | None, str]:

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import wraps
 from pathlib import Path
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from .analysis import BadInputError, Configuration, MindlinLaw, Packing, RunFile, read_dump
+from .analysis import spectrum as spectrum_of_packing
+from .analysis import stability as stability_of_packing
+from .analysis.configuration import HasConfiguration
 from .analysis.files.configuration_file import holds_configuration, read_configuration
 from .analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
 
@@ -51,7 +57,7 @@ def load(
     PackingFileError
         If the file is missing, damaged, or of no known format.
     """
-    path = Path(file)
+    path = path_of(file, "load")
     if path.suffix == ".disks":
         return read_dump(path, frame=frame)
     if path.suffix == ".in" or path.name.startswith("in."):
@@ -73,6 +79,42 @@ def load(
             "top=10) takes the disks as they stand, and `faultgouge import` brings them to rest."
         )
     return packing_of(disks, law, upper_layer(disks, top), fx=fx, fy=fy)
+
+
+def path_of(file: object, caller: str) -> Path:
+    """The path that a function is given; a BadInputError if it is none."""
+    if isinstance(file, (str, Path)):
+        return Path(file)
+    raise BadInputError(f"{caller} takes the path of a file, and no {type(file).__name__}.")
+
+
+Options = ParamSpec("Options")
+Result = TypeVar("Result")
+
+
+def takes_file(
+    function: Callable[Concatenate[HasConfiguration, Options], Result],
+) -> Callable[Concatenate[HasConfiguration | str | Path, Options], Result]:
+    """A function of a packing that also takes the path of a stored one, of which it takes the last."""
+    name = function.__name__.removesuffix("_packing")
+
+    @wraps(function)
+    def opens(packing: Any, *args: Options.args, **options: Options.kwargs) -> Result:
+        if isinstance(packing, (str, Path)):
+            packing = load(packing)
+        elif not hasattr(packing, "configuration"):
+            advice = ": give its .packing" if hasattr(packing, "packing") else ""
+            raise BadInputError(
+                f"{name} takes a Packing, a Configuration, or the path of a stored one, and no "
+                f"{type(packing).__name__}{advice}."
+            )
+        return function(packing, *args, **options)
+
+    return opens
+
+
+stability = takes_file(stability_of_packing)
+spectrum = takes_file(spectrum_of_packing)
 
 
 def packing_in(run: RunFile, frame: int = -1) -> Packing:

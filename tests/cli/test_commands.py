@@ -216,6 +216,15 @@ def test_a_driven_packing_has_its_spring_in_command_and_python_alike(faultgouge_
         assert abs(difference).max() < 1e-9 * abs(stiffness_matrix(drawn)).max()
 
 
+def test_one_rank_alone_prints_the_spectrum(faultgouge_here, tmp_path, reference_packing, monkeypatch):
+    with RunFile.create(tmp_path / "run.h5", reference_packing(1.0)) as file:
+        file.append(reference_packing(1.0))
+        file.complete = True
+    monkeypatch.setattr("faultgouge.mpi_rank.rank", lambda: 1)
+    for more in ((), ("--json",), ("--values",)):
+        assert faultgouge_here("spectrum", "run.h5", *more).stdout == ""
+
+
 def test_spectrum_says_what_contacts_at_the_bound_do(faultgouge_here, tmp_path):
     """With the standard law, whose contacts slide on or stick there; the smoothed law has one derivative."""
     scene = SMALL | {"law": {"kn": 2e5, "mu": 0.4}, "ramp": {"step": 5e-2, "until": 0.6}}

@@ -240,7 +240,7 @@ def test_a_scene_takes_the_same_files(tmp_path, reference, reference_packing):
         return settle(Scene.from_mapping({"packing": section, **rest}, tmp_path)).packing
 
     expected = settled(file="packing.json")
-    assert settled(file="packing.dump", top="type:2") == expected
+    assert settled(file="packing.dump", top="type:2") == replace(expected, slips_known=False)
     with pytest.raises(SceneError, match="does not say which disks are the upper layer"):
         settled(file="packing.dump")
 

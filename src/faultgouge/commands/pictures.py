@@ -29,6 +29,8 @@ from .terminal import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
     from faultgouge.analysis import Configuration, Packing
     from faultgouge.figures.film import Film
     from faultgouge.figures.mode import ModeShape
@@ -235,7 +237,14 @@ def view(
     lock_output(context, output, file)
     if not is_root():
         return
-    count = write_page(file, output, loads, say, lambda them: progress(them, "loads"))
+    count = 0
+
+    def shown(packings: Sequence[HasConfiguration]) -> Iterable[HasConfiguration]:
+        nonlocal count
+        count = len(packings)
+        return progress(packings, "loads")
+
+    write_page(file, output, loads, say, shown)
     print_line(f"{counted(count, 'packing')}, {output.stat().st_size / 1e6:.1f} MB; written to {output}")
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..mpi_rank import is_root
 from .terminal import (
     AsJson,
     Frame,
@@ -71,6 +72,8 @@ def spectrum(
     packing = stored_configuration(file, number) or stored_packing(file, number)
     if rise and not packing.configuration.top.any():
         raise typer.BadParameter(f"--rise: {file} has no upper layer that a load could push; leave it out")
+    if not is_root():
+        return
     spring = packing.configuration.spring
     size = packing.configuration.coordinates
     if size > SLOW_COORDINATES:

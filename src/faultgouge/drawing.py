@@ -1,0 +1,6 @@
+"""Draw a packing, or that of a file."""
+
+from .figures import draw_packing
+from .stored_files import takes_file
+
+draw = takes_file(draw_packing)
