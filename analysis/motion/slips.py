@@ -105,6 +105,21 @@ class SlipDetector:
         return self._begin is not None
 
     @property
+    def so_far(self) -> Slip | None:
+        """The slip under way, up to its last fast motion; None between slips."""
+        begin, end = self._begin, self._end
+        if begin is None or end is None:
+            return None
+        return Slip(
+            begins=begin.time,
+            ends=end.time,
+            force_before=begin.force,
+            force_after=end.force,
+            slip=end.displacement - begin.displacement,
+            kinetic_energy=self._energy_at_end,
+        )
+
+    @property
     def largest(self) -> float:
         """Time of the largest force in the rows from which a slip may begin; of the slip under way, its beginning."""
         return (self._begin or self._largest()).time
@@ -124,16 +139,7 @@ class SlipDetector:
             if fast:
                 self._end, self._energy_at_end = row, self._energy
             elif self._begin is not None and self._end is not None and time - self._end.time >= self.quiet:
-                begin, end = self._begin, self._end
-                found = Slip(
-                    begins=begin.time,
-                    ends=end.time,
-                    force_before=begin.force,
-                    force_after=end.force,
-                    slip=end.displacement - begin.displacement,
-                    kinetic_energy=self._energy_at_end,
-                )
-                self._begin = None
+                found, self._begin = self.so_far, None
                 self._past.clear()
         self._past.append(row)
         while self._past[0].time < time - self.look_back:
@@ -153,7 +159,7 @@ def find_slips(
     kinetic_energy: ArrayLike,
     velocity: float,
     period: float,
-) -> list[Slip]:
+) -> tuple[list[Slip], Slip | None]:
     """Find the slips in the series of a driven run.
 
     Parameters
@@ -170,10 +176,13 @@ def find_slips(
     -------
     list of Slip
         Those that have ended.
+    Slip or None
+        The one that is under way at the end of the series, as far as it has come.
     """
     detector = SlipDetector(velocity, period)
     columns = [np.asarray(column, dtype=np.float64).tolist() for column in (time, force, displacement, kinetic_energy)]
-    return [slip for row in zip(*columns, strict=True) if (slip := detector.add(*row)) is not None]
+    ended = [slip for row in zip(*columns, strict=True) if (slip := detector.add(*row)) is not None]
+    return ended, detector.so_far
 
 
 @dataclass(frozen=True)

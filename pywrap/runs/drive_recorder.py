@@ -132,13 +132,18 @@ def drive_of(file: RunFile) -> Drive | None:
 
 
 def slips_in(file: RunFile) -> list[Slip]:
-    """The slips in the series of a drive.h5."""
+    """The slips in the series of a drive.h5 that have ended."""
+    return all_slips_in(file)[0]
+
+
+def all_slips_in(file: RunFile) -> tuple[list[Slip], Slip | None]:
+    """The slips in the series of a drive.h5, and the one that is under way at its end."""
     settings = drive_of(file)
     if settings is None:
-        return []
+        return [], None
     period = layer_period(settings, file.packing(0))
     if period is None or SERIES not in file.names_of_series:
-        return []
+        return [], None
     series = file.series(SERIES)
     return find_slips(
         series["time"],

@@ -24,6 +24,7 @@ from faultgouge.analysis import (
 )
 from faultgouge.analysis.files.atomic_write import SEAL
 from faultgouge.analysis.files.formats import read_disks, upper_layer, write_packing
+from faultgouge.analysis.files.formats.disks import mass_of_density
 from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.pywrap.lammps import restart_file
 
@@ -382,3 +383,17 @@ def test_a_packing_that_came_to_rest_without_friction_says_so(heap, tmp_path):
     path.write_text(json.dumps(disks | {"slip": 1e-3}))
     with pytest.raises(PackingFileError, match="slip can only be 0"):
         load(path, law=MindlinLaw(2e5, 5e4, 1.0), fy=3.0)
+
+
+def test_masses_are_those_before_lammps_wrote_densities_of_sixteen_digits():
+    from faultgouge.lammps_inputs import __file__ as decks
+
+    shipped = read_disks(Path(decks).parent / "packing100.data")
+    assert set(shipped.mass.tolist()) == {1.0}
+    radius = np.random.default_rng(0).uniform(0.3, 0.8, 500)
+    volume = 4.0 * np.pi / 3.0 * radius * radius * radius
+    for mass in (1.0, 0.37, 2.5e-6):
+        written = np.array([float(f"{each:.16g}") for each in mass / volume])
+        assert np.array_equal(mass_of_density(written, radius), np.full(500, mass))
+    odd = np.random.default_rng(1).uniform(1.0, 2.0, 500)
+    assert np.array_equal(mass_of_density(odd, radius), odd * volume)

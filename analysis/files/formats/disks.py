@@ -154,7 +154,7 @@ def of_columns(source: str, columns: Mapping[str, Floats], type_names: Sequence[
     _check_numbers(source, columns, ids)
     _check_plane(source, columns, found["radius"])
     if "density" in columns:
-        found.setdefault("mass", columns["density"] * sphere_volume(found["radius"]))
+        found.setdefault("mass", mass_of_density(columns["density"], found["radius"]))
     order = np.argsort(ids, kind="stable")
     ids = ids[order]
     twice = ids[1:][ids[1:] == ids[:-1]]
@@ -183,6 +183,19 @@ def of_columns(source: str, columns: Mapping[str, Floats], type_names: Sequence[
 def sphere_volume(radius: Floats) -> Floats:
     """Volume of a sphere in the very order of LAMMPS's operations, so that masses are those of LAMMPS to the bit."""
     return 4.0 * np.pi / 3.0 * radius * radius * radius
+
+
+def mass_of_density(density: Floats, radius: Floats) -> Floats:
+    """Masses of spheres, as they were before LAMMPS wrote their densities with 16 digits.
+
+    A mass of one may come back as 0.9999999999999999. A mass is therefore the number of twelve digits, if there is one
+    within the rounding of its density; else it is that which LAMMPS reads, to the bit.
+    """
+    volume = sphere_volume(radius)
+    mass = density * volume
+    short = np.array([float(f"{each:.12g}") for each in mass.tolist()])
+    half = 0.5 * 10.0 ** (np.floor(np.log10(density)) - 15)
+    return np.where(np.abs(short - mass) <= half * volume + 2 * np.spacing(mass), short, mass)
 
 
 def packing_of(

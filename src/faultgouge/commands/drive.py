@@ -145,10 +145,10 @@ def _result(path: Path, scene: Scene) -> dict[str, Any]:
     from faultgouge.analysis import RunFile
     from faultgouge.analysis.motion.slips import friction_of
     from faultgouge.pywrap.runs.drive import strays
-    from faultgouge.pywrap.runs.drive_recorder import SERIES, slips_in
+    from faultgouge.pywrap.runs.drive_recorder import SERIES, all_slips_in
 
     with RunFile(path) as file:
-        slips, series, times = slips_in(file), file.series(SERIES), file.observable("time")
+        (slips, under_way), series, times = all_slips_in(file), file.series(SERIES), file.observable("time")
         out = np.flatnonzero(strays(file.packing(-1), file.packing(0)))
     frames = [
         {
@@ -159,6 +159,7 @@ def _result(path: Path, scene: Scene) -> dict[str, Any]:
     ]
     return {
         "slips": [asdict(slip) | frame for slip, frame in zip(slips, frames, strict=True)],
+        "under_way": None if under_way is None else asdict(under_way),
         "cycles": max(0, len(slips) - 1),
         "friction": asdict(friction_of(series["time"], series["force"], slips, scene.load.fy)),
         "time": float(series["time"][-1]),
@@ -179,8 +180,9 @@ def _write_table(path: Path, slips: list[dict[str, Any]]) -> None:
 def _in_words(result: dict[str, Any], rigid: bool) -> str:
     friction, slips = result["friction"], result["slips"]
     mean = f"F/F_y is {friction['mean']:.3g} on average"
+    under_way = _under_way(result["under_way"])
     if not slips:
-        why = ", of a rigid drive, which counts no slips" if rigid else ": no slip"
+        why = ", of a rigid drive, which counts no slips" if rigid else under_way or ": no slip"
         return f"t = {result['time']:.4g}{why}; {mean}, at most {friction['largest']:.3g}"
     columns = ("begins", "ends", "force_before", "force_after", "slip", "kinetic_energy", "frame_before", "frame_after")
     headings = ("begins", "ends", "F before", "F after", "slip", "kinetic energy", "frame before", "frame after")
@@ -191,5 +193,13 @@ def _in_words(result: dict[str, Any], rigid: bool) -> str:
     return (
         f"{table_of(headings, rows)}\n{len(slips)} slip{'s' * (len(slips) > 1)} up to t = {result['time']:.4g}"
         f"{recurrence}; {mean} from the first slip on, {friction['before']:.3g} before slips, "
-        f"{friction['after']:.3g} after them"
+        f"{friction['after']:.3g} after them{under_way}"
     )
+
+
+def _under_way(slip: dict[str, float] | None) -> str:
+    """That a slip has not ended with the run."""
+    if slip is None:
+        return ""
+    fell = f"F has fallen from {slip['force_before']:.4g} to {slip['force_after']:.4g}"
+    return f": a slip that began at t = {slip['begins']:.4g} is under way, {fell}"
