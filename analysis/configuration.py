@@ -42,6 +42,7 @@ from .arrays import (
     square,
 )
 from .contacts import UNIT, LinearisedContacts, refuse_first
+from .counted import counted
 
 UNKNOWN_SLIPS = (
     "the tangential forces were not given, and the slips began at zero: K depends on both (`faultgouge import "
@@ -218,18 +219,20 @@ class Configuration:
         return hash((len(self), self.fx, self.position.tobytes()))
 
     def __repr__(self) -> str:
-        what = "disks" if self.dimension == 2 else "spheres"
+        what = counted(len(self), "disk" if self.dimension == 2 else "sphere")
         count, walls = len(self.contacts), int(self.contacts.wall.sum())
         bound = int(self.contacts.at_bound.sum())
-        slide = ", which slide" if self.contacts.sliding.any() else ", which stick" if bound else ""
+        s = "s" if bound == 1 else ""
+        slide = f", which slide{s}" if self.contacts.sliding.any() else f", which stick{s}" if bound else ""
         state = f"{walls} with walls, {bound} at Coulomb's bound{slide}"
         if self.stiffness is not None:
             count_one_sided = len(self.one_sided_particles)
-            sided = f", forces on {count_one_sided} particles one-sided" if count_one_sided else ""
-            state = f"{walls} known with walls, K and C by differences of forces to {self.operator_error:.1g}{sided}"
+            sided = f", forces on {counted(count_one_sided, 'particle')} one-sided" if count_one_sided else ""
+            known = f"{walls or 'none'} known with walls"
+            state = f"{known}, K and C by differences of forces to {self.operator_error:.1g}{sided}"
         return (
-            f"<Configuration: {len(self)} {what}, {count - walls} contacts between them and {state}, "
-            f"{len(self.rattlers)} rattlers, residual {self.residual:.3g}, "
+            f"<Configuration: {what}, {counted(count - walls, 'contact')} between them and {state}, "
+            f"{counted(len(self.rattlers), 'rattler')}, residual {self.residual:.3g}, "
             f"{'not proved' if self.proof is None else f'proof {self.proof:.1g}'}>"
         )
 

@@ -34,6 +34,8 @@ GIVE_LINES = (
     "from_lammps(lmp, commands=[...])"
 )
 
+GIVE_LINE = "give the line that the deck has among commands"
+
 COHESIVE = ("jkr", "dmt", "mdr")
 UNSUPPORTED_SUBMODELS = {"twisting": "twisting friction", "rolling": "rolling friction", "heat": "heat conduction"}
 TANGENTIAL = (
@@ -219,9 +221,7 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
             continue
         line = commands.fixes.get(name)
         if line is None or without_suffix(line.split()[3]) != plain:
-            raise NotTakenError(
-                f"The commands have no line of fix {name} {style}: give the line that the deck has among commands."
-            )
+            raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINE}.")
         if plain == "wall/gran":
             _check_wall(name, line)
         if plain in BODIES:

@@ -10,6 +10,7 @@ from ...analysis.arrays import Floats
 from .force_probe import HOLDS, MOVES
 from .granular_commands import (
     BODIES,
+    GIVE_LINE,
     GIVE_LINES,
     MOBILE,
     OWN,
@@ -102,9 +103,7 @@ def look_at_forces(
                 f"fix {name} {style} moves or holds particles in a way that is not known here: unfix it."
             )
         if name not in given.fixes or without_suffix(given.fixes[name].split()[3]) != without_suffix(style):
-            raise NotTakenError(
-                f"The commands have no line of fix {name} {style}: give the line that the deck has among commands."
-            )
+            raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINE}.")
     refuse_moving_regions(lmp, given)
     groups = {name: line.split()[2] for name, line in given.fixes.items() if name in moving}
     for name in list(groups):

@@ -18,6 +18,8 @@ from ...analysis import BadInputError, Configuration
 from ..lammps.instance import lammps_instance
 from .balance import BALANCE, check_balance
 from .granular_commands import (
+    GIVE_LINE,
+    GIVE_LINES,
     NotLinearisedError,
     NotTakenError,
     commands_in,
@@ -43,6 +45,10 @@ CHANGES = re.compile(
 """Commands that change what has been set up, or stand in a variable and may do so."""
 
 CONDITION = re.compile(r"""\b(el)?if\s+("[^"]*"|'[^']*'|\S+)""")
+
+
+HIDES = re.compile(r"\s*(log|echo)\s")
+"""Commands that keep what follows out of LAMMPS's log."""
 
 
 class Deck(NamedTuple):
@@ -91,10 +97,15 @@ def run_deck(
             _carry_out(lmp, path, path.name)
         else:
             _carry_out_text(lmp, path, deck.head)
-            _refuse_what_stays(lmp, path, _text_of_logs(lmp, log, path), deck.ahead)
+            _refuse_what_stays(lmp, path, _text_of_logs(lmp, log, path), deck)
             _carry_out_text(lmp, path, deck.second_part)
-        commands = commands_in(_text_of_logs(lmp, log, path))
-        found = take_or_keep(lmp, commands, keep, slides=slides, balance=balance, relaxes=relaxes)
+        try:
+            commands = commands_in(_text_of_logs(lmp, log, path))
+            found = take_or_keep(lmp, commands, keep, slides=slides, balance=balance, relaxes=relaxes)
+        except SnapshotError as error:
+            if (says := _of_deck(str(error), text)) == str(error):
+                raise
+            raise SnapshotError(says) from error
         lmp.close()
     return found
 
@@ -140,8 +151,9 @@ def _text_of_logs(lmp: Any, log: IO[str], path: Path) -> str:
     return communicator(lmp).bcast(logged_text(log.read(), path.parent), root=0)
 
 
-def _refuse_what_stays(lmp: Any, path: Path, text: str, ahead: str) -> None:
+def _refuse_what_stays(lmp: Any, path: Path, text: str, deck: Deck) -> None:
     """Refuse what an instance cannot be taken with, unless a command ahead may change it."""
+    ahead = deck.ahead
     if CHANGES.search(CONDITION.sub("", ahead)):
         return
     try:
@@ -151,6 +163,14 @@ def _refuse_what_stays(lmp: Any, path: Path, text: str, ahead: str) -> None:
             check_instance(lmp, styles, commands)
     except NotLinearisedError as error:
         if not can_copy(lmp):  # for K by differences of forces
-            raise BadInputError(f"{path}: {with_one_rank(error)}") from error
+            raise BadInputError(f"{path}: {_of_deck(with_one_rank(error), deck.head)}") from error
     except NotTakenError as error:
-        raise BadInputError(f"{path}: {error}") from error
+        raise BadInputError(f"{path}: {_of_deck(str(error), deck.head)}") from error
+
+
+def _of_deck(says: str, text: str) -> str:
+    """A sentence about commands that are missing, for a deck in place of a script in Python."""
+    hides = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1) if HIDES.match(line)]
+    named = " and ".join(f"line {number}, `{line}`" for number, line in hides)
+    advice = f"{named}, may keep it out of LAMMPS's log: leave that out" if hides else "see that LAMMPS's log has it"
+    return says.replace(GIVE_LINES, advice).replace(GIVE_LINE, advice)

@@ -572,3 +572,15 @@ def test_laws_that_are_others_than_their_lines_say(faultgouge_here, tmp_path):
         if share:
             assert float(share[1]) == pytest.approx(measured, rel=0.3)  # that of the contact of the median overlap
         assert f"proof {found.proof:.1g}" in said
+
+
+@pytest.mark.parametrize("before", ["pair_style", "fix load"])
+def test_the_line_of_a_deck_that_hides_commands_is_named(faultgouge_here, tmp_path, before):
+    """A user of the command has no script in Python to which he could give commands."""
+    text = DECK.format(**FLAT, word="contacts").replace(f"\n{before}", f"\nlog none\n{before}", 1)
+    (tmp_path / "quiet.in").write_text(text)
+    said = faultgouge_here("import", "quiet.in", code=None).stderr
+    assert "from_lammps" not in said
+    assert "commands" not in said.partition("give")[2]
+    number = 1 + text.splitlines().index("log none")
+    assert before == "pair_style" or f"line {number}, `log none`, may keep it out of LAMMPS's log" in said
