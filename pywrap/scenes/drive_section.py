@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis.files.signal_files import read_signal
-from ...analysis.motion.signals import Signal, SignalError, pulse
+from ...analysis.motion.signals import Signal, pulse
+from .signal_keys import absolute_signal, check_signal
 from .validation import NotNegative, Positive, Section, is_number, refusal_sentence
 
 Velocity = Annotated[float, Field(allow_inf_nan=False)]
@@ -90,20 +90,14 @@ class Drive(Section):
     @field_validator("signal")
     @classmethod
     def _absolute(cls, signal: str | None, info: ValidationInfo) -> str | None:
-        if signal is None or signal == "pulse":
-            return signal
-        folder: Path = (info.context or {}).get("folder", Path())
-        return str((folder / signal).resolve())
+        return absolute_signal(signal, ("pulse",), info)
 
     @model_validator(mode="after")
     def _complete(self) -> Drive:
         wrong = self._wrong()
         if wrong:
             raise refusal_sentence(*wrong)
-        try:
-            self.forcing()
-        except SignalError as error:
-            raise refusal_sentence("signal", f"is refused: {str(error).rstrip('.')}") from None
+        check_signal(self.forcing)
         return self
 
     def _wrong(self) -> tuple[str, str] | None:

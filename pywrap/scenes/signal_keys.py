@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -14,6 +15,22 @@ from .validation import NotNegative, Positive, Section, refusal_sentence
 KINDS = ("pulse", "sweep")
 OF_FILES = ("channel", "scale", "stretch")
 DERIVATIVES = {"displacement": 2, "velocity": 1, "acceleration": 0}
+
+
+def absolute_signal(signal: str | None, kinds: Collection[str], info: ValidationInfo) -> str | None:
+    """The key signal, whose path, if it is none of some kinds, counts from the folder of the scene's file."""
+    if signal is None or signal in kinds:
+        return signal
+    folder: Path = (info.context or {}).get("folder", Path())
+    return str((folder / signal).resolve())
+
+
+def check_signal(forcing: Callable[[], object]) -> None:
+    """Refuse a section whose signal cannot be made."""
+    try:
+        forcing()
+    except SignalError as error:
+        raise refusal_sentence("signal", f"is refused: {str(error).rstrip('.')}") from None
 
 
 class SignalKeys(Section):
@@ -58,20 +75,14 @@ class SignalKeys(Section):
     @field_validator("signal")
     @classmethod
     def _absolute(cls, signal: str | None, info: ValidationInfo) -> str | None:
-        if signal is None or signal in KINDS:
-            return signal
-        folder: Path = (info.context or {}).get("folder", Path())
-        return str((folder / signal).resolve())
+        return absolute_signal(signal, KINDS, info)
 
     @model_validator(mode="after")
     def _forcing(self) -> SignalKeys:
         wrong = self._unfit() or self._missing_key()
         if wrong:
             raise refusal_sentence(*wrong)
-        try:
-            self.forcing()
-        except SignalError as error:
-            raise refusal_sentence("signal", f"is refused: {str(error).rstrip('.')}") from None
+        check_signal(self.forcing)
         return self
 
     @property

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict, deque
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from importlib.metadata import version
 from typing import Any
@@ -31,7 +31,7 @@ from .tasks import task_of
 from .user_function import UserFunctionError
 
 TRIES = 3
-"""Deaths of workers, without a point that ends in between, after which a point and not an accident is to blame."""
+"""Number of successive worker deaths after which the point is considered the cause."""
 
 FINAL = (NoEquilibriumError, SceneError)
 """Errors that the same scene has again, to the bit: it has no equilibrium, or it is refused. Others may have passed, as
@@ -51,7 +51,7 @@ def compute_points(pool: Executor | None, task: str, points: Sequence[SweepPoint
     for point in points:
         groups[point.settling_key].append(point)
     if pool is not None and len(points) > 1:
-        yield from _Shared(pool, task).rows(groups.values())
+        yield from PointQueue(pool, task).rows(groups.values())
         return
     for group in groups.values():
         bed = None
@@ -60,7 +60,7 @@ def compute_points(pool: Executor | None, task: str, points: Sequence[SweepPoint
             yield row
 
 
-class _Shared:
+class PointQueue:
     """Points that are in the hands of workers."""
 
     def __init__(self, pool: Executor, task: str) -> None:
@@ -68,11 +68,11 @@ class _Shared:
         self._running: dict[Future[Any], tuple[SweepPoint, Packing | None, deque[SweepPoint]]] = {}
         self._lost: list[tuple[SweepPoint, Packing | None, deque[SweepPoint]]] = []
 
-    def rows(self, groups: Any) -> Iterator[Row]:
-        """Rows as they end; the first point of a group is handed out before the others."""
+    def rows(self, groups: Iterable[deque[SweepPoint]]) -> Iterator[Row]:
+        """Rows as they end; the first point of a group is submitted before the others."""
         deaths = 0
         for group in groups:
-            self._hand_out(group.popleft(), None, group)
+            self.submit(group.popleft(), None, group)
         try:
             while self._running or self._lost:
                 for future in wait(self._running, return_when=FIRST_COMPLETED).done:
@@ -84,16 +84,17 @@ class _Shared:
                         continue
                     deaths = 0
                     while group:
-                        self._hand_out(group.popleft(), bed, deque())
+                        self.submit(group.popleft(), bed, deque())
                     yield row
                 if self._lost and not self._running:
                     deaths += 1
-                    self._again(deaths)
+                    self.resubmit_lost(deaths)
         finally:
             for future in self._running:
                 future.cancel()
 
-    def _hand_out(self, point: SweepPoint, bed: Packing | None, group: deque[SweepPoint]) -> None:
+    def submit(self, point: SweepPoint, bed: Packing | None, group: deque[SweepPoint]) -> None:
+        """Give a worker a point, with its packing if that is known; a group is the points that wait for its packing."""
         try:
             future = self._pool.submit(compute_point, self._task, point, bed, bool(group))
         except BrokenExecutor:
@@ -101,8 +102,8 @@ class _Shared:
         else:
             self._running[future] = point, bed, group
 
-    def _again(self, deaths: int) -> None:
-        """Hand out the points of killed workers again."""
+    def resubmit_lost(self, deaths: int) -> None:
+        """Submit the points of killed workers again."""
         if isinstance(self._pool, Processes) and not self._pool.began:
             raise WorkerError(
                 "the workers end as they start; each reads a script anew that calls run_sweep with several workers, "
@@ -115,7 +116,7 @@ class _Shared:
         self._pool.renew()
         lost, self._lost = self._lost, []
         for point, bed, group in lost:
-            self._hand_out(point, bed, group)
+            self.submit(point, bed, group)
 
 
 def compute_point(task: str, point: SweepPoint, bed: Packing | None, keep: bool) -> tuple[Row, Packing | None]:
