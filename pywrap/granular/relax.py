@@ -20,7 +20,7 @@ from .balance import check_balance, force_scale, restless_fix
 from .configuration_by_differences import still_particles
 from .from_lammps import take_configuration
 from .granular_commands import NotTakenError, read_commands
-from .instance_queries import check_instance, explain_error
+from .instance_queries import explain_error, require_instance
 from .lammps_arrays import owned_array, rows_of, set_velocity
 from .look_in_a_copy import can_copy
 
@@ -79,7 +79,7 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
     check_balance(balance)
     if steps < 1:
         raise BadInputError(f"steps = {steps} is refused: nothing would come to rest; give a number from 1 on.")
-    check_instance(lmp, "relax")
+    require_instance(lmp, "relax")
     if not can_copy(lmp):
         raise NotTakenError("relax looks at copies of the process: use one rank and one thread.")
     given = None if commands is None else list(commands)

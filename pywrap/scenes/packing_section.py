@@ -181,6 +181,9 @@ class StoredPacking(Section):
     def packing(self, law: MindlinLaw, **more: Any) -> Packing:
         """The packing of the file under a law; `more` are its fy, inertia_factor and drag_time.
 
+        Contacts of which the file has no slips begin without, by definition of the scene. Slips that the file itself
+        calls unknown remain unknown.
+
         Raises
         ------
         PackingFileError
@@ -188,7 +191,8 @@ class StoredPacking(Section):
         """
         if not is_hdf5(self.file):
             disks = read_disks(self.file, self.frame)
-            return packing_of(disks, law, upper_layer(disks, self.top), **more)
+            found = packing_of(disks, law, upper_layer(disks, self.top), **more)
+            return replace(found, slips_known=bool(disks.given.get("slips_known", True)))
         with RunFile(self.file) as run:
             if len(run) == 0:
                 raise PackingFileError(f"{self.file} has no equilibrium in it")

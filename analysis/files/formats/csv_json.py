@@ -65,8 +65,8 @@ def _is_comment(line: str) -> bool:
 
 
 def read_json(path: Path) -> Disks:
-    """Disks of a packing.json."""
-    packing = read_packing(path, MindlinLaw(kn=1.0, kt=1.0, mu=1.0))  # the file says nothing about forces
+    """Disks of a packing.json, which came to rest without friction: no contact has a slip."""
+    packing = read_packing(path, MindlinLaw(kn=1.0, kt=0.0, mu=0.0))  # the file says nothing about forces
     none = np.zeros(0)
     return Disks(
         str(path),
@@ -76,7 +76,7 @@ def read_json(path: Path) -> Disks:
         packing.mass,
         top=packing.top if packing.top.any() else None,
         box_length=packing.box_length,
-        slips=Slips(none.astype(np.int64), none.astype(np.int64), none) if packing.slips_known else None,
+        slips=Slips(none.astype(np.int64), none.astype(np.int64), none),
     )
 
 
