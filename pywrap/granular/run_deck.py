@@ -102,10 +102,10 @@ def run_deck(
         try:
             commands = commands_in(_text_of_logs(lmp, log, path))
             found = take_or_keep(lmp, commands, keep, slides=slides, balance=balance, relaxes=relaxes)
-        except SnapshotError as error:
+        except NotTakenError as error:
             if (says := _of_deck(str(error), text)) == str(error):
                 raise
-            raise SnapshotError(says) from error
+            raise NotTakenError(says) from error
         lmp.close()
     return found
 
