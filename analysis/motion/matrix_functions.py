@@ -25,7 +25,8 @@ from ..packing.packing import Floats, Indices
 from .eigenvalues import Complexes
 
 WELL_CONDITIONED = 0.1
-"""Eigenvalues with a smaller |y^H x| are kept together with their partner; the others lose a digit at most."""
+"""Eigenvalues with a smaller |y^H x| are kept together with their partner; eigenvalues with a larger |y^H x| lose at
+most one digit."""
 
 TOLERABLE = 1e-3
 """Where no plane of two eigenvectors can be set apart, as among the modes of overdamped motions, which are oblique
@@ -183,7 +184,15 @@ class BlockDiagonal:
         return BlockDiagonal(self.basis[:, columns], self.inverse[columns], self.values[columns], blocks, self.reach)
 
     def oscillation_modes(self) -> "BlockDiagonal":
-        """The modes of the system (z, z')' = ((0, 1), (-A, 0)) (z, z'), which has the rates +-i sqrt(A)."""
+        """The modes of the system (z, z')' = ((0, 1), (-A, 0)) (z, z'), which has the rates +-i sqrt(A).
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If an eigenvalue is zero: a motion that no force opposes does not oscillate.
+        """
+        if not np.all(self.values):
+            raise np.linalg.LinAlgError("a motion that no force opposes does not oscillate")
         root = 1j * np.sqrt(self.values)
         rate, inverse = np.diag(root), np.diag(1 / root)
         blocks = {}

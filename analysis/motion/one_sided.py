@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import block_array, bsr_array, csr_array, eye_array
 from scipy.sparse.linalg import expm_multiply
 
-from ..arrays import Floats, floats
+from ..arrays import Floats, Indices, floats
 from ..configuration import Configuration, HasConfiguration
 from ..operators.linearised_contacts import rescaling_operators
 from ..operators.sliders import margins, sliders_of
@@ -128,22 +128,23 @@ class OneSidedSystem:
     ----------
     motion : Motion
         K and C of sticking contacts.
+    step_share : float
+        Time step, as a share of the largest stable one.
     """
 
     motion: Motion
-    share: float = MOTION_STEP
-    """Time step, as a share of the largest stable one."""
+    step_share: float = MOTION_STEP
 
     @classmethod
-    def of(cls, packing: HasConfiguration, share: float = MOTION_STEP) -> "OneSidedSystem":
+    def of(cls, packing: HasConfiguration, step_share: float = MOTION_STEP) -> "OneSidedSystem":
         """Assemble the equations, with the packing's own dashpots and drag."""
-        return cls(Motion.of(packing, sliding=False), share)
+        return cls(Motion.of(packing, sliding=False), step_share)
 
     @cached_property
-    def step(self) -> float:
-        """Time step of `advance`, time."""
+    def time_step(self) -> float:
+        """Longest time step of `advance`, time."""
         configuration = self.motion.configuration
-        return self.share * float(stable_timestep(configuration)) if len(self.motion.active) else 1.0
+        return self.step_share * float(stable_timestep(configuration)) if len(self.motion.active) else 1.0
 
     @cached_property
     def _weight(self) -> csr_array:
@@ -151,6 +152,27 @@ class OneSidedSystem:
         m = self.motion
         shape = (m.configuration.coordinates, len(m.active))
         return csr_array((1 / m.root_mass, (m.active, np.arange(len(m.active)))), shape=shape)
+
+    def on_active(self, forces: Floats) -> Floats:
+        """Mass-weighted forces, shape (E, P), of forces on all coordinates, shape (coordinates, P)."""
+        return np.asarray(self._weight.T @ forces)
+
+    def of_particles(self, z: Floats) -> Floats:
+        """The values of all coordinates, shape (coordinates,), of one mass-weighted displacement, shape (E, 1)."""
+        return np.asarray(self._weight @ z)[:, 0]
+
+    def of_contacts(self, r: Floats) -> Floats:
+        """r of one motion for all contacts, shape (C,); zero of contacts with one derivative."""
+        contacts = self.motion.configuration.contacts
+        whole = np.zeros(len(contacts))
+        whole[self._two_derivatives] = r[:, 0]
+        return whole
+
+    @cached_property
+    def _two_derivatives(self) -> Indices:
+        """Numbers of the contacts whose derivatives differ while they close and while they part."""
+        contacts = self.motion.configuration.contacts
+        return np.flatnonzero(np.any(contacts.closing != contacts.parting, axis=1))
 
     @cached_property
     def sliders(self) -> tuple[csr_array, csr_array, csr_array, Floats, NDArray[np.bool_]]:
@@ -172,7 +194,7 @@ class OneSidedSystem:
         """N, shape (R, E), and B, shape (E, R), of the R contacts with two derivatives; h selects, shape (B, R)."""
         rates, forces = rescaling_operators(self.motion.configuration)
         contacts = self.motion.configuration.contacts
-        two = np.flatnonzero(np.any(contacts.closing != contacts.parting, axis=1))
+        two = self._two_derivatives
         bound = np.flatnonzero(contacts.one_sided)
         here, place = np.isin(bound, two), np.searchsorted(two, bound)
         select = csr_array((np.ones(here.sum()), (np.flatnonzero(here), place[here])), shape=(len(bound), len(two)))
@@ -192,7 +214,7 @@ class OneSidedSystem:
         return OneSidedState(0.0, np.zeros_like(v), v, *remembered)
 
     def advance(self, state: OneSidedState, time: float, rise: Floats | None = None) -> None:
-        """Go on to a time, in equal steps no longer than `step`.
+        """Go on to a time, in equal steps no longer than `time_step`.
 
         Parameters
         ----------
@@ -203,17 +225,17 @@ class OneSidedSystem:
         rise : ndarray, shape (coordinates, P), optional
             Forces that rise, per time: the load is t times these.
         """
-        count = int(np.ceil((time - state.time) / self.step - 1e-9))
+        count = int(np.ceil((time - state.time) / self.time_step - 1e-9))
         if count < 1:
             return
-        load = None if rise is None else self._weight.T @ rise
+        load = None if rise is None else self.on_active(rise)
         self.take_steps(state, (time - state.time) / count, count, rise=load)
         state.time = time
 
     def take_steps(
         self,
         state: OneSidedState,
-        dt: float,
+        time_step: float,
         count: int,
         *,
         rise: Floats | None = None,
@@ -226,8 +248,8 @@ class OneSidedSystem:
         ----------
         state : OneSidedState
             Changes in place.
-        dt : float
-            The step, time.
+        time_step : float
+            Of each step, time.
         count : int
             Number of steps.
         rise, constant : ndarray, shape (E, P), optional
@@ -238,14 +260,14 @@ class OneSidedSystem:
         force = self._force(state, state.v, rise) + constant
         for _ in range(count):
             before = state.v.copy() if extrapolates else 0.0
-            state.v += 0.5 * dt * force
-            change = dt * state.v
+            state.v += 0.5 * time_step * force
+            change = time_step * state.v
             state.z += change
-            state.time += dt
+            state.time += time_step
             if len(state.r):
                 state.r += np.abs(self.rescaled[0] @ change)
             force = self._force(state, 2 * state.v - before if extrapolates else state.v, rise) + constant
-            state.v += 0.5 * dt * force
+            state.v += 0.5 * time_step * force
 
     @property
     def remembers_nothing(self) -> bool:
@@ -257,7 +279,7 @@ class OneSidedSystem:
         a, g = self.motion.stiffness, self.motion.damping
         size, columns = state.z.shape
         omega = float(np.sqrt(abs(a).sum(axis=1).max(initial=0.0))) or 1.0  # so that both halves weigh as much
-        load = np.zeros((size, columns)) if rise is None else self._weight.T @ rise
+        load = np.zeros((size, columns)) if rise is None else self.on_active(rise)
         clock = csr_array([[0.0, 1.0], [0.0, 0.0]])  # of t and 1
         for k in range(columns):
             pull = csr_array(np.column_stack([load[:, k], np.zeros(size)]))

@@ -44,7 +44,7 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
-from ..configuration import UNKNOWN_SLIPS, HasConfiguration
+from ..configuration import HasConfiguration
 from ..counted import counted
 from ..errors import BadInputError
 from ..operators.stiffness import Form, stiffness_matrix
@@ -64,6 +64,7 @@ from .eigenvalues import (
 )
 from .modes import Mode, Modes, growth_rate
 from .motion import SLICED, Motion, Rates
+from .no_verdict import no_verdict
 
 DENSE_LARGEST = 900
 """Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
@@ -127,14 +128,14 @@ class Spectrum(TableDisplay):
         pairs, negative = counted(len(self.pairs), "complex pair"), counted(len(self.negative), "negative eigenvalue")
         counts = f"{pairs} and {negative}" if len(self.negative) else pairs
         alone = f"K alone has {counts}, D as exp({self.growth_rate():.6g} t)"
-        if not self.packing.configuration.slips_known:
-            return f"not known whether the packing is stable: {UNKNOWN_SLIPS}; {alone}"
+        if self._doubts:
+            return f"not known whether the packing is stable: {'; '.join(self._doubts)}; {alone}"
         if contacts.one_sided.any():
-            stick, slide = (Motion.of(self.packing, sliding=slides).rates.growth_rate for slides in (False, True))
+            stick, slide = (Motion.of(self.packing, sliding=on).rates.growth_rate for on in (False, True))
             count = int(contacts.one_sided.sum())
-            slide_on, stick_on = ("slides", "sticks") if count == 1 else ("slide", "stick")
+            slides = "slides on ahead and sticks" if count == 1 else "slide on ahead and stick"
             return (
-                f"{counted(count, 'contact')} at Coulomb's bound {slide_on} on ahead and {stick_on} on the way back: "
+                f"{counted(count, 'contact')} at Coulomb's bound {slides} on the way back: "
                 f"neither linear motion decides: D as exp({stick:.4g} t) if all stuck, exp({slide:.4g} t) if all "
                 f"slid (`stability` follows them); {alone}"
             )
@@ -159,14 +160,18 @@ class Spectrum(TableDisplay):
         """Whether no motion grows beyond rounding, with the packing's dissipation.
 
         None where contacts at Coulomb's bound slide on ahead and stick on the way back: no eigenvalue decides, and
-        :func:`~faultgouge.analysis.stability` follows their motion. None, too, where the slips are not known.
+        :func:`~faultgouge.analysis.stability` follows their motion. None, too, where no verdict is possible, as of a
+        packing that moves.
         """
-        configuration = self.packing.configuration
-        if configuration.contacts.one_sided.any() or not configuration.slips_known:
+        if self._doubts or self.packing.configuration.contacts.one_sided.any():
             return None
         if self._damped is not None:
             return not self._damped.grows.any()
         return not self.pairs and not len(self.negative)
+
+    @cached_property
+    def _doubts(self) -> tuple[str, ...]:
+        return tuple(no_verdict(self.packing.configuration))
 
     @property
     def damped_growth_rate(self) -> float | None:

@@ -14,29 +14,24 @@ state is followed (:mod:`~faultgouge.analysis.motion.decay`). Sticking contacts 
 decayed so far that a motion that grows, however slowly, would be seen. Otherwise there is no verdict."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats
-from ..configuration import UNKNOWN_SLIPS, Configuration, HasConfiguration
+from ..arrays import Floats, number
+from ..configuration import Configuration, HasConfiguration
+from ..counted import counted
 from ..operators.asymmetry import asymmetry
 from ..operators.sliders import with_sticking_contacts
 from .decay import Decay, follow_decay
-from .eigenvalues import in_balance
 from .motion import Motion, Rates
+from .no_verdict import no_verdict
 from .one_sided import OneSidedSystem, forces_on_coordinates
-from .one_sided_outcome import (
-    PUSHES,
-    STEP_OF_LARGE,
-    VERDICT_STEP,
-    follow_load,
-    follow_pushes,
-    vibrate_otherwise,
-)
+from .one_sided_outcome import PUSHES, STEP_OF_LARGE, VERDICT_STEP, follow_pushes
+from .rising_load import NotFollowedError, motion_under_load, vibrate_otherwise
 from .spectrum import Spectrum, spectrum
 
 LARGE = 6000
@@ -103,15 +98,19 @@ class Stability:
     at_bound : int
         Contacts at Coulomb's bound.
     one_sided : dict or None
-        grows (True, False, None), growth_rate and its error, amplification (largest D over the mean square velocity of
-        the push along an axis, time^2), time (how long), pushes (how many), scales (between which velocities of the
-        push along an axis this holds: with smaller ones contacts that count as at the bound do not reach it, with
-        larger ones others do, or open); None without contacts that slide on one side.
+        grows (True, False, None); growth_rate and its error; searched (growth rate of D below which growth would not
+        have been seen; 0 where grows is known); amplification (largest D over the mean square velocity of the push
+        along an axis, time^2, while contacts slid: what moves on may take D further); time (how long), pushes (how
+        many); scales (between which velocities of the push along an axis this holds: with smaller ones contacts that
+        count as at the bound do not reach it, with larger ones others do, or open). None without contacts that slide
+        on one side.
     decay : Decay or None
         What became of a random state with sticking contacts; None where eigenvalues decide.
     rising : dict or None
-        drift and vibration over the rate of loading, steady, time; other_start: the first three from another start, or
-        None; None unless asked.
+        drift and vibration over the rate of loading, with drift_error and vibration_error; steady; time, None if the
+        motion was not followed but solved for; other_start: the first five from another start, or None; next_change,
+        the increase of the load at which the first contact reaches Coulomb's bound or opens, to first order, and
+        next_event, which of the two. None unless asked, and where it was `not_followed`.
     sticking, sliding : LinearNeighbour
         If all contacts at the bound stuck, and if all slid on; no bounds of what they do.
     asymmetry : dict
@@ -127,6 +126,8 @@ class Stability:
         Number of contacts; where K is given, and walls hand out no contacts, of particles that feel something.
     reasons : tuple of str
         Why the verdict is unknown.
+    not_followed : str
+        Why the motion under a rising load was not followed, where it was asked for.
     remarks : tuple of str
         Those of the Configuration: what of its origin is left out, or other than it seems.
     """
@@ -145,8 +146,9 @@ class Stability:
     free: int
     searched: float
     contacts: int
-    reasons: tuple[str, ...] = field(default=())
-    remarks: tuple[str, ...] = field(default=())
+    reasons: tuple[str, ...] = ()
+    not_followed: str = ""
+    remarks: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         """The verdict in sentences, the verdict first."""
@@ -160,7 +162,7 @@ class Stability:
 
     @property
     def _verdict(self) -> str:
-        free = f", except for {_number(self.free, 'motion')} that no force opposes" if self.free else ""
+        free = f", except for {counted(self.free, 'motion')} that no force opposes" if self.free else ""
         if not self.contacts:
             return "no particle touches another or a wall: stability is not defined"
         if self.stable is None:
@@ -171,10 +173,11 @@ class Stability:
                 return f"unstable: small motion grows{how}: {self.decay}"
             return f"unstable: small motion grows{how}, D as exp({self.growth_rate:.6g} t)"
         if self.one_sided is not None:
+            pushes, size, time = (self.one_sided[name] for name in ("pushes", "amplification", "time"))
+            sticks = f"; with sticking contacts {self.decay}" if self.decay else ""
             return (
-                f"stable: each of {self.one_sided['pushes']} pushes comes to rest{free}; D reaches "
-                f"{self.one_sided['amplification']:.3g} times the mean square velocity of the push (followed for t = "
-                f"{self.one_sided['time']:.4g})" + (f"; with sticking contacts {self.decay}" if self.decay else "")
+                f"stable: each of {pushes} pushes comes to rest{free}; D reaches {size:.3g} times the mean square "
+                f"velocity of the push until the contacts have stopped sliding (followed for t = {time:.4g}){sticks}"
             )
         if self.decay is not None:
             return f"stable: {self.decay}{free}"
@@ -187,7 +190,7 @@ class Stability:
         u = self.undamped
         if self.dissipative and u.growth_rate > 0:
             counts = {"complex pair": u.pairs, "negative eigenvalue": u.negative}
-            what = " and ".join(_number(count, name) for name, count in counts.items() if count)
+            what = " and ".join(counted(count, name) for name, count in counts.items() if count)
             yield f"without dissipation: {what or 'small motion grows'}, D as exp({u.growth_rate:.6g} t)"
 
     @property
@@ -199,7 +202,7 @@ class Stability:
     def _at_the_bound(self) -> Iterator[str]:
         if self.at_bound == 0:
             return
-        yield f"{self.at_bound} of {_number(self.contacts, 'contact')} {_is(self.at_bound)} at Coulomb's bound" + (
+        yield f"{self.at_bound} of {counted(self.contacts, 'contact')} {_is(self.at_bound)} at Coulomb's bound" + (
             ": each slides on ahead and sticks on the way back"
             if self._has_two_neighbours
             else f" and {'slides' if self.at_bound == 1 else 'slide'}"
@@ -222,11 +225,15 @@ class Stability:
 
     @property
     def _under_the_load(self) -> Iterator[str]:
+        if self.not_followed:
+            yield f"under a load that rises: not followed, since {self.not_followed}"
         if self.rising is not None:
             other = self.rising["other_start"]
             starts = [self.rising, other] if other and vibrate_otherwise(self.rising, other) else [self.rising]
             says = ", and from another start ".join(map(_drift_and_vibration, starts))
-            yield f"under a load that rises at the rate 1: {says}"
+            change, event = self.rising["next_change"], self.rising["next_event"]
+            until = "" if change is None else f"; until the load has risen by {change:.2g} (a contact {event})"
+            yield f"under a load that rises at the rate 1: {says}{until}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
@@ -244,6 +251,7 @@ class Stability:
             "free": self.free,
             "searched": self.searched,
             "reasons": list(self.reasons),
+            "not_followed": self.not_followed,
             "remarks": list(self.remarks),
         }
 
@@ -278,72 +286,137 @@ def stability(
     Raises
     ------
     ValueError
-        If the direction has another shape, or is "fx" of a packing without an upper layer.
+        If the direction has another shape, or is "fx" of a packing without an upper layer; or if the time is not
+        positive.
     """
+    limit = None if time is None else _positive_time(time)
     configuration = with_sticking_contacts(packing.configuration)
     if configuration is not packing.configuration:
         spectrum_of_stiffness = None  # of contacts that slide
     direction = None if rise is None else _direction(configuration, rise)
     large = configuration.coordinates > LARGE
-    share = STEP_OF_LARGE if large else VERDICT_STEP
-    found = spectrum(configuration) if spectrum_of_stiffness is None and not large else spectrum_of_stiffness
-    contacts, damped = configuration.contacts, configuration.damped
-    undamped, own = _without_dissipation(configuration, found)
-    if damped:
-        own = Motion.of(configuration).rates
-    sticking = LinearNeighbour.of(own)
-    why = [*reasons, *_what_is_wrong(configuration)]
-    small_motion = not why
-    sliding, one_sided, rising, decay = sticking, None, None, None
-    grows: bool | None = bool(own.grows.any())
-    rate = sticking.growth_rate
-    if contacts.one_sided.any():
-        sliding = LinearNeighbour.of(Motion.of(configuration, sliding=True).rates)
-        if small_motion:
-            system = OneSidedSystem.of(configuration, share)
-            one_sided = follow_pushes(system, rate, bool(grows), time, 1 if large else PUSHES)
-            grows = one_sided["grows"]
-            if grows is None:
-                why.append(
-                    f"the motion of contacts at Coulomb's bound has not settled within t = {one_sided['time']:.4g}, "
-                    f"where D is {one_sided['amplification']:.3g} times the mean square velocity of the push"
-                )
-            elif grows:
-                rate = one_sided["growth_rate"]
-    if small_motion and own.searched and grows is False:
-        decay = follow_decay(Motion.of(configuration), time)
-        grows, rate, sticking = decay.grows, decay.growth_rate, LinearNeighbour(decay.growth_rate, decay.searched)
-        if grows is None:
-            why.append(f"{'with sticking contacts ' if one_sided else ''}{decay}")
-    if direction is not None and small_motion:
-        rising = follow_load(OneSidedSystem.of(configuration, share), direction, time)
-    given = configuration.stiffness is not None  # and contacts, as far as they are known, have no derivatives
-    shares = {} if given else asymmetry(configuration)
+    linear = _LinearRates.of(configuration, spectrum_of_stiffness, large)
+    doubts = [*reasons, *no_verdict(configuration)]
+    outcome = _Outcome.of_linear(linear, doubts)
+    if not doubts:
+        system = OneSidedSystem.of(configuration, STEP_OF_LARGE if large else VERDICT_STEP)
+        outcome = _small_motion(system, linear, limit, 1 if large else PUSHES)
+    rising, not_followed = None, ""
+    if direction is not None:
+        if doubts or outcome.grows:
+            not_followed = "no verdict is possible" if doubts else "small motion grows"
+        else:
+            decays = outcome.grows is False
+            try:
+                rising = motion_under_load(system, direction, limit, free=linear.sticking.free, decays=decays)
+            except NotFollowedError as error:
+                not_followed = str(error)
+    contacts, given = configuration.contacts, configuration.stiffness is not None
+    # where K is given, contacts, as far as they are known, have no derivatives
     touching = max(len(contacts), len(configuration) - len(configuration.rattlers)) if given else len(contacts)
+    known = outcome.grows is not None and not outcome.reasons and touching > 0
     return Stability(
-        stable=None if why or not touching else not grows, growth_rate=rate, undamped=undamped,
-        at_bound=int(contacts.at_bound.sum()), one_sided=one_sided, decay=decay, rising=rising, sticking=sticking,
-        sliding=sliding, asymmetry=shares, dissipative=damped, free=own.free, searched=sticking.searched,
-        contacts=touching, reasons=tuple(why), remarks=configuration.remarks,
+        stable=not outcome.grows if known else None, growth_rate=outcome.growth_rate, undamped=linear.undamped,
+        at_bound=int(contacts.at_bound.sum()), one_sided=outcome.one_sided, decay=outcome.decay, rising=rising,
+        sticking=outcome.sticking, sliding=LinearNeighbour.of(linear.sliding) if linear.one_sided else outcome.sticking,
+        asymmetry={} if given else asymmetry(configuration), dissipative=configuration.damped,
+        free=linear.sticking.free, searched=outcome.sticking.searched, contacts=touching,
+        reasons=tuple(outcome.reasons), not_followed=not_followed,
+        remarks=configuration.remarks,
     )  # fmt: skip
 
 
-def _what_is_wrong(configuration: Configuration) -> Iterator[str]:
-    """Why no verdict is possible."""
-    if not configuration.slips_known:
-        yield UNKNOWN_SLIPS
-    sided = configuration.one_sided_particles
-    if len(sided):
-        named = ", ".join(map(str, configuration.ids[sided[:5]])) + (", ..." if len(sided) > 5 else "")
-        yield (
-            f"the forces on {_number(len(sided), 'particle')} ({named}) have other derivatives forwards than "
-            "backwards, and K by differences of forces is the mean of both"
+@dataclass(frozen=True)
+class _LinearRates:
+    """Eigenvalues of the linear motions.
+
+    Attributes
+    ----------
+    undamped : WithoutDissipation
+        Of sticking contacts, without dissipation.
+    sticking, sliding : Rates
+        With the dissipation, if all contacts at the bound stick, and if all slide on.
+    one_sided : bool
+        Whether contacts at the bound slide on ahead and stick on the way back.
+    """
+
+    undamped: WithoutDissipation
+    sticking: Rates
+    sliding: Rates
+    one_sided: bool
+
+    @classmethod
+    def of(cls, configuration: Configuration, known: Spectrum | None, large: bool) -> "_LinearRates":
+        """Compute them; K's spectrum may be known, and that of a large packing is not computed."""
+        found = spectrum(configuration) if known is None and not large else known
+        undamped, sticking = _without_dissipation(configuration, found)
+        if configuration.damped:
+            sticking = Motion.of(configuration).rates
+        one_sided = bool(configuration.contacts.one_sided.any())
+        sliding = Motion.of(configuration, sliding=True).rates if one_sided else sticking
+        return cls(undamped, sticking, sliding, one_sided)
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What becomes of small motion under a load that is held: `grows` is None if that is not known."""
+
+    grows: bool | None
+    growth_rate: float
+    sticking: LinearNeighbour
+    reasons: Sequence[str] = ()
+    one_sided: dict[str, Any] | None = None
+    decay: Decay | None = None
+
+    @classmethod
+    def of_linear(cls, linear: _LinearRates, doubts: Sequence[str] = ()) -> "_Outcome":
+        """Of linear motion with sticking contacts."""
+        sticking = LinearNeighbour.of(linear.sticking)
+        grows = None if doubts else bool(linear.sticking.grows.any())
+        return cls(grows, sticking.growth_rate, sticking, doubts)
+
+
+def _small_motion(system: OneSidedSystem, linear: _LinearRates, time: float | None, pushes: int) -> _Outcome:
+    """Follow what eigenvalues do not decide."""
+    outcome = _Outcome.of_linear(linear)
+    if linear.one_sided:
+        outcome = _after_pushes(outcome, follow_pushes(system, outcome.growth_rate, bool(outcome.grows), time, pushes))
+    if linear.sticking.searched and outcome.grows is False:
+        decay = follow_decay(system.motion, time)
+        says = f"{'with sticking contacts ' if outcome.one_sided else ''}{decay}"
+        outcome = replace(
+            outcome,
+            grows=decay.grows,
+            growth_rate=decay.growth_rate,
+            sticking=LinearNeighbour(decay.growth_rate, decay.searched),
+            reasons=[says] if decay.grows is None else [],
+            decay=decay,
         )
-    if not in_balance(configuration):
-        yield (
-            f"the packing moves: the residual force on a particle is {configuration.residual:.3g}, "
-            f"the largest contact force {configuration.normal_force.max(initial=0.0):.3g}"
-        )
+    return outcome
+
+
+def _after_pushes(sticks: _Outcome, found: dict[str, Any]) -> _Outcome:
+    """The outcome of one-sided motion."""
+    says = (
+        f"the motion of contacts at Coulomb's bound has not settled within t = {found['time']:.4g}, where D is "
+        f"{found['amplification']:.3g} times the mean square velocity of the push, and D that grows more slowly than "
+        f"exp({found['searched']:.2g} t) would not have been seen"
+    )
+    return replace(
+        sticks,
+        grows=found["grows"],
+        growth_rate=found["growth_rate"] if found["grows"] else sticks.growth_rate,
+        reasons=[says] if found["grows"] is None else [],
+        one_sided=found,
+    )
+
+
+def _positive_time(time: float) -> float:
+    """The time as a number."""
+    try:
+        return number("time", time, positive=True)
+    except (TypeError, ValueError):
+        raise ValueError(f"The time that motion is followed is a positive number, not {time!r}.") from None
 
 
 def _without_dissipation(configuration: Configuration, found: Spectrum | None) -> tuple[WithoutDissipation, Rates]:
@@ -370,11 +443,11 @@ def _direction(configuration: Configuration, rise: str | ArrayLike) -> Floats:
 
 def _drift_and_vibration(rising: dict[str, Any]) -> str:
     steady = "" if rising["steady"] else ", not steady yet"
-    return f"drift {rising['drift']:.3g}, vibration {rising['vibration']:.3g}{steady}"
-
-
-def _number(count: int, name: str) -> str:
-    return f"{count} {name}{'' if count == 1 else 's'}"
+    numbers = (
+        f"{name} {rising[name]:.3g}" + (f" \u00b1 {error:.1g}" if (error := rising[f"{name}_error"]) else "")
+        for name in ("drift", "vibration")
+    )
+    return ", ".join(numbers) + steady
 
 
 def _is(count: int) -> str:

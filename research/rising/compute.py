@@ -14,7 +14,7 @@ seed before the next; the number of seeds is what the time allowed.
 
 **Beside LAMMPS.** At 0.2 F_y and the restitution 0.9 the plugin integrates the layer of the slider under a load that
 rises at the rates `RATES` per disk of the layer. A drag fades out before velocities are measured, as in
-:mod:`faultgouge.analysis.motion.one_sided_outcome`.
+:mod:`faultgouge.analysis.motion.rising_load`.
 """
 
 import json
@@ -30,7 +30,7 @@ import numpy as np
 from mpi4py import MPI
 
 from faultgouge.analysis import Configuration, Packing, Signal, Stability, stability
-from faultgouge.analysis.motion.one_sided_outcome import DRAG, FADE
+from faultgouge.analysis.motion.rising_load import DRAG, FADE
 from faultgouge.pywrap import Engine, Scene, dashpot, settle, time_step
 from research.lammps_laws.compute import GAMMA, KN, MU, pour, rest
 from research.laws.both_laws import as_slider, at_loads

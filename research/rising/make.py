@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from faultgouge.analysis.motion.one_sided_outcome import FADE, WINDOWS
+from faultgouge.analysis.motion.rising_load import FADE, WINDOWS
 from faultgouge.figures import render, save, styled
 from faultgouge.studies.statistics import share
 from research.laws.both_laws import RESTITUTIONS as WEAKEST_FIRST

@@ -19,7 +19,8 @@ import numpy as np
 
 from faultgouge.analysis import Packing
 from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
-from faultgouge.analysis.motion.one_sided_outcome import FADE, STEPS_OF_CHUNK, VERDICT_STEP, windows_under_load
+from faultgouge.analysis.motion.one_sided_outcome import STEPS_OF_CHUNK, VERDICT_STEP
+from faultgouge.analysis.motion.rising_load import FADE, windows_under_load
 from faultgouge.pywrap import Scene, dashpot, settle
 from research.laws.both_laws import as_slider, at_loads
 from research.modes.loss import impact_velocity, with_dashpots
@@ -55,11 +56,12 @@ def rows_of(seed: int) -> Iterator[dict[str, Any]]:
     """Vibration over the rate in one window after the other, of both starts."""
     begin, packing = time.process_time(), layer(seed)
     system = OneSidedSystem.of(packing, VERDICT_STEP)
-    chunk = STEPS_OF_CHUNK * system.step / system.share
+    chunk = STEPS_OF_CHUNK * system.time_step / system.step_share
     force = np.zeros((len(packing), 2))
     force[:, 0] = packing.top
     direction = forces_on_coordinates(packing.configuration, force)
-    windows = np.array(list(islice(windows_under_load(system, direction, chunk), FOLLOWED)))[FADE:]
+    followed = list(islice(windows_under_load(system, direction, chunk), FOLLOWED))[FADE:]
+    windows = np.array([window.drift_and_vibration(system) for window in followed])
     lammps = [windows_in_lammps(packing, min(RATES), spins, FOLLOWED) for spins in (True, False)]
     yield {
         "seed": seed,

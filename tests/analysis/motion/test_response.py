@@ -173,3 +173,8 @@ def test_impossible_responses(cluster, wrong, says):
         linear_response(cluster, **({"times": [1.0]} | wrong))
     with pytest.raises(ValueError, match="undamped"):
         linear_response(replace(cluster, drag_time=1.0), [1.0], dt=0.1)
+
+
+def test_a_motion_that_no_force_opposes_has_no_oscillation():
+    with pytest.raises(np.linalg.LinAlgError, match="a motion that no force opposes does not oscillate"):
+        BlockDiagonal.of(np.diag([0.0, 1.0])).oscillation_modes()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from granular_packings import LAWS, command, instance
 
-from faultgouge.analysis import damping_matrix, stability, stiffness_matrix
+from faultgouge.analysis import damping_matrix, spectrum, stability, stiffness_matrix
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 
 
@@ -32,6 +32,10 @@ def test_measured_laws_and_differences_agree(beds, law, d):
     assert found.operator_error < 1e-5
     # a law with two derivatives has a jump at every contact, and no other has one where nothing slides
     assert len(found.one_sided_particles) == (len(found) if "rescale" in law else 0)
+    if "rescale" in law:
+        told = spectrum(found)
+        assert told.is_stable is stability(found).stable is None
+        assert "not known whether the packing is stable: the forces on" in repr(told)
     assert found.residual == pytest.approx(laws.residual, abs=1e-9 * laws.contacts.normal_force.mean())
 
 

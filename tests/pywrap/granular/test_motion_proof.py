@@ -168,6 +168,25 @@ def test_commands_of_another_run(sliding):
         from_lammps(sliding, [f"pair_style {style.replace('40 0.3', '40 0.1')}", *rest])
 
 
+def test_a_fix_is_not_accused_without_which_the_motion_is_no_other(sliding):
+    """The commands have another law, and two fixes add constant forces."""
+    from faultgouge.pywrap import NotTakenError, from_lammps
+    from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
+
+    style = HERTZ.replace("0.5", "0.3").replace("NULL", "1e3")
+    commands = [f"pair_style {style}", "pair_coeff * *", "fix move all nve/sphere",
+                "fix floor all wall/gran hertz/history 3e3 9e2 40 40 0.3 1 yplane 0 NULL contacts",
+                "fix one all addforce 0 0 0", "fix two all addforce 0 0 0"]  # fmt: skip
+
+    def work():
+        command(sliding, "fix one all addforce 0 0 0\nfix two all addforce 0 0 0")
+        return from_lammps(sliding, commands)
+
+    with pytest.raises(NotTakenError, match=r"as K says: .*the commands are those of another run") as refusal:
+        in_a_copy(work)
+    assert "addforce" not in str(refusal.value)
+
+
 @pytest.mark.parametrize(
     "around",
     [
