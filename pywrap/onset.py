@@ -15,7 +15,8 @@ from ..analysis.arrays import Floats
 from ..analysis.errors import TurningPointError
 from ..analysis.motion.eigenvalues import active_coordinates
 from ..analysis.progress import Watch, report_progress, show_progress
-from ..analysis.windows import HIGHER, NoGrowthError, Ranks, full_operator, takes_all_modes
+from ..analysis.windows import NoGrowthError, Ranks, full_operator, takes_all_modes
+from ..analysis.windows.onset import RAISE_LOAD
 from .equilibria.quasistatic import Equilibrium
 from .lammps.engine import Engine
 from .runs.path_error import with_path_error
@@ -157,7 +158,7 @@ def onset_run(
         except TurningPointError:
             raise
         except (OnsetError, NoEquilibriumError) as error:
-            says = str(error).replace(HIGHER, "raise ramp.until")
+            says = str(error).replace(RAISE_LOAD, "raise ramp.until")
             if flows or not isinstance(error, OnsetError):
                 says = (
                     f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond: the "

@@ -15,14 +15,13 @@ from .edges import Edge, Increments, LostPairError, Window, follow_to, track
 from .find_onset import find_onset, takes_all_modes
 from .find_windows import complex_windows, find_windows, windows_up_to
 from .limits import LIMITS, Limits
-from .onset import HIGHER, NoGrowthError, Onset, OnsetError
+from .onset import NoGrowthError, Onset, OnsetError
 from .slices.ranks import Ranks
 from .space import Space
 from .system import System, force_bearing, full_operator
 from .system_modes import SystemModes
 
 __all__ = [
-    "HIGHER",
     "LIMITS",
     "Edge",
     "Increments",

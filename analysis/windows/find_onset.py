@@ -18,7 +18,7 @@ from ..progress import Watch, report_progress, show_progress
 from .edges import At, Edge, Window
 from .find_windows import Known, check_increasing, find_windows, windows_up_to
 from .limits import LIMITS, Limits
-from .onset import HIGHER, Increments, NoGrowthError, Onset, OnsetError
+from .onset import RAISE_LOAD, Increments, NoGrowthError, Onset, OnsetError
 from .search import Look
 from .slices.ranks import ALONE, Ranks
 from .system import System, force_bearing, full_operator
@@ -200,7 +200,7 @@ class _OnsetSearch:
 
     def _check_growth(self, windows: tuple[Window, ...], undamped: Onset | None) -> None:
         if not windows:
-            raise NoGrowthError(f"No motion grows up to F_x = {self.loads[-1]:.10g}: {HIGHER}.", undamped)
+            raise NoGrowthError(f"No motion grows up to F_x = {self.loads[-1]:.10g}: {RAISE_LOAD}.", undamped)
 
     def _undamped_windows(self) -> tuple[tuple[Window, ...], Increments, Spectrum | None, float | None]:
         """Windows without dissipation, increments in doubt, the spectrum at the smallest load if that is known, and the

@@ -14,7 +14,7 @@ from ..table_display import TableDisplay
 from ..uncertain_digits import with_uncertainty
 from .edges import Increments, Window
 
-HIGHER = "raise the largest load"
+RAISE_LOAD = "raise the largest load"
 """What a sentence advises where nothing grows up to the last load."""
 
 
@@ -26,11 +26,11 @@ class OnsetError(FaultgougeError):
         """The sentence for some modes, or all, up to the last load."""
         which = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
         if not doubtful:
-            return cls(f"No pair of eigenvalues{which} is complex up to F_x = {last:.10g}: {HIGHER}.")
+            return cls(f"No pair of eigenvalues{which} is complex up to F_x = {last:.10g}: {RAISE_LOAD}.")
         below, above = doubtful[0]
         return cls(
             f"No pair of eigenvalues{which} was found to become complex up to F_x = {last:.10g}, but one was expected "
-            f"between {below:.10g} and {above:.10g}: take smaller increments, or {HIGHER}."
+            f"between {below:.10g} and {above:.10g}: take smaller increments, or {RAISE_LOAD}."
         )
 
 

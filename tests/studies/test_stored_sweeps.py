@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,6 @@ import pytest
 from reference_layer import REFERENCE, SMALL, toml
 
 from faultgouge.pywrap import SceneError
-from faultgouge.studies.sweep import run_sweep as stored
 from faultgouge.studies.sweep import sweep_plan
 from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
 from faultgouge.studies.sweep.seeds import other_packings
@@ -224,7 +224,7 @@ def test_merge_takes_the_keys_that_the_sweep_had_and_names_versions(folder, monk
     (folder / "ask.py").unlink()
     assert len(merge([one, two], folder / "whole", id)[1]) == 3
     (folder / "ask.py").write_text(TASK)
-    monkeypatch.setattr(stored, "version", lambda _: "0.9")
+    monkeypatch.setattr(import_module("faultgouge.studies.sweep.run_sweep"), "version", lambda _: "0.9")
     run_sweep(sweep_of(folder, "ends"), two, (2, 2), say=id)
     with pytest.raises(SceneError, match=r"part2 is of version 0.9, and .*part1 of "):
         merge([one, two], folder / "whole", id)

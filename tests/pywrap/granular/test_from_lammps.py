@@ -516,6 +516,7 @@ def test_a_log_that_two_instances_write(two, lammps_with, tmp_path):
 
 INTERRUPTED = """
 import os, signal, sys, threading
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 sys.path.insert(0, {tests!r})
 import time
 from granular_packings import command, instance, start, with_law

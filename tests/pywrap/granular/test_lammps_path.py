@@ -326,6 +326,7 @@ def test_a_copy_that_relaxes_ends_with_the_path(layer, tmp_path):
 
 INTERRUPTED = """
 import os, signal, sys, threading, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 sys.path.insert(0, {tests!r})
 from granular_packings import command, instance, start, with_law
 from faultgouge.pywrap import lammps_path
