@@ -21,7 +21,7 @@ from .one_sided import OneSidedSystem
 REACHES, OPENS = "reaches Coulomb's bound", "opens"
 
 
-def next_change(system: OneSidedSystem, velocity: Floats, rubbed: Floats) -> dict[str, Any]:
+def next_change(system: OneSidedSystem, velocity: Floats, paths: Floats) -> dict[str, Any]:
     """The first change of a contact under a load that rises: its `Stability.rising` `next_change` and `next_event`.
 
     Parameters
@@ -30,18 +30,18 @@ def next_change(system: OneSidedSystem, velocity: Floats, rubbed: Floats) -> dic
         Of the configuration.
     velocity : ndarray, shape (E, 1)
         Mean mass-weighted velocity at the rate 1.
-    rubbed : ndarray, shape (R, 1)
-        Mean rates of the ways of the overlaps of contacts with two derivatives.
+    paths : ndarray, shape (R, 1)
+        Mean rates of the paths of the overlaps of contacts with two derivatives.
     """
     configuration = system.motion.configuration
     if configuration.stiffness is not None or not len(configuration.contacts):
         return {"next_change": None, "next_event": None}
-    slides, opens = _increases(configuration, system.of_particles(velocity), system.of_contacts(rubbed))
+    slides, opens = _increases(configuration, system.of_particles(velocity), system.of_contacts(paths))
     first, event = min((float(slides.min()), REACHES), (float(opens.min()), OPENS))
     return {"next_change": first, "next_event": event} if first < np.inf else {"next_change": None, "next_event": None}
 
 
-def _increases(configuration: Configuration, velocity: Floats, rubbed: Floats) -> tuple[Floats, Floats]:
+def _increases(configuration: Configuration, velocity: Floats, paths: Floats) -> tuple[Floats, Floats]:
     """Increases of the load until each contact reaches the bound, and until each opens; infinite if none does."""
     c = configuration.contacts
     moves, turns = configuration.vectors(velocity)
@@ -52,7 +52,7 @@ def _increases(configuration: Configuration, velocity: Floats, rubbed: Floats) -
     closing = -np.einsum("ca,ca->c", c.normal, parting)
     slip = parting + closing[:, None] * c.normal + np.cross(c.normal, rolling)
     gain = -c.tangential_stiffness[:, None] * slip + c.overlap_derivative() * closing[:, None]
-    gain += 0.5 * (c.overlap_derivative(0.0) - c.overlap_derivative(1.0)) * rubbed[:, None]
+    gain += 0.5 * (c.overlap_derivative(0.0) - c.overlap_derivative(1.0)) * paths[:, None]
     sticks = np.isfinite(c.friction) & (c.friction > 0) & ~c.at_bound
     bound = np.where(sticks, c.friction, 1.0)
     bound_gain = bound / c.normal_force * c.normal_stiffness * closing

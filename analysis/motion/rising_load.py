@@ -102,30 +102,30 @@ class Span:
     ----------
     time : float
         Its length.
-    moved : ndarray, shape (E, S)
+    displacement : ndarray, shape (E, S)
         Mass-weighted displacement.
-    rubbed : ndarray, shape (R, S)
-        Ways of the overlaps of contacts with two derivatives.
+    paths : ndarray, shape (R, S)
+        Paths of the overlaps of contacts with two derivatives: sums of the sizes of their changes.
     squares : ndarray, shape (N, d, S)
         Integral of the squares of the particles' velocities.
     """
 
     time: float
-    moved: Floats
-    rubbed: Floats
+    displacement: Floats
+    paths: Floats
     squares: Floats
 
     @classmethod
     def joined(cls, windows: Sequence["Span"]) -> "Span":
         """Of windows that follow each other."""
-        moved, rubbed, squares = (
-            np.sum([getattr(each, name) for each in windows], axis=0) for name in ("moved", "rubbed", "squares")
+        displacement, paths, squares = (
+            np.sum([getattr(each, name) for each in windows], axis=0) for name in ("displacement", "paths", "squares")
         )
-        return cls(sum(each.time for each in windows), moved, rubbed, squares)
+        return cls(sum(each.time for each in windows), displacement, paths, squares)
 
     def drift_and_vibration(self, system: OneSidedSystem) -> Floats:
         """Root mean squares over particles and axes, shape (2, S)."""
-        mean = system.displacement(self.moved) / self.time
+        mean = system.displacement(self.displacement) / self.time
         left = np.maximum(self.squares / self.time - mean**2, 0.0)
         return np.asarray(np.sqrt([np.mean(each, axis=(0, 1)) for each in (mean**2, left)]))
 
@@ -156,11 +156,11 @@ def motion_under_load(
     velocity = steady_velocity(system, direction, free) if decays else None
     if velocity is None:
         return follow_load(system, direction, time)
-    rubbed = np.abs(system.rescaled[0] @ velocity)
-    still = Span(1.0, velocity, rubbed, system.displacement(velocity) ** 2)
+    paths = np.abs(system.rescaled[0] @ velocity)
+    still = Span(1.0, velocity, paths, system.displacement(velocity) ** 2)
     drift = float(still.drift_and_vibration(system)[0, 0])
     alone: dict[str, Any] = {"drift": drift, "drift_error": 0.0, "vibration": 0.0, "vibration_error": 0.0}
-    return alone | {"steady": True, "time": None, "other_start": None} | next_change(system, velocity, rubbed)
+    return alone | {"steady": True, "time": None, "other_start": None} | next_change(system, velocity, paths)
 
 
 def steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Floats | None:
@@ -224,9 +224,9 @@ def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = 
             break
     span, found = _of_starts(system, windows)
     first, *others = found
-    velocity, rubbed = (each[:, :1] / span.time for each in (span.moved, span.rubbed))
+    velocity, paths = (each[:, :1] / span.time for each in (span.displacement, span.paths))
     whole = {**first, "time": length * len(windows), "other_start": others[0] if others else None}
-    return whole | next_change(system, velocity, rubbed)
+    return whole | next_change(system, velocity, paths)
 
 
 def windows_under_load(system: OneSidedSystem, direction: Floats, length: float) -> Iterator[Span]:
@@ -258,7 +258,7 @@ def windows_under_load(system: OneSidedSystem, direction: Floats, length: float)
 def _drag_of_starts(system: OneSidedSystem) -> Floats:
     """Which coordinates the drag at the beginning acts on, shape (E, S): on all; and on all but rotations.
 
-    Sliders remember what they have slid, so that one packing may vibrate in two ways. Large packings, and bodies, whose
+    One packing may vibrate in two ways, by its start. Large packings, and bodies, whose
     coordinates are of another kind, have one start.
     """
     configuration = system.motion.configuration

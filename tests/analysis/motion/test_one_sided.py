@@ -332,14 +332,14 @@ def test_spans_of_windows_are_joined_exactly(bound):
     direction = forces_on_coordinates(bound.configuration, np.random.default_rng(4).standard_normal((len(bound), 2)))
     short = list(islice(rising_load.windows_under_load(system, direction, 0.2), 6))
     whole = Span.joined(short)
-    state = system.start(np.zeros((bound.coordinates, whole.moved.shape[1])))
+    state = system.start(np.zeros((bound.coordinates, whole.displacement.shape[1])))
     assert whole.time == pytest.approx(1.2)
     np.testing.assert_allclose(
         Span.joined([Span.joined(short[:4]), Span.joined(short[4:])]).drift_and_vibration(system),
         whole.drift_and_vibration(system),
         rtol=1e-12,
     )
-    assert state.z.shape == whole.moved.shape
+    assert state.z.shape == whole.displacement.shape
     assert np.all(whole.drift_and_vibration(system)[0] <= np.mean([w.drift_and_vibration(system)[0] for w in short], 0))
 
 
