@@ -90,6 +90,10 @@ class NotProvedError(NotLinearisedError):
     """Something acts on particles as the laws of contacts do not tell, and LAMMPS's motion shows it."""
 
 
+class OtherStiffnessError(NotProvedError):
+    """Forces depend on positions as no contact does, as of a spring or a trap: differences of forces have them."""
+
+
 def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extrapolates: bool) -> float | None:
     """Relative difference of LAMMPS's motion from that of the linearised packing; None if no contact moves.
 
@@ -121,7 +125,7 @@ def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extr
         if not causes and moves(tuple(others))[1] < OTHER:
             causes = list(others.values())
         causes = causes or ["something acts on particles by their positions"]
-        raise NotProvedError(
+        raise OtherStiffnessError(
             "LAMMPS's forces do not change as K says: where all particles are displaced alike, forces change that no "
             f"contact has; {' and '.join(causes)}."
         )
