@@ -37,7 +37,7 @@ def beds(tmp_path_factory) -> Callable[..., Any]:
         lmp = instance(tmp_path_factory.mktemp("log") / "log.lammps")
         start(lmp, d, 20 if d == 3 else 18)
         # with 3 a contact of these disks comes to rest at the bound
-        mu = "10.0" if "rescale" in law and d == 2 and damped else "3.0"
+        mu = "10.0" if (law, d, damped) == ("mindlin_rescale", 2, True) else "3.0"
         with_law(lmp, law, d, "40", "40" if damped else ALMOST_NONE, ("0.2", "0.2" if damped else "1.0"), mu)
         command(lmp, f"""
 fix load all gravity 1.0 vector {"0.1 0 -1" if d == 3 else "0.05 -1 0"}
