@@ -146,6 +146,8 @@ def results(folder: Path) -> dict[str, tuple[object, ...]]:
 
     for path in sorted(folder.rglob("*")):
         name = str(path.relative_to(folder))
+        if path.name.startswith("."):
+            continue  # what SIGKILL left of a new file
         if path.suffix == ".h5":
             with h5py.File(path) as file:
                 found[f"{name} complete"] = (bool(file.attrs["complete"]),)
