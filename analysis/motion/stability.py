@@ -215,12 +215,11 @@ class Stability:
 
     @property
     def _scales(self) -> Iterator[str]:
-        if self.one_sided is not None and self.one_sided["grows"] is False:
-            least, most = self.one_sided["scales"]
-            holds = f"pushes from {least:.1g} to {most:.1g}" if least < most else "a push of no size"
+        least, most = (0.0, 0.0) if self.one_sided is None else self.one_sided["scales"]
+        if self.one_sided is not None and self.one_sided["grows"] is False and least < most:
             yield (
-                f"this is the motion after {holds} (velocity along an axis): below {least:.1g} contacts that count as "
-                f"at the bound do not reach it, and above {most:.1g} others do, or open"
+                f"this is the motion after pushes from {least:.1g} to {most:.1g} (velocity along an axis): below, "
+                "contacts that count as at the bound do not reach it, and above, others do, or open"
             )
 
     @property
@@ -242,7 +241,7 @@ class Stability:
             "growth_rate": self.growth_rate,
             "undamped": vars(self.undamped),
             "at_bound": self.at_bound,
-            "one_sided": self.one_sided,
+            "one_sided": None if self.one_sided is None else _finite(self.one_sided),
             "decay": None if self.decay is None else vars(self.decay),
             "rising": self.rising,
             "sticking": vars(self.sticking),
@@ -389,26 +388,45 @@ def _small_motion(system: OneSidedSystem, linear: _LinearRates, time: float | No
             grows=decay.grows,
             growth_rate=decay.growth_rate,
             sticking=LinearNeighbour(decay.growth_rate, decay.searched),
-            reasons=[says] if decay.grows is None else [],
+            reasons=[*outcome.reasons, *([says] if decay.grows is None else [])],
             decay=decay,
         )
     return outcome
 
 
 def _after_pushes(sticks: _Outcome, found: dict[str, Any]) -> _Outcome:
-    """The outcome of one-sided motion."""
-    says = (
-        f"the motion of contacts at Coulomb's bound has not settled within t = {found['time']:.4g}, where D is "
-        f"{found['amplification']:.3g} times the mean square velocity of the push, and D that grows more slowly than "
-        f"exp({found['searched']:.2g} t) would not have been seen"
-    )
+    """The outcome of one-sided motion; unknown, too, if it is the motion after no push of any size."""
+    reasons, (least, most) = [], found["scales"]
+    if found["grows"] is None:
+        reasons.append(
+            f"the motion of contacts at Coulomb's bound has not settled within t = {found['time']:.4g}, where D is "
+            f"{found['amplification']:.3g} times the mean square velocity of the push, and D that grows more slowly "
+            f"than exp({found['searched']:.2g} t) would not have been seen"
+        )
+    elif not found["grows"] and least >= most:
+        reasons.append(
+            f"contacts that count as at Coulomb's bound reach it after pushes above {least:.1g} (velocity along an "
+            f"axis) alone, and others reach it, or open, after pushes above {most:.1g}: bring the packing to rest more "
+            "closely"
+        )
     return replace(
         sticks,
         grows=found["grows"],
         growth_rate=found["growth_rate"] if found["grows"] else sticks.growth_rate,
-        reasons=[says] if found["grows"] is None else [],
+        reasons=reasons,
         one_sided=found,
     )
+
+
+def _finite(numbers: dict[str, Any]) -> dict[str, Any]:
+    """With None in place of numbers that JSON does not have, as of a scale without a bound."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return [plain(each) for each in value]
+        return None if isinstance(value, float) and not np.isfinite(value) else value
+
+    return {name: plain(value) for name, value in numbers.items()}
 
 
 def _positive_time(time: float) -> float:

@@ -191,6 +191,19 @@ def test_stability_of_three_disks():
         stability(at_rest, rise="fx")
 
 
+@pytest.mark.parametrize(("scales", "stable"), [((1e-7, 1e-9), None), ((1e-9, np.inf), True)])
+def test_a_motion_that_is_that_of_no_push_has_no_verdict(monkeypatch, scales, stable):
+    """Some contacts count as at the bound and are not, and others are as near to it."""
+    at_rest = _three().configuration
+    at_rest = derive_frozen(at_rest, load=-at_rest.contact_force)
+    follow = stability_module.follow_pushes
+    monkeypatch.setattr(stability_module, "follow_pushes", lambda *given: follow(*given) | {"scales": scales})
+    found = stability(at_rest)
+    assert found.stable is stable
+    assert any("bring the packing to rest more closely" in each for each in found.reasons) is (stable is None)
+    assert "Infinity" not in json.dumps(found.as_dict())
+
+
 @pytest.mark.parametrize(("count", "says"), [(1, "1 of 3 contacts is at Coulomb's bound and slides"), (2, "and slide")])
 def test_the_verdict_says_what_contacts_of_a_smoothed_law_do_at_the_bound(count, says):
     found = stability(_three())
