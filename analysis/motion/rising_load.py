@@ -160,7 +160,8 @@ def motion_under_load(
     still = Span(1.0, velocity, paths, system.displacement(velocity) ** 2)
     drift = float(still.drift_and_vibration(system)[0, 0])
     alone: dict[str, Any] = {"drift": drift, "drift_error": 0.0, "vibration": 0.0, "vibration_error": 0.0}
-    return alone | {"steady": True, "time": None, "other_start": None} | next_change(system, velocity, paths)
+    whole = alone | {"steady": True, "time": None, "span": None, "other_start": None}
+    return whole | next_change(system, velocity, paths)
 
 
 def steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Floats | None:
@@ -225,7 +226,8 @@ def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = 
     span, found = _of_starts(system, windows)
     first, *others = found
     velocity, paths = (each[:, :1] / span.time for each in (span.displacement, span.paths))
-    whole = {**first, "time": length * len(windows), "other_start": others[0] if others else None}
+    time = length * len(windows)
+    whole = {**first, "time": time, "span": span.time, "other_start": others[0] if others else None}
     return whole | next_change(system, velocity, paths)
 
 

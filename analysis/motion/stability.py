@@ -108,9 +108,10 @@ class Stability:
         What became of a random state with sticking contacts; None where eigenvalues decide.
     rising : dict or None
         drift and vibration over the rate of loading, with drift_error and vibration_error; steady; time, None if the
-        motion was not followed but solved for; other_start: the first five from another start, or None; next_change,
-        the increase of the load at which the first contact reaches Coulomb's bound or opens, to first order, and
-        next_event, which of the two. None unless asked, and where it was `not_followed`.
+        motion was not followed but solved for; span, the last part of this time, of which drift and vibration are;
+        other_start: the first five from another start, or None; next_change, the increase of the load at which the
+        first contact reaches Coulomb's bound or opens, to first order, and next_event, which of the two. None unless
+        asked, and where it was `not_followed`.
     sticking, sliding : LinearNeighbour
         If all contacts at the bound stuck, and if all slid on; no bounds of what they do.
     asymmetry : dict

@@ -187,6 +187,8 @@ def test_stability_of_three_disks():
     rising = stability(at_rest, rise=np.tile([1.0, 0.0], (3, 1)), time=4.0).rising
     twice = stability(at_rest, rise=np.tile([2.0, 0.0], (3, 1)), time=4.0).rising
     assert twice["drift"] == pytest.approx(2 * rising["drift"], rel=1e-9)
+    # of sixteen windows the drag fades out in four; then all count, or the last half of these
+    assert rising["span"] in (pytest.approx(3.0), pytest.approx(1.5))
     with pytest.raises(ValueError, match="upper layer"):
         stability(at_rest, rise="fx")
 
@@ -402,7 +404,7 @@ def test_two_vibrations_of_one_packing_are_told_apart():
         ({"steady": False}, "vibration 0.000685 \u00b1 2e-05, not steady yet"),
         ({"vibration": 6.8e-4}, "1e-05, vibration 0.000685 \u00b1 2e-05"),
     ):
-        rising = {**one, "time": 4.0, "other_start": one | other, "next_change": None, "next_event": None}
+        rising = {**one, "time": 4.0, "span": 3.0, "other_start": one | other, "next_change": None, "next_event": None}
         assert replace(found, rising=rising).sentences[-1].endswith(says)
     assert set(found.rising["other_start"]) == set(one)
 
