@@ -24,6 +24,7 @@ The steps are those of velocity Verlet, with dashpots at the velocity of the hal
 contact that remembers, the motion is linear, and is that of the exponential function of the first-order matrix.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -47,6 +48,12 @@ decades; with twice the step, to some 8 per cent."""
 SLIPS = 0.1
 """Slip of a contact as a share of the largest, from which on it counts that the contact reaches the bound."""
 
+CLOSE_STEP = 0.3
+"""Time between two close looks at contacts, as a share of the largest stable time step: ten of the fastest period."""
+
+CLOSE_LOOKS = 1000
+"""Close looks, over some ten periods of a slow mode. Contacts go farthest at the beginning."""
+
 
 @dataclass(frozen=True, eq=False)
 class OneSidedMotion:
@@ -61,8 +68,9 @@ class OneSidedMotion:
     slid : ndarray, shape (T, B)
         p of each contact at the bound: the tangential force that its slider has taken away, force.
     scales : tuple of float
-        Between which multiples of the push, or of the rate, the motion holds as it was seen at these times: with
-        smaller ones contacts that count as at the bound do not reach it, and with larger ones others do, or open.
+        Between which multiples of the push, or of the rate, the motion holds, as it was seen in `CLOSE_LOOKS` at its
+        beginning and at these times: with smaller ones contacts that count as at the bound do not reach it, and with
+        larger ones others do, or open.
     """
 
     times: Floats
@@ -104,6 +112,14 @@ class ContactReach:
         self.farthest = now if self.farthest is None else np.maximum(self.farthest, now)
         self.slid = state.p.copy()
 
+    def look_closely(self, start: OneSidedState, time: float = np.inf, rise: Floats | None = None) -> None:
+        """Look at the beginning of a motion up to a time, step by step; the state stays as it is."""
+        state = OneSidedState(start.time, *(each.copy() for each in (start.z, start.v, start.p, start.r)))
+        step = CLOSE_STEP / self.system.step_share * self.system.time_step
+        count = int(min(CLOSE_LOOKS, np.ceil((time - start.time) / step)))
+        load = None if rise is None else self.system.on_active(rise)
+        self.system.take_steps(state, step, count, rise=load, look=self.look)
+
     @property
     def scales(self) -> tuple[float, float]:
         """Multiples of the motion from which on sliders have slipped by more than was missing to the bound, and up to
@@ -113,11 +129,24 @@ class ContactReach:
         with np.errstate(divide="ignore", invalid="ignore"):
             limit = self.system.margins[1][:, None] / self.farthest
         most = float(limit[self.farthest > 0].min(initial=np.inf))
-        c = self.system.motion.configuration.contacts
-        missing = np.maximum(c.friction - np.linalg.norm(c.tangential_force, axis=1), 0.0)[c.one_sided, None]
-        missing = np.broadcast_to(missing, self.slid.shape)
-        counts = self.slid > SLIPS * self.slid.max(axis=0, initial=0.0)
-        return float((missing[counts] / self.slid[counts]).max(initial=0.0)), most
+        return least_scale(self.system, self.slid), most
+
+
+def least_scale(system: "OneSidedSystem", slid: Floats) -> float:
+    """The multiple of a motion from which on contacts that count as at Coulomb's bound reach it.
+
+    Parameters
+    ----------
+    system : OneSidedSystem
+        Of the configuration.
+    slid : ndarray, shape (B, P)
+        p of each contact at the bound; of contacts that hardly slip it does not matter what is missing.
+    """
+    c = system.motion.configuration.contacts
+    missing = np.maximum(c.friction - np.linalg.norm(c.tangential_force, axis=1), 0.0)[c.one_sided, None]
+    missing = np.broadcast_to(missing, slid.shape)
+    counts = slid > SLIPS * slid.max(axis=0, initial=0.0)
+    return float((missing[counts] / slid[counts]).max(initial=0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,6 +270,7 @@ class OneSidedSystem:
         rise: Floats | None = None,
         constant: Floats | float = 0.0,
         extrapolates: bool = False,
+        look: Callable[[OneSidedState], None] | None = None,
     ) -> None:
         """Take steps of velocity Verlet.
 
@@ -256,6 +286,8 @@ class OneSidedSystem:
             Mass-weighted forces, per time, and those that are always there.
         extrapolates : bool
             Whether dashpots feel 2 v(n + 1/2) - v(n), as those of mindlin/smooth do, in place of v(n + 1/2).
+        look : callable, optional
+            What looks at the state after each step.
         """
         force = self._force(state, state.v, rise) + constant
         for _ in range(count):
@@ -268,6 +300,8 @@ class OneSidedSystem:
                 state.r += np.abs(self.rescaled[0] @ change)
             force = self._force(state, 2 * state.v - before if extrapolates else state.v, rise) + constant
             state.v += 0.5 * time_step * force
+            if look is not None:
+                look(state)
 
     @property
     def remembers_nothing(self) -> bool:
@@ -361,6 +395,7 @@ def one_sided_motion(
     state = system.start(_of_all_coordinates(configuration, "velocity", velocity))
     load = None if rise is None else forces_on_coordinates(configuration, rise)
     seen, reach = [], ContactReach(system)
+    reach.look_closely(state, float(time[-1]), load)
     advance = system.advance_exactly if system.remembers_nothing else system.advance
     for each in time:
         advance(state, float(each), load)

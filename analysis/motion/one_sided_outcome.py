@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..configuration import Configuration
 from ..progress import report_progress
-from .one_sided import ContactReach, OneSidedState, OneSidedSystem
+from .one_sided import ContactReach, OneSidedSystem
 
 PUSHES = 2
 """Random pushes; the opposite of each is followed, too, since one-sided motion is not odd."""
@@ -86,12 +86,13 @@ def follow_pushes(
     state = system.start(random_pushes(system.motion.configuration, pushes))
     chunk, most = window_and_most(system, 2 * pushes, time)
     times, sizes, slid, reach = [], [], [state.p.copy()], ContactReach(system)
+    reach.look_closely(state)
     grows: bool | None = None
     for number in range(most):
         for look in range(LOOKS_PER_CHUNK):
             system.advance(state, chunk * (number + (look + 1) / LOOKS_PER_CHUNK))
             times.append(state.time)
-            sizes.append(_mean_square(system, state))
+            sizes.append(mean_square_displacements(system, state.z))
             slid.append(state.p.copy())
             reach.look(state)
         seen = np.array(times), np.array(sizes)
@@ -124,9 +125,9 @@ def random_pushes(configuration: Configuration, pushes: int) -> Floats:
     return np.hstack([push, -push])
 
 
-def _mean_square(system: OneSidedSystem, state: OneSidedState) -> Floats:
-    """D of each push, shape (P,)."""
-    return np.asarray(np.sum(system.displacement(state.z) ** 2, axis=1).mean(axis=0))
+def mean_square_displacements(system: OneSidedSystem, z: Floats) -> Floats:
+    """D of mass-weighted displacements in columns, shape (P,)."""
+    return np.asarray(np.sum(system.displacement(z) ** 2, axis=1).mean(axis=0))
 
 
 def _outcome(time: Floats, size: Floats, slid: list[Floats], sticking_grows: bool) -> bool | None:

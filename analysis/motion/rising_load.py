@@ -22,7 +22,9 @@ followed, and from two starts, which differ in whether the drag acts on rotation
 by its start.
 
 **How far.** While the load rises slowly the mean motion takes sticking contacts to the bound and opens others, as
-:mod:`~faultgouge.analysis.motion.next_change` says from the drift. From there on the packing is another one.
+:mod:`~faultgouge.analysis.motion.next_change` says from the drift. From there on the packing is another one. A contact
+that counts as at the bound lacks some force, up to the tolerance of that, and slides once the load has risen enough. A
+load that brings another contact to the bound before has no motion of this kind.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -40,7 +42,7 @@ from ..factors.sparse_lu import general_lu
 from ..progress import report_progress
 from .eigenvalues import operator_rounding, zero_uncertainty
 from .next_change import next_change
-from .one_sided import OneSidedSystem
+from .one_sided import OneSidedSystem, least_scale
 from .one_sided_outcome import window_and_most
 
 SAMPLES_OF_WINDOW = 400
@@ -108,20 +110,22 @@ class Span:
         Paths of the overlaps of contacts with two derivatives: sums of the sizes of their changes.
     squares : ndarray, shape (N, d, S)
         Integral of the squares of the particles' velocities.
+    slid : ndarray, shape (B, S)
+        Growth of p of contacts at the bound, force.
     """
 
     time: float
     displacement: Floats
     paths: Floats
     squares: Floats
+    slid: Floats
 
     @classmethod
     def joined(cls, windows: Sequence["Span"]) -> "Span":
         """Of windows that follow each other."""
-        displacement, paths, squares = (
-            np.sum([getattr(each, name) for each in windows], axis=0) for name in ("displacement", "paths", "squares")
-        )
-        return cls(sum(each.time for each in windows), displacement, paths, squares)
+        names = "displacement", "paths", "squares", "slid"
+        sums = (np.sum([getattr(each, name) for each in windows], axis=0) for name in names)
+        return cls(sum(each.time for each in windows), *sums)
 
     def drift_and_vibration(self, system: OneSidedSystem) -> Floats:
         """Root mean squares over particles and axes, shape (2, S)."""
@@ -157,11 +161,10 @@ def motion_under_load(
     if velocity is None:
         return follow_load(system, direction, time)
     paths = np.abs(system.rescaled[0] @ velocity)
-    still = Span(1.0, velocity, paths, system.displacement(velocity) ** 2)
+    still = Span(1.0, velocity, paths, system.displacement(velocity) ** 2, np.zeros((0, 1)))
     drift = float(still.drift_and_vibration(system)[0, 0])
     alone: dict[str, Any] = {"drift": drift, "drift_error": 0.0, "vibration": 0.0, "vibration_error": 0.0}
-    whole = alone | {"steady": True, "time": None, "span": None, "other_start": None}
-    return whole | next_change(system, velocity, paths)
+    return alone | {"steady": True, "time": None, "span": None, "other_start": None} | _range(system, still)
 
 
 def steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Floats | None:
@@ -225,10 +228,28 @@ def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = 
             break
     span, found = _of_starts(system, windows)
     first, *others = found
-    velocity, paths = (each[:, :1] / span.time for each in (span.displacement, span.paths))
     time = length * len(windows)
     whole = {**first, "time": time, "span": span.time, "other_start": others[0] if others else None}
-    return whole | next_change(system, velocity, paths)
+    return whole | _range(system, span)
+
+
+def _range(system: OneSidedSystem, span: Span) -> dict[str, Any]:
+    """Between which increases of the load the motion of a span holds: `least_rise`, `next_change` and `next_event`.
+
+    Raises
+    ------
+    NotFollowedError
+        If there is none.
+    """
+    velocity, paths, slid = (each[:, :1] / span.time for each in (span.displacement, span.paths, span.slid))
+    least, change = least_scale(system, slid), next_change(system, velocity, paths)
+    most = change["next_change"]
+    if most is not None and least >= most:
+        raise NotFollowedError(
+            f"contacts that count as at Coulomb's bound reach it once the load has risen by {least:.1g}, and another "
+            f"{change['next_event']} before, at {most:.1g}: bring the packing to rest more closely"
+        )
+    return {"least_rise": least, **change}
 
 
 def windows_under_load(system: OneSidedSystem, direction: Floats, length: float) -> Iterator[Span]:
@@ -247,14 +268,15 @@ def windows_under_load(system: OneSidedSystem, direction: Floats, length: float)
     direction = np.repeat(direction, drag.shape[1], axis=1)
     state = system.start(np.zeros_like(direction))
     for number in count():
-        place, way = state.z.copy(), state.r.copy()
+        place, way, slid = state.z.copy(), state.r.copy(), state.p.copy()
         squares = np.zeros_like(system.displacement(place))
         for sample in range(SAMPLES_OF_WINDOW):
             now = number + (sample + 1) / SAMPLES_OF_WINDOW
             system.advance(state, length * now, direction)
             state.v *= np.exp(-DRAG / SAMPLES_OF_WINDOW * max(0.0, 1 - now / FADE) ** 2 * drag)
             squares += system.displacement(state.v) ** 2
-        yield Span(length, state.z - place, state.r - way, squares * (length / SAMPLES_OF_WINDOW))
+        squares *= length / SAMPLES_OF_WINDOW
+        yield Span(length, state.z - place, state.r - way, squares, state.p - slid)
 
 
 def _drag_of_starts(system: OneSidedSystem) -> Floats:

@@ -9,6 +9,9 @@ dashpots and drag. Complex pairs of K alone are the answer without loss, and no 
 rests, and so is the motion under a load that rises (:mod:`~faultgouge.analysis.motion.one_sided_outcome`). If it has
 not settled in the time that was followed, the verdict is unknown.
 
+**Laws with two derivatives**, one while a contact closes and one while it parts, let vibration carry particles on,
+without a contact at the bound, too (:mod:`~faultgouge.analysis.motion.creep`).
+
 **Large packings.** Where not all eigenvalues are known and the fastest motions do not grow, the motion from a random
 state is followed (:mod:`~faultgouge.analysis.motion.decay`). Sticking contacts are stable only if this motion has
 decayed so far that a motion that grows, however slowly, would be seen. Otherwise there is no verdict."""
@@ -26,17 +29,21 @@ from ..configuration import Configuration, HasConfiguration
 from ..counted import counted
 from ..operators.asymmetry import asymmetry
 from ..operators.sliders import with_sticking_contacts
+from .creep import Creep, follow_creep
 from .decay import Decay, follow_decay
 from .motion import Motion, Rates
 from .no_verdict import no_verdict
-from .one_sided import OneSidedSystem, forces_on_coordinates
-from .one_sided_outcome import PUSHES, STEP_OF_LARGE, VERDICT_STEP, follow_pushes
+from .one_sided import ContactReach, OneSidedSystem, forces_on_coordinates
+from .one_sided_outcome import PUSHES, STEP_OF_LARGE, VERDICT_STEP, follow_pushes, random_pushes
 from .rising_load import NotFollowedError, motion_under_load, vibrate_otherwise
 from .spectrum import Spectrum, spectrum
 
 LARGE = 6000
 """Coordinates beyond which the fastest growing motions stand for all eigenvalues, and one push and its opposite for
 several, in larger steps."""
+
+STILL_CREEPS = 0.01
+"""Share of the displacement by vibration that the second half of the time added, from which on it is said to go on."""
 
 
 @dataclass(frozen=True)
@@ -104,14 +111,19 @@ class Stability:
         many); scales (between which velocities of the push along an axis this holds: with smaller ones contacts that
         count as at the bound do not reach it, with larger ones others do, or open). None without contacts that slide
         on one side.
+    creep : Creep or None
+        How far a push carries particles if contacts have two derivatives, and none is at the bound.
+    largest_push : float or None
+        Where motion does not grow, and no contact slides on one side: velocity of a push along an axis up to which
+        contacts neither reach the bound nor open. None where K is given.
     decay : Decay or None
         What became of a random state with sticking contacts; None where eigenvalues decide.
     rising : dict or None
         drift and vibration over the rate of loading, with drift_error and vibration_error; steady; time, None if the
         motion was not followed but solved for; span, the last part of this time, of which drift and vibration are;
-        other_start: the first five from another start, or None; next_change, the increase of the load at which the
-        first contact reaches Coulomb's bound or opens, to first order, and next_event, which of the two. None unless
-        asked, and where it was `not_followed`.
+        other_start: the first five from another start, or None; least_rise, the increase of the load from which on
+        contacts that count as at the bound reach it; next_change, at which the first other contact reaches it or opens,
+        to first order, and next_event, which of the two. None unless asked, and where it was `not_followed`.
     sticking, sliding : LinearNeighbour
         If all contacts at the bound stuck, and if all slid on; no bounds of what they do.
     asymmetry : dict
@@ -138,6 +150,8 @@ class Stability:
     undamped: WithoutDissipation
     at_bound: int
     one_sided: dict[str, Any] | None
+    creep: Creep | None
+    largest_push: float | None
     decay: Decay | None
     rising: dict[str, Any] | None
     sticking: LinearNeighbour
@@ -158,7 +172,9 @@ class Stability:
     @property
     def sentences(self) -> tuple[str, ...]:
         """The verdict, what holds without dissipation, what contacts at the bound do, and remarks on the origin."""
-        parts = self._without_loss, self._at_the_bound, self._scales, self._under_the_load, self.remarks
+        parts = (
+            self._without_loss, self._at_the_bound, self._by_vibration, self._scales, self._under_the_load, self.remarks
+        )  # fmt: skip
         return (self._verdict, *chain.from_iterable(parts))
 
     @property
@@ -183,7 +199,10 @@ class Stability:
         if self.decay is not None:
             return f"stable: {self.decay}{free}"
         if self.dissipative and self.growth_rate < 0:
-            return f"stable: every motion decays, the slowest with D as exp({self.growth_rate:.6g} t){free}"
+            motion = "every vibration" if self.creep else "every motion"
+            return f"stable: {motion} decays, the slowest with D as exp({self.growth_rate:.6g} t){free}"
+        if self.creep and not self.dissipative:
+            return f"stable but for creep: no motion grows exponentially{free}"
         return f"stable: no motion grows{free}"
 
     @property
@@ -215,7 +234,26 @@ class Stability:
             )
 
     @property
+    def _by_vibration(self) -> Iterator[str]:
+        creep = self.creep
+        if creep is None or not self.stable:
+            return
+        says = f": D as ({creep.velocity:.2g} t)^2 times the mean square velocity of the push"
+        if self.dissipative:
+            still = 0.5 * creep.velocity * creep.time > STILL_CREEPS * creep.amplification**0.5
+            says = (
+                f", and they stay displaced, by D up to {creep.amplification:.2g} times the mean square velocity of "
+                f"the push within t = {creep.time:.4g}{', and farther later' if still else ''}"
+            )
+        yield f"contacts bear less after they have closed and parted, so that vibration carries particles on{says}"
+
+    @property
     def _scales(self) -> Iterator[str]:
+        if self.stable and self.largest_push is not None:
+            yield (
+                f"holds for pushes up to {self.largest_push:.1g} (velocity along an axis), which open no contact and "
+                "take none to Coulomb's bound"
+            )
         least, most = (0.0, 0.0) if self.one_sided is None else self.one_sided["scales"]
         if self.one_sided is not None and self.one_sided["grows"] is False and least < most:
             yield (
@@ -231,9 +269,10 @@ class Stability:
             other = self.rising["other_start"]
             starts = [self.rising, other] if other and vibrate_otherwise(self.rising, other) else [self.rising]
             says = ", and from another start ".join(map(_drift_and_vibration, starts))
-            change, event = self.rising["next_change"], self.rising["next_event"]
+            least, change, event = (self.rising[name] for name in ("least_rise", "next_change", "next_event"))
+            since = f"; from a rise of {least:.1g} on, where all contacts at the bound have reached it" if least else ""
             until = "" if change is None else f"; until the load has risen by {change:.2g} (a contact {event})"
-            yield f"under a load that rises at the rate 1: {says}{until}"
+            yield f"under a load that rises at the rate 1: {says}{since}{until}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
@@ -243,6 +282,8 @@ class Stability:
             "undamped": vars(self.undamped),
             "at_bound": self.at_bound,
             "one_sided": None if self.one_sided is None else _finite(self.one_sided),
+            "creep": None if self.creep is None else vars(self.creep),
+            "largest_push": self.largest_push,
             "decay": None if self.decay is None else vars(self.decay),
             "rising": self.rising,
             "sticking": vars(self.sticking),
@@ -317,7 +358,8 @@ def stability(
     known = outcome.grows is not None and not outcome.reasons and touching > 0
     return Stability(
         stable=not outcome.grows if known else None, growth_rate=outcome.growth_rate, undamped=linear.undamped,
-        at_bound=int(contacts.at_bound.sum()), one_sided=outcome.one_sided, decay=outcome.decay, rising=rising,
+        at_bound=int(contacts.at_bound.sum()), one_sided=outcome.one_sided, creep=outcome.creep,
+        largest_push=outcome.largest_push, decay=outcome.decay, rising=rising,
         sticking=outcome.sticking, sliding=LinearNeighbour.of(linear.sliding) if linear.one_sided else outcome.sticking,
         asymmetry={} if given else asymmetry(configuration), dissipative=configuration.damped,
         free=linear.sticking.free, searched=outcome.sticking.searched, contacts=touching,
@@ -366,6 +408,8 @@ class _Outcome:
     sticking: LinearNeighbour
     reasons: Sequence[str] = ()
     one_sided: dict[str, Any] | None = None
+    creep: Creep | None = None
+    largest_push: float | None = None
     decay: Decay | None = None
 
     @classmethod
@@ -381,6 +425,8 @@ def _small_motion(system: OneSidedSystem, linear: _LinearRates, time: float | No
     outcome = _Outcome.of_linear(linear)
     if linear.one_sided:
         outcome = _after_pushes(outcome, follow_pushes(system, outcome.growth_rate, bool(outcome.grows), time, pushes))
+    elif outcome.grows is False:
+        outcome = _as_contacts_part(outcome, system, time, pushes)
     if linear.sticking.searched and outcome.grows is False:
         decay = follow_decay(system.motion, time)
         says = f"{'with sticking contacts ' if outcome.one_sided else ''}{decay}"
@@ -393,6 +439,25 @@ def _small_motion(system: OneSidedSystem, linear: _LinearRates, time: float | No
             decay=decay,
         )
     return outcome
+
+
+def _as_contacts_part(linear: _Outcome, system: OneSidedSystem, time: float | None, pushes: int) -> _Outcome:
+    """The outcome of linear motion that does not grow: how far it holds, and what laws of two derivatives add."""
+    configuration = system.motion.configuration
+    if configuration.stiffness is not None or not len(configuration.contacts):
+        return linear
+    reach = ContactReach(system)
+    reach.look_closely(system.start(random_pushes(configuration, 1)))
+    most = reach.scales[1]
+    found = replace(linear, largest_push=most if np.isfinite(most) else None)
+    if system.remembers_nothing:
+        return found
+    creep = follow_creep(system, pushes, time)
+    reasons = (
+        f"vibration wears contacts down, and adds more to D within t = {creep.time:.4g} than creep, which adds as the "
+        "square of the time; whether this goes on was not followed",
+    )
+    return replace(found, creep=creep, reasons=reasons if creep.grows else ())
 
 
 def _after_pushes(sticks: _Outcome, found: dict[str, Any]) -> _Outcome:

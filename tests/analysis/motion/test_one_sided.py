@@ -330,8 +330,8 @@ def test_the_drift_of_a_slow_cycle_is_its_mean_velocity(monkeypatch):
     def windows(system, direction, length):
         for number in count():
             speed = 10.0 if number % 5 == 0 else 0.0
-            yield Span(length, speed * length * z, np.zeros((len(system.rescaled[1].T.toarray()), 1)),
-                         speed**2 * length * shape**2)  # fmt: skip
+            yield Span(length, speed * length * z, np.zeros((system.rescaled[1].shape[1], 1)),
+                       speed**2 * length * shape**2, np.zeros((system.sliders[1].shape[0], 1)))  # fmt: skip
 
     monkeypatch.setattr(rising_load, "windows_under_load", windows)
     found = follow_load(system, forces_on_coordinates(at_rest, RISE))
@@ -340,6 +340,26 @@ def test_the_drift_of_a_slow_cycle_is_its_mean_velocity(monkeypatch):
     assert found["vibration"] == pytest.approx(4 * size, abs=2 * found["vibration_error"])
     assert found["drift_error"] < 0.3 * found["drift"]
     assert found["steady"]
+
+
+def test_a_rise_that_comes_after_the_next_change_is_refused(monkeypatch):
+    """A contact that counts as at the bound lacks 5e-7 of it, and another one reaches it before."""
+    three = _three()
+    limit = three.law.slip_limit(three.geometry.overlap)
+    slips = np.array([1 - 5e-7, -0.3, 0.2, 0.3, 0.1]) * limit
+    at_rest = replace(three, contacts=three.contacts.slipped(slips, None)).configuration
+    at_rest = derive_frozen(at_rest, load=-at_rest.contact_force)
+    assert at_rest.contacts.at_bound.sum() == 1
+    found = stability(at_rest, rise=RISE, time=4.0)
+    least, change = found.rising["least_rise"], found.rising["next_change"]
+    assert 0 < least < change
+    assert f"from a rise of {least:.1g} on" in str(found)
+    monkeypatch.setattr(rising_load, "next_change", lambda *given: {"next_change": 0.5 * least, "next_event": "opens"})
+    found = stability(at_rest, rise=RISE, time=4.0)
+    assert found.rising is None
+    assert found.not_followed.endswith(
+        f"another opens before, at {0.5 * least:.1g}: bring the packing to rest more closely"
+    )
 
 
 def test_spans_of_windows_are_joined_exactly(bound):
@@ -404,7 +424,8 @@ def test_two_vibrations_of_one_packing_are_told_apart():
         ({"steady": False}, "vibration 0.000685 \u00b1 2e-05, not steady yet"),
         ({"vibration": 6.8e-4}, "1e-05, vibration 0.000685 \u00b1 2e-05"),
     ):
-        rising = {**one, "time": 4.0, "span": 3.0, "other_start": one | other, "next_change": None, "next_event": None}
+        rest = {"time": 4.0, "span": 3.0, "least_rise": 0.0, "next_change": None, "next_event": None}
+        rising = {**one, **rest, "other_start": one | other}
         assert replace(found, rising=rising).sentences[-1].endswith(says)
     assert set(found.rising["other_start"]) == set(one)
 

@@ -420,6 +420,68 @@ def test_the_standard_law_after_a_push(layer):
         np.testing.assert_allclose(pushed_layer(layer, column, times), expected.mean_square_displacement, rtol=0.02)
 
 
+@pytest.fixture(scope="module")
+def far_from_the_bound():
+    """Thirty disks with Coulomb's slider at 0.02 F_y, whose contacts all stick, and dashpots or none."""
+    from faultgouge.pywrap import Engine, Scene, equilibrate, settle
+
+    width = {"disks": 30, "seed": 4, "top": 3, "width": 3.57}
+    law = {"kn": 2e5, "mu": 2.0, "history": "coulomb"}
+
+    @cache
+    def make(cn):
+        damping = {"damping": {"cn": cn, "ct": 2 / 7 * cn}} if cn else {}
+        state = settle(Scene.from_mapping({"packing": width, "law": law, "load": {"fy": 3.0}, **damping}))
+        with Engine(state.packing) as engine:
+            for step in range(1, 16):
+                state = equilibrate(engine, state, fx=4e-3 * step)
+        assert not state.packing.configuration.contacts.at_bound.any()
+        return state.packing
+
+    return make
+
+
+def test_vibration_carries_particles_on_whose_contacts_wear_down(far_from_the_bound):
+    """Without loss D grows as the square of the time; the mean of both derivatives has D below 1e-3."""
+    packing = far_from_the_bound(0.0)
+    here, verdict = packing.configuration, stability(packing)
+    assert str(verdict).startswith("stable but for creep: no motion grows exponentially\n")
+    push, times = random_pushes(here, 1)[:, :1], np.array([4.0, 12.0])
+    found = pushed_layer(packing, push[:, 0], times)
+    expected = one_sided_motion(packing, velocities(here, push)[0], times=times).mean_square_displacement
+    np.testing.assert_allclose(found, expected, rtol=0.02)
+    assert np.sqrt(found[-1]) / 12 == pytest.approx(verdict.creep.velocity, rel=0.3)
+
+
+def test_with_loss_particles_stay_displaced(far_from_the_bound):
+    """Every linear motion decays, and D rises."""
+    packing = far_from_the_bound(20.0)
+    here, verdict = packing.configuration, stability(packing)
+    assert verdict.stable
+    assert verdict.growth_rate < 0
+    assert "they stay displaced, by D up to" in str(verdict)
+    push, times = random_pushes(here, 1)[:, :1], np.array([1.0, 10.0])
+    found = pushed_layer(packing, push[:, 0], times)
+    assert found[1] > 2 * found[0]
+    expected = one_sided_motion(packing, velocities(here, push)[0], times=times).mean_square_displacement
+    np.testing.assert_allclose(found, expected, rtol=0.03)
+    assert verdict.creep.amplification == pytest.approx(found[1], rel=0.5)
+
+
+def test_a_push_beyond_the_stated_size_moves_otherwise(far_from_the_bound):
+    """The size does not depend on when the motion is looked at, as contacts go farthest at the beginning."""
+    packing = far_from_the_bound(20.0)
+    here, push = packing.configuration, random_pushes(packing.configuration, 1)[:, 0]
+    velocity, times = velocities(here, push[:, None])[0], np.array([0.5, 1.0, 2.0])
+    expected = one_sided_motion(packing, velocity, times=times)
+    _, most = expected.scales
+    assert one_sided_motion(packing, velocity, times=np.linspace(0.0, 2.0, 4001)).scales[1] == pytest.approx(most, 0.05)
+    assert stability(packing).largest_push == pytest.approx(most, rel=0.7)
+    d = expected.mean_square_displacement
+    np.testing.assert_allclose(pushed_layer(packing, push, times, size=0.1 * most), d, rtol=0.1)
+    assert np.any(np.abs(pushed_layer(packing, push, times, size=20 * most) / d - 1) > 0.5)
+
+
 @pytest.mark.long
 def test_the_standard_law_under_a_load_that_rises(layer):
     """The layer vibrates for ever in proportion to the rate: as one-sided motion says, and not with more friction."""
