@@ -148,11 +148,6 @@ class Window:
         return self.onset.error + (self.path_error or 0.0)
 
     @property
-    def end_error(self) -> float | None:
-        """Uncertainty of fx_end."""
-        return None if self.end is None else self.end.error
-
-    @property
     def kind(self) -> Kind:
         """What begins the window, as of `Edge`."""
         return self.onset.kind
