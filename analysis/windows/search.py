@@ -39,7 +39,7 @@ Changes = Sequence[tuple[Space, Space]]
 """Motions that begin or end to grow on an increment, at its lower and at its upper load."""
 
 Sure = Callable[[Changes], bool]
-"""Whether these are certain to be all, each once."""
+"""Whether no motion begins or ceases to grow beside these, and each of them does so once."""
 
 
 class Screen(Protocol):
@@ -250,7 +250,7 @@ class Search:
         return edge
 
     def _blunt(self, here: System, there: System) -> tuple[Open, list[Window]]:
-        """An increment that is not divided: an edge that cannot be solved for is uncertain by half of it."""
+        """Carry the windows over an increment that is not divided; an unsolved edge is uncertain by half of it."""
         left, now = list(self.open or []), []
         for space in self.modes(there).growing:
             origin = space.follow(here, self.limits)
@@ -296,18 +296,18 @@ def _sure(space: Space | None) -> Space:
 
 
 def _growing_of(modes: Sequence[Space]) -> list[bool]:
-    """Of how many modes each does grow, in order."""
+    """Whether each mode grows, those that do not first."""
     return sorted(mode.grows for mode in modes)
 
 
 def other_growth(
     at: At, known: Sequence[list[Space]], narrowest: float, *, dipping: bool = False, limits: Limits = LIMITS
 ) -> list[Space] | None:
-    """Modes that nearly meet, at a load where not as many of them grow as at any of the loads where they are known.
+    """Modes that nearly meet, at a load at which another number of them grows than at each load where they are known.
 
-    None if there surely is none between these loads, but for stretches narrower than `narrowest`. A DoubtError is
-    raised if that is not known after `Limits.dips` looks, or if the modes cannot be followed; and, of a pair that has
-    to be `dipping`, if its discriminant does not dip where its slopes say so: these are then of loads too far apart.
+    None if there surely is no such load, but on stretches narrower than `narrowest`. A DoubtError is raised if that is
+    open after `Limits.dips` looks, or if the modes cannot be followed. For a pair that has to be `dipping` it is also
+    raised if the discriminant does not dip where its slopes say so: the loads are then too far apart.
     """
     places, ends = sorted(known, key=lambda each: each[0].fx), [_growing_of(each) for each in known]
     for _ in range(limits.dips):
@@ -360,7 +360,7 @@ def windows_along(
 
 
 def look_between(look: At, below: float, middle: float, above: float) -> list[System]:
-    """What is at a load in between, or at one beside it where that has no equilibrium; nothing if there is none."""
+    """The system at a load in between, or beside that load if it has no equilibrium; an empty list if none has."""
     for fx in (middle, 0.5 * (below + middle), 0.5 * (middle + above)):
         try:
             return [look(fx)]

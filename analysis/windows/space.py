@@ -66,9 +66,9 @@ class Space:
 
     @classmethod
     def of(cls, system: System, right: Any, left: Any, rate: complex = 0.0) -> "Space":
-        """That of a complex mode, or of two real ones, from right and left vectors in columns.
+        """The subspace of a complex mode, or of two real modes, from right and left vectors in columns.
 
-        With dissipation these are displacements x and y, and s is `rate`.
+        With dissipation the vectors are displacements x and y, and s is `rate`.
         """
         if system.damping is None:
             return cls(system, _real_plane(right), _real_plane(left))
@@ -106,7 +106,7 @@ class Space:
 
     @property
     def growth(self) -> float:
-        """What is positive where the motion grows: -D, 1 / time^4, or Re s, 1 / time."""
+        """A number that is positive where the motion grows: -D, 1 / time^4, or Re s, 1 / time."""
         return float(self.mean.real) if self.system.dissipative else -self.discriminant
 
     @cached_property
@@ -153,7 +153,7 @@ class Space:
 
     @property
     def definite(self) -> bool:
-        """Whether two modes are a real pair, or a complex one, by more than rounding; of one mode always."""
+        """Whether rounding leaves no doubt that two modes are a real or a complex pair; always so for one mode."""
         if self.system.dissipative:
             return True
         split = complex(self.mean, 0.5 * np.sqrt(abs(self.discriminant)))
@@ -188,7 +188,7 @@ class Space:
         return self.like(other)
 
     def closest(self, others: "Iterable[Space]") -> "Space | None":
-        """The one with the closest eigenvalues among others of the same shapes."""
+        """The subspace of the same shapes with the closest eigenvalues."""
         alike = [other for other in others if self.like(other)]
         return min(alike, key=lambda other: abs(other.mean - self.mean), default=None)
 
@@ -217,7 +217,7 @@ class Space:
         return next(_renewed(self, rate, limits), None)
 
     def follow(self, system: System, limits: Limits = LIMITS) -> "Space | None":
-        """The same modes at another load, in small steps of the straight line between both where it has to be."""
+        """The same modes at another load, if need be in small steps on the straight line between both systems."""
         if system is self.system:
             return self
         moving, done, step = self, 0.0, 1.0
@@ -292,9 +292,9 @@ def _turned(guess: Space, inverse: Inverse) -> Iterator[Planes]:
 def _iterate(
     system: System, bases: Iterator[Planes], most: int, limits: Limits, slow: float = np.inf
 ) -> tuple[bool, Planes]:
-    """The first bases whose residuals are rounding; the last ones once the pace says that there will be none in time.
+    """The first bases whose residuals are rounding; the last bases if the pace says that none will be in time.
 
-    Nor are more asked for once a step leaves more than the share `slow` of the residual.
+    The iteration also ends if a step leaves more than the share `slow` of the residual.
     """
     level, residuals = limits.residual * system.backward_error, []
     for planes in bases:

@@ -181,10 +181,10 @@ class SlicePass:
 
     @contextmanager
     def lock_slices(self) -> Iterator[Take]:
-        """What takes a slice if no other search has it; all are given back at the end.
+        """A function that takes a slice if no other search has it; at the end all slices are given back.
 
-        A taken slice is a byte of a file that is locked. The system unlocks what a process leaves that dies. Where
-        there are no locks, two searches find the same.
+        A taken slice is a locked byte of a file. The system unlocks the bytes of a process that dies. Where there are
+        no locks, two searches find the same.
         """
         folder = self.folder
         if folder is None:
