@@ -190,10 +190,6 @@ class Record:
             yield sample
         self._keep(name, samples, motions, None)
 
-    def append_motion(self, time: float, motion: MotionState) -> None:
-        """Write positions of an undamped run, series trajectory."""
-        self._append_motions([(time, motion)])
-
     def _known(self, name: str, kind: Callable[..., S]) -> tuple[list[S], Checkpoint | None]:
         """Lines of a series so far, and the state after them."""
         if self._file is None or name not in self._file.names_of_series:
@@ -214,14 +210,15 @@ class Record:
                 if samples:
                     columns = {key: [getattr(sample, key) for sample in samples] for key in vars(samples[0])}
                     self._file.append_series(name, **columns)
-                self._append_motions(motions)
+                self.append_motions(motions)
                 state: dict[str, Any] = {} if reached is None else {"step": reached.step, **reached.state}
                 self._file.put_checkpoint(**state)
             self._say_saved(f", and the series {name}" + (f" up to t = {samples[-1].time:g}" if samples else ""))
         samples.clear()
         motions.clear()
 
-    def _append_motions(self, motions: list[tuple[float, MotionState]]) -> None:
+    def append_motions(self, motions: list[tuple[float, MotionState]]) -> None:
+        """Write positions of an undamped run at some times, series trajectory."""
         if self._file is None or not motions:
             return
         low = [motion.position_low for _, motion in motions if motion.position_low is not None]
