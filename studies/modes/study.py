@@ -28,7 +28,6 @@ MODES_COLUMNS = (
     "growth_rate",
     "omega",
     "least_q",
-    "pairs_error",
 )
 
 PACKING_KEYS = ("ends", "reach", "contacts")
