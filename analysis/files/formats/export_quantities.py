@@ -18,7 +18,7 @@ from ...arrays import Floats
 from ...contacts import LinearisedContacts
 from ...packing.contacts import Contacts
 from ...packing.packing import Packing
-from ..runfile_header import differing_parameters
+from ..runfile_header import law_parameters
 from .disks import Slips
 
 PARAMETER_NAMES = (
@@ -93,9 +93,7 @@ class Frame:
 
 def scalars(packing: Packing) -> dict[str, float]:
     """Law, load and inertia by name, without absent values and defaults."""
-    law = packing.law
-    values = {"kn": law.kn, "kt": law.kt, "mu": law.mu}
-    values |= differing_parameters(law)
+    values = law_parameters(packing.law)
     if packing.drag_time is not None:
         values["tau"] = packing.drag_time
     if not packing.slips_known:
