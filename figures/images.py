@@ -55,7 +55,7 @@ class Images:
 
     @classmethod
     def of(cls, packing: HasConfiguration) -> "Images":
-        """Those of a packing."""
+        """The images of a packing."""
         if packing.dimension == 3:
             return cls._of_spheres(packing.configuration)
         view = View.of(packing, margin=IMAGE_MARGIN * packing.radius.max())

@@ -1,4 +1,4 @@
-"""What stands about the particles of a picture: planes that they touch, and the box."""
+"""The surroundings of the particles of a picture: planes that they touch, and the box."""
 
 from typing import NamedTuple
 

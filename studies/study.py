@@ -54,15 +54,15 @@ class SceneStudy:
     package, name : str
         `__package__` of the study, whose folder has the template NAME.md.j2, and NAME.
     beside : str
-        A section of the scene that may change without making what was found worthless.
+        A section of the scene that may change while the stored rows remain valid.
     check : callable
         Raises SceneError for a scene without what is needed.
     compute : callable
-        Scene and `Work` to what NAME.json holds beside the scene and its units.
+        Scene, `Work` -> the contents of NAME.json but the scene and its units.
     figures : callable
-        From what NAME.json holds and the rows, what draws each picture.
+        Contents of NAME.json, rows -> the functions that draw the pictures.
     page : callable
-        From what NAME.json holds, what the template names beside `result`, which is that, and its `units`.
+        Contents of NAME.json -> the names of the template but `result`, which is these contents, and `units`.
     """
 
     package: str

@@ -149,7 +149,7 @@ class Window:
 
     @property
     def kind(self) -> Kind:
-        """What begins the window, as of `Edge`."""
+        """Kind of the edge at which the window begins."""
         return self.onset.kind
 
     @property

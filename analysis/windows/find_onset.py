@@ -106,7 +106,7 @@ def find_onset(
 
 @dataclass(frozen=True, eq=False)
 class _OnsetSearch:
-    """What is searched, and how; fields as of `find_onset`, and the packing at the smallest load."""
+    """A search: the parameters of `find_onset`, and the packing at the smallest load."""
 
     equilibrium: Callable[[float], HasConfiguration]
     start: HasConfiguration

@@ -34,7 +34,7 @@ def nearest_mode(system: System, frequency: float) -> Space | None:
 
 
 def find_growing_near(system: System, point: complex, count: int) -> list[Space]:
-    """Those of the modes nearest to a point of the complex plane that grow, by shift and invert with ARPACK.
+    """The modes that grow among those nearest to a point of the complex plane, by shift and invert with ARPACK.
 
     Parameters
     ----------

@@ -176,7 +176,7 @@ class Search:
         self.open = [] if nothing else [(each, Edge.start(each)) for each in self.modes(here).growing]
 
     def _by_all_modes(self, here: System, there: System, depth: int) -> tuple[Open, list[Window]]:
-        """The same by all modes of both loads."""
+        """As `_carry`, by all modes of both loads."""
         lower, upper = self.modes(here), self.modes(there)
         if self.open is None:
             self._begin(here)
@@ -199,7 +199,7 @@ class Search:
     def _settle(
         self, here: System, there: System, courses: Sequence[Course], hiding: Sequence[Ends], sure: Sure
     ) -> tuple[Open, list[Window]]:
-        """What grows at the upper load, and the windows that end before.
+        """The motions that grow at the upper load, and the windows that end before.
 
         Motions that begin or end to grow are handed to `sure`, then edges are solved for and modes `hiding` looked at.
         """

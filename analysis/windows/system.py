@@ -141,7 +141,7 @@ class System:
         return System((1 - share) * self.fx + share * other.fx, *matrices, balance=max(self.balance, other.balance))
 
     def in_units_of(self, unit: float) -> "System":
-        """The same with A in some unit, 1 / time^2, that is a power of four: no digit changes."""
+        """The system with A in a unit, 1 / time^2, that is a power of four: no digit changes."""
         damping = None if self.damping is None else self.damping / np.sqrt(unit)
         return replace(self, stiffness=self.stiffness / unit, damping=damping)
 

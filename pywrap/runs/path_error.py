@@ -61,7 +61,7 @@ CARRIES = 1e-9
 """Normal force, in units of F_y, from which on a contact counts; that of a disk that carries nothing is noise."""
 
 FAILURES = NoEquilibriumError, OnsetError, ArpackError, LinAlgError
-"""What another path may end in: an onset that is known is worth more than the error of its path."""
+"""Errors of another path, which cost the error of the path alone and not the onset."""
 
 SHIFTS = 1 / 3, 2 / 3
 """Shares of an increment by which the loads of two other paths are moved up where contacts change."""
@@ -79,7 +79,7 @@ Where its coefficient changes sign along the path, the correction is wrong by mo
 
 @dataclass(frozen=True)
 class PathError:
-    """What the increments do to one onset.
+    """The effect of the increments on one onset.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class PathError:
 
     @property
     def correction(self) -> float:
-        """What has to be added to F_h, force: 0 where it is no more than rounding, or contacts change."""
+        """Correction of F_h, force: 0 where the correction is no more than rounding, or contacts change."""
         if self.changes or not abs(self.shift) > 2 * self.rounding:
             return 0.0
         return -self.shift / self.weight
@@ -201,7 +201,7 @@ class PathErrors:
         )
 
     def error(self, fx: float, vanishes: Vanishes, rounding: float) -> PathError:
-        """What the increments do to the onset at fx, whose rounding error is known.
+        """The effect of the increments on the onset at fx, whose rounding error is known.
 
         Parameters
         ----------

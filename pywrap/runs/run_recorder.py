@@ -234,7 +234,7 @@ class Record:
         self._said(f"{self.path} holds {self._contents(file)}{more}; {goes_on}", self.path)
 
     def _contents(self, file: RunFile) -> str:
-        """What the file holds, in words."""
+        """The contents of the file, in words."""
         return f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}"
 
     def _attributes(self) -> dict[str, str | int | float]:
@@ -258,7 +258,7 @@ class Record:
 
 
 def _stored_steps(scene: Scene, disks: int, steps: Indices) -> Indices:
-    """Of the steps at which an undamped run is sampled those at which its positions are stored."""
+    """The steps, among those of the samples, at which an undamped run stores positions."""
     wanted = None if scene.output is None else scene.output.trajectory
     if wanted is not None:
         return steps if wanted else steps[:0]

@@ -113,7 +113,7 @@ def touching_nothing(disks: Disks) -> NDArray[np.bool_]:
 
 
 def layer_remark(disks: Disks, says: str | None, layer: NDArray[np.bool_]) -> str:
-    """What is to be said of disks that touch nothing, in the layer or above it; empty for none, or too many."""
+    """A remark on disks that touch nothing, in the layer or above it; empty for none, or too many."""
     alone = touching_nothing(disks)
     if alone.mean() > 1 - FEW_TOUCH:
         return ""

@@ -185,7 +185,7 @@ class GrowthScreen:
         self._seen: tuple[System, Reduced] | None = None
 
     def __call__(self, here: System, there: System, known: Sequence[Space], depth: int) -> Few | None:
-        """What grows at the upper load among the modes of a few clusters, as the system itself has it.
+        """The modes of the system that grow at the upper load, sought where a few clusters announce them.
 
         None if the clusters are not known, or too many. A DoubtError says where a cluster has a window in between.
         """
@@ -241,7 +241,7 @@ def reduce_system(basis: Basis, levels: Levels, system: System) -> Reduced:
 
 
 def shift_load(basis: Basis, here: System, reduced: Reduced, there: System) -> Reduced:
-    """What is reduced at one load, at another."""
+    """The reduced system at another load."""
     if here is there:
         return reduced
     return Reduced(

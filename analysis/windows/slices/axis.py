@@ -42,7 +42,7 @@ class UncoveredAxisError(FaultgougeError):
 
 @dataclass(frozen=True, eq=False)
 class Disc:
-    """What is known about a point of the imaginary axis.
+    """The eigenvalues about a point of the imaginary axis.
 
     Attributes
     ----------
@@ -142,11 +142,11 @@ class _Scaled:
 
     @property
     def largest_frequency(self) -> float:
-        """Of motions that grow: the feed allows no more beyond the largest undamped one."""
+        """A bound of the frequency of motions that grow: the largest undamped one, and what the feed adds to it."""
         return float(np.sqrt(1 + 0.25 * np.abs(self.feed).sum(axis=1).max() ** 2))
 
     def fastest_growth(self, low: float, high: float) -> float:
-        """What Re s does not exceed between two frequencies."""
+        """An upper bound of Re s between two frequencies."""
         fastest = float(np.sqrt(high**2 + max(0.0, self.softening)))
         if not low:
             return fastest

@@ -65,7 +65,7 @@ class SliceSearch(ABC):
 
     @abstractmethod
     def look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[System]) -> SliceResult:
-        """What a basis announces between some places; A at the first of them is given in the basis."""
+        """The motions that a basis announces between some loads; `levels` are A at the first load."""
 
     @abstractmethod
     def growing_motion(self, candidate: Candidate, there: System) -> Space | None:
@@ -131,7 +131,7 @@ class SliceSearch(ABC):
     # What clusters announce
 
     def candidates(self, places: Sequence[System], depth: int) -> list[list[Candidate]]:
-        """What the clusters of all ranks announce on each increment, by increasing onset."""
+        """The motions that the clusters of all ranks announce on each increment, by increasing onset."""
         increments = zip(*(each.candidates for each in self.found_by_all(places)), strict=True)
         return [sorted(chain(*each), key=lambda candidate: candidate.onset) for each in increments]
 

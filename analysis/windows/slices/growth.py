@@ -293,7 +293,7 @@ def find_growing(cluster: Cluster, limits: Limits = LIMITS) -> Iterator[Candidat
 
 
 def make_candidate(onset: float, cluster: Cluster, mode: Space) -> Candidate:
-    """What is kept of a mode of a cluster, at its load."""
+    """The announced motion of a mode of a cluster, at its load."""
     right, left = (np.column_stack([each.real, each.imag]) for each in cluster.lift(mode))
     return Candidate(onset, mode.fx, right, left)
 

@@ -44,7 +44,7 @@ class Ranks:
         return slice(self.rank * count // self.size, (self.rank + 1) * count // self.size)
 
     def together(self, work: Callable[[], Mine]) -> list[Mine]:
-        """What the work of each rank gives, by rank.
+        """The results of the work of all ranks, by rank.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What a search finds in the slices of a spectrum, and the folder that keeps it.
+"""Results of a search in the slices of a spectrum, and the folder that keeps them.
 
 A *pass* goes through all slices of the spectrum, for a few neighbouring loads. A slice of 100,000 disks takes 13 s, and
 leaves little: the pairs that may turn complex, and the eigenvalues that neighbouring slices must agree on. So each
@@ -73,7 +73,7 @@ class Border(NamedTuple):
 
     @classmethod
     def of(cls, number: int, values: Floats, own: slice) -> "Border":
-        """Of increasing eigenvalues, the first of which has this number in the spectrum; `own` are the slice's."""
+        """The border of a slice: increasing eigenvalues, the number of the first in the spectrum, and which are its own."""
         near = values[max(0, own.start - 1) : own.stop + 1]
         beyond = float(values[own.stop]) if own.stop < len(values) else float("nan")
         modes = number + own.start, number + own.stop
@@ -176,7 +176,7 @@ class SlicePass:
 
     @property
     def borders(self) -> list[Border]:
-        """Those of the known slices."""
+        """The borders of the known slices."""
         return [each.border for each in self.found]
 
     @contextmanager

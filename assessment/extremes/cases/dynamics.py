@@ -37,7 +37,7 @@ MODE_AMPLITUDE = 1e-4
 K."""
 
 SHAKEN = 0.1
-"""Of the motion whose energy is followed: contacts stay closed."""
+"""Amplitude of the motion whose energy is followed, in units of the smallest overlap: contacts stay closed."""
 
 
 @cache
