@@ -228,7 +228,7 @@ class Record:
     def _say_saved(self, more: str = "") -> None:
         """Say what the stored file holds, if it holds all."""
         file = self._file
-        if file is None or not file.is_complete or len(file) == 0:
+        if file is None or not file.saved or len(file) == 0:
             return
         goes_on = "is complete" if file.complete else "the same command continues from there"
         self._said(f"{self.path} holds {self._contents(file)}{more}; {goes_on}", self.path)

@@ -73,7 +73,7 @@ class Border(NamedTuple):
 
     @classmethod
     def of(cls, number: int, values: Floats, own: slice) -> "Border":
-        """The border of a slice, from increasing eigenvalues, the number of the first, and which are the slice's own."""
+        """The border of a slice, from increasing eigenvalues, the number of the first, and which are its own."""
         near = values[max(0, own.start - 1) : own.stop + 1]
         beyond = float(values[own.stop]) if own.stop < len(values) else float("nan")
         modes = number + own.start, number + own.stop
