@@ -56,7 +56,7 @@ class ModeVectors:
 
         Without it the rotations are those of disks, shape (N,).
         """
-        found = {}
+        found: dict[str, Floats] = {}
         for part, moved in (("", self.displacement.real), ("_imag", self.displacement.imag)):
             if not part or np.any(moved):
                 translation, rotation = vectors(moved) if vectors else (in_space(moved[:2].T), moved[2])
