@@ -91,7 +91,7 @@ def frame_of(configuration: Configuration, eye: Eye) -> Frame:
     return float(left), float(right), float(bottom), float(top)
 
 
-def shaded(eye: Eye, place: Floats, radius: Floats, colour: Floats, frame: Frame) -> Floats:
+def shade_spheres(eye: Eye, place: Floats, radius: Floats, colour: Floats, frame: Frame) -> Floats:
     """Colours and opacity of every dot, shape (height, width, 4); `frame` is left, right, bottom, top."""
     left, right, bottom, top = frame
     size = (right - left) / DOTS_ACROSS
@@ -138,7 +138,7 @@ class SpheresArtist:
         self._surroundings(axes)
         if faces is None:
             faces = np.where(configuration.free[:, None], to_rgb(BULK), to_rgb(FLOOR))
-        balls = shaded(self.eye, configuration.position, configuration.radius, faces, self.frame)
+        balls = shade_spheres(self.eye, configuration.position, configuration.radius, faces, self.frame)
         axes.imshow(balls, extent=self.frame, zorder=1, interpolation="bilinear")
 
     def _surroundings(self, axes: Axes) -> None:

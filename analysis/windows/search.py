@@ -151,7 +151,7 @@ class Search:
             if not self.finished:
                 self._advance(middle[0], there, depth + 1)
         else:
-            self.open, ended = self._blunt(here, there)
+            self.open, ended = self._carry_undivided(here, there)
             self.closed += ended
 
     def _carry(self, here: System, there: System, depth: int) -> tuple[Open, list[Window]]:
@@ -207,8 +207,10 @@ class Search:
         begun: list[tuple[Space, Space]] = []
         ending: list[tuple[Space, Space, Edge]] = []
         for below, above in courses:
-            below = _sure(above.follow(here, self.limits)) if below is None and above is not None else _sure(below)
-            above = _sure(below.follow(there, self.limits)) if above is None else above
+            below = (
+                _require(above.follow(here, self.limits)) if below is None and above is not None else _require(below)
+            )
+            above = _require(below.follow(there, self.limits)) if above is None else above
             known = next((each for each in left if each[0].equals(below)), None)
             if known is not None:
                 left.remove(known)
@@ -223,7 +225,7 @@ class Search:
             if below.grows == above.grows:
                 watched.append(([below], [above]))
         for space, onset in left:
-            ahead = _sure(space.follow(there, self.limits))
+            ahead = _require(space.follow(there, self.limits))
             if ahead.grows:
                 raise DoubtError
             ending.append((space, ahead, onset))
@@ -249,7 +251,7 @@ class Search:
                     raise DoubtError
         return edge
 
-    def _blunt(self, here: System, there: System) -> tuple[Open, list[Window]]:
+    def _carry_undivided(self, here: System, there: System) -> tuple[Open, list[Window]]:
         """Carry the windows over an increment that is not divided; an unsolved edge is uncertain by half of it."""
         left, now = list(self.open or []), []
         for space in self.modes(there).growing:
@@ -261,13 +263,13 @@ class Search:
                 left.remove(known)
                 now.append((space, known[1]))
             else:
-                now.append((space, self._blunt_edge(origin, space, here, there)))
+                now.append((space, self._edge_or_half(origin, space, here, there)))
         return now, [
-            Window(onset, self._blunt_edge(space, space.follow(there, self.limits), here, there))
+            Window(onset, self._edge_or_half(space, space.follow(there, self.limits), here, there))
             for space, onset in left
         ]
 
-    def _blunt_edge(self, below: Space | None, above: Space | None, here: System, there: System) -> Edge:
+    def _edge_or_half(self, below: Space | None, above: Space | None, here: System, there: System) -> Edge:
         last = above or below
         assert last is not None
         if below is not None and above is not None and below.growth * above.growth < 0:
@@ -289,7 +291,7 @@ class Search:
         return known
 
 
-def _sure(space: Space | None) -> Space:
+def _require(space: Space | None) -> Space:
     if space is None:
         raise DoubtError
     return space

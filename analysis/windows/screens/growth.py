@@ -277,7 +277,7 @@ def group_clusters(
         ends = here[1].between(left, right), there[1].between(left, right)
         spread = np.zeros((2, basis.size, len(modes)))
         spread[0, basis.active], spread[1, basis.active] = basis.vectors @ right, basis.vectors @ left
-        own_range = _between(ordered, int(core[0])), _between(ordered, int(core[-1]) + 1)
+        own_range = _frequency_between(ordered, int(core[0])), _frequency_between(ordered, int(core[-1]) + 1)
         yield Cluster((here[0].fx, there[0].fx), ends, spread[0], spread[1], own_range)
 
 
@@ -338,7 +338,7 @@ def _with_others(matrix: Floats, level: Floats, modes: Indices) -> Floats:
     return np.asarray(vectors)
 
 
-def _between(frequencies: Floats, first: int) -> float:
+def _frequency_between(frequencies: Floats, first: int) -> float:
     """The frequency half-way between a mode and the next one below; 0 or inf beyond the ends of the basis."""
     if first <= 0:
         return 0.0

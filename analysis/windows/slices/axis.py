@@ -222,7 +222,7 @@ def _cover_axis(scaled: _Scaled) -> tuple[list[Space], list[Rectangle]]:
 
 def _solve(system: System, x: Complexes, s: complex, distance: float) -> list[Space]:
     """The mode of an eigenvalue that is nearly known; or those next to it that grow, where it is lost on the way."""
-    mode = Space.of(system, x, x.conj(), s).refined(s)
+    mode = Space.of(system, x, x.conj(), s).refine(s)
     if mode is not None and abs(mode.mean - s) < LIMITS.strayed * distance:
         return [mode]
     try:
