@@ -49,7 +49,7 @@ from ...analysis.arrays import Floats
 from ...analysis.windows import Space, System, Window, force_bearing
 from ...analysis.windows.nearby import nearest_mode
 from ..equilibria.quasistatic import Equilibrium
-from ..load_path import EquilibriumSolver, LoadPath
+from ..load_path import LoadPath
 from .nearby_root import nearby_root
 
 Vanishes = Callable[[Packing], float]
@@ -168,20 +168,6 @@ def with_path_error(
     return replace(onset, windows=tuple(map(whole, onset.windows)), undamped=undamped)
 
 
-@dataclass(frozen=True)
-class BranchSolver:
-    """A solver that takes no other way where the branch of equilibria ends, on the path through other loads."""
-
-    solver: EquilibriumSolver[Equilibrium]
-
-    def solve(self, load: float, below: Equilibrium | None, beside: Equilibrium | None, ahead: bool) -> Equilibrium:
-        """As of :class:`~faultgouge.pywrap.load_path.EquilibriumSolver`."""
-        return self.solver.solve(load, below, beside, ahead=False)
-
-    def close(self) -> None:
-        """The solver is that of the ramp."""
-
-
 class PathErrors:
     """The errors of the onsets of one ramp, which have the paths through other loads in common for the most part.
 
@@ -260,7 +246,7 @@ class PathErrors:
         common = 0
         while common < min(len(inner), len(known) - 1) and known[common + 1].fx == inner[common]:
             common += 1
-        path = LoadPath(BranchSolver(self.path.solver), known[: common + 1])
+        path = LoadPath(self.path.solver, known[: common + 1], onward=False)
         try:
             for load in inner[common:]:
                 path(float(load))
