@@ -1,4 +1,4 @@
-"""Every size, share and tolerance of the search for complex pairs, with its reason."""
+"""Every size, share and tolerance of the search for windows, with its reason."""
 
 from dataclasses import dataclass
 
