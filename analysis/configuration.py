@@ -412,7 +412,7 @@ def _check_particles(made: Configuration) -> None:
 
 
 class HasConfiguration(Protocol):
-    """What an analysis takes: a Configuration, or a Packing, which has one. Members are those of a Configuration."""
+    """Argument of an analysis: a Configuration, or a Packing, which has one. Members are those of a Configuration."""
 
     @property
     def configuration(self) -> Configuration: ...

@@ -24,7 +24,7 @@ CHECKSUM = {"fletcher32": True}
 """A checksum for every chunk, for readers other than this one."""
 
 LAW_DEFAULTS = {field.name: field.default for field in fields(MindlinLaw) if field.default is not MISSING}
-"""Parameters of the law that are in a file only if they are others than these."""
+"""Default parameters of the law, which a file need not have."""
 
 COMPACT = {"shuffle": True, "compression": "gzip", "compression_opts": 1, **CHECKSUM}
 """Filters of what is stored for every disk or contact: half the size, mostly from indices and equal leading bytes, at a

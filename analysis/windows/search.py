@@ -240,7 +240,7 @@ class Search:
         return now, ended
 
     def _edge(self, below: Space, above: Space) -> Edge:
-        """Where a motion that grows at one of two loads begins to, or ends to, if it does so once."""
+        """Edge between two loads, at one of which a motion grows; in doubt unless growth begins or ends once."""
         try:
             edge, left, right = locate_edge(self.at, below, above, self.limits)
         except (LostPairError, NoEquilibriumError):

@@ -308,7 +308,7 @@ def predict_mode(candidate: Candidate, system: System) -> tuple[Space, complex]:
 
 
 def parabola_vertex(modes: Sequence[Space]) -> float:
-    """Where a parabola through Re s of three modes has its top; the best of them if it has none."""
+    """Load at the top of a parabola through Re s of three modes; load of the first if there is no top."""
     loads, rates = np.array([mode.fx for mode in modes]), np.array([mode.mean.real for mode in modes])
     scale = np.ptp(loads)
     curve, slope, _ = np.polyfit((loads - loads[0]) / scale, rates, 2)

@@ -136,11 +136,11 @@ class _Spectrum:
         self.spare: list[Floats] = []  # memory for bases: fresh memory takes longer than a pass over it
 
     def below(self, shift: float) -> int:
-        """How many eigenvalues are below the shift."""
+        """Number of eigenvalues below the shift."""
         return self.factorise(self.matrix, shift)[1]
 
     def count_below(self, pool: ThreadPoolExecutor, shifts: Floats) -> list[int]:
-        """How many eigenvalues are below each of some shifts; all ranks know what each has counted."""
+        """Numbers of eigenvalues below some shifts; all ranks have the counts of all."""
         mine = shifts[self.ranks.part(len(shifts))]
         return [each for one in self.ranks.together(lambda: list(pool.map(self.below, mine))) for each in one]
 

@@ -68,7 +68,7 @@ class Border(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many modes the slice has."""
+        """Number of modes in the slice."""
         return self.modes[1] - self.modes[0]
 
     @classmethod
@@ -236,7 +236,7 @@ NEW_PASS = SlicePass()
 
 
 def pass_folder(parent: Path, places: Sequence[System], modes: tuple[int, int], limits: Limits) -> Path:
-    """Where what is found on the increments between some loads is kept."""
+    """Folder of the results on the increments between some loads."""
     digest = hashlib.sha256(repr((version("faultgouge"), modes, limits)).encode())
     for place in places:
         digest.update(repr(place.fx).encode())
