@@ -285,6 +285,13 @@ class Configuration:
         return self.contacts.normal_force
 
     @property
+    def branch(self) -> Floats:
+        """From the second partner of each contact, or from the wall, to the first; length, shape (C, 3)."""
+        c = self.contacts
+        reach = np.where(c.wall, self.radius[c.i] - c.overlap, c.distance)
+        return np.asarray(reach[:, None] * c.normal)
+
+    @property
     def mobilised(self) -> Floats:
         """|f_t|/(mu f_n): the share of Coulomb's bound that each contact uses, shape (C,); zero without friction."""
         size, limit = np.linalg.norm(self.contacts.tangential_force, axis=1), self.contacts.friction
@@ -405,7 +412,7 @@ def _check_particles(made: Configuration) -> None:
 
 
 class HasConfiguration(Protocol):
-    """What an analysis takes: a Configuration, or a Packing, which has one. Members are those of a Configuration."""
+    """Argument of an analysis: a Configuration, or a Packing, which has one. Members are those of a Configuration."""
 
     @property
     def configuration(self) -> Configuration: ...

@@ -14,13 +14,13 @@ _watch: ContextVar[Watch] = ContextVar("watch", default=lambda says: None)
 
 
 def report_progress(says: str) -> None:
-    """Say what begins, to whoever shows it."""
+    """Pass on the words for a step that begins to the function that shows them."""
     _watch.get()(says)
 
 
 @contextmanager
 def show_progress(watch: Watch | None = None, what: str = "") -> Iterator[None]:
-    """Show what is reported inside, with a few words before; None passes it on to who showed it outside."""
+    """Show the steps reported inside, after a few words; with None, the function outside shows them."""
     beyond = watch or _watch.get()
     before = _watch.set(lambda says: beyond(what + says))
     try:

@@ -83,7 +83,7 @@ def search_windows(scene: Scene, mu: float, first: bool) -> Row:
     except NoEquilibriumError:
         row["ends"] = "flows"
     else:
-        row["windows"] = [window.as_dict() | {"end_error": window.end_error} for window in onset.windows]
+        row["windows"] = [window.as_dict() | {"end_error": window.end and window.end.error} for window in onset.windows]
         row["doubtful"] = [list(each) for each in onset.doubtful]
     row["seconds"] = round(time.process_time() - begin, 2)
     return row

@@ -178,7 +178,7 @@ def _encode(value: Any) -> Any:
 
 
 def _frame(packing: HasConfiguration, axis: Axis, images: Images, followed: RampEigenvalues, k: int) -> dict[str, Any]:
-    """What the page shows of one packing."""
+    """The part of the page's data that belongs to one packing."""
     verdict, contacts, force = followed.verdicts[k], packing.configuration.contacts, packing.normal_force
     share = np.log(np.maximum(packing.mobilised, LEAST_SHARE)) / np.log(LEAST_SHARE)
     faces = PackingArtist.faces(packing)
@@ -280,7 +280,7 @@ def _colours(count: int) -> list[str]:
 
 
 def _legend(packing: HasConfiguration) -> str:
-    """What the colours of the particles are."""
+    """Meaning of the colours of the particles, in words."""
     kinds = ["White: rattlers, which touch nothing."] if len(packing.rattlers) else []
     configuration = packing.configuration
     if packing.top.any():

@@ -27,8 +27,9 @@ from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.motion.hysteresis import layer_displacement
 
 from .cycle import in_powers_of_ten
+from .disk_view import View
 from .mode import ModeArtist, ModeShape, finish, side_by_side
-from .packing import COLOURS, PackingArtist, View
+from .packing import COLOURS, PackingArtist
 from .series import few_decades
 from .style import BULK, EDGE, INK, styled
 

@@ -10,7 +10,8 @@ from faultgouge.analysis import Configuration
 from faultgouge.analysis.arrays import Floats, Indices
 from faultgouge.analysis.configuration import HasConfiguration
 
-from .packing import View
+from .disk_view import View
+from .surroundings import Wall, cell_of, walls_of, within_cell
 
 IMAGE_MARGIN = 0.5
 """Images of disks beyond the sides of a periodic box that move into sight, in units of the largest radius."""
@@ -34,8 +35,7 @@ class Images:
         Whose they are.
     low, high : ndarray, shape (dimension,)
         The frame of the picture of disks; of spheres the box along its periodic edges, and else what lies in it.
-    walls : list of dict
-        axis, sign, place: all that lies beyond a place along an axis, seen along sign times the axis.
+    walls : tuple of Wall
     corners : ndarray, shape (8, 3)
         Of the box of spheres; bit k of the number of a corner says on which side along edge k.
     periodic : bool
@@ -49,13 +49,13 @@ class Images:
     contact: Indices
     low: Floats
     high: Floats
-    walls: list[dict[str, Any]]
+    walls: tuple[Wall, ...]
     corners: Floats
     periodic: bool
 
     @classmethod
     def of(cls, packing: HasConfiguration) -> "Images":
-        """Those of a packing."""
+        """The images of a packing."""
         if packing.dimension == 3:
             return cls._of_spheres(packing.configuration)
         view = View.of(packing, margin=IMAGE_MARGIN * packing.radius.max())
@@ -69,7 +69,7 @@ class Images:
             view.contact,
             np.array([view.left, view.bottom]),
             np.array([view.right, top + room * float(packing.radius.min())]),
-            [{"axis": wall.axis, "sign": wall.sign, "place": wall.place} for wall in view.walls],
+            view.walls,
             np.zeros((0, 3)),
             bool(len(view.edges)),
         )
@@ -77,13 +77,12 @@ class Images:
     @classmethod
     def _of_spheres(cls, packing: Configuration) -> "Images":
         """Spheres within the box; of a contact through a periodic side each partner has half."""
-        cell = packing.box.copy()
-        cell[~cell.any(axis=1)] = np.eye(3)[~cell.any(axis=1)]  # an open side may have no length
-        share = (packing.position - packing.origin) @ np.linalg.inv(cell)
-        share -= np.where(packing.periodic, np.floor(share), 0.0)
-        place, c = packing.origin + share @ cell, packing.contacts
-        reach = np.where(c.wall, packing.radius[c.i] - c.overlap, c.distance)
-        branch = reach[:, None] * c.normal
+        cell, place, c, branch = (
+            cell_of(packing),
+            within_cell(packing, packing.position),
+            packing.contacts,
+            packing.branch,
+        )
         bars = np.stack([place[c.i], place[c.i] - branch], axis=1)
         through = np.flatnonzero(
             ~c.wall & (np.linalg.norm(bars[:, 1] - place[c.j], axis=1) > 1e-6 * packing.radius.max())
@@ -91,9 +90,9 @@ class Images:
         bars[through, 1] += 0.5 * branch[through]
         again = np.stack([place[c.j[through]] + 0.5 * branch[through], place[c.j[through]]], axis=1)
         low, high = (place - packing.radius[:, None]).min(axis=0), (place + packing.radius[:, None]).max(axis=0)
-        walls = _planes(packing, place)
+        walls = walls_of(packing)
         for wall in walls:
-            (low if wall["sign"] > 0 else high)[wall["axis"]] = wall["place"]
+            wall.cut(low, high)
         sides = [
             (np.zeros(3), cell[k]) if packing.periodic[k] else (np.eye(3)[k] * low[k], np.eye(3)[k] * (high - low)[k])
             for k in range(3)
@@ -122,21 +121,10 @@ class Images:
         return {
             "extent": [low.tolist(), high.tolist()],
             "periodic": first.periodic,
-            "walls": first.walls,
+            "walls": [wall._asdict() for wall in first.walls],
             "corners": first.corners.tolist(),
         }
 
 
 def _flat(points: Floats) -> Floats:
     return np.column_stack([points, np.zeros(len(points))])
-
-
-def _planes(packing: Configuration, place: Floats) -> list[dict[str, Any]]:
-    """Planes along the axes that spheres touch."""
-    c = packing.contacts
-    at = np.flatnonzero(c.wall)
-    axis = np.argmax(np.abs(c.normal[at]), axis=1)
-    sign = np.sign(c.normal[at, axis])
-    where = place[c.i[at], axis] - sign * (packing.radius[c.i[at]] - c.overlap[at])
-    sides = sorted({*zip(axis.tolist(), sign.tolist(), strict=True)})
-    return [{"axis": a, "sign": s, "place": float(np.mean(where[(axis == a) & (sign == s)]))} for a, s in sides]

@@ -26,7 +26,8 @@ from faultgouge.analysis import (
 from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.configuration import HasConfiguration
 
-from .packing import PACKING_WIDTH, PackingArtist, View
+from .disk_view import View
+from .packing import PACKING_WIDTH, PackingArtist
 from .spheres import add_scale_of_turns, draw_turns, new_figure
 from .style import EDGE, INK, styled
 

@@ -12,7 +12,6 @@ Most contacts of a stable packing are far below Coulomb's bound, so that both fr
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
 
@@ -27,10 +26,11 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from faultgouge.analysis import BadInputError, Configuration, Packing
-from faultgouge.analysis.arrays import Floats, Indices
+from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.counted import counted
 
+from .disk_view import View
 from .spheres import SpheresArtist, new_figure
 from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER, figure_of, styled
 
@@ -65,149 +65,6 @@ COLOURS: dict[str, tuple[str, Callable[[HasConfiguration], Floats], Callable[[Fl
     "force": ("normal force $f_n$", attrgetter("normal_force"), _force_scale, "viridis_r"),
 }
 """What the bars of the contacts may show: label, values of the contacts, scale, colours."""
-
-
-@dataclass(frozen=True, eq=False)
-class View:
-    """Which images of the disks a picture shows, and its edges.
-
-    Attributes
-    ----------
-    left, right, bottom, ceiling : float
-        Edges, length.
-    disk : ndarray of int, shape (n,)
-        The disk of each image.
-    place : ndarray, shape (n, 2)
-        Its centre, length.
-    contact : ndarray of int, shape (c,)
-        The contact of each bar.
-    start, end : ndarray, shape (c, 2)
-        Where the bar begins and ends, length.
-    walls : tuple of Wall
-        Floor and walls.
-    edges : ndarray, shape (e, 2, 2)
-        Ends of the lines at which the picture repeats, length.
-    """
-
-    left: float
-    right: float
-    bottom: float
-    ceiling: float
-    disk: Indices
-    place: Floats
-    contact: Indices
-    start: Floats
-    end: Floats
-    walls: tuple["Wall", ...]
-    edges: Floats
-
-    @classmethod
-    def of(cls, packing: HasConfiguration, margin: float = 0.0) -> "View":
-        """Every image of every disk and contact that reaches to within a margin of the box; length."""
-        cell, origin, periodic = _cell(packing)
-        position, radius, contacts = packing.position[:, :2], packing.radius, packing.configuration.contacts
-        walls, branch = _walls(packing), branch_vectors(packing)
-        share = (position - origin) @ np.linalg.inv(cell)
-        position = origin + (share - np.where(periodic, np.floor(share), 0.0)) @ cell
-        low, high = _frame(packing, position, cell, origin, periodic, walls)
-        around = [np.arange(-2, 3) if each else [0] for each in periodic]
-        images = position + (np.stack(np.meshgrid(*around), axis=-1).reshape(-1, 1, 2) @ cell)
-        near_low, near_high = (np.where(periodic, side, far) for side, far in ((low, -np.inf), (high, np.inf)))
-        reach = radius[:, None]
-        within = (images + reach > near_low - margin) & (images - reach < near_high + margin)
-        image, disk = np.nonzero(within.all(axis=2))
-        start = images[:, contacts.i]
-        ends = np.stack([start, start - branch])
-        within = (ends.max(axis=0) > near_low - margin) & (ends.min(axis=0) < near_high + margin)
-        bar, contact = np.nonzero(within.all(axis=2))
-        (left, bottom), (right, ceiling) = low.tolist(), high.tolist()
-        place, begin = images[image, disk], start[bar, contact]
-        edges = _edges(cell, origin, periodic, low, high, walls)
-        return cls(left, right, bottom, ceiling, disk, place, contact, begin, begin - branch[contact], walls, edges)
-
-    def points(self, axes: Axes) -> float:
-        """Points per unit of length, so that widths of lines are to scale; as the axes stand now."""
-        box = axes.get_window_extent()
-        scale = min(box.width / (self.right - self.left), box.height / (self.ceiling - self.bottom))
-        return float(72 / figure_of(axes).dpi * scale)
-
-
-@dataclass(frozen=True)
-class Wall:
-    """A wall: all that lies beyond a place along an axis, seen along sign times the axis."""
-
-    axis: int
-    sign: float
-    place: float
-
-    def corners(self, view: View) -> Floats:
-        """Corners of the part of the wall in the picture, shape (4, 2), length."""
-        low, high = np.array([view.left, view.bottom]), np.array([view.right, view.ceiling])
-        (high if self.sign > 0 else low)[self.axis] = self.place
-        return np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
-
-
-def branch_vectors(packing: HasConfiguration) -> Floats:
-    """From the second partner of each contact, or from the wall, to the first; length, shape (C, 2)."""
-    c = packing.configuration.contacts
-    reach = np.where(c.wall, packing.radius[c.i] - c.overlap, c.distance)
-    return np.asarray(reach[:, None] * c.normal[:, :2])
-
-
-def _cell(packing: HasConfiguration) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """Edges of the box in rows, its lower corner, and along which edges it is periodic."""
-    configuration = packing.configuration
-    cell = configuration.box[:2, :2].copy()
-    cell[~cell.any(axis=1)] = np.eye(2)[~cell.any(axis=1)]  # an open side may have no length
-    return cell, configuration.origin[:2], configuration.periodic[:2]
-
-
-def _walls(packing: HasConfiguration) -> tuple[Wall, ...]:
-    """The floor of a packing; the walls that disks of a snapshot touch."""
-    if isinstance(packing, Packing):
-        return (Wall(1, 1.0, 0.0),)
-    c = packing.configuration.contacts
-    at = np.flatnonzero(c.wall)
-    normal, axis = c.normal[at, :2], np.argmax(np.abs(c.normal[at, :2]), axis=1)
-    sign = np.sign(normal[np.arange(len(at)), axis])
-    place = packing.position[c.i[at], axis] - sign * (packing.radius[c.i[at]] - c.overlap[at])
-    sides = sorted({*zip(axis.tolist(), sign.tolist(), strict=True)})
-    return tuple(Wall(a, s, float(np.mean(place[(axis == a) & (sign == s)]))) for a, s in sides)
-
-
-def _frame(
-    packing: HasConfiguration,
-    position: Floats,
-    cell: Floats,
-    origin: Floats,
-    periodic: Any,
-    walls: tuple[Wall, ...],
-) -> tuple[Floats, Floats]:
-    """Lower left and upper right corner of a picture: the box where it is periodic, else what lies in it."""
-    reach, largest = packing.radius[:, None], packing.radius.max()
-    low, high = (position - reach).min(axis=0), (position + reach).max(axis=0)
-    if isinstance(packing, Packing):
-        low[1] = -0.3 * largest
-        high[1] += (1.5 if packing.fx or packing.fy else 0.3) * largest
-    else:
-        for wall in walls:
-            (low if wall.sign > 0 else high)[wall.axis] = wall.place
-        low, high = low - 0.3 * largest, high + 0.3 * largest
-    corners = origin + np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) @ cell
-    return np.where(periodic, corners.min(axis=0), low), np.where(periodic, corners.max(axis=0), high)
-
-
-def _edges(cell: Floats, origin: Floats, periodic: Any, low: Floats, high: Floats, walls: tuple[Wall, ...]) -> Floats:
-    """Lines at which a picture repeats, shape (e, 2, 2)."""
-    if all(periodic):
-        a, b, c, d = (origin + np.array(corner) @ cell for corner in ((0, 0), (1, 0), (1, 1), (0, 1)))
-        return np.array([[a, b], [b, c], [c, d], [d, a]])
-    begin, end = low.copy(), high.copy()
-    for wall in walls:
-        (begin if wall.sign > 0 else end)[wall.axis] = wall.place
-    lines = [[[low[0], begin[1]], [low[0], end[1]]], [[high[0], begin[1]], [high[0], end[1]]]] if periodic[0] else []
-    lines += [[[begin[0], low[1]], [end[0], low[1]]], [[begin[0], high[1]], [end[0], high[1]]]] if periodic[1] else []
-    return np.array(lines).reshape(-1, 2, 2)
 
 
 class PackingArtist:
@@ -251,7 +108,7 @@ class PackingArtist:
         self.disks = self._disks(axes)
         self.widest = 0.5 * packing.radius.min() * self.points
         self.chains = self._chains(axes, color)
-        corners = [wall.corners(self.view) for wall in self.view.walls]
+        corners = [self.view.part_of(wall) for wall in self.view.walls]
         floor = PolyCollection(corners, facecolors=FLOOR, linewidths=0, zorder=4, label="floor")
         axes.add_collection(floor)
         if len(self.view.edges):

@@ -70,14 +70,16 @@ def _curve(load: Floats, eigenvalues: NDArray[np.complex128], coalescence: float
         load, eigenvalues = load[::-1], eigenvalues[::-1]
     mean, square = eigenvalues.mean(axis=1).real, ((eigenvalues[:, 0] - eigenvalues[:, 1]) ** 2).real
     if len(load) > 1:
-        load, mean, square = _between(load, mean, square, coalescence)
+        load, mean, square = _with_loads_between(load, mean, square, coalescence)
     root = 0.5 * np.sqrt(square.astype(np.complex128))
     below = np.where(square > 0, -root, root)
     rows = np.column_stack([load, mean + below, mean - below])
     return rows[::-1] if falls else rows
 
 
-def _between(load: Floats, mean: Floats, square: Floats, coalescence: float | None) -> tuple[Floats, Floats, Floats]:
+def _with_loads_between(
+    load: Floats, mean: Floats, square: Floats, coalescence: float | None
+) -> tuple[Floats, Floats, Floats]:
     """Loads, mean and D of a stretch, with loads in between that crowd at the roots of D."""
     mean_at = PchipInterpolator(load, mean)
     if coalescence is not None and load[0] < coalescence < load[-1]:

@@ -23,6 +23,7 @@ from faultgouge.analysis import Configuration
 from faultgouge.analysis.arrays import Floats
 
 from .style import BULK, EDGE, FLOOR, INK
+from .surroundings import walls_of
 
 AZIMUTH, ELEVATION = np.radians([-62.0, 16.0])
 """Where the eye is."""
@@ -75,8 +76,8 @@ def corners_of(configuration: Configuration) -> tuple[Floats, Floats]:
     across = configuration.periodic & (np.abs(configuration.box - np.diag(np.diag(configuration.box))).sum(axis=1) == 0)
     box = configuration.origin + np.diag(configuration.box)
     low, high = np.where(across, configuration.origin, low), np.where(across, box, high)
-    for axis, sign, place in walls_of(configuration):
-        (low if sign > 0 else high)[axis] = place
+    for wall in walls_of(configuration):
+        wall.cut(low, high)
     return low, high
 
 
@@ -90,18 +91,7 @@ def frame_of(configuration: Configuration, eye: Eye) -> Frame:
     return float(left), float(right), float(bottom), float(top)
 
 
-def walls_of(configuration: Configuration) -> list[tuple[int, float, float]]:
-    """Axis, side and place of each plane that spheres touch; planes along the axes alone."""
-    c = configuration.contacts
-    at = np.flatnonzero(c.wall & (np.abs(c.normal).max(axis=1) > 1 - 1e-9))
-    axis = np.argmax(np.abs(c.normal[at]), axis=1)
-    sign = np.sign(c.normal[at, axis])
-    place = configuration.position[c.i[at], axis] - sign * (configuration.radius[c.i[at]] - c.overlap[at])
-    sides = sorted({*zip(axis.tolist(), sign.tolist(), strict=True)})
-    return [(a, s, float(np.mean(place[(axis == a) & (sign == s)]))) for a, s in sides]
-
-
-def shaded(eye: Eye, place: Floats, radius: Floats, colour: Floats, frame: Frame) -> Floats:
+def shade_spheres(eye: Eye, place: Floats, radius: Floats, colour: Floats, frame: Frame) -> Floats:
     """Colours and opacity of every dot, shape (height, width, 4); `frame` is left, right, bottom, top."""
     left, right, bottom, top = frame
     size = (right - left) / DOTS_ACROSS
@@ -148,7 +138,7 @@ class SpheresArtist:
         self._surroundings(axes)
         if faces is None:
             faces = np.where(configuration.free[:, None], to_rgb(BULK), to_rgb(FLOOR))
-        balls = shaded(self.eye, configuration.position, configuration.radius, faces, self.frame)
+        balls = shade_spheres(self.eye, configuration.position, configuration.radius, faces, self.frame)
         axes.imshow(balls, extent=self.frame, zorder=1, interpolation="bilinear")
 
     def _surroundings(self, axes: Axes) -> None:
@@ -176,8 +166,7 @@ class SpheresArtist:
         """The bars of the contacts, from back to front."""
         c, eye = self.configuration.contacts, self.eye
         start = self.configuration.position[c.i]
-        reach = np.where(c.wall, self.configuration.radius[c.i] - c.overlap, c.distance)
-        end = start - reach[:, None] * c.normal
+        end = start - self.configuration.branch
         depth = 0.5 * (start + end) @ eye.into
         order = np.argsort(-depth)
         near = (depth.max() - depth) / (np.ptp(depth) or 1.0) if len(c) else depth

@@ -35,8 +35,8 @@ class EquilibriumSolver(Protocol[S]):
     def solve(self, load: float, below: S | None, beside: S | None, ahead: bool) -> S:
         """The equilibrium at a load that follows from the one `below`; None for where the path begins.
 
-        `beside` is another one near `below`, for an initial guess. `ahead` says that the load is larger than all so
-        far, so that the path goes on from the result; it raises a NoEquilibriumError where the packing flows.
+        `beside` is another one near `below`, for an initial guess. `ahead` says that the path goes on from the result,
+        at a load larger than all so far. A NoEquilibriumError says that the packing flows.
         """
 
     def close(self) -> None:
@@ -52,10 +52,12 @@ class LoadPath(Generic[E]):
         Finds each equilibrium.
     equilibria : sequence
         Those of the path that are known already, by increasing load.
+    onward : bool
+        Whether the solver may go on by other ways where the branch of equilibria ends.
     """
 
-    def __init__(self, solver: EquilibriumSolver[E], equilibria: Sequence[E] = ()) -> None:
-        self.solver = solver
+    def __init__(self, solver: EquilibriumSolver[E], equilibria: Sequence[E] = (), onward: bool = True) -> None:
+        self.solver, self._onward = solver, onward
         self.equilibria = list(equilibria)
         self._between: tuple[E | None, E] | None = None  # a kept one, and the last one found above it
 
@@ -67,7 +69,7 @@ class LoadPath(Generic[E]):
             return below.packing
         if not kept or load > kept[-1].fx:
             # from the kept ones alone, so that it does not depend on what is asked for in between
-            found = self.solver.solve(load, below, kept[-2] if len(kept) > 1 else None, ahead=True)
+            found = self.solver.solve(load, below, kept[-2] if len(kept) > 1 else None, ahead=self._onward)
             kept.append(found)
             return found.packing
         beside = self._between[1] if self._between and self._between[0] is below else None

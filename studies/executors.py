@@ -66,10 +66,10 @@ class Processes(Executor):
 
 @contextmanager
 def open_executor(workers: int | None, executor: Executor | None = None) -> Iterator[Executor | None]:
-    """An executor; None where this process computes by itself, or works for another rank.
+    """An executor; None if this process computes by itself, or has worked for another rank.
 
-    So many workers are processes, as many as there are cores for None; ranks of mpiexec take their place, and an
-    executor, which is not shut down, that of all of these.
+    The workers are processes, one for each core if `workers` is None. Under mpiexec its ranks replace the processes. An
+    executor that is given replaces both, and is not shut down.
     """
     number = cores() if workers is None else workers
     if executor is not None:

@@ -75,7 +75,7 @@ def keep_rows(path: Path, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, 
 class Rows:
     """Lines of one scene in a file, NAME.jsonl; lines of other scenes are left alone.
 
-    The section `beside` of the scene may change without making its lines worthless.
+    The section `beside` of the scene may change while the lines remain valid.
     """
 
     def __init__(self, path: Path, scene: Scene, beside: str) -> None:

@@ -17,7 +17,7 @@ from mpi4py import MPI
 
 from ..analysis.files.atomic_write import make_folder, write_json, write_text
 from ..figures.pages import render
-from ..figures.style import report_failure, save, save_as
+from ..figures.style import report_failure, save
 from ..pywrap import Scene
 from ..pywrap.scenes.units import real_units
 from .executors import Progress, Say, Share, open_executor
@@ -29,45 +29,11 @@ Figures = Mapping[str, Callable[[], Figure]]
 """Functions that draw the pictures, by file name."""
 
 
-def leave(
-    folder: Path,
-    package: str,
-    name: str,
-    result: Result,
-    page: Result,
-    figures: Figures,
-    say: Say,
-    keep: Callable[[Figure, Path], object] = save,
-) -> Path:
-    """Write what a study has found into its folder, and return the path of its page.
-
-    Parameters
-    ----------
-    package, name : str
-        `__package__` of the study, whose folder has the template NAME.md.j2, and NAME.
-    result : dict
-        What NAME.json holds.
-    page : dict
-        What the template names.
-    figures, say, keep
-        As of `draw_all`.
-    """
-    write_json(folder / f"{name}.json", result)
-    draw_all(figures, folder, say, keep)
-    write_text(folder / f"{name}.md", render(package, f"{name}.md.j2", **page))
-    return folder / f"{name}.md"
-
-
-def draw_all(figures: Figures, folder: Path, say: Say, keep: Callable[[Figure, Path], object] = save) -> None:
-    """Draw pictures, which `keep` saves under paths without ending; one that cannot be drawn costs a sentence alone."""
+def draw_all(figures: Figures, folder: Path, say: Say) -> None:
+    """Draw and save pictures; one that cannot be drawn costs a sentence alone."""
     for name, figure in figures.items():
         with report_failure(f"{name}.png", say):
-            keep(figure(), folder / name)
-
-
-def save_png(figure: Figure, stem: Path) -> None:
-    """Save a figure as PNG alone."""
-    save_as(figure, stem.with_suffix(".png"))
+            save(figure(), folder / name)
 
 
 class Work(NamedTuple):
@@ -86,17 +52,17 @@ class SceneStudy:
     Attributes
     ----------
     package, name : str
-        As of `leave`.
+        `__package__` of the study, whose folder has the template NAME.md.j2, and NAME.
     beside : str
-        A section of the scene that may change without making what was found worthless.
+        A section of the scene that may change while the stored rows remain valid.
     check : callable
         Raises SceneError for a scene without what is needed.
     compute : callable
-        Scene and `Work` to what NAME.json holds beside the scene and its units.
+        Scene, `Work` -> the contents of NAME.json but the scene and its units.
     figures : callable
-        From what NAME.json holds and the rows, what draws each picture.
+        Contents of NAME.json, rows -> the functions that draw the pictures.
     page : callable
-        From what NAME.json holds, what the template names beside `result`, which is that, and its `units`.
+        Contents of NAME.json -> the names of the template but `result`, which is these contents, and `units`.
     """
 
     package: str
@@ -138,5 +104,7 @@ class SceneStudy:
         real = real_units(scene)
         result = {"scene": scene.resolved(), "units": None if real is None else real.as_dict()} | found
         names = {"result": result, "units": result["units"], **self.page(result)}
-        leave(output, self.package, self.name, result, names, self.figures(result, rows), say)
+        write_json(output / f"{self.name}.json", result)
+        draw_all(self.figures(result, rows), output, say)
+        write_text(output / f"{self.name}.md", render(self.package, f"{self.name}.md.j2", **names))
         return result

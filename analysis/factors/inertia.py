@@ -74,7 +74,7 @@ def count_places(
 
 
 def places_of_numbers(places: Floats, numbers: NDArray[np.int64], wanted: NDArray[np.int64]) -> Floats:
-    """Where the eigenvalues of some numbers begin, by interpolation between the counts."""
+    """Places below which there are as many eigenvalues as wanted, interpolated between the counts."""
     from scipy.interpolate import PchipInterpolator
 
     numbers, last = np.unique(numbers[::-1], return_index=True)

@@ -96,5 +96,5 @@ class SymmetricFactors:
 
 
 def _places(*arrays: NDArray[Any]) -> list[int]:
-    """Where arrays are in memory."""
+    """Addresses of arrays in memory."""
     return [array.ctypes.data for array in arrays]

@@ -207,7 +207,7 @@ class SparseSolver:
         return step
 
     def _solve_with_factors(self, force: Floats) -> Floats | None:
-        """The solution with the factors at hand; None without any, and if they are of no use."""
+        """The solution with the factors at hand; None without factors, or if they give no solution."""
         if self._factors is None:
             return None
         exact = self.own and self._factors.exact

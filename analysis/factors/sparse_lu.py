@@ -156,7 +156,7 @@ def _mumps() -> Any:
 
 
 _LOCK = RLock()
-"""Held by who makes, uses or frees factors of MUMPS, which has variables that all of them share."""
+"""Lock on MUMPS, whose factors share variables: held while factors are made, used or freed."""
 
 
 class MumpsFactors:
@@ -170,7 +170,7 @@ class MumpsFactors:
     """
 
     SINGULAR = (-6, -10)
-    """What MUMPS calls a matrix without factors, by its structure and by its numbers."""
+    """Errors of MUMPS for a matrix without factors: singular by its structure, and by its numbers."""
 
     def __init__(self, matrix: csc_array, symmetric: bool) -> None:
         mumps = _mumps()

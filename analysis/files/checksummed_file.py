@@ -92,8 +92,8 @@ class SealedFile:
             self._unsaved = True
 
     @property
-    def is_complete(self) -> bool:
-        """Whether the stored file has everything."""
+    def saved(self) -> bool:
+        """Whether the stored file has all changes."""
         return not self._unsaved
 
     def save(self) -> None:

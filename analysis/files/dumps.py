@@ -25,13 +25,14 @@ from typing import TextIO
 
 import numpy as np
 
+from ..errors import PackingFileError
 from ..packing.compensated import exact_sum
 from ..packing.contacts import FLOOR, Contacts
 from ..packing.geometry import nearest_image
 from ..packing.law import MindlinLaw
 from ..packing.packing import Floats, Indices, Packing
-from .json_packing import PackingFileError
 from .plain_file import open_text, read_plain_text
+from .runfile_header import law_of_parameters
 
 DISK = {
     "id": ("id",),
@@ -156,10 +157,7 @@ def read_dump(
 def _law(given: Mapping[str, float], disks: Path) -> MindlinLaw:
     """The law of a sidecar file."""
     try:
-        kn, kt, mu = (given[name] for name in ("kn", "kt", "mu"))
-        more = {name: given[name] for name in ("exponent", "cn", "ct") if name in given}
-        rescaled, coulomb = bool(given.get("rescaled")), bool(given.get("coulomb"))
-        return MindlinLaw(kn, kt, mu, rescaled=rescaled, coulomb=coulomb, **more)
+        return law_of_parameters(given)
     except KeyError as error:
         sidecar = disks.with_suffix(".params")
         raise PackingFileError(f"The law of {disks} is not given: {sidecar} does not name {error}.") from None

@@ -36,7 +36,7 @@ except ImportError:
     ) from None
 
 FORMAT = "H5"
-"""What MDAnalysis calls files whose names end so; those of plain H5MD end in .h5md for MDAnalysis."""
+"""MDAnalysis's name of a format is the suffix of its files; its own suffix of H5MD is .h5md."""
 
 DISK_TYPES = "bed", "top"
 

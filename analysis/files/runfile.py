@@ -44,10 +44,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import PackingFileError
 from ..packing.contacts import Contacts
-from ..packing.law import MindlinLaw
 from ..packing.packing import Floats, Packing
 from .checksummed_file import SealedFile, new_file, write
-from .runfile_header import CHECKSUM, COMPACT, LAW_DEFAULTS, parameters_of, write_header
+from .runfile_header import CHECKSUM, COMPACT, law_of_parameters, parameters_of, write_header
 from .runfile_validation import equilibria
 
 if TYPE_CHECKING:
@@ -55,7 +54,7 @@ if TYPE_CHECKING:
 
 
 NONE_GIVEN = "none were given"
-"""What the attribute tangential_forces of older files says of slips that are not known."""
+"""The attribute tangential_forces of older files, where slips are not known."""
 
 
 class RunFile(SealedFile):
@@ -228,31 +227,28 @@ class RunFile(SealedFile):
     def _packing(self, frame: int) -> Packing:
         rows = self._file["observables/contacts/value"][frame]
         rows = rows[~np.isnan(rows[:, 0])]
-        parameters = self._file["parameters"]
+        parameters = {name: item[()] for name, item in self._file["parameters"].items()}
         low = self._file.get("observables/position_low")
         return Packing(
             position=self._file["particles/disks/position/value"][frame, :, :2],
-            radius=parameters["radius"][...],
+            radius=parameters["radius"],
             angle=self._file["observables/angle/value"][frame],
-            mass=parameters["mass"][...],
-            inertia_factor=parameters["inertia_factor"][()],
-            box_length=parameters["box_length"][()] if "box_length" in parameters else None,
-            top=parameters["top"][...].astype(np.bool_),
+            mass=parameters["mass"],
+            inertia_factor=parameters["inertia_factor"],
+            box_length=parameters.get("box_length"),
+            top=parameters["top"].astype(np.bool_),
             contacts=Contacts(
                 rows[:, 0].astype(np.int64),
                 rows[:, 1].astype(np.int64),
                 rows[:, 2],
                 rows[:, 3] if rows.shape[1] > 3 else None,
             ),
-            law=MindlinLaw(
-                *(parameters[name][()] for name in ("kn", "kt", "mu")),
-                **{name: parameters[name][()] for name in LAW_DEFAULTS if name in parameters},
-            ),
-            drag_time=parameters["drag_time"][()] if "drag_time" in parameters else None,
+            law=law_of_parameters(parameters),
+            drag_time=parameters.get("drag_time"),
             fx=self._file["observables/fx/value"][frame],
             fy=self._file["observables/fy/value"][frame],
             position_low=low["value"][frame] if low is not None else None,
-            spring=parameters["spring"][()] if "spring" in parameters else 0.0,
+            spring=parameters.get("spring", 0.0),
             slips_known="slips_known" not in parameters and self.attributes.get("tangential_forces") != NONE_GIVEN,
         )
 

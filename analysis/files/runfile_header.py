@@ -5,6 +5,7 @@ The format is described in :mod:`~faultgouge.analysis.files.runfile`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
@@ -23,31 +24,29 @@ CHECKSUM = {"fletcher32": True}
 """A checksum for every chunk, for readers other than this one."""
 
 LAW_DEFAULTS = {field.name: field.default for field in fields(MindlinLaw) if field.default is not MISSING}
-"""Parameters of the law that are in a file only if they are others than these."""
+"""Default parameters of the law, which a file need not have."""
 
 COMPACT = {"shuffle": True, "compression": "gzip", "compression_opts": 1, **CHECKSUM}
 """Filters of what is stored for every disk or contact: half the size, mostly from indices and equal leading bytes, at a
 few milliseconds for a thousand disks. Slower ones gain 3 % more."""
 
 
-def differing_parameters(law: MindlinLaw) -> dict[str, float]:
-    """Parameters of the law that are others than `LAW_DEFAULTS`."""
-    return {name: float(getattr(law, name)) for name, other in LAW_DEFAULTS.items() if getattr(law, name) != other}
+def law_parameters(law: MindlinLaw) -> dict[str, float]:
+    """kn, kt, mu, and the parameters of the law that differ from `LAW_DEFAULTS`."""
+    more = {name: float(getattr(law, name)) for name, other in LAW_DEFAULTS.items() if getattr(law, name) != other}
+    return {"kn": law.kn, "kt": law.kt, "mu": law.mu} | more
+
+
+def law_of_parameters(given: Mapping[str, Any]) -> MindlinLaw:
+    """The reverse of `law_parameters`; a KeyError if kn, kt or mu is missing."""
+    more = {name: given[name] for name in LAW_DEFAULTS if name in given}
+    return MindlinLaw(given["kn"], given["kt"], given["mu"], **more)
 
 
 def parameters_of(packing: Packing) -> dict[str, Any]:
-    """What never changes in a run, by its name below /parameters."""
-    law = packing.law
-    values = {
-        "radius": packing.radius,
-        "mass": packing.mass,
-        "top": packing.top,
-        "kn": law.kn,
-        "kt": law.kt,
-        "mu": law.mu,
-        "inertia_factor": packing.inertia_factor,
-    }
-    values |= differing_parameters(law)
+    """The constants of a run, by their names below /parameters."""
+    values: dict[str, Any] = {name: getattr(packing, name) for name in ("radius", "mass", "top", "inertia_factor")}
+    values |= law_parameters(packing.law)
     if packing.drag_time is not None:
         values["drag_time"] = packing.drag_time
     if packing.spring:

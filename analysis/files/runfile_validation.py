@@ -30,7 +30,7 @@ LARGEST_CHUNK = 1 << 30
 
 
 class _UnsoundError(Exception):
-    """What is wrong, in words."""
+    """A file is damaged; the message says in what."""
 
 
 def _require(sound: object, says: str) -> None:

@@ -94,7 +94,7 @@ class SpectrumSlice:
         return cls(shift, 0.0, np.zeros(0, complex), Modes.none(size))
 
     def between(self, low: float, high: float) -> Complexes:
-        """Those with a real part in [low, high)."""
+        """Eigenvalues with a real part in [low, high)."""
         return self.values[(self.values.real >= low) & (self.values.real < high)]
 
 

@@ -65,7 +65,7 @@ FREE_FORCE = 1e-12
 
 @dataclass(frozen=True)
 class Decay:
-    """What becomes of a random state.
+    """Fate of a random state.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Decay:
     needed: float | None
 
     def __str__(self) -> str:
-        """What it says."""
+        """The outcome in a sentence."""
         if self.grows:
             return f"motion from a random state grows, D as exp({self.growth_rate:.2g} t)"
         if self.grows is False:

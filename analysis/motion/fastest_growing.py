@@ -199,7 +199,7 @@ class _Undamped:
         return np.asarray(2 * np.abs(np.sqrt(values.astype(complex)).imag))
 
     def uncertainty(self, values: Complexes, residuals: Floats) -> Floats:
-        """What residuals may change the rates of eigenvalues by, if these are well conditioned."""
+        """Error of the rates by the residuals, for well-conditioned eigenvalues."""
         return residuals * np.sqrt(np.abs(values))
 
     def outstanding(self, chance: float) -> float:
@@ -349,7 +349,7 @@ class _Space:
 
 
 def _search(motion: Equation, step: Step, start: Floats, count: int) -> tuple[_Space, Krylov]:
-    """What grows over a time."""
+    """The motions that grow over a time, and the Krylov space in which they are found."""
     block = len(start)
     krylov = Krylov(step.apply, start, MOST_BLOCKS * block)
     blocks = FIRST_BLOCKS

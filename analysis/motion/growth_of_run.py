@@ -77,7 +77,7 @@ class GrowthOfRun:
 
     @property
     def says(self) -> str:
-        """What happened, in sentences."""
+        """The outcome in sentences."""
         with_friction = "" if self.weakened is None else f" with the friction weakened to mu = {self.weakened:.6g}"
         unstable = f"{_in_words(self.pairs, self.negative)}{with_friction}"
         if self.measured is None:
@@ -93,7 +93,7 @@ class GrowthOfRun:
         return f"{told}; the spectrum, {unstable}, predicts {self.predicted:.6g}: a difference of {off:+.2g} %."
 
     def as_dict(self) -> dict[str, object]:
-        """What JSON has: growth, or null with `why`."""
+        """Entries of JSON: growth, or null with `why`."""
         fit = self.measured
         growth = None
         if fit is not None:

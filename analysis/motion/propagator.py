@@ -81,7 +81,7 @@ class Propagator:
 
     @classmethod
     def of(cls, motion: LinearMotion, norm: Norm) -> "Propagator":
-        """That of a packing in one of the norms."""
+        """Propagator of a packing in one of the norms."""
         system, modes = motion.system, motion.modes
         root, size, energy = system.root_mass, len(system.active), system.energy_norm
         if not motion.dissipative and norm == "displacement":

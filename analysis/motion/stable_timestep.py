@@ -193,7 +193,7 @@ def rayleigh_timestep(configuration: Configuration) -> float | None:
 
 
 def _largest_mu(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> float:
-    """What mu does not exceed, by the largest sums of rows, 1 / time."""
+    """Upper bound of mu by the largest sums of rows, 1 / time."""
     k, c = (0.0 if matrix is None else _largest_row_sum(scale, matrix) for matrix in (stiffness, damping))
     return 0.5 * (c + float(np.sqrt(c * c + 4 * k)))
 

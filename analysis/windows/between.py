@@ -10,7 +10,7 @@ bends the levels: something may hide, too, if it may as the levels go on from th
 modes meets a third shows in the product :math:`(\lambda_1 - \lambda)(\lambda_2 - \lambda) = (\bar\lambda - \lambda)^2 -
 D / 4`, which is smooth where the two coalesce.
 
-**Two modes with dissipation** that nearly meet may begin to grow, and end to, between two loads at which neither grows.
+**Two modes with dissipation** that nearly meet may begin and cease to grow between two loads at which neither grows.
 Half the sum m of two eigenvalues and :math:`D = (s_1 - s_2)^2` are smooth even where both coalesce, so that
 :math:`m \pm \tfrac12\sqrt D` of the cubics tells what the modes do in between (`excursion`).
 """
@@ -38,7 +38,7 @@ Course = tuple[Space | None, Space | None]
 class Few(NamedTuple):
     """The few motions that may change on an increment.
 
-    `named` is how many there were to look at; the courses are of those that grow at one of the loads, or nearly do so.
+    `named` is the number of motions that were looked at; `courses` has those that grow, or nearly grow, at one load.
     """
 
     courses: Sequence[Course]
@@ -114,7 +114,7 @@ class LoadStep:
         return (below, above) if below.like(above) else None
 
     def hiding(self, narrowest: float) -> list[Ends] | None:
-        """Modes that may grow somewhere on a stretch wider than `narrowest`; None if that cannot be told."""
+        """Modes that may grow inside on a stretch wider than `narrowest`; None if that cannot be told."""
         return (self._modes_hiding if self.here.system.dissipative else self._pairs_hiding)(narrowest)
 
     def _modes_hiding(self, narrowest: float) -> list[Ends]:
@@ -204,10 +204,9 @@ class LoadStep:
 
 
 def stretch(below: Sequence[Space], above: Sequence[Space], limits: Limits = LIMITS) -> tuple[float, float]:
-    """Where modes may grow between two loads, or cease to, in another number than at both.
+    """The widest stretch between two loads on which another number of modes may grow than at both loads.
 
-    Returned are the width of the widest such stretch that is possible, force, zero if there is surely none, and the
-    load at which it is deepest.
+    Returned are its width, force, zero if there is surely no such stretch, and the load at which it is deepest.
     """
     (here, *_), (there, *_) = below, above
     span = there.fx - here.fx

@@ -26,7 +26,7 @@ Kind = Literal["coalescence", "hopf", "steady", "contact change", "start"]
 
 
 class LostPairError(FaultgougeError):
-    """A motion that can be followed no further: one sentence."""
+    """A motion cannot be followed to another load; the text is one sentence."""
 
     @classmethod
     def of(cls, space: Space, where: str) -> "LostPairError":
@@ -40,11 +40,11 @@ class LostPairError(FaultgougeError):
 
 
 class LostTrackError(FaultgougeError):
-    """The motions that grow at the begin of an increment are not those that grew at the end of the last one."""
+    """At the beginning of an increment other motions grow than at the end of the increment before."""
 
 
 class DoubtError(FaultgougeError):
-    """What happens on an increment is not known; `fx` is a load at which more is to be seen, if there is one."""
+    """What happens on an increment is in doubt; `fx` is a load inside at which to look, or None."""
 
     def __init__(self, fx: float | None = None) -> None:
         super().__init__("an increment is in doubt")
@@ -53,14 +53,14 @@ class DoubtError(FaultgougeError):
 
 @dataclass(frozen=True)
 class Edge:
-    """Where a motion begins to grow, or ends to.
+    """A load at which a motion begins or ceases to grow.
 
     Attributes
     ----------
     fx : float
         The load, force per top disk.
     error : float
-        Its uncertainty: that of the root, twice the scatter over the slope, or half of the bracket of a jump; and the
+        Uncertainty of the load: of a root twice the scatter over the slope, of a jump half of its bracket; plus the
         `load_error` of the equilibria. 0 at a "start".
     eigenvalue : float or complex
         Without dissipation the double eigenvalue (the real part of the pair if it does not coalesce there),
@@ -85,7 +85,7 @@ class Edge:
 
     @classmethod
     def between(cls, one: float, other: float, *spaces: Space) -> "Edge":
-        """The edge between two loads where the equilibrium jumps or a motion is not recognised: uncertain by half."""
+        """The edge half way between two loads, where the equilibrium jumps or a motion is not recognised."""
         last = spaces[-1]
         error, overlap = 0.5 * abs(other - one) + last.system.balance, min(each.overlap for each in spaces)
         return cls(0.5 * (one + other), error, last.mean, overlap, "contact change")
@@ -117,10 +117,10 @@ class Window:
     onset : Edge
         Where the motion begins to grow.
     end : Edge or None
-        Where it ends to; None if it grows at the largest load that was looked at.
+        Where the motion ceases to grow; None if it grows at the largest load that was looked at.
     path_error : float or None
-        What of the error of the onset comes from the increments in which the path of equilibria was taken, force. One
-        path cannot tell: None of a search, a number where another path was taken as well.
+        Part of the onset's error that comes from the increments of the path of equilibria, force. None until the path
+        has been taken once more, with other increments.
     """
 
     onset: Edge
@@ -134,37 +134,32 @@ class Window:
 
     @property
     def fx_end(self) -> float | None:
-        """Load at which it ends to."""
+        """Load at which the motion ceases to grow."""
         return None if self.end is None else self.end.fx
 
     @property
     def rounding_error(self) -> float:
-        """What of the error of the onset comes from rounding and from equilibria out of balance, force."""
+        """Part of the onset's error that comes from rounding and from equilibria out of balance, force."""
         return self.onset.error
 
     @property
     def error(self) -> float:
-        """Uncertainty of fx_onset, from rounding and from the path, as far as that is known."""
+        """Uncertainty of fx_onset: from rounding and, where known, from the path."""
         return self.onset.error + (self.path_error or 0.0)
 
     @property
-    def end_error(self) -> float | None:
-        """Uncertainty of fx_end."""
-        return None if self.end is None else self.end.error
-
-    @property
     def kind(self) -> Kind:
-        """What begins the window, as of `Edge`."""
+        """Kind of the edge at which the window begins."""
         return self.onset.kind
 
     @property
     def dissipative(self) -> bool:
-        """Whether it is one of motion with dissipation."""
+        """Whether the motion has dissipation."""
         return isinstance(self.onset.eigenvalue, complex)
 
     @property
     def eigenvalue(self) -> float:
-        """The double eigenvalue at the onset without dissipation, 1 / time^2; with it that of -s^2."""
+        """The double eigenvalue at the onset, 1 / time^2; with dissipation Re(-s^2)."""
         value = self.onset.eigenvalue
         return -((value**2).real) if isinstance(value, complex) else value
 
@@ -213,8 +208,8 @@ class SignChange(NamedTuple):
 def sign_change(value: Callable[[float], float], below: float, above: float, limits: Limits = LIMITS) -> SignChange:
     """Where a function of the load goes through zero, or jumps, between two loads at which it has opposite signs.
 
-    Where its signs there are the same, it is within rounding of zero at one of them: the root is that load, to within
-    the function over its slope.
+    If rounding makes both signs equal, the function is zero within rounding at one of the loads. That load is the root,
+    uncertain by the function over its slope.
     """
     ends = value(below), value(above)
     if ends[0] * ends[1] >= 0:
@@ -290,7 +285,7 @@ def follow_to(space: Space, system: System, limits: Limits = LIMITS) -> Space:
 
 
 def track(at: At, known: dict[float, Space], limits: Limits = LIMITS) -> Callable[[float], Space]:
-    """A motion at any load, followed from the nearest load where it is known, and then known."""
+    """A function of the load that follows a motion there from the nearest load in `known`, and adds it to `known`."""
 
     def look_at(fx: float) -> Space:
         if fx not in known:
@@ -302,7 +297,7 @@ def track(at: At, known: dict[float, Space], limits: Limits = LIMITS) -> Callabl
 
 
 def _follow_from(near: Sequence[Space], system: System, limits: Limits) -> Space:
-    """From the nearest of some loads; first from where the two nearest lead on a straight line."""
+    """The motion at another load: from a straight line through the two nearest loads, else from the nearest alone."""
     guess = near[0].extrapolate(near[1], system) if len(near) > 1 else None
     image = None if guess is None else guess.at(system, limits)
     return image if image is not None and image.like(near[0]) else follow_to(near[0], system, limits)

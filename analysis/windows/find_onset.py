@@ -34,7 +34,6 @@ def find_onset(
     forces: ArrayLike,
     *,
     dissipation: bool = False,
-    narrowest: float | None = None,
     modes: tuple[int, int] | None = None,
     first: bool = False,
     known: Callable[[Onset, float], None] = lambda onset, fx: None,
@@ -61,8 +60,6 @@ def find_onset(
         The increasing loads of the ramp, force per top disk.
     dissipation : bool
         Whether the packing's own dashpots and drag count. The onset without them is found as well, `Onset.undamped`.
-    narrowest : float, optional
-        Windows narrower than this are not looked for, force; by default as in `Limits`, `narrowest` and `finest`.
     modes : tuple of (int, int), optional
         Search these modes alone, and for their first window: numbers of the first one and of the first one beyond, by
         frequency, the lowest being 0, of the symmetric part at the load where the search stands. Parts that are
@@ -100,7 +97,7 @@ def find_onset(
     start = equilibrium(float(loads[0]))
     if dissipation and not start.damped:
         raise ValueError("The packing has no dissipation: find_onset without it is what it needs.")
-    search = _OnsetSearch(equilibrium, start, loads, narrowest, modes, first, ranks, folder, limits)
+    search = _OnsetSearch(equilibrium, start, loads, modes, first, ranks, folder, limits)
     with show_progress(watch):
         if not dissipation:
             return search.undamped_onset()
@@ -109,12 +106,11 @@ def find_onset(
 
 @dataclass(frozen=True, eq=False)
 class _OnsetSearch:
-    """What is searched, and how; fields as of `find_onset`, and the packing at the smallest load."""
+    """A search: the parameters of `find_onset`, and the packing at the smallest load."""
 
     equilibrium: Callable[[float], HasConfiguration]
     start: HasConfiguration
     loads: Floats
-    narrowest: float | None
     modes: tuple[int, int] | None
     first: bool
     ranks: Ranks
@@ -143,7 +139,6 @@ class _OnsetSearch:
             found = find_windows(
                 system,
                 self.loads,
-                narrowest=self.narrowest,
                 look=look,
                 first=self.first,
                 known=known,
@@ -152,8 +147,7 @@ class _OnsetSearch:
             return found[:1] if self.first else found, ()
         from .slices.first_window import first_window  # with libraries that nothing else needs
 
-        narrowest = self.narrowest or 0.0
-        one, doubtful = first_window(system, self.loads, self.modes, self.ranks, self.folder, narrowest, self.limits)
+        one, doubtful = first_window(system, self.loads, self.modes, self.ranks, self.folder, self.limits)
         return (one,) if one else (), doubtful
 
     def undamped_onset(self) -> Onset:

@@ -38,7 +38,7 @@ def find_windows(
     forces : array_like, shape (S,)
         The increasing loads.
     narrowest : float, optional
-        As of :func:`find_onset`.
+        Windows narrower than this are not looked for, force; by default as in `Limits`.
     look : callable, optional
         Two neighbouring loads -> further loads between them that are to be looked at; they may have no equilibrium.
     first : bool

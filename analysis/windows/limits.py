@@ -1,11 +1,11 @@
-"""Every size, share and tolerance of the search for complex pairs, with its reason."""
+"""Every size, share and tolerance of the search for windows, with its reason."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What the search takes for small, near, many and long; the defaults are meant for packings."""
+    """Sizes, shares and tolerances of the search; the defaults are meant for packings."""
 
     # Sizes at which the way changes
 
@@ -39,7 +39,7 @@ class Limits:
     changing: int = 1
     """How often an increment is divided in which a pair changes."""
     bent: int = 3
-    """The same where contacts open or close: levels then leave the straight line at loads that nobody knows."""
+    """As `changing`, where contacts open or close: levels then leave the straight line at unknown loads."""
     share: float = 0.47
     """Where an increment is divided: not in the middle, as the edges of models lie at round numbers."""
 
@@ -64,7 +64,7 @@ class Limits:
     steps: int = 40
     """Iterations before a shift is given up: a solution costs a hundredth of a dense decomposition."""
     steps_on: int = 12
-    """The same with the factors of a neighbour: four solutions a step, against a hundred for a factorisation."""
+    """As `steps`, with the factors of a neighbour: four solutions a step, against a hundred for a factorisation."""
     pace: int = 5
     """Steps by which the pace is judged: the iteration slows down while farther modes go, and then keeps its
     pace."""
@@ -139,7 +139,7 @@ class Limits:
     largest_cluster: int = 100
     """Modes of a cluster with dissipation; beyond, all modes take no longer."""
     largest_share: float = 1 / 3
-    """The same as a share of all modes, where that is more."""
+    """As `largest_cluster`, as a share of all modes; the larger of both counts."""
 
     # Slices of the spectrum
 

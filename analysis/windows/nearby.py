@@ -30,11 +30,11 @@ def nearest_mode(system: System, frequency: float) -> Space | None:
     for _ in range(LIMITS.inverse_steps):
         right, left = (inverse.solve(each, adjoint) for each, adjoint in ((right, False), (left, True)))
         right, left = right / np.linalg.norm(right), left / np.linalg.norm(left)
-    return Space(system, right, left).refined(shift)
+    return Space(system, right, left).refine(shift)
 
 
 def find_growing_near(system: System, point: complex, count: int) -> list[Space]:
-    """Those of the modes nearest to a point of the complex plane that grow, by shift and invert with ARPACK.
+    """The modes that grow among those nearest to a point of the complex plane, by shift and invert with ARPACK.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def find_growing_near(system: System, point: complex, count: int) -> list[Space]
     found: list[Space] = []
     for s, x in zip(shift + 1 / values, states[: system.size // 2].T, strict=True):
         if s.real > -1e-6 * abs(s):  # else it surely loses energy
-            mode = Space.of(system, x, x.conj(), s).refined(s)
+            mode = Space.of(system, x, x.conj(), s).refine(s)
             if mode is not None and mode.grows and mode.mean.imag >= 0:
                 found.append(mode)
     return found

@@ -39,7 +39,7 @@ Changes = Sequence[tuple[Space, Space]]
 """Motions that begin or end to grow on an increment, at its lower and at its upper load."""
 
 Sure = Callable[[Changes], bool]
-"""Whether these are certain to be all, each once."""
+"""Whether no motion begins or ceases to grow beside these, and each of them does so once."""
 
 
 class Screen(Protocol):
@@ -151,7 +151,7 @@ class Search:
             if not self.finished:
                 self._advance(middle[0], there, depth + 1)
         else:
-            self.open, ended = self._blunt(here, there)
+            self.open, ended = self._carry_undivided(here, there)
             self.closed += ended
 
     def _carry(self, here: System, there: System, depth: int) -> tuple[Open, list[Window]]:
@@ -176,7 +176,7 @@ class Search:
         self.open = [] if nothing else [(each, Edge.start(each)) for each in self.modes(here).growing]
 
     def _by_all_modes(self, here: System, there: System, depth: int) -> tuple[Open, list[Window]]:
-        """The same by all modes of both loads."""
+        """As `_carry`, by all modes of both loads."""
         lower, upper = self.modes(here), self.modes(there)
         if self.open is None:
             self._begin(here)
@@ -199,7 +199,7 @@ class Search:
     def _settle(
         self, here: System, there: System, courses: Sequence[Course], hiding: Sequence[Ends], sure: Sure
     ) -> tuple[Open, list[Window]]:
-        """What grows at the upper load, and the windows that end before.
+        """The motions that grow at the upper load, and the windows that end before.
 
         Motions that begin or end to grow are handed to `sure`, then edges are solved for and modes `hiding` looked at.
         """
@@ -207,8 +207,10 @@ class Search:
         begun: list[tuple[Space, Space]] = []
         ending: list[tuple[Space, Space, Edge]] = []
         for below, above in courses:
-            below = _sure(above.follow(here, self.limits)) if below is None and above is not None else _sure(below)
-            above = _sure(below.follow(there, self.limits)) if above is None else above
+            below = (
+                _require(above.follow(here, self.limits)) if below is None and above is not None else _require(below)
+            )
+            above = _require(below.follow(there, self.limits)) if above is None else above
             known = next((each for each in left if each[0].equals(below)), None)
             if known is not None:
                 left.remove(known)
@@ -223,7 +225,7 @@ class Search:
             if below.grows == above.grows:
                 watched.append(([below], [above]))
         for space, onset in left:
-            ahead = _sure(space.follow(there, self.limits))
+            ahead = _require(space.follow(there, self.limits))
             if ahead.grows:
                 raise DoubtError
             ending.append((space, ahead, onset))
@@ -238,7 +240,7 @@ class Search:
         return now, ended
 
     def _edge(self, below: Space, above: Space) -> Edge:
-        """Where a motion that grows at one of two loads begins to, or ends to, if it does so once."""
+        """Edge between two loads, at one of which a motion grows; in doubt unless growth begins or ends once."""
         try:
             edge, left, right = locate_edge(self.at, below, above, self.limits)
         except (LostPairError, NoEquilibriumError):
@@ -249,8 +251,8 @@ class Search:
                     raise DoubtError
         return edge
 
-    def _blunt(self, here: System, there: System) -> tuple[Open, list[Window]]:
-        """An increment that is not divided: an edge that cannot be solved for is uncertain by half of it."""
+    def _carry_undivided(self, here: System, there: System) -> tuple[Open, list[Window]]:
+        """Carry the windows over an increment that is not divided; an unsolved edge is uncertain by half of it."""
         left, now = list(self.open or []), []
         for space in self.modes(there).growing:
             origin = space.follow(here, self.limits)
@@ -261,13 +263,13 @@ class Search:
                 left.remove(known)
                 now.append((space, known[1]))
             else:
-                now.append((space, self._blunt_edge(origin, space, here, there)))
+                now.append((space, self._edge_or_half(origin, space, here, there)))
         return now, [
-            Window(onset, self._blunt_edge(space, space.follow(there, self.limits), here, there))
+            Window(onset, self._edge_or_half(space, space.follow(there, self.limits), here, there))
             for space, onset in left
         ]
 
-    def _blunt_edge(self, below: Space | None, above: Space | None, here: System, there: System) -> Edge:
+    def _edge_or_half(self, below: Space | None, above: Space | None, here: System, there: System) -> Edge:
         last = above or below
         assert last is not None
         if below is not None and above is not None and below.growth * above.growth < 0:
@@ -289,25 +291,25 @@ class Search:
         return known
 
 
-def _sure(space: Space | None) -> Space:
+def _require(space: Space | None) -> Space:
     if space is None:
         raise DoubtError
     return space
 
 
 def _growing_of(modes: Sequence[Space]) -> list[bool]:
-    """Of how many modes each does grow, in order."""
+    """Whether each mode grows, those that do not first."""
     return sorted(mode.grows for mode in modes)
 
 
 def other_growth(
     at: At, known: Sequence[list[Space]], narrowest: float, *, dipping: bool = False, limits: Limits = LIMITS
 ) -> list[Space] | None:
-    """Modes that nearly meet, at a load where not as many of them grow as at any of the loads where they are known.
+    """Modes that nearly meet, at a load at which another number of them grows than at each load where they are known.
 
-    None if there surely is none between these loads, but for stretches narrower than `narrowest`. A DoubtError is
-    raised if that is not known after `Limits.dips` looks, or if the modes cannot be followed; and, of a pair that has
-    to be `dipping`, if its discriminant does not dip where its slopes say so: these are then of loads too far apart.
+    None if there surely is no such load, but on stretches narrower than `narrowest`. A DoubtError is raised if that is
+    open after `Limits.dips` looks, or if the modes cannot be followed. For a pair that has to be `dipping` it is also
+    raised if the discriminant does not dip where its slopes say so: the loads are then too far apart.
     """
     places, ends = sorted(known, key=lambda each: each[0].fx), [_growing_of(each) for each in known]
     for _ in range(limits.dips):
@@ -360,7 +362,7 @@ def windows_along(
 
 
 def look_between(look: At, below: float, middle: float, above: float) -> list[System]:
-    """What is at a load in between, or at one beside it where that has no equilibrium; nothing if there is none."""
+    """The system at a load in between, or beside that load if it has no equilibrium; an empty list if none has."""
     for fx in (middle, 0.5 * (below + middle), 0.5 * (middle + above)):
         try:
             return [look(fx)]

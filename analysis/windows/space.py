@@ -66,9 +66,9 @@ class Space:
 
     @classmethod
     def of(cls, system: System, right: Any, left: Any, rate: complex = 0.0) -> "Space":
-        """That of a complex mode, or of two real ones, from right and left vectors in columns.
+        """The subspace of a complex mode, or of two real modes, from right and left vectors in columns.
 
-        With dissipation these are displacements x and y, and s is `rate`.
+        With dissipation the vectors are displacements x and y, and s is `rate`.
         """
         if system.damping is None:
             return cls(system, _real_plane(right), _real_plane(left))
@@ -106,7 +106,7 @@ class Space:
 
     @property
     def growth(self) -> float:
-        """What is positive where the motion grows: -D, 1 / time^4, or Re s, 1 / time."""
+        """A number that is positive where the motion grows: -D, 1 / time^4, or Re s, 1 / time."""
         return float(self.mean.real) if self.system.dissipative else -self.discriminant
 
     @cached_property
@@ -153,7 +153,7 @@ class Space:
 
     @property
     def definite(self) -> bool:
-        """Whether two modes are a real pair, or a complex one, by more than rounding; of one mode always."""
+        """Whether rounding leaves no doubt that two modes are a real or a complex pair; always so for one mode."""
         if self.system.dissipative:
             return True
         split = complex(self.mean, 0.5 * np.sqrt(abs(self.discriminant)))
@@ -188,7 +188,7 @@ class Space:
         return self.like(other)
 
     def closest(self, others: "Iterable[Space]") -> "Space | None":
-        """The one with the closest eigenvalues among others of the same shapes."""
+        """The subspace of the same shapes with the closest eigenvalues."""
         alike = [other for other in others if self.like(other)]
         return min(alike, key=lambda other: abs(other.mean - self.mean), default=None)
 
@@ -209,15 +209,15 @@ class Space:
         A single mode is sought from a `rate` on, by default from its s in first order.
         """
         guess = Space(system, self.right, self.left, self.inverse)
-        ways = _renewed(guess, rate, limits) if system.dissipative else _ways(self, guess, limits)
+        ways = _single_mode(guess, rate, limits) if system.dissipative else _two_modes(self, guess, limits)
         return next((found for found in ways if found is not None and found.like(self)), None)
 
-    def refined(self, rate: complex | None = None, limits: Limits = LIMITS) -> "Space | None":
+    def refine(self, rate: complex | None = None, limits: Limits = LIMITS) -> "Space | None":
         """The mode next to a guess of one, from a `rate` on; None if the iteration does not converge."""
-        return next(_renewed(self, rate, limits), None)
+        return next(_single_mode(self, rate, limits), None)
 
     def follow(self, system: System, limits: Limits = LIMITS) -> "Space | None":
-        """The same modes at another load, in small steps of the straight line between both where it has to be."""
+        """The same modes at another load, if need be in small steps on the straight line between both systems."""
         if system is self.system:
             return self
         moving, done, step = self, 0.0, 1.0
@@ -233,42 +233,46 @@ class Space:
         return moving
 
 
-def _renewed(guess: Space, rate: complex | None, limits: Limits) -> Iterator[Space | None]:
+def _single_mode(guess: Space, rate: complex | None, limits: Limits) -> Iterator[Space | None]:
     """A single mode: its s is the shift, renewed where the iteration is slow."""
     for _ in range(limits.shifts):
         shift, rate = guess.mean if rate is None else rate, None
         inverse = guess.system.inverse(shift * (1 + limits.off_eigenvalue), limits) if np.isfinite(shift) else None
         if inverse is None:
             return
-        found, planes = _iterate(guess.system, _bases(guess, inverse), limits.steps_on, limits, limits.slow)
+        found, planes = _iterate(guess.system, _inverse_iteration(guess, inverse), limits.steps_on, limits, limits.slow)
         if found:
             yield Space(guess.system, *planes)
             return
         guess = Space(guess.system, *planes)
 
 
-def _ways(pair: Space, guess: Space, limits: Limits) -> Iterator[Space | None]:
+def _two_modes(pair: Space, guess: Space, limits: Limits) -> Iterator[Space | None]:
     """Two modes: ways to their planes, the cheapest first."""
     system = guess.system
     if guess.inverse is not None:
-        yield _found(system, _bases(guess, guess.inverse), guess.inverse, limits.steps_on, limits)
+        yield _space_of(system, _inverse_iteration(guess, guess.inverse), guess.inverse, limits.steps_on, limits)
     scale = max(pair.spread, 1e3 * np.finfo(np.float64).eps * abs(pair.mean))
     for turn, offset in enumerate(limits.offsets):
         inverse = system.inverse(guess.mean + offset * scale, limits)
         if inverse is not None:
-            yield _found(system, _bases(guess, inverse), None if inverse.exact else inverse, limits.steps, limits)
+            yield _space_of(
+                system, _inverse_iteration(guess, inverse), None if inverse.exact else inverse, limits.steps, limits
+            )
         if turn == 0 and pair.growth > 0 and guess.growth > 0:
             inverse = system.inverse(complex(guess.mean, 0.5 * np.sqrt(guess.growth)), limits)
             if inverse is not None:
-                yield _found(system, _turned(guess, inverse), None, limits.steps, limits)
+                yield _space_of(system, _complex_inverse_iteration(guess, inverse), None, limits.steps, limits)
 
 
-def _found(system: System, bases: Iterator[Planes], inverse: Inverse | None, most: int, limits: Limits) -> Space | None:
+def _space_of(
+    system: System, bases: Iterator[Planes], inverse: Inverse | None, most: int, limits: Limits
+) -> Space | None:
     found, planes = _iterate(system, bases, most, limits)
     return Space(system, *planes, inverse) if found else None
 
 
-def _bases(guess: Space, inverse: Inverse) -> Iterator[Planes]:
+def _inverse_iteration(guess: Space, inverse: Inverse) -> Iterator[Planes]:
     """(Residual) inverse iteration of both bases, good through a coalescence."""
     v, u = guess.right, guess.left
     while True:
@@ -281,7 +285,7 @@ def _bases(guess: Space, inverse: Inverse) -> Iterator[Planes]:
         yield v, u
 
 
-def _turned(guess: Space, inverse: Inverse) -> Iterator[Planes]:
+def _complex_inverse_iteration(guess: Space, inverse: Inverse) -> Iterator[Planes]:
     """Inverse iteration of a complex pair with its own eigenvalue: with both members of it, in real numbers."""
     v, u = guess.right, guess.left
     while True:
@@ -292,9 +296,9 @@ def _turned(guess: Space, inverse: Inverse) -> Iterator[Planes]:
 def _iterate(
     system: System, bases: Iterator[Planes], most: int, limits: Limits, slow: float = np.inf
 ) -> tuple[bool, Planes]:
-    """The first bases whose residuals are rounding; the last ones once the pace says that there will be none in time.
+    """The first bases whose residuals are rounding; the last bases if the pace says that none will be in time.
 
-    Nor are more asked for once a step leaves more than the share `slow` of the residual.
+    The iteration also ends if a step leaves more than the share `slow` of the residual.
     """
     level, residuals = limits.residual * system.backward_error, []
     for planes in bases:

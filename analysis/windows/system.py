@@ -69,7 +69,7 @@ class System:
 
     @classmethod
     def of(cls, packing: HasConfiguration, dissipation: bool = False, limits: Limits = LIMITS) -> "System":
-        """That of a packing, without the contacts whose force is unknown."""
+        """The system of a packing, without the contacts whose force is unknown."""
         bearing = force_bearing(packing, limits)
         stiffness = mass_weighted(stiffness_matrix(bearing), bearing)
         damping = mass_weighted(damping_matrix(bearing), bearing) if dissipation else None
@@ -82,12 +82,12 @@ class System:
 
     @property
     def matrices(self) -> tuple[Any, ...]:
-        """All that describes it, A first."""
+        """A and, with dissipation, G."""
         return (self.stiffness,) if self.damping is None else (self.stiffness, self.damping)
 
     @cached_property
     def transposed(self) -> tuple[Any, ...]:
-        """The transposes of these."""
+        """The transposes of `matrices`."""
         return tuple(each.T for each in self.matrices)
 
     @property
@@ -105,7 +105,7 @@ class System:
 
     @cached_property
     def backward_error(self) -> float:
-        """u |Z|_F in displacements and velocities: what residuals are compared with."""
+        """u |Z|_F in displacements and velocities, the measure of residuals."""
         if self.damping is None:
             return self.rounding
         squares = self.stiffness.shape[0] + sum(float(np.sum(entries(each) ** 2)) for each in self.matrices)
@@ -141,7 +141,7 @@ class System:
         return System((1 - share) * self.fx + share * other.fx, *matrices, balance=max(self.balance, other.balance))
 
     def in_units_of(self, unit: float) -> "System":
-        """The same with A in some unit, 1 / time^2, that is a power of four: no digit changes."""
+        """The system with A in a unit, 1 / time^2, that is a power of four: no digit changes."""
         damping = None if self.damping is None else self.damping / np.sqrt(unit)
         return replace(self, stiffness=self.stiffness / unit, damping=damping)
 
@@ -195,7 +195,7 @@ def _dense_factors(matrix: Any) -> Callable[[Any, bool], Any] | None:
 
 
 def _sparse_factors(matrix: csc_array) -> Callable[[Any, bool], Any]:
-    """Solutions with a matrix or its adjoint; of a singular one with a rounding in place of the pivot."""
+    """Solutions with a matrix or its adjoint; a singular matrix gets a rounding on its diagonal."""
     try:
         factors = general_lu(matrix)
     except SingularMatrixError:
@@ -215,7 +215,7 @@ def to_dense(matrix: Operator) -> Floats:
 
 
 def halves(vectors: Any) -> tuple[Any, Any]:
-    """Displacements and velocities of states, or of what they are multiplied with from the left, in columns."""
+    """Displacements and velocities of right or left states in columns."""
     size = len(vectors) // 2
     return vectors[:size], vectors[size:]
 
@@ -223,8 +223,7 @@ def halves(vectors: Any) -> tuple[Any, Any]:
 def unit_of(system: System) -> float:
     """A power of four of the size of the largest element of A, 1 / time^2.
 
-    A search divides A by this unit, since what is rough in a search squares A in single precision, which goes from
-    1e-38 to 1e38.
+    A search divides A by this unit: its screens square A in single precision, which goes from 1e-38 to 1e38.
     """
     largest = float(np.abs(entries(system.stiffness)).max(initial=0.0))
     return 4.0 ** int(np.floor(0.5 * np.log2(largest))) if largest > 0 else 1.0

@@ -1,6 +1,6 @@
 """What a scene includes, what it leaves out, why, and what each part costs: the command `explain`.
 
-`switches` runs a scene with and without a part, `parts` has what is told of one, `explain` puts this into words.
+`switches` runs a scene with and without a part, `cost_comparison` times both, `explanation_table` prints the result.
 
 May import: `faultgouge.analysis`, `faultgouge.pywrap`.
 """

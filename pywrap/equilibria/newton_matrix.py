@@ -43,7 +43,7 @@ class StiffnessFactors(NamedTuple):
     Attributes
     ----------
     solver : Solver
-        What solves with them.
+        Solves with the factors.
     expelled : ndarray of bool, shape (N,)
         Disks that a neighbour or two ran into and nothing else holds.
     """
@@ -95,7 +95,7 @@ def factor_stiffness(
 
 
 def _find_expelled(graph: ContactGraph, loaded: Booleans, old: Booleans | None) -> Booleans:
-    """Disks with one loaded contact, or with two that are both new, shape (N,)."""
+    """Disks with one loaded contact, or with two loaded contacts that are both new, shape (N,)."""
     count = graph.count(loaded)
     if old is None:
         return count == 1
@@ -110,7 +110,7 @@ def _band_matrix(band: Band, terms: Floats, idle: Booleans) -> BandSolver:
 
 
 def _stiffen_idle(diagonal: Floats, disk: Indices, idle: Booleans) -> Floats:
-    """The diagonal of K with a little more stiffness for idle disks, and next to nothing more for all others."""
+    """The diagonal of K with `CREEP` more stiffness for idle disks, and `AFLOAT` more for all others."""
     held = (1 + AFLOAT) * diagonal
     creeping = idle[disk]
     if creeping.any():

@@ -129,8 +129,8 @@ def equilibrate(
     force_tolerance : float, optional
         Residual at which the iteration stops. By default the iteration ends at the rounding floor.
     beside : Equilibrium, optional
-        Another equilibrium near the last, at another fx, whose displacement gives the initial guess. It changes the
-        result only within rounding.
+        Another equilibrium near the last, at another fx, whose displacement gives the initial guess. The guess changes
+        the result only within rounding.
     onward : bool
         Whether to try the methods in `ATTEMPTS` if halving the increment fails. By default the branch of equilibria
         ends there.
@@ -198,7 +198,7 @@ def _otherwise(
 
 
 def _at_rest(engine: Engine, start: Equilibrium, fx: float) -> Equilibrium | None:
-    """Where overdamped dynamics come to rest at fx; None where the layer flows on by a diameter, or creeps too long."""
+    """The rest of overdamped dynamics at fx; None if the layer flows on by a diameter, or creeps too long."""
     engine.restore(start.packing)
     engine.set_fx(fx)
     here, flown, steps = start.packing, 0.0, 0

@@ -104,7 +104,7 @@ class DriveState:
 
 @dataclass(frozen=True, eq=False)
 class DriveStep:
-    """What a driven run hands out with each row of its series.
+    """State that a driven run hands out with each row of its series.
 
     Attributes
     ----------

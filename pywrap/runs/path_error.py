@@ -2,32 +2,35 @@ r"""The part of an onset's error that comes from the path of equilibria.
 
 Friction remembers the path, and a ramp takes the path in finite increments h. Between two equilibria the slips advance
 along a straight line with the tangent at its middle: an error of order h^3 an increment, and so of h^2 at the onset. A
-contact that closes on the way begins without slip at the end of its increment: what it would have slipped before, up to
-all that it slips in one increment, is lost, and the error is of order h. Where a contact reaches the Coulomb bound or
-leaves it the order is the second, but the coefficient depends on where in an increment that happens.
+contact that closes within an increment begins without slip at the end of the increment. It loses the slip that it would
+have had by then, which is an error of order h. Where a contact reaches Coulomb's bound or leaves it the order is the
+second, but the coefficient depends on where in the increment that happens.
 
-So the path is solved once more, to the onset F_h found on the ramp, through every second load of the ramp. On this path
-the same pair of eigenvalues coalesces at F_2h. With the increments :math:`h_i` of either path, and no change of the
-contacts on the way, the error that is left out is
+**Contacts do not change.** The path is solved once more, to the onset F_h of the ramp, through every second load of the
+ramp. On this path the same pair of eigenvalues coalesces at F_2h. With the increments :math:`h_i` of either path the
+remaining error is
 
 .. math:: F_h - F = \frac{F_{2h} - F_h}{S_{2h}/S_h - 1}, \qquad S = \sum_i h_i^3,
 
-Richardson's extrapolation, for increments that need not be equal. The onset is given at F, and twice the largest
-difference that rounding of both onsets allows is its uncertainty. Where contacts change, nothing is extrapolated. The
-loads that are left out are then those after an increment with a change: a contact that closes there loses its slip
-over twice the increment. What is lost depends on where in its increment the contact closes, and so does where a rattler
-lies that two neighbours are about to seize: it is moved, by convention, when it is met. A path through loads that the
-ramp has may meet both as the ramp does, however small its increments are. Two more paths therefore have the increments
-of the ramp, moved up by a third and by two thirds of an increment. If a change at the share :math:`\varphi` of its
-increment makes an error :math:`c \varphi`, on these it makes :math:`c` times :math:`\varphi - 1/3` and
-:math:`\varphi - 2/3`, modulo 1, and the three onsets span :math:`2c/3`. A contact that closes becomes stiff soon: of an
-error that grows as the root of :math:`\varphi` they span :math:`0.42 c` at the least. Twice the span is therefore as
-large as :math:`c`, all that can be lost, or nearly so. Increments in which a contact begins to slide are as long on all
-of these. What they add, of order h^2, is seen on a path through the middles of all increments: three quarters of it.
-What is stated is the largest of :math:`|F_{2h} - F_h|`, twice the span, and :math:`2 |F_h - F_{h/2}|`.
+Richardson's extrapolation for increments that need not be equal. The onset is given at F. Its uncertainty is twice the
+largest difference that rounding of both onsets allows. A ramp with fewer than `FEWEST` increments up to the onset is
+compared with the path through the middles of its increments, which has the smaller S, by the same formula.
 
-Of a ramp that has fewer than `FEWEST` increments up to the onset the other path goes through the middles of the
-increments, too; its S is then the smaller one, and the same formula holds.
+**Contacts change.** Nothing is extrapolated, and three effects are bounded.
+
+- A contact that closes loses slip. The path through fewer loads leaves out the load after an increment with a change:
+  the contact then loses the slip of up to two increments, and :math:`|F_{2h} - F_h|` shows how much that is.
+- The loss depends on where in its increment the contact closes. So does the place of a rattler, which is moved when a
+  neighbour meets it. A path through loads of the ramp may meet both as the ramp does, however small the increments are.
+  Two more paths therefore have the increments of the ramp, moved up by a third and by two thirds of an increment. If a
+  change at the share :math:`\varphi` of its increment makes an error :math:`c \varphi`, the errors on these paths are
+  :math:`c` times :math:`\varphi - 1/3` and :math:`\varphi - 2/3`, modulo 1, and the three onsets span :math:`2c/3`. A
+  contact becomes stiff soon after it closes: of an error that grows as the root of :math:`\varphi` they span
+  :math:`0.42 c` at the least. Twice the span is therefore :math:`c`, the largest loss, or nearly so.
+- Increments in which a contact begins to slide are as long on all these paths. Their error, of order h^2, shows on a
+  path through the middles of all increments: :math:`F_h - F_{h/2}` is three quarters of it.
+
+The stated error is the largest of :math:`|F_{2h} - F_h|`, twice the span, and :math:`2 |F_h - F_{h/2}|`.
 """
 
 from __future__ import annotations
@@ -46,7 +49,7 @@ from ...analysis.arrays import Floats
 from ...analysis.windows import Space, System, Window, force_bearing
 from ...analysis.windows.nearby import nearest_mode
 from ..equilibria.quasistatic import Equilibrium
-from ..load_path import EquilibriumSolver, LoadPath
+from ..load_path import LoadPath
 from .nearby_root import nearby_root
 
 Vanishes = Callable[[Packing], float]
@@ -58,7 +61,7 @@ CARRIES = 1e-9
 """Normal force, in units of F_y, from which on a contact counts; that of a disk that carries nothing is noise."""
 
 FAILURES = NoEquilibriumError, OnsetError, ArpackError, LinAlgError
-"""What another path may end in: an onset that is known is worth more than the error of its path."""
+"""Errors of another path, which cost the error of the path alone and not the onset."""
 
 SHIFTS = 1 / 3, 2 / 3
 """Shares of an increment by which the loads of two other paths are moved up where contacts change."""
@@ -76,7 +79,7 @@ Where its coefficient changes sign along the path, the correction is wrong by mo
 
 @dataclass(frozen=True)
 class PathError:
-    """What the increments do to one onset.
+    """The effect of the increments on one onset.
 
     Attributes
     ----------
@@ -106,7 +109,7 @@ class PathError:
 
     @property
     def correction(self) -> float:
-        """What has to be added to F_h, force: 0 where it is no more than rounding, or contacts change."""
+        """Correction of F_h, force: 0 where the correction is no more than rounding, or contacts change."""
         if self.changes or not abs(self.shift) > 2 * self.rounding:
             return 0.0
         return -self.shift / self.weight
@@ -165,20 +168,6 @@ def with_path_error(
     return replace(onset, windows=tuple(map(whole, onset.windows)), undamped=undamped)
 
 
-@dataclass(frozen=True)
-class BranchSolver:
-    """A solver that takes no other way where the branch of equilibria ends, on the path through other loads."""
-
-    solver: EquilibriumSolver[Equilibrium]
-
-    def solve(self, load: float, below: Equilibrium | None, beside: Equilibrium | None, ahead: bool) -> Equilibrium:
-        """As of :class:`~faultgouge.pywrap.load_path.EquilibriumSolver`."""
-        return self.solver.solve(load, below, beside, ahead=False)
-
-    def close(self) -> None:
-        """The solver is that of the ramp."""
-
-
 class PathErrors:
     """The errors of the onsets of one ramp, which have the paths through other loads in common for the most part.
 
@@ -198,7 +187,7 @@ class PathErrors:
         )
 
     def error(self, fx: float, vanishes: Vanishes, rounding: float) -> PathError:
-        """What the increments do to the onset at fx, whose rounding error is known.
+        """The effect of the increments on the onset at fx, whose rounding error is known.
 
         Parameters
         ----------
@@ -257,7 +246,7 @@ class PathErrors:
         common = 0
         while common < min(len(inner), len(known) - 1) and known[common + 1].fx == inner[common]:
             common += 1
-        path = LoadPath(BranchSolver(self.path.solver), known[: common + 1])
+        path = LoadPath(self.path.solver, known[: common + 1], onward=False)
         try:
             for load in inner[common:]:
                 path(float(load))

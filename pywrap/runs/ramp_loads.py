@@ -64,9 +64,9 @@ def count_behind(settings: Ramp, reached: Floats) -> int:
         return count
     k = int(np.argmin(same))
     # `until` of one of the two is no multiple of the step, and the other one goes on from there
-    if k == len(reached) - 1 and k > 0 and _between(reached[k], wanted[k - 1], wanted[k]):
+    if k == len(reached) - 1 and k > 0 and _lies_between(reached[k], wanted[k - 1], wanted[k]):
         return k
-    if k == len(wanted) - 1 and k > 0 and _between(wanted[k], reached[k - 1], reached[k]):
+    if k == len(wanted) - 1 and k > 0 and _lies_between(wanted[k], reached[k - 1], reached[k]):
         return len(wanted)
     raise SceneError(
         f"the run has gone to F_x = {reached[k]:g} where ramp.until leads to F_x = {wanted[k]:g}: give another name "
@@ -74,5 +74,5 @@ def count_behind(settings: Ramp, reached: Floats) -> int:
     )
 
 
-def _between(load: float, one: float, other: float) -> bool:
+def _lies_between(load: float, one: float, other: float) -> bool:
     return bool(min(one, other) < load < max(one, other))

@@ -190,10 +190,6 @@ class Record:
             yield sample
         self._keep(name, samples, motions, None)
 
-    def append_motion(self, time: float, motion: MotionState) -> None:
-        """Write positions of an undamped run, series trajectory."""
-        self._append_motions([(time, motion)])
-
     def _known(self, name: str, kind: Callable[..., S]) -> tuple[list[S], Checkpoint | None]:
         """Lines of a series so far, and the state after them."""
         if self._file is None or name not in self._file.names_of_series:
@@ -214,14 +210,15 @@ class Record:
                 if samples:
                     columns = {key: [getattr(sample, key) for sample in samples] for key in vars(samples[0])}
                     self._file.append_series(name, **columns)
-                self._append_motions(motions)
+                self.append_motions(motions)
                 state: dict[str, Any] = {} if reached is None else {"step": reached.step, **reached.state}
                 self._file.put_checkpoint(**state)
             self._say_saved(f", and the series {name}" + (f" up to t = {samples[-1].time:g}" if samples else ""))
         samples.clear()
         motions.clear()
 
-    def _append_motions(self, motions: list[tuple[float, MotionState]]) -> None:
+    def append_motions(self, motions: list[tuple[float, MotionState]]) -> None:
+        """Write positions of an undamped run at some times, series trajectory."""
         if self._file is None or not motions:
             return
         low = [motion.position_low for _, motion in motions if motion.position_low is not None]
@@ -231,13 +228,13 @@ class Record:
     def _say_saved(self, more: str = "") -> None:
         """Say what the stored file holds, if it holds all."""
         file = self._file
-        if file is None or not file.is_complete or len(file) == 0:
+        if file is None or not file.saved or len(file) == 0:
             return
         goes_on = "is complete" if file.complete else "the same command continues from there"
         self._said(f"{self.path} holds {self._contents(file)}{more}; {goes_on}", self.path)
 
     def _contents(self, file: RunFile) -> str:
-        """What the file holds, in words."""
+        """The contents of the file, in words."""
         return f"{len(file)} equilibri{'um' if len(file) == 1 else 'a'}, the last at F_x = {file.fx[-1]:g}"
 
     def _attributes(self) -> dict[str, str | int | float]:
@@ -261,7 +258,7 @@ class Record:
 
 
 def _stored_steps(scene: Scene, disks: int, steps: Indices) -> Indices:
-    """Of the steps at which an undamped run is sampled those at which its positions are stored."""
+    """The steps, among those of the samples, at which an undamped run stores positions."""
     wanted = None if scene.output is None else scene.output.trajectory
     if wanted is not None:
         return steps if wanted else steps[:0]

@@ -67,7 +67,7 @@ class Checkpoint:
     step : int
         Time steps so far.
     state : dict of ndarray
-        The disks, see :meth:`~faultgouge.pywrap.Engine.state`.
+        The disks, as of :meth:`~faultgouge.pywrap.lammps.dynamics.Dynamics.state`.
     """
 
     step: int

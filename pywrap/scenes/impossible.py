@@ -33,9 +33,9 @@ STEPS_OF_A_YEAR = 1e13
 LARGEST_FILE = 1e13
 """10 TB."""
 BYTES_IN_MEMORY = 4000
-"""For each disk, at the least: LAMMPS, the matrices and their factors."""
+"""Bytes for each disk, at the least: LAMMPS, the matrices and their factors."""
 BYTES_WRITTEN = 150
-"""Of one equilibrium in run.h5, for each disk."""
+"""Bytes of one equilibrium in run.h5, for each disk."""
 
 SETTLING_STEPS = 100.0
 """Steps to rest, in units of the time step that F_y's own time has: 26,000 at k_n = 2e5, F_y = 3, as many for 30 disks
@@ -52,7 +52,7 @@ STEPS_TO_REST = 10_000_000
 SINKING_STEPS = 400_000
 """Steps after which they give up on a stage of a larger one."""
 LEAST_SETTLING_SHARE = 0.4
-"""Of `SETTLING_STEPS`, what a larger packing takes at the least in its first stage; and of `SETTLING_WITH_FRICTION`."""
+"""Share of `SETTLING_STEPS`, or `SETTLING_WITH_FRICTION`, that the first stage of a larger packing takes at least."""
 ROUNDING_LIMIT = 5e-5
 """Rounding of a force, in units of F_y, beyond which a bed never comes to the 1e-3 F_y that the first stage asks."""
 

@@ -25,7 +25,7 @@ from .units_section import Units, is_stress, quantity
 from .validation import SceneError, is_number
 
 Powers: TypeAlias = tuple[float, float, float]
-"""Of mass, length and time."""
+"""Powers of mass, length and time."""
 
 MASS: Powers = (1, 0, 0)
 LENGTH: Powers = (0, 1, 0)
@@ -69,7 +69,7 @@ DIMENSIONS: Mapping[str, Mapping[str, Powers | tuple[Powers, Powers]]] = {
     "trigger": {"omega": FREQUENCY, "time": TIME},
     "eruptions": {"load": FORCE, "time": TIME},
 }
-"""What each number of a scene is, or each pair of numbers; all others have no dimension."""
+"""Dimension of each number of a scene, or of each pair of numbers; all others have none."""
 
 WAVES = {"perturb": "amplitude", "drive": "scale"}
 """Sections with a wave, and their keys that are a velocity where the wave is on the floor."""

@@ -49,7 +49,7 @@ KEYS_TO_ADD = {
 
 
 MISSING_KEY_ADVICE = {"friction.v_ss": ', and the paper gives no value: give a velocity, or a multiple such as "10 v0"'}
-"""What is said of a key that is missing, where it is more than to add the key."""
+"""Advice for a missing key, where the advice is more than to add the key."""
 
 
 class SceneError(BadInputError):

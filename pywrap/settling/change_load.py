@@ -27,14 +27,7 @@ from ...analysis import NoEquilibriumError, Packing
 from ...analysis.progress import report_progress
 from ..equilibria.quasistatic import Equilibrium, equilibrate
 from ..lammps.engine import Engine
-from .minimize_energy import (
-    ABOVE_ROUNDING,
-    TOLERANCES,
-    contact_rounding,
-    is_minimum,
-    minimize_energy,
-    settle_loose,
-)
+from .minimize_energy import finest_tolerance, is_minimum, minimize_energy, settle_loose
 
 FACTOR = 1.05
 """Factor of F_y from one equilibrium to the next. Up to 25 times the load of the paper's packing, factors
@@ -112,5 +105,5 @@ def _rest(packing: Packing, communicator: MPI.Comm | None) -> Packing:
 def _relax(engine: Engine, packing: Packing) -> Packing:
     """Overdamped dynamics from a packing until forces are down at rounding."""
     engine.restore(packing)
-    engine.relax(max(TOLERANCES[-1] * packing.fy, ABOVE_ROUNDING * contact_rounding(packing)))
+    engine.relax(finest_tolerance(packing))
     return engine.packing

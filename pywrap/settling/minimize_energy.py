@@ -98,7 +98,7 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
         steps ran out.
     """
     if loose.law.frictional or len(loose) <= DYNAMICS_DISKS:
-        finest = max(TOLERANCES[-1] * loose.fy, ABOVE_ROUNDING * contact_rounding(loose))
+        finest = finest_tolerance(loose)
         if bed:
             engine.settle(finest)
         else:
@@ -208,9 +208,14 @@ def _stiffest(packing: Packing) -> float:
     return float(packing.law.normal_stiffness(packing.law.overlap_of_force(packing.fy)))
 
 
-def contact_rounding(packing: Packing) -> float:
-    """Change of the force of a contact that carries F_y when a coordinate changes by one unit in the last place."""
-    return _stiffest(packing) * float(np.finfo(float).eps * _width(packing))
+def finest_tolerance(packing: Packing) -> float:
+    """Largest force on a disk to which dynamics can bring a packing: the last tolerance, or rounding.
+
+    Rounding is the change of the force of a contact that carries F_y when a coordinate changes by one unit in the last
+    place.
+    """
+    rounding = _stiffest(packing) * float(np.finfo(float).eps * _width(packing))
+    return max(TOLERANCES[-1] * packing.fy, ABOVE_ROUNDING * rounding)
 
 
 def _width(packing: Packing) -> float:

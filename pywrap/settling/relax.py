@@ -17,7 +17,7 @@ from ...analysis.progress import Watch, show_progress
 from ..equilibria.quasistatic import Equilibrium, equilibrate, idle_disks
 from ..equilibria.rattlers import clear_rattlers
 from ..lammps.engine import Engine
-from .minimize_energy import ABOVE_ROUNDING, TOLERANCES, contact_rounding, largest_force, settle_loose
+from .minimize_energy import finest_tolerance, largest_force, settle_loose
 
 MOTION_LIMIT = 0.01
 """Displacement, in radii of the disk, from which a disk counts as moved."""
@@ -91,5 +91,5 @@ def _without(packing: Packing) -> Packing:
 
 def _with_friction(packing: Packing) -> Packing:
     with Engine(packing) as engine:
-        engine.relax(max(TOLERANCES[-1] * packing.fy, ABOVE_ROUNDING * contact_rounding(packing)))
+        engine.relax(finest_tolerance(packing))
         return engine.packing

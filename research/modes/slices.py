@@ -12,10 +12,12 @@ from typing import Any
 
 from faultgouge.analysis import dynamical_matrix, eigenvalues
 from faultgouge.studies.modes import PairCounts
-from faultgouge.studies.modes.count_in_slices import count_in_slices
-from faultgouge.studies.modes.count_pairs import DENSE_DISKS
 from faultgouge.studies.result_rows import append_row
 from research.modes.bounds import at_loads
+from research.modes.count_in_slices import count_in_slices
+
+DENSE_DISKS = 1000
+"""Disks up to which all eigenvalues are counted as well."""
 
 PACKINGS = {1000: 5, 3000: 5, 10_000: 1}
 LOADS = {1000: (0.03, 0.1), 3000: (0.01, 0.03, 0.1), 10_000: (0.01, 0.03)}

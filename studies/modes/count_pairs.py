@@ -19,9 +19,6 @@ pairs the vectors are computed, and decide.
 point, and no packing reaches such an equilibrium by itself. The loads of a packing end before this point ("turning
 point").
 
-**Large packings.** For more than `DENSE_DISKS` disks the pairs are counted in slices of the spectrum, with a stated
-error (:mod:`~faultgouge.studies.modes.count_in_slices`): the key pairs_error of a load.
-
 **A bound.** The imaginary part of an eigenvalue is at most the norm of the antisymmetric part, :math:`|\mathrm{Im}\,
 \lambda| \le |(A - A^T)/2|_2` with A the mass-weighted operator (Bendixson, Acta Math. 25, 359 (1902)): the key bound. A
 contact couples only two disks, so that the norm does not grow with the number of disks unless contacts become stiffer
@@ -54,6 +51,7 @@ from ...analysis import (
     growth_rate,
     nearest_modes,
     negative_eigenvalues,
+    spectrum,
     stiffness_matrix,
 )
 from ...analysis.motion.eigenvalues import (
@@ -64,15 +62,12 @@ from ...analysis.motion.eigenvalues import (
     mass_weighted,
     unit_rounding,
 )
+from ...analysis.motion.motion import SLICED
 from ...pywrap import Equilibrium, Scene
 from ...pywrap.load_path import LoadPath
 from ...pywrap.scenes.study_sections import ModesSection
 from ...pywrap.scenes.validation import require_section
 from ..packing_tools import Start, path_from
-from .count_in_slices import count_in_slices
-
-DENSE_DISKS = 1000
-"""Disks up to which all eigenvalues are computed: ten seconds a load, and 70 MB."""
 
 SWITCH_DISKS = 300
 """Disks up to which b is switched: three more decompositions a load."""
@@ -97,15 +92,12 @@ class PairCounts:
         Of each pair the frequency with positive real and imaginary part, fastest growing first, 1 / time.
     modes : int
         Number of eigenvalues.
-    error : int or None
-        Of the number of pairs, where these are counted in slices.
     negative : tuple of float
         The real negative eigenvalues, the most negative first, 1 / time^2.
     """
 
     omega: Complexes
     modes: int
-    error: int | None = None
     negative: tuple[float, ...] = ()
 
     @classmethod
@@ -136,10 +128,10 @@ def count_pairs(packing: Packing) -> PairCounts:
     packing : Packing
         In equilibrium.
     """
-    if len(packing) > DENSE_DISKS:
-        found, error = count_in_slices(packing)
-        size, negative = dynamical_matrix(packing)[0].shape[0], tuple(negative_eigenvalues(packing).tolist())
-        return replace(PairCounts.of(found), modes=size, error=error, negative=negative)
+    if packing.coordinates > SLICED:
+        found = spectrum(packing)
+        omega = np.sqrt([pair.eigenvalue for pair in found.pairs]).astype(np.complex128)
+        return PairCounts(omega, len(found.eigenvalues), tuple(found.negative.tolist()))
     values = eigenvalues(packing)
     rounding = unit_rounding(dynamical_matrix(packing)[0].data)
     surely = np.sqrt(SAFETY * rounding * np.abs(values).max(initial=0.0))
@@ -214,8 +206,8 @@ def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[s
     ----------
     scene : Scene
         With a section [ramp].
-    start : callable
-        mu -> the settled packing.
+    rest : Equilibrium
+        The settled packing.
     look : callable
         Packing -> the numbers of one load.
     """
@@ -254,8 +246,6 @@ def _load(packing: Packing) -> dict[str, Any]:
         "rattlers": len(packing.rattlers),
         "bound": antisymmetric_norm(packing),
     }
-    if found.error is not None:
-        row["pairs_error"] = found.error
     if len(found.omega):
         value = found.omega[0] ** 2
         pair = nearest_modes(packing, value * (1 + SHIFT_OFFSET), 1)

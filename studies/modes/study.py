@@ -28,11 +28,10 @@ MODES_COLUMNS = (
     "growth_rate",
     "omega",
     "least_q",
-    "pairs_error",
 )
 
 PACKING_KEYS = ("ends", "reach", "contacts")
-"""What modes.json has of a packing beside its loads."""
+"""Keys of a packing in modes.json besides its loads."""
 
 PANELS = 4
 """Loads whose frequencies are drawn side by side."""

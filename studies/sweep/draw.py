@@ -179,7 +179,7 @@ def _draw_median(axes: Axes, place: float, sample: SeedSample, highest: float, c
 
 
 def _symbols() -> list[Line2D]:
-    """What the legend shows."""
+    """The symbols of the legend."""
     return [
         Line2D([], [], linestyle="none", marker="o", mfc="none", ms=2.5, color="0.4", label="onset"),
         Line2D([], [], linestyle="none", marker="^", mfc="none", ms=2.5, color="0.4", label="none up to here"),

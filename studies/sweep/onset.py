@@ -24,11 +24,10 @@ from typing import Any, Literal
 import numpy as np
 from scipy.linalg import eigh, eigvals
 
-from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
-from ...analysis.motion.eigenvalues import active_coordinates
+from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, dynamical_matrix, find_onset
 from ...analysis.motion.nearest_modes import nearest_modes
 from ...analysis.packing.packing import Floats, Indices
-from ...analysis.windows import force_bearing, full_operator, takes_all_modes
+from ...analysis.windows import force_bearing, takes_all_modes
 from ...pywrap import Scene, SceneError
 from ...pywrap.equilibria.quasistatic import Equilibrium
 from ...pywrap.load_path import LoadPath
@@ -127,6 +126,5 @@ def _among_all(packing: Packing, rest: Packing, eigenvalue: float, plane: Floats
 
 def _dense(packing: Packing) -> tuple[Floats, Indices]:
     """A of the coordinates with stiffness, 1 / time^2, and their numbers."""
-    operator = full_operator(packing)
-    active = active_coordinates(operator)
-    return operator[active][:, active].toarray(), active
+    matrix, active = dynamical_matrix(force_bearing(packing))
+    return matrix.toarray(), active

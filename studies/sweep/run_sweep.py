@@ -229,7 +229,7 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
 
 
 def _common_request(folders: Sequence[Path]) -> dict[str, Any]:
-    """What the folders of a sweep ask for, whichever shard each has; SceneError if it is not the same."""
+    """The request of the folders of one sweep, whose shards may differ; SceneError if the requests differ."""
     asked = [_read_request(folder) for folder in folders]
     for folder, each in zip(folders, asked, strict=True):
         if each["version"] != asked[0]["version"]:

@@ -128,8 +128,8 @@ def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats)
     -------
     list of dict
         fx, distance, omega : F_x, 1 - F_x/F_x^c, and the angular frequency, 1 / time; predicted : a_c, a force, or an
-        acceleration of the floor; stationary : what it were, v_0/abs(H(omega)), without a transient; reached : when the
-        layer is fastest, time.
+        acceleration of the floor; stationary : a_c without the transient, v_0/abs(H(omega)); reached : when the layer
+        is fastest, time.
     """
     if growth_rate(packing) > 0:
         where = f"at F_x = {packing.fx:.10g}, below the onset," if packing.fx > 0 else "before any shear is added"
@@ -150,7 +150,7 @@ def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats)
 def map_predictions(
     scene: Scene, packings: Mapping[float, Packing], fx_c: float, distances: Iterable[float]
 ) -> Iterator[tuple[float, list[Row]]]:
-    """The predictions at each distance, the largest first; frequencies are those of the largest distance of all."""
+    """The predictions at each distance, the largest first, at the frequencies of the packing with the smallest load."""
     if packings:
         omegas = frequencies(packings[min(packings)], settings(scene))
         for distance in sorted(distances, reverse=True):
@@ -158,7 +158,7 @@ def map_predictions(
 
 
 def spread_over_map(predicted: list[Row], runs: int) -> list[Row]:
-    """A number of points of the map, spread over distances and frequencies."""
+    """So many points of the map, spread over distances and frequencies."""
     distances = sorted({each["distance"] for each in predicted}, reverse=True)
     rows = [sorted((p for p in predicted if p["distance"] == d), key=lambda p: p["omega"]) for d in distances]
     share = [runs // len(rows) + (k < runs % len(rows)) for k in range(len(rows))]
@@ -194,7 +194,7 @@ def bisect_amplitude(wave: Wave) -> Row:
 
 
 def _bracket(wave: Wave) -> tuple[float, float, int, float]:
-    """An amplitude that does not trigger, one that does, runs, and when the latter triggered."""
+    """An amplitude that does not trigger, one that triggers, the number of runs, and the time of the triggering."""
     predicted = wave.expected["predicted"]
     below, above = predicted * (1 - FIRST_BRACKET), predicted * (1 + FIRST_BRACKET)
     runs = 1

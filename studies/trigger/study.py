@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ...analysis.uncertain_digits import with_uncertainty
 from ...pywrap import Scene
 from ...pywrap.onset import onset_run
 from ...pywrap.scenes.units import real_units
@@ -76,16 +75,10 @@ def _onset(scene: Scene, work: Work) -> Row:
     if known is not None:
         return known
     work.say("onset")
-    mu, undamped = scene.law.mus[0], None
-    if scene.damping is None:
-        found = onset_run(scene, mu)
-        fx_c, error, says = found.fx_c, found.error, found.describe()
-    else:
-        run = onset_run(scene, mu, dissipation=True)
-        fx_c, error, undamped = run.fx_c, run.error, None if run.undamped is None else run.undamped.fx_c
-        says = f"F_x^c = {with_uncertainty(fx_c, error)}"
-    work.say(says)
-    return work.rows.append(kind="onset", fx_c=fx_c, error=error, undamped_fx_c=undamped)
+    found = onset_run(scene, scene.law.mus[0], dissipation=scene.damping is not None)
+    work.say(found.describe())
+    undamped = None if found.undamped is None else found.undamped.fx_c
+    return work.rows.append(kind="onset", fx_c=found.fx_c, error=found.error, undamped_fx_c=undamped)
 
 
 def _predict_map(scene: Scene, fx_c: float, work: Work) -> list[Row]:

@@ -50,8 +50,8 @@ EARLY = 2000
 early in a run, within a small share of its length."""
 
 FALL = 20_000
-"""The same of the run whose friction falls: within some twenty time steps after a thousand, and this many samples take
-each step up to there."""
+"""Such samples of the run whose friction falls. The friction falls within some twenty time steps after a thousand; so
+many samples include each step up to there."""
 
 SENSITIVE = 1e-2
 """Largest distance 1 - F_x/F_x^c at which the response is compared with its power law: further off, the pair is no
@@ -96,7 +96,7 @@ class Triggering:
     response : Response
         Of the linearised packing to that perturbation, time step included.
     foreseen : Forecast
-        Of the run with mu(v) after friction has weakened, by linear theory.
+        What linear theory says of the run with mu(v) after friction has weakened.
     outcome : TriggeringOutcome
         What the run with mu(v) shows.
     control_rate : float or None
@@ -141,14 +141,14 @@ class Sensitivity:
 
     @property
     def near(self) -> tuple[NormalForm, ...]:
-        """The pairs of which damping may take half of the response."""
+        """The pairs whose response damping may halve."""
         return tuple(pair for pair in self.pairs if pair.amplitude() >= LEAST_CROSSOVER)
 
     @property
     def plateaus(self) -> dict[str, float] | None:
-        """Ratio of the undamped amplitudes of the nearest and the furthest pair of `near`, and of their epsilon^(-1/2).
+        """Ratio of the undamped amplitudes of the nearest and the farthest pair of `near`, and ratio of epsilon^(-1/2).
 
-        None if there are no two.
+        None if `near` has fewer than two pairs.
         """
         if len(self.near) < 2:
             return None

@@ -23,8 +23,8 @@ from faultgouge.analysis import (
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.motion.modes import participation_ratio, rotation_share
 from faultgouge.figures import PairCurve, draw_packing, draw_pair, save
+from faultgouge.figures.disk_view import View
 from faultgouge.figures.mode import ModeShape, draw_modes
-from faultgouge.figures.packing import View
 
 
 @pytest.fixture(scope="module")

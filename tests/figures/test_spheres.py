@@ -7,7 +7,7 @@ from matplotlib.quiver import Quiver
 
 from faultgouge.analysis import Configuration, LinearisedContacts, normal_modes
 from faultgouge.figures import draw_mode, draw_packing
-from faultgouge.figures.spheres import AZIMUTH, DOTS_ACROSS, ELEVATION, LIGHT, Eye, shaded
+from faultgouge.figures.spheres import AZIMUTH, DOTS_ACROSS, ELEVATION, LIGHT, Eye, shade_spheres
 
 RED, BLUE = [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]
 FRAME = (-1.0, 1.0, -1.0, 1.0)
@@ -36,7 +36,7 @@ def test_the_nearer_sphere_hides_the_other_in_any_order():
     eye = Eye.at(AZIMUTH, ELEVATION)
     place = np.array([0.5 * eye.into, -0.5 * eye.into])  # the second is nearer
     for order in ([0, 1], [1, 0]):
-        dots = shaded(eye, place[order], np.full(2, 0.4), np.array([RED, BLUE])[order], FRAME)
+        dots = shade_spheres(eye, place[order], np.full(2, 0.4), np.array([RED, BLUE])[order], FRAME)
         red, _, blue, opaque = dots[len(dots) // 2, DOTS_ACROSS // 2]
         assert blue > red
         assert opaque == 1
@@ -45,7 +45,7 @@ def test_the_nearer_sphere_hides_the_other_in_any_order():
 
 def test_the_brightest_dot_faces_the_lamp():
     eye, radius = Eye.at(AZIMUTH, ELEVATION), 0.8
-    dots = shaded(eye, np.zeros((1, 3)), np.array([radius]), np.array([[0.5, 0.5, 0.5]]), FRAME)
+    dots = shade_spheres(eye, np.zeros((1, 3)), np.array([radius]), np.array([[0.5, 0.5, 0.5]]), FRAME)
     row, column = np.unravel_index(np.argmax(dots[..., 0]), dots.shape[:2])
     size = 2 / DOTS_ACROSS
     seen = np.array([-1 + size * (column + 0.5), 1 - size * (row + 0.5)]) / radius

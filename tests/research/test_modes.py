@@ -2,20 +2,24 @@
 
 import json
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from reference_layer import parted
+from reference_layer import SMALL, parted
 from scipy.stats import mannwhitneyu
 
-from faultgouge.pywrap import Scene
+from faultgouge.analysis.windows import LIMITS
+from faultgouge.pywrap import Engine, Scene, equilibrate, settle
 from faultgouge.pywrap.scenes.units import real_units
+from faultgouge.studies.modes import count_pairs
 from faultgouge.studies.statistics import median
 from faultgouge.studies.sweep.run_sweep import run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.tasks import TASKS
+from research.modes.count_in_slices import count_in_slices
 from research.modes.make import different
 from research.modes.packing_rows import condense, read_known
 from research.modes.page import critical, part, write_page
@@ -239,6 +243,16 @@ def test_counts_in_slices_are_within_their_errors():
     stated = re.search(r"Growth rates and least Q from slices are within ([\d.]+) %", REFEREE)
     assert stated
     assert max(off) < float(stated[1]) / 100 < 1.2 * max(off)
+
+
+def test_pairs_counted_in_slices_are_those_of_all_eigenvalues():
+    """Five slices of 60 disks, whose neighbours do not cover the spectrum."""
+    rest = settle(Scene.from_mapping(SMALL | {"packing": {"disks": 60, "width": 9.2, "seed": 77}}))
+    with Engine(rest.packing) as engine:
+        packing = equilibrate(engine, rest, fx=0.3).packing
+    (found, error), every = count_in_slices(packing, replace(LIMITS, own=35)), count_pairs(packing)
+    assert abs(len(found) - len(every.omega)) <= error <= 2
+    assert np.sqrt(found).imag.max() == pytest.approx(every.omega[0].imag, rel=1e-2)
 
 
 def shares_told(load, ratio, power=0.53):

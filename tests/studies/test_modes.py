@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from reference_layer import SMALL, toml
 
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, spectrum, stiffness_matrix
-from faultgouge.analysis.windows import LIMITS
+from faultgouge.analysis import Contacts, MindlinLaw, Packing, eigenvalues, spectrum, stiffness_matrix
 from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, settle
-from faultgouge.studies.modes.count_in_slices import count_in_slices
+from faultgouge.studies.modes import PairCounts
 from faultgouge.studies.modes.count_pairs import antisymmetric_norm, count_pairs, count_with_part_of_b, modes
 from research.modes.sets import sets
 
@@ -130,11 +129,14 @@ def test_displacements_that_lammps_would_refuse_end_no_ramp(name, seed):
     assert len(found["loads"]) >= 8
 
 
-@pytest.mark.slow
-def test_pairs_counted_in_slices_are_those_of_all_eigenvalues(loaded):
-    """Five slices of 60 disks, whose neighbours do not cover the spectrum."""
-    for packing in loaded:
-        (found, error), every = count_in_slices(packing, replace(LIMITS, own=35)), count_pairs(packing)
-        assert abs(len(found) - len(every.omega)) <= error
-        assert error <= 2
-    assert np.sqrt(found).imag.max() == pytest.approx(every.omega[0].imag, rel=1e-2)
+@pytest.mark.long  # ten seconds of LAPACK
+def test_pairs_of_a_large_packing_are_those_of_lapack():
+    scene = Scene.from_mapping(SMALL | {"packing": {"disks": 700, "width": 31.5, "seed": 1}})
+    rest = settle(scene)
+    with Engine(rest.packing) as engine:
+        packing = equilibrate(engine, equilibrate(engine, rest, fx=0.03), fx=0.06).packing
+    found, every = count_pairs(packing), PairCounts.of(eigenvalues(packing))
+    assert packing.coordinates > 2000
+    assert (found.modes, len(found.omega)) == (every.modes, len(every.omega))
+    assert found.omega == pytest.approx(every.omega, rel=1e-6)
+    assert len(found.omega) > 30

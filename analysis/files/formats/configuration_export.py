@@ -15,7 +15,7 @@ from ...configuration import Configuration
 from ...counted import counted
 from ...errors import BadInputError
 from ..atomic_write import replace_whole
-from .export_quantities import ModeVectors
+from .export_quantities import ModeVectors, sum_at_particles
 from .vtp import write_frame_list, write_poly_data, write_xml
 
 
@@ -57,6 +57,8 @@ def write_mode_frames(
     ----------
     path : Path
         An .xyz of many frames, or a .pvd, beside which a folder of .vtp is made.
+    configuration, mode : Configuration, ModeVectors
+        The particles, and the mode that moves them.
     count, periods : int
         Frames, and whole periods of the mode in them.
 
@@ -82,10 +84,9 @@ def _in_space(configuration: Configuration) -> Floats:
 
 
 def _of_particles(configuration: Configuration, modes: Sequence[ModeVectors]) -> dict[str, Floats]:
-    c, pair = configuration.contacts, ~configuration.contacts.wall
+    c = configuration.contacts
     count, pressure = (
-        np.bincount(c.i, weight, len(configuration)) + np.bincount(c.j[pair], weight[pair], len(configuration))
-        for weight in (np.ones(len(c)), c.normal_force)
+        sum_at_particles(np.add, len(configuration), c, each) for each in (np.ones(len(c)), c.normal_force)
     )
     values: dict[str, Floats] = {
         "radius": configuration.radius,
@@ -96,16 +97,11 @@ def _of_particles(configuration: Configuration, modes: Sequence[ModeVectors]) ->
         "load": configuration.load[:, 0],
         "net_force": configuration.net_force[:, 0],
         "net_torque": configuration.net_force[:, 1],
-        "normal_force": pressure.astype(np.float64),
-        "coordination": count.astype(np.float64),
+        "normal_force": pressure,
+        "coordination": count,
     }
     for mode in modes:
-        for name, moved in (
-            (mode.name, mode.displacement.real),
-            (f"{mode.name}_imag", mode.displacement.imag),
-        ):
-            if name == mode.name or np.any(moved):
-                values[name], values[f"{name}_rotation"] = configuration.vectors(moved)
+        values |= mode.fields(configuration.vectors)
     return values
 
 
@@ -113,9 +109,9 @@ def _poly_data(configuration: Configuration, position: Floats, modes: Sequence[M
     """Particles where they have been moved to, with the contacts that they have at rest."""
     c = configuration.contacts
     first, rest = position[c.i], _in_space(configuration)
-    reach = np.where(c.wall, configuration.radius[c.i] - c.overlap, c.distance)
-    numbers = {f"{mode.name}_eigenvalue": mode.eigenvalue.real for mode in modes}
-    numbers |= {f"{mode.name}_eigenvalue_imag": mode.eigenvalue.imag for mode in modes}
+    numbers: dict[str, float] = {}
+    for mode in modes:
+        numbers |= mode.numbers
     on_contacts = {
         "contact_i": configuration.ids[c.i].astype(np.float64),
         "contact_j": np.where(c.wall, 0, configuration.ids[np.maximum(c.j, 0)]).astype(np.float64),
@@ -126,7 +122,7 @@ def _poly_data(configuration: Configuration, position: Floats, modes: Sequence[M
         "contact_mobilised": configuration.mobilised,
     }
     moved = np.where(c.wall[:, None], 0.0, position[np.maximum(c.j, 0)] - rest[np.maximum(c.j, 0)])
-    second = rest[c.i] - reach[:, None] * c.normal + moved
+    second = rest[c.i] - configuration.branch + moved
     ends = np.stack([first, second], axis=1).reshape(-1, 3)
     return write_poly_data(position, ends, numbers, _of_particles(configuration, modes), on_contacts)
 

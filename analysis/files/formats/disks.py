@@ -34,7 +34,7 @@ NAMES = {
     "id": ("id",),
     "top": ("top",),
 }
-"""What a column may be called; further ones (diameter, density, x_low, y_low) have one name alone."""
+"""Names of columns; further columns (diameter, density, x_low, y_low) have one name each."""
 
 
 @dataclass(frozen=True, eq=False)

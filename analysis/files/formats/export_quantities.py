@@ -7,7 +7,7 @@ same double when it is read. Exports also show forces, mobilised friction and mo
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats
+from ...contacts import LinearisedContacts
+from ...packing.contacts import Contacts
 from ...packing.packing import Packing
-from ..runfile_header import differing_parameters
+from ..runfile_header import law_parameters
 from .disks import Slips
 
 PARAMETER_NAMES = (
@@ -45,13 +47,20 @@ class ModeVectors:
     displacement: NDArray[np.complex128]
 
     @property
-    def fields(self) -> dict[str, Floats]:
-        """Vectors, shape (N, 3), and rotations, shape (N,), by their names in a file."""
-        found = {}
+    def numbers(self) -> dict[str, float]:
+        """Real and imaginary part of the eigenvalue by their names in a file."""
+        return {f"{self.name}_eigenvalue": self.eigenvalue.real, f"{self.name}_eigenvalue_imag": self.eigenvalue.imag}
+
+    def fields(self, vectors: Callable[[Floats], tuple[Floats, Floats]] | None = None) -> dict[str, Floats]:
+        """Translations, shape (N, 3), and rotations by their names in a file; `vectors` is that of a Configuration.
+
+        Without it the rotations are those of disks, shape (N,).
+        """
+        found: dict[str, Floats] = {}
         for part, moved in (("", self.displacement.real), ("_imag", self.displacement.imag)):
             if not part or np.any(moved):
-                found[f"{self.name}{part}"] = in_space(moved[:2].T)
-                found[f"{self.name}{part}_rotation"] = moved[2]
+                translation, rotation = vectors(moved) if vectors else (in_space(moved[:2].T), moved[2])
+                found |= {f"{self.name}{part}": translation, f"{self.name}{part}_rotation": rotation}
         return found
 
 
@@ -84,9 +93,7 @@ class Frame:
 
 def scalars(packing: Packing) -> dict[str, float]:
     """Law, load and inertia by name, without absent values and defaults."""
-    law = packing.law
-    values = {"kn": law.kn, "kt": law.kt, "mu": law.mu}
-    values |= differing_parameters(law)
+    values = law_parameters(packing.law)
     if packing.drag_time is not None:
         values["tau"] = packing.drag_time
     if not packing.slips_known:
@@ -139,18 +146,19 @@ def disk_force(packing: Packing) -> Floats:
 
 def disk_pressure(packing: Packing) -> Floats:
     """Sum of the normal forces on each disk, shape (N,)."""
-    return _sum_at_disks(np.add, packing, packing.normal_force)
+    return sum_at_particles(np.add, len(packing), packing.contacts, packing.normal_force)
 
 
 def disk_mobilised(packing: Packing) -> Floats:
     """The largest |f_t|/(mu f_n) of the contacts of each disk, shape (N,)."""
-    return _sum_at_disks(np.maximum, packing, packing.mobilised)
+    return sum_at_particles(np.maximum, len(packing), packing.contacts, packing.mobilised)
 
 
-def _sum_at_disks(operation: np.ufunc, packing: Packing, values: Floats) -> Floats:
-    """Numbers of contacts, put together at their disks."""
-    found = np.zeros(len(packing))
-    pair = ~packing.contacts.floor
-    operation.at(found, packing.contacts.i, values)
-    operation.at(found, packing.contacts.j[pair], values[pair])
+def sum_at_particles(
+    operation: np.ufunc, count: int, contacts: Contacts | LinearisedContacts, values: Floats
+) -> Floats:
+    """Numbers of contacts put together at their particles, shape (N,)."""
+    found, pair = np.zeros(count), contacts.j >= 0
+    operation.at(found, contacts.i, values)
+    operation.at(found, contacts.j[pair], values[pair])
     return found

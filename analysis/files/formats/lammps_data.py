@@ -126,6 +126,6 @@ def box_lines(packing: Packing) -> list[str]:
 
 
 def box_heights(packing: Packing) -> tuple[float, float]:
-    """Where the box ends below and above, length: a layer that erupts has room for its own height twice more."""
+    """Lower and upper end of the box, length: a layer that erupts has room for its own height twice more."""
     margin = 4 * packing.radius.max()
     return -float(margin), float(3 * (packing.position[:, 1].max() + margin))

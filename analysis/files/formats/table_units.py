@@ -23,7 +23,7 @@ UNIT_HEAD = re.compile(r"\s*(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*")
 LENGTHS = ("x", "xu", "y", "yu", "z", "zu", "radius", "r", "diameter", "x_low", "y_low", "slip", "slip_low")
 ANGLES = ("angle", "theta", "d_theta")
 NO_UNIT = ("", "-", "1")
-"""What stands in brackets where there is no unit."""
+"""Texts in brackets that are no unit."""
 
 
 @cache
@@ -35,7 +35,7 @@ def registry() -> Any:
 
 
 def unit_factor(source: str, name: str, unit: str, into: str) -> float:
-    """What a column's numbers are multiplied by.
+    """Factor of the numbers of a column.
 
     Raises
     ------

@@ -113,24 +113,24 @@ def touching_nothing(disks: Disks) -> NDArray[np.bool_]:
 
 
 def layer_remark(disks: Disks, says: str | None, layer: NDArray[np.bool_]) -> str:
-    """What is to be said of disks that touch nothing, in the layer or above it; empty for none, or too many."""
+    """A remark on disks that touch nothing, in the layer or above it; empty for none, or too many."""
     alone = touching_nothing(disks)
     if alone.mean() > 1 - FEW_TOUCH:
         return ""
     loose = disks.id[layer & alone].tolist()
     if loose:
-        return f"{len(loose)} of the {layer.sum()} disks of the upper layer touch nothing: {_listed(loose)}"
+        return f"{len(loose)} of the {layer.sum()} disks of the upper layer touch nothing: {_list_ids(loose)}"
     if says is None or not says.strip().isdecimal():
         return ""
     above = disks.id[alone & (disks.position[:, 1] > disks.position[layer, 1].min())].tolist()
     return (
-        f"--top {says} leaves out {len(above)} of the highest disks, which touch nothing: {_listed(above)}"
+        f"--top {says} leaves out {len(above)} of the highest disks, which touch nothing: {_list_ids(above)}"
         if above
         else ""
     )
 
 
-def _listed(ids: list[int]) -> str:
+def _list_ids(ids: list[int]) -> str:
     return ", ".join(map(str, ids[:LISTED])) + (", ..." if len(ids) > LISTED else "")
 
 

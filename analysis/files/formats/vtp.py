@@ -69,8 +69,8 @@ def _tree(frame: Frame, modes: list[ModeVectors]) -> Element:
         {} if packing.box_length is None else {"box_length": packing.box_length}
     )
     numbers |= frame.number
-    numbers |= {f"{mode.name}_eigenvalue": mode.eigenvalue.real for mode in modes}
-    numbers |= {f"{mode.name}_eigenvalue_imag": mode.eigenvalue.imag for mode in modes}
+    for mode in modes:
+        numbers |= mode.numbers
     on_disks, unknown = _of_disks(packing, modes), () if frame.whole else FORCES + SLIPS
     if frame.displacement is not None:
         on_disks["displacement"] = export_quantities.in_space(frame.displacement)
@@ -121,7 +121,7 @@ def _of_disks(packing: Packing, modes: list[ModeVectors]) -> dict[str, NDArray]:
         "mobilised": export_quantities.disk_mobilised(packing),
     }
     for mode in modes:
-        values |= mode.fields
+        values |= mode.fields()
     return values
 
 

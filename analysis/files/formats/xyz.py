@@ -98,7 +98,7 @@ def _write_columns(frame: Frame, modes: list[ModeVectors]) -> list[tuple[str, st
         columns.append(("displacement", "R", export_quantities.in_space(frame.displacement)))
     if packing.position_low is not None:
         columns += [("x_low", "R", packing.position_low[:, 0]), ("y_low", "R", packing.position_low[:, 1])]
-    columns += [(name, "R", values) for mode in modes for name, values in mode.fields.items()]
+    columns += [(name, "R", values) for mode in modes for name, values in mode.fields().items()]
     return columns
 
 

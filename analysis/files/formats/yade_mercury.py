@@ -1,6 +1,6 @@
-"""Text files of YADE_NAMES and MercuryDPM.
+"""Text files of YADE and MercuryDPM.
 
-**YADE_NAMES**, from yade.export.textExt: a line with the names of the columns, and one line for each sphere.
+**YADE**, from yade.export.textExt: a line with the names of the columns, and one line for each sphere.
 
     #format x_y_z_r_matId
     1.25    0.5    0    0.5    1
@@ -37,23 +37,23 @@ MERCURY_COLUMNS = {
 
 
 def read_yade(path: Path) -> Disks:
-    """Spheres of a text file of YADE_NAMES; the sides are open."""
+    """Spheres of a text file of YADE; the sides are open."""
     lines = lines_of(path)
     says = lines[0].split()
     names = [YADE_NAMES.get(name, name) for name in says[1].split("_")] if len(says) > 1 else []
     names = names[: names.index("attrs")] if "attrs" in names else names  # of any number, at the end
     if not {"x", "y", "z", "radius"} <= set(names):
         raise PackingFileError(
-            f"{path}, line 1: {lines[0]!r} names no columns x, y, z and r: export x_y_z_r from YADE_NAMES."
+            f"{path}, line 1: {lines[0]!r} names no columns x, y, z and r: export x_y_z_r from YADE."
         )
     rows = list(strip_comments(lines[1:], 2))
     if not rows:
         raise PackingFileError(f"{path} has no spheres.")
     columns = columns_of(path, rows, names, f"line 1 announces {len(names)}")
     if "id" in columns:
-        columns["id"] = columns["id"] + 1  # YADE_NAMES counts from 0, and here 0 is the floor
+        columns["id"] = columns["id"] + 1  # YADE counts from 0, and here 0 is the floor
     short = all(len(word.lstrip("-0.").partition("e")[0]) <= SIX_DIGITS for _, words in rows for word in words[:4])
-    remark = "its numbers have six digits, as YADE_NAMES writes them: overlaps are lost below that" if short else ""
+    remark = "its numbers have six digits, as YADE writes them: overlaps are lost below that" if short else ""
     return of_columns(str(path), columns, remark=remark)
 
 

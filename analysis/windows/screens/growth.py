@@ -1,4 +1,4 @@
-r"""Which modes may begin to grow, or end to, between two loads: perturbation theory, and small pencils of a few modes.
+r"""Which modes may begin or cease to grow between two loads: perturbation theory, and small pencils of a few modes.
 
 In an eigenbasis of the symmetric part of A at a load nearby, :math:`H = X^T A X` and :math:`\Gamma = X^T G X` are
 nearly diagonal. Mode k alone has :math:`s^2 + s \Gamma_{kk} + H_{kk} = 0`. The others add in second order
@@ -17,14 +17,13 @@ mode comes so close that :math:`|V_{kl}/g_{kl}|` exceeds `Limits.mixed` in betwe
 **A cluster is quiet** where no motion of it can be fed as much as it loses. On the axis, :math:`s = i\omega`, a unit
 vector x has :math:`x^H A_s x = \omega^2` and :math:`\omega\, x^H G x = |x^H A_a x|`, with the symmetric and the
 antisymmetric part of A. So nothing crosses the axis if :math:`\omega_0 G + i A_a` is positive definite, where
-:math:`\omega_0^2` is the lowest level of the cluster. Along the straight line between two loads that holds if it does
-at both ends; and as it goes on holding while :math:`A_a` is scaled down to zero, nothing grows there. A Cholesky
-factorisation tells.
+:math:`\omega_0^2` is the lowest level of the cluster. A form that is positive definite at two loads is so on the
+straight line between them, and remains so while :math:`A_a` is scaled down to zero. Nothing grows there, then. A
+Cholesky factorisation tells.
 
 **All other modes** are *suspects*. They form clusters with `Limits.margin` modes on either side. A cluster is a small
-pencil: that of vectors to which the modes outside are added in first order. It is a straight line between the loads,
-and all of its windows are found as those of a small system. The operator has the last word about what begins or ends
-there.
+pencil, projected on vectors to which the modes outside are added in first order. The pencil is taken as a straight line
+between the loads, and all of its windows are found as those of a small system. The full operator confirms them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -84,7 +83,7 @@ class Reduced:
     def bears(self) -> float:
         """Factor by which the antisymmetric part may surely grow before it feeds any motion of these modes.
 
-        Form of `Cluster.quiet`, of all modes of the basis.
+        The factor comes from the form of `Cluster.quiet`, taken for all modes of the basis.
         """
         feed = self.stiffness.coupling.astype(np.float64)
         loss = self.damping.coupling + np.diag(self.damping.diagonal)
@@ -109,18 +108,18 @@ class Reduced:
 
 @dataclass(frozen=True, eq=False)
 class Cluster:
-    """A small pencil between two loads, and how its vectors become those of all coordinates.
+    """A small pencil between two loads, with vectors that lift its motions to all coordinates.
 
     Attributes
     ----------
     loads : (float, float)
         The lower and the upper load.
     ends : ((ndarray, ndarray), (ndarray, ndarray)), shape (m, m)
-        The stiffness and the damping of its pencil at both of them.
+        Stiffness and damping of the pencil at either load.
     right, left : ndarray, shape (3N, m)
-        Its right and left vectors on all coordinates.
-    owned : (float, float)
-        Frequencies of the modes that are its own, 1 / time.
+        Right and left vectors on all coordinates.
+    own_range : (float, float)
+        Range of the frequencies that belong to this cluster and to no other, 1 / time.
     """
 
     loads: tuple[float, float]
@@ -165,7 +164,7 @@ class Cluster:
         return search
 
     def nearly_growing(self, modes: SystemModes, limits: Limits = LIMITS) -> list[Space]:
-        """Those of its modes at the upper load that grow, nearly do so, or grow a little beyond."""
+        """Own modes that grow or nearly grow at the upper load, or grow a little beyond that load."""
         near = np.flatnonzero(modes.values.real > limits.weak_damping * np.median(modes.values.real))
         found = [modes.space((int(k),)) for k in near if self.owns(modes.values[k].imag)]
         below, above = self.loads
@@ -177,7 +176,7 @@ class Cluster:
 
 
 class GrowthScreen:
-    """The motions that may begin or end to grow along a ramp, from one basis for as many increments as it serves."""
+    """The motions that may begin or cease to grow along a ramp, from one basis for as many increments as it serves."""
 
     def __init__(self, limits: Limits = LIMITS) -> None:
         self.limits = limits
@@ -186,7 +185,7 @@ class GrowthScreen:
         self._seen: tuple[System, Reduced] | None = None
 
     def __call__(self, here: System, there: System, known: Sequence[Space], depth: int) -> Few | None:
-        """What grows at the upper load among the modes of a few clusters, as the system itself has it.
+        """The modes of the system that grow at the upper load, sought where a few clusters announce them.
 
         None if the clusters are not known, or too many. A DoubtError says where a cluster has a window in between.
         """
@@ -204,7 +203,7 @@ class GrowthScreen:
         return Few([(None, mode) for mode in growing], len(clusters))
 
     def _guesses(self, cluster: "Cluster", there: System) -> list[tuple[Space, complex]]:
-        """Modes that grow in a cluster at the upper load, or nearly do so, where the search of the system begins."""
+        """Modes of a cluster that grow or nearly grow at the upper load: guesses for modes of the system."""
         search = cluster.search(self.limits)
         for each in search.closed:
             if each.kind != "start" and each.fx_end is not None and cluster.owns(each.frequency):
@@ -242,7 +241,7 @@ def reduce_system(basis: Basis, levels: Levels, system: System) -> Reduced:
 
 
 def shift_load(basis: Basis, here: System, reduced: Reduced, there: System) -> Reduced:
-    """What is reduced at one load, at another."""
+    """The reduced system at another load."""
     if here is there:
         return reduced
     return Reduced(
@@ -278,7 +277,7 @@ def group_clusters(
         ends = here[1].between(left, right), there[1].between(left, right)
         spread = np.zeros((2, basis.size, len(modes)))
         spread[0, basis.active], spread[1, basis.active] = basis.vectors @ right, basis.vectors @ left
-        own_range = _between(ordered, int(core[0])), _between(ordered, int(core[-1]) + 1)
+        own_range = _frequency_between(ordered, int(core[0])), _frequency_between(ordered, int(core[-1]) + 1)
         yield Cluster((here[0].fx, there[0].fx), ends, spread[0], spread[1], own_range)
 
 
@@ -302,7 +301,7 @@ def may_grow(here: Reduced, there: Reduced) -> Indices:
 
 
 def _mixing_and_third_order(here: Reduced, there: Reduced, frequency: Floats) -> tuple[Floats, Floats]:
-    """The largest |V/g| of each mode with another, and the scale of the third order of Im sigma, 1 / time^2."""
+    """The largest |V/g| of each mode with any other, and the scale of the third order of Im sigma, 1 / time^2."""
     frequency = np.nan_to_num(frequency).astype(np.float32)
     h = np.maximum(here.stiffness.largest, there.stiffness.largest)
     p = np.maximum(here.damping.largest, there.damping.largest) * np.maximum(frequency, frequency[:, None])
@@ -339,8 +338,8 @@ def _with_others(matrix: Floats, level: Floats, modes: Indices) -> Floats:
     return np.asarray(vectors)
 
 
-def _between(frequencies: Floats, first: int) -> float:
-    """Half-way between a mode and the one below, one mode more on either side being no harm; 0 or inf at the ends."""
+def _frequency_between(frequencies: Floats, first: int) -> float:
+    """The frequency half-way between a mode and the next one below; 0 or inf beyond the ends of the basis."""
     if first <= 0:
         return 0.0
     if first >= len(frequencies):

@@ -42,7 +42,7 @@ class UncoveredAxisError(FaultgougeError):
 
 @dataclass(frozen=True, eq=False)
 class Disc:
-    """What is known about a point of the imaginary axis.
+    """The eigenvalues about a point of the imaginary axis.
 
     Attributes
     ----------
@@ -142,11 +142,11 @@ class _Scaled:
 
     @property
     def largest_frequency(self) -> float:
-        """Of motions that grow: the feed allows no more beyond the largest undamped one."""
+        """A bound of the frequency of motions that grow: the largest undamped one, and what the feed adds to it."""
         return float(np.sqrt(1 + 0.25 * np.abs(self.feed).sum(axis=1).max() ** 2))
 
     def fastest_growth(self, low: float, high: float) -> float:
-        """What Re s does not exceed between two frequencies."""
+        """An upper bound of Re s between two frequencies."""
         fastest = float(np.sqrt(high**2 + max(0.0, self.softening)))
         if not low:
             return fastest
@@ -222,7 +222,7 @@ def _cover_axis(scaled: _Scaled) -> tuple[list[Space], list[Rectangle]]:
 
 def _solve(system: System, x: Complexes, s: complex, distance: float) -> list[Space]:
     """The mode of an eigenvalue that is nearly known; or those next to it that grow, where it is lost on the way."""
-    mode = Space.of(system, x, x.conj(), s).refined(s)
+    mode = Space.of(system, x, x.conj(), s).refine(s)
     if mode is not None and abs(mode.mean - s) < LIMITS.strayed * distance:
         return [mode]
     try:

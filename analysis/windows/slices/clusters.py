@@ -46,7 +46,7 @@ class SliceSearch(ABC):
     """
 
     locates = True
-    """Whether clusters tell where a window begins, and not only that one does."""
+    """Whether clusters tell where a window begins, and not only that it does."""
 
     def __init__(
         self,
@@ -65,14 +65,14 @@ class SliceSearch(ABC):
 
     @abstractmethod
     def look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[System]) -> SliceResult:
-        """What a basis announces between some places; A at the first of them is given in the basis."""
+        """The motions that a basis announces between some loads; `levels` are A at the first load."""
 
     @abstractmethod
     def growing_motion(self, candidate: Candidate, there: System) -> Space | None:
-        """The announced motion of the system itself at a load where it grows; None if it surely grows nowhere.
+        """The announced motion of the system itself at a load where the motion grows; None if it surely never grows.
 
-        `there` is the end of the increment. A DoubtError, a LostPairError or a NoEquilibriumError says that one cannot
-        tell.
+        `there` is the end of the increment. A DoubtError, a LostPairError or a NoEquilibriumError says that this is
+        open.
         """
 
     @property
@@ -131,12 +131,12 @@ class SliceSearch(ABC):
     # What clusters announce
 
     def candidates(self, places: Sequence[System], depth: int) -> list[list[Candidate]]:
-        """What the clusters of all ranks announce on each increment, by increasing onset."""
+        """The motions that the clusters of all ranks announce on each increment, by increasing onset."""
         increments = zip(*(each.candidates for each in self.found_by_all(places)), strict=True)
         return [sorted(chain(*each), key=lambda candidate: candidate.onset) for each in increments]
 
     def found_by_all(self, places: Sequence[System]) -> list[SliceResult]:
-        """What the slices of all ranks have, by the order of the spectrum; those of other searches are waited for."""
+        """Results of the slices of all ranks, in the order of the spectrum; waits for the slices of other searches."""
         first, stop = self.bases.range(places[0].matrices[0])
         while True:
             known = self._stored_slices(places)
@@ -148,7 +148,7 @@ class SliceSearch(ABC):
                 time.sleep(self.limits.wait)
 
     def _stored_slices(self, places: Sequence[System]) -> SlicePass:
-        """What other searches have left; nothing if bases are kept, as the increments beyond need these."""
+        """Results that other searches have left; none if bases are kept, since later increments need them."""
         matrix = places[0].matrices[0]
         if self.folder is None or self.bases.keeps(matrix):
             return NEW_PASS
@@ -156,7 +156,7 @@ class SliceSearch(ABC):
         return self.ranks.together(lambda: SlicePass.read(folder) if self.ranks.rank == 0 else NEW_PASS)[0]
 
     def _search_slices(self, places: Sequence[System], known: SlicePass) -> list[SliceResult]:
-        """What this rank's slices have, without those that are known."""
+        """Results of this rank's slices, without the slices that are known."""
         found: list[SliceResult] = []
         first, stop = self.bases.range(places[0].matrices[0])
         before = sum(each.size for each in known.borders)
@@ -184,7 +184,7 @@ class SliceSearch(ABC):
     def _confirm(
         self, candidates: list[Candidate], here: System, there: System, depth: int
     ) -> tuple[Window | None, list[System]]:
-        """The first window that one of the candidates has become; parts of the increment where that is in doubt."""
+        """The first window of the candidates; and parts of the increment, if that window is in doubt."""
         if not self.passed or self.passed[-1].fx != here.fx:
             self.passed.append(here)
         finest = depth == self.limits.depth
@@ -203,9 +203,10 @@ class SliceSearch(ABC):
             return []
 
     def _earliest(self, candidates: list[Candidate], there: System, finest: bool) -> tuple[Window | None, bool]:
-        """The first window of the system itself, and whether that is in doubt, at which the search ends.
+        """The first window of the system itself, and whether it is in doubt.
 
-        On the finest increments it goes on, and an error is raised if no window has been found beside it.
+        The search ends at a doubt. On the finest increments the search goes on, and raises the error behind the doubt
+        if it finds no window.
         """
         here = self.passed[-1]
         off = 2 * self.limits.reach  # of what clusters locate, in shares of the way or of the increment
@@ -233,7 +234,7 @@ class SliceSearch(ABC):
         return first, doubt
 
     def _window_of(self, candidate: Candidate, there: System, first: Window | None) -> Window | None:
-        """The window of the system itself in place of that of a cluster; None if it is none, or not the first."""
+        """Confirm a cluster's window with the system itself; None if there is none, or an earlier one is known."""
         inside = self.growing_motion(candidate, there)
         if inside is None or (first is not None and self.opens_later(inside, first)):
             return None

@@ -64,7 +64,7 @@ class Levels:
         return np.diag(diagonal) + self.coupling[cluster.modes, cluster.modes] + second
 
     def beyond(self, there: "Levels", share: float) -> "Levels":
-        """The levels at a share of the way to others and on, beyond 1, along a straight line."""
+        """The levels at a share, which may exceed 1, of the straight line to others."""
         return Levels(
             (1 - share) * self.diagonal + share * there.diagonal,
             np.float32(1 - share) * self.coupling + np.float32(share) * there.coupling,

@@ -18,7 +18,6 @@ def first_window(
     modes: tuple[int, int] | None = None,
     ranks: Ranks = ALONE,
     folder: Path | None = None,
-    narrowest: float = 0.0,
     limits: Limits = LIMITS,
 ) -> tuple[Window | None, Increments]:
     """The first window of a family of large systems, if there is one, and increments before it that are in doubt.
@@ -33,7 +32,7 @@ def first_window(
         fx -> System.
     loads : ndarray, shape (S,)
         The increasing loads of the ramp. Of loads beyond the one above the onset see `SliceSearch.along`.
-    modes, ranks, folder, narrowest, limits
+    modes, ranks, folder, limits
         As of :func:`~faultgouge.analysis.find_onset`.
 
     Raises
@@ -49,10 +48,6 @@ def first_window(
     def in_units(fx: float) -> System:
         return (start if fx == start.fx else system(fx)).in_units_of(unit)
 
-    search: SliceSearch
-    if start.dissipative:
-        search = SlicedGrowth(in_units, modes, ranks, folder, limits)
-    else:
-        search = SlicedPairs(in_units, modes, ranks, folder, narrowest, limits)
-    first, doubtful = search.first_window(loads)
+    kind: type[SliceSearch] = SlicedGrowth if start.dissipative else SlicedPairs
+    first, doubtful = kind(in_units, modes, ranks, folder, limits).first_window(loads)
     return None if first is None else first.in_units_of(unit), doubtful

@@ -68,7 +68,7 @@ class SlicedGrowth(SliceSearch):
         return place.stiffness.shape[0] <= self.limits.axis
 
     def ahead(self, done: int) -> int:
-        """More and more of them, as dissipation may put off the onset by much; each costs a tenth of the bases."""
+        """More and more increments, as dissipation may put off the onset by much; each costs a tenth of the bases."""
         return min(done + 1, self.limits.most_ahead)
 
     def first_window(self, loads: Floats) -> tuple[Window | None, Increments]:
@@ -230,9 +230,10 @@ class SlicedGrowth(SliceSearch):
         return mode if mode is not None and mode.grows else None
 
     def _beside(self, rate: complex, *places: System) -> Space | None:
-        """A motion that grows at one of some loads, about the frequency at which one was announced; None if none does.
+        """A motion that grows at one of some loads, about the announced frequency; None if there is none.
 
-        Where contacts change, a cluster does not know the shapes of modes any more, and announces what there is not.
+        Where contacts change, a cluster no longer knows the shapes of modes, and may announce a motion that is not
+        there.
         """
         try:
             for place in places:
@@ -244,7 +245,7 @@ class SlicedGrowth(SliceSearch):
         return None
 
     def _most(self, mode: Space, there: System) -> Space | None:
-        """The mode where it grows on an increment, by parabolas through Re s; None if it is seen to lose energy."""
+        """The mode at a load of the increment where it grows, by parabolas through Re s; None if it loses energy."""
         here = self.passed[-1]
         try:
             ends = [follow_to(mode, place, self.limits) for place in (here, there)]
@@ -292,7 +293,7 @@ def find_growing(cluster: Cluster, limits: Limits = LIMITS) -> Iterator[Candidat
 
 
 def make_candidate(onset: float, cluster: Cluster, mode: Space) -> Candidate:
-    """What is kept of a mode of a cluster, at its load."""
+    """The announced motion of a mode of a cluster, at its load."""
     right, left = (np.column_stack([each.real, each.imag]) for each in cluster.lift(mode))
     return Candidate(onset, mode.fx, right, left)
 
@@ -307,7 +308,7 @@ def predict_mode(candidate: Candidate, system: System) -> tuple[Space, complex]:
 
 
 def parabola_vertex(modes: Sequence[Space]) -> float:
-    """Where a parabola through Re s of three modes has its top; the best of them if it has none."""
+    """Load at the top of a parabola through Re s of three modes; load of the first if there is no top."""
     loads, rates = np.array([mode.fx for mode in modes]), np.array([mode.mean.real for mode in modes])
     scale = np.ptp(loads)
     curve, slope, _ = np.polyfit((loads - loads[0]) / scale, rates, 2)

@@ -11,8 +11,9 @@ serves the slice, and slices know nothing of each other, so that threads share t
 are as many as there are eigenvalues below :math:`\sigma`. So every eigenvalue of a slice has its number in the whole
 spectrum. Where two slices meet both must give the same eigenvalue the same number.
 
-Several ranks count together, and each finds a run of neighbouring slices (:mod:`~faultgouge.analysis.windows.ranks`) of
-those that no other search has found or taken (:mod:`~faultgouge.analysis.windows.slice_store`).
+Several ranks count together, and each finds a run of neighbouring slices
+(:mod:`~faultgouge.analysis.windows.slices.ranks`) of those that no other search has found or taken
+(:mod:`~faultgouge.analysis.windows.slices.store`).
 """
 
 from collections import deque
@@ -135,11 +136,11 @@ class _Spectrum:
         self.spare: list[Floats] = []  # memory for bases: fresh memory takes longer than a pass over it
 
     def below(self, shift: float) -> int:
-        """How many eigenvalues are below the shift."""
+        """Number of eigenvalues below the shift."""
         return self.factorise(self.matrix, shift)[1]
 
     def count_below(self, pool: ThreadPoolExecutor, shifts: Floats) -> list[int]:
-        """How many eigenvalues are below each of some shifts; all ranks know what each has counted."""
+        """Numbers of eigenvalues below some shifts; all ranks have the counts of all."""
         mine = shifts[self.ranks.part(len(shifts))]
         return [each for one in self.ranks.together(lambda: list(pool.map(self.below, mine))) for each in one]
 

@@ -7,15 +7,13 @@ its kind, so a pair is followed from inside of its window to the edge.
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from ...packing.packing import Floats
 from ...progress import report_progress
-from ..edges import At, DoubtError, LostPairError, follow_to
-from ..limits import LIMITS, Limits
+from ..edges import DoubtError, LostPairError, follow_to
 from ..screens.pairs import PairScreen, may_meet
 from ..search import other_growth, windows_along
 from ..space import Space
@@ -23,7 +21,6 @@ from ..system import System
 from ..system_modes import SystemModes
 from .clusters import SliceSearch
 from .eigenbasis import Basis, Levels, ModeCluster, width_and_mixing
-from .ranks import ALONE, Ranks
 from .store import Candidate, SliceResult
 
 Reached = tuple[float, Levels]
@@ -32,18 +29,6 @@ Reached = tuple[float, Levels]
 
 class SlicedPairs(SliceSearch):
     """The search for complex pairs."""
-
-    def __init__(
-        self,
-        at: At,
-        modes: tuple[int, int] | None = None,
-        ranks: Ranks = ALONE,
-        folder: Path | None = None,
-        narrowest: float = 0.0,
-        limits: Limits = LIMITS,
-    ) -> None:
-        super().__init__(at, modes, ranks, folder, limits)
-        self.narrowest = narrowest
 
     def look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[System]) -> SliceResult:
         """The pairs of a basis that turn complex in their clusters."""
@@ -66,7 +51,7 @@ class SlicedPairs(SliceSearch):
         increment = there[0] - here[0]
         before, after = (levels.block(cluster) for _, levels in (here, there))
         if len(before) < len(basis.active):
-            before, after = (_memory_exceeded(block, self.limits.excess) for block in (before, after))
+            before, after = (_with_larger_feed(block, self.limits.excess) for block in (before, after))
 
         def small(fx: float) -> System:
             share = (fx - here[0]) / increment
@@ -74,7 +59,7 @@ class SlicedPairs(SliceSearch):
 
         limits = replace(self.limits, root=self.limits.cluster)
         last = there[0] + self.limits.reach * increment
-        narrowest, screen = self._narrowest(increment), PairScreen(limits)
+        narrowest, screen = limits.finest * increment, PairScreen(limits)
         *_, (_, windows) = windows_along(small, np.array([here[0], last]), narrowest, screen, limits=limits)
         for window in windows:
             end = last if window.fx_end is None else window.fx_end
@@ -84,10 +69,6 @@ class SlicedPairs(SliceSearch):
             if cluster.owns(pair.right):
                 right, left = (basis.lift(cluster.modes, plane) for plane in (pair.right, pair.left))
                 yield Candidate(window.fx_onset, min(inside, there[0]), right, left)
-
-    def _narrowest(self, increment: float) -> float:
-        """The narrowest windows that are looked for on an increment, force."""
-        return max(self.narrowest, self.limits.finest * increment)
 
     def growing_motion(self, candidate: Candidate, there: System) -> Space | None:
         """The pair at a load where it is complex; None if it is surely real, or not before these loads are passed."""
@@ -107,14 +88,14 @@ class SlicedPairs(SliceSearch):
             inside = next((each for each in known if each.grows), None)
             if inside is not None:
                 return inside
-            narrowest = self._narrowest(there.fx - here.fx)
+            narrowest = self.limits.finest * (there.fx - here.fx)
             found = other_growth(self.at, [[each] for each in known], narrowest, limits=self.limits)
             return None if found is None else found[0]
         except LostPairError as error:
             raise DoubtError from error
 
 
-def _memory_exceeded(block: Floats, excess: float) -> Floats:
+def _with_larger_feed(block: Floats, excess: float) -> Floats:
     """The operator in a cluster with its antisymmetric couplings enlarged by what they may be in error."""
     width, mixing = width_and_mixing(block, np.diag(block))
     return block + excess * mixing**2 * width / len(block) * np.sign(block - block.T)

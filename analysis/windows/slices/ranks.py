@@ -40,11 +40,11 @@ class Ranks:
     workers: int = field(default_factory=cores)
 
     def part(self, count: int) -> slice:
-        """Which of so many neighbouring things are this rank's."""
+        """Range of neighbouring items that this rank has."""
         return slice(self.rank * count // self.size, (self.rank + 1) * count // self.size)
 
     def together(self, work: Callable[[], Mine]) -> list[Mine]:
-        """What the work of each rank gives, by rank.
+        """The results of the work of all ranks, by rank.
 
         Raises
         ------

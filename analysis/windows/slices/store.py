@@ -1,4 +1,4 @@
-"""What a search finds in the slices of a spectrum, and the folder that keeps it.
+"""Results of a search in the slices of a spectrum, and the folder that keeps them.
 
 A *pass* goes through all slices of the spectrum, for a few neighbouring loads. A slice of 100,000 disks takes 13 s, and
 leaves little: the pairs that may turn complex, and the eigenvalues that neighbouring slices must agree on. So each
@@ -68,12 +68,12 @@ class Border(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many modes the slice has."""
+        """Number of modes in the slice."""
         return self.modes[1] - self.modes[0]
 
     @classmethod
     def of(cls, number: int, values: Floats, own: slice) -> "Border":
-        """Of increasing eigenvalues, the first of which has this number in the spectrum; `own` are the slice's."""
+        """The border of a slice, from increasing eigenvalues, the number of the first, and which are its own."""
         near = values[max(0, own.start - 1) : own.stop + 1]
         beyond = float(values[own.stop]) if own.stop < len(values) else float("nan")
         modes = number + own.start, number + own.stop
@@ -176,15 +176,15 @@ class SlicePass:
 
     @property
     def borders(self) -> list[Border]:
-        """Those of the known slices."""
+        """The borders of the known slices."""
         return [each.border for each in self.found]
 
     @contextmanager
     def lock_slices(self) -> Iterator[Take]:
-        """What takes a slice if no other search has it; all are given back at the end.
+        """A function that takes a slice if no other search has it; at the end all slices are given back.
 
-        A taken slice is a byte of a file that is locked. The system unlocks what a process leaves that dies. Where
-        there are no locks, two searches find the same.
+        A taken slice is a locked byte of a file. The system unlocks the bytes of a process that dies. Where there are
+        no locks, two searches find the same.
         """
         folder = self.folder
         if folder is None:
@@ -236,7 +236,7 @@ NEW_PASS = SlicePass()
 
 
 def pass_folder(parent: Path, places: Sequence[System], modes: tuple[int, int], limits: Limits) -> Path:
-    """Where what is found on the increments between some loads is kept."""
+    """Folder of the results on the increments between some loads."""
     digest = hashlib.sha256(repr((version("faultgouge"), modes, limits)).encode())
     for place in places:
         digest.update(repr(place.fx).encode())

@@ -1,4 +1,4 @@
-"""A case of the stability study: an extreme input and the outcome."""
+"""A stiff or extreme case: an input and the outcome."""
 
 from __future__ import annotations
 

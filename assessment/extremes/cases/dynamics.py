@@ -37,7 +37,7 @@ MODE_AMPLITUDE = 1e-4
 K."""
 
 SHAKEN = 0.1
-"""Of the motion whose energy is followed: contacts stay closed."""
+"""Amplitude of the motion whose energy is followed, in units of the smallest overlap: contacts stay closed."""
 
 
 @cache
@@ -115,11 +115,12 @@ def _energy(packing: Packing, position: np.ndarray, velocity: np.ndarray, dt: fl
     return float(0.5 * v @ v + elastic + lifted + dt**2 * correction)
 
 
-def _drift(steps: int, samples: int = 400) -> Outcome:
+def _drift(steps: int) -> Outcome:
     """Energies, and momenta along x in units of the disks' own, of an undamped run without friction."""
     packing = _smooth()
     _, limit = _fastest()
     push = np.random.default_rng(1).uniform(-1, 1, 2 * len(packing)) * SHAKEN * packing.geometry.overlap.min()
+    samples = 400
     energy, momentum = np.empty(samples), np.empty(samples)
     dt = 0.1 * limit
     # every rank has a run of its own, the same one: six disks on two ranks would do nothing but wait for each other

@@ -52,9 +52,10 @@ def crystal(
     return replace(packing, position_low=np.zeros_like(position)) if compensated else packing
 
 
-def arches(ratio: float, law: MindlinLaw = PAPERS, load: float = 1e-6) -> Packing:
+def arches(ratio: float) -> Packing:
     """Three disks of radius 1, each on two of radius 1/ratio, which touch so that they cannot roll."""
-    small, reach = 1.0 / ratio, law.overlap_of_force(load * law.kn)
+    small, load = 1.0 / ratio, 1e-6
+    reach = PAPERS.overlap_of_force(load * KN)
     half = small - 0.5 * reach
     centre = np.array([1.0, 3.05, 5.1])
     height = small - reach + np.sqrt((1.0 + small - reach) ** 2 - half**2)
@@ -65,7 +66,7 @@ def arches(ratio: float, law: MindlinLaw = PAPERS, load: float = 1e-6) -> Packin
         ]
     )
     radius = np.repeat([1.0, small], [3, 6])
-    return _load_packing(position, radius, 6.15, radius == 1.0, law, load)
+    return _load_packing(position, radius, 6.15, radius == 1.0, PAPERS, load)
 
 
 def _load_packing(
@@ -119,15 +120,11 @@ def with_rattlers(packing: Packing, position: Floats, top: bool) -> Packing:
 def at_rest(packing: Packing) -> Equilibrium:
     """The equilibrium at F_x = 0."""
     with Engine(packing) as engine:
-        return equilibrate(engine, _start(packing), 0.0)
+        return equilibrate(engine, Equilibrium.of(packing), 0.0)
 
 
 def shear_packing(packing: Packing) -> Equilibrium:
     """An equilibrium far from sliding as a whole, F_x = 3e-3 F_y, or 0.3 mu F_y if that is less."""
     share = min(3e-3, 0.3 * packing.law.mu) if packing.law.frictional else 0.0
     with Engine(packing) as engine:
-        return equilibrate(engine, equilibrate(engine, _start(packing), 0.0), share * packing.fy)
-
-
-def _start(packing: Packing) -> Equilibrium:
-    return Equilibrium.of(packing)
+        return equilibrate(engine, equilibrate(engine, Equilibrium.of(packing), 0.0), share * packing.fy)

@@ -1,31 +1,25 @@
 """Stated and true errors of onsets before which contacts slide, stick, close or open, undamped and damped.
 
-    python -m faultgouge.assessment.work_precision.coverage.stated_errors [--rows table.jsonl] [--scenes 60] [--restate]
-
 Scenes are drawn at random: seeds, numbers of disks, friction, stiffness and exponent of the law, dashpots, increments,
 both arithmetics. A scene counts if its ramp has an onset and contacts change before the onset. The true onset is that
 of a ramp whose increments are `FINER` times smaller. A ramp with twice these increments shows how accurate the true
 onset is. The search looks for windows in each of these small increments, because between loads farther apart it may
 miss a window that a change of contacts ends. The rule for the stated errors was chosen with the first draws of the
-table; draws marked `fresh` came later. Each draw becomes a row as soon as it is computed, and the same command resumes
-an interrupted run.
+table; draws marked `fresh` came later. `research/coverage.py` computes the table.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
 from ....analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
-from ....analysis.files.atomic_write import write_text
 from ....analysis.packing.packing import Floats
 from ....analysis.windows import Window
 from ....pywrap import Engine, Equilibrium, Scene, settle
@@ -33,7 +27,6 @@ from ....pywrap.load_path import LoadPath
 from ....pywrap.runs.path_error import PathErrors, with_path_error
 from ....pywrap.runs.ramp_loads import ramp_loads
 from ....pywrap.runs.scene_path import scene_path
-from ....pywrap.scenes.validation import require_section
 
 Kind = Literal["undamped", "damped"]
 
@@ -41,8 +34,6 @@ FINER = 20
 """How many times smaller the increments of the ramp are on which the true onset is found."""
 
 TABLE = Path(__file__).with_name("table.jsonl")
-SCENES = 60
-"""Of either kind that have an onset and contacts that change before it."""
 
 AT_ONCE = 3
 """Increments that are searched at once: an onset far below the ramp's end costs no more than it has to."""
@@ -208,44 +199,6 @@ class FirstOnset:
         return first.fx_onset, first.error
 
 
-def compute_cases(number: int) -> list[CoverageCase]:
-    """The undamped and the damped case of a draw."""
-    scene = draw_scene(number)
-    bare = scene.model_copy(update={"damping": None})
-    step = require_section(scene.ramp, "ramp").step
-    undamped, damped = (
-        CoverageCase(
-            kind, number, getattr(scene.packing, "disks", 100), scene.law.mus[0], scene.precision, step, fresh=True
-        )
-        for kind in get_args(Kind)
-    )
-    try:
-        start = settle(bare)
-    except NoEquilibriumError:
-        return [undamped, damped]
-    with Engine(start.packing) as engine:
-        undamped = _compare_case(FirstOnset(bare, engine, start), undamped)
-        if undamped.changes or number == 0:  # a damped search takes ten times the time, and its onset is near
-            damped = _compare_case(FirstOnset(scene, engine, start), damped)
-    return [undamped, damped]
-
-
-def _compare_case(onset: FirstOnset, case: CoverageCase) -> CoverageCase:
-    """The case with what its onset states and the limit of small increments, if contacts change before the onset."""
-    found = onset.first_window()
-    changes = 0 if found is None else onset.changes(found[0], found[1].fx_onset)
-    if found is None or not changes:
-        return case
-    fx_c, stated = onset.whole(*found)
-    case = replace(case, changes=changes, fx_c=fx_c, stated=stated)
-    before = found[1].fx_onset - AT_ONCE * case.increment
-    coarser, finest = (onset.first_window(finer, before) for finer in (FINER // 2, FINER))
-    if coarser is None or finest is None:
-        return case
-    limit = finest[1].fx_onset
-    return replace(case, limit=limit, uncertain=abs(coarser[1].fx_onset - limit))
-
-
 def restate_case(case: CoverageCase) -> CoverageCase:
     """The case with the onset and the stated error of the present code; the limit is not computed again.
 
@@ -268,43 +221,3 @@ def read(path: Path = TABLE) -> list[CoverageCase]:
     """The cases of a table, in the order in which they were computed."""
     lines = path.read_text().splitlines() if path.exists() else []
     return [CoverageCase(**json.loads(line)) for line in lines]
-
-
-def cases(path: Path, scenes: int) -> Iterator[CoverageCase]:
-    """Yield cases until enough scenes of either kind count: first those of the file, then new ones, which it adds."""
-    known = read(path)
-    counts = dict.fromkeys(get_args(Kind), 0)
-    number = 0
-    while min(counts.values()) < scenes:
-        found = [case for case in known if case.number == number]
-        if not found:
-            found = compute_cases(number)
-            with path.open("a") as file:
-                file.write("".join(json.dumps(asdict(case)) + "\n" for case in found))
-        for case in found:
-            counts[case.kind] += case.counts
-            yield case
-        number += 1
-
-
-def main() -> None:
-    """The command."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rows", type=Path, default=TABLE, help="the file, which is gone on with")
-    parser.add_argument("--scenes", type=int, default=SCENES, help="of either kind")
-    parser.add_argument("--restate", action="store_true", help="only state the errors of the file anew")
-    chosen = parser.parse_args()
-    if chosen.restate:
-        anew = [restate_case(case) if case.counts else case for case in read(chosen.rows)]
-        write_text(chosen.rows, "".join(json.dumps(asdict(case)) + "\n" for case in anew))
-    for case in cases(chosen.rows, chosen.scenes):
-        if case.counts:
-            print(
-                f"{case.kind} {case.number}: {case.changes} changes, F_x^c = {case.fx_c:.9g}, true error "
-                f"{case.true:.2g} (+- {case.uncertain:.2g}), stated {case.stated:.2g}: {case.share:.3g}",
-                flush=True,
-            )
-
-
-if __name__ == "__main__":
-    main()

@@ -232,8 +232,7 @@ def _show_modes(rows: list[dict[str, Any]]) -> None:
     lines = []
     for row in first:
         least = "" if row["least_q"] is None else f"{row['least_q']:.4g}"
-        pairs = f"{row['pairs']} ± {row['pairs_error']}" if row.get("pairs_error") else f"{row['pairs']}"
-        numbers = pairs, f"{row['share']:.3f}", f"{row['growth_rate']:.4g}", least
+        numbers = str(row["pairs"]), f"{row['share']:.3f}", f"{row['growth_rate']:.4g}", least
         lines.append((f"{row['fx_over_fy']:g}", *numbers))
     if lines:
         print_line(table_of(("F_x/F_y", "complex pairs", "share", "growth rate of D", "least Q"), lines))

@@ -1,0 +1,120 @@
+"""What a picture of disks shows: images of disks and contacts, walls, and the lines at which the picture repeats."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from faultgouge.analysis import Packing
+from faultgouge.analysis.arrays import Floats, Indices
+from faultgouge.analysis.configuration import HasConfiguration
+
+from .style import figure_of
+from .surroundings import Wall, cell_of, walls_of, within_cell
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Which images of the disks a picture shows, and its edges.
+
+    Attributes
+    ----------
+    left, right, bottom, ceiling : float
+        Edges, length.
+    disk : ndarray of int, shape (n,)
+        The disk of each image.
+    place : ndarray, shape (n, 2)
+        Its centre, length.
+    contact : ndarray of int, shape (c,)
+        The contact of each bar.
+    start, end : ndarray, shape (c, 2)
+        Where the bar begins and ends, length.
+    walls : tuple of Wall
+        Floor and walls.
+    edges : ndarray, shape (e, 2, 2)
+        Ends of the lines at which the picture repeats, length.
+    """
+
+    left: float
+    right: float
+    bottom: float
+    ceiling: float
+    disk: Indices
+    place: Floats
+    contact: Indices
+    start: Floats
+    end: Floats
+    walls: tuple[Wall, ...]
+    edges: Floats
+
+    @classmethod
+    def of(cls, packing: HasConfiguration, margin: float = 0.0) -> "View":
+        """Every image of every disk and contact that reaches to within a margin of the box; length."""
+        configuration, radius = packing.configuration, packing.radius
+        cell, origin, periodic = cell_of(configuration), configuration.origin[:2], configuration.periodic[:2]
+        contacts, branch = configuration.contacts, configuration.branch[:, :2]
+        walls = (Wall(1, 1.0, 0.0),) if isinstance(packing, Packing) else walls_of(configuration)
+        position = within_cell(configuration, packing.position)
+        low, high = _frame(packing, position, cell, origin, periodic, walls)
+        around = [np.arange(-2, 3) if each else [0] for each in periodic]
+        images = position + (np.stack(np.meshgrid(*around), axis=-1).reshape(-1, 1, 2) @ cell)
+        near_low, near_high = (np.where(periodic, side, far) for side, far in ((low, -np.inf), (high, np.inf)))
+        reach = radius[:, None]
+        within = (images + reach > near_low - margin) & (images - reach < near_high + margin)
+        image, disk = np.nonzero(within.all(axis=2))
+        start = images[:, contacts.i]
+        ends = np.stack([start, start - branch])
+        within = (ends.max(axis=0) > near_low - margin) & (ends.min(axis=0) < near_high + margin)
+        bar, contact = np.nonzero(within.all(axis=2))
+        (left, bottom), (right, ceiling) = low.tolist(), high.tolist()
+        place, begin = images[image, disk], start[bar, contact]
+        edges = _edges(cell, origin, periodic, low, high, walls)
+        return cls(left, right, bottom, ceiling, disk, place, contact, begin, begin - branch[contact], walls, edges)
+
+    def points(self, axes: Axes) -> float:
+        """Points per unit of length, so that widths of lines are to scale; as the axes stand now."""
+        box = axes.get_window_extent()
+        scale = min(box.width / (self.right - self.left), box.height / (self.ceiling - self.bottom))
+        return float(72 / figure_of(axes).dpi * scale)
+
+    def part_of(self, wall: Wall) -> Floats:
+        """Corners of the part of a wall in the picture, shape (4, 2), length."""
+        low, high = np.array([self.left, self.bottom]), np.array([self.right, self.ceiling])
+        wall.cut(high, low)
+        return np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
+
+
+def _frame(
+    packing: HasConfiguration,
+    position: Floats,
+    cell: Floats,
+    origin: Floats,
+    periodic: Any,
+    walls: tuple[Wall, ...],
+) -> tuple[Floats, Floats]:
+    """Lower left and upper right corner of a picture: the box where it is periodic, else what lies in it."""
+    reach, largest = packing.radius[:, None], packing.radius.max()
+    low, high = (position - reach).min(axis=0), (position + reach).max(axis=0)
+    if isinstance(packing, Packing):
+        low[1] = -0.3 * largest
+        high[1] += (1.5 if packing.fx or packing.fy else 0.3) * largest
+    else:
+        for wall in walls:
+            wall.cut(low, high)
+        low, high = low - 0.3 * largest, high + 0.3 * largest
+    corners = origin + np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) @ cell
+    return np.where(periodic, corners.min(axis=0), low), np.where(periodic, corners.max(axis=0), high)
+
+
+def _edges(cell: Floats, origin: Floats, periodic: Any, low: Floats, high: Floats, walls: tuple[Wall, ...]) -> Floats:
+    """Lines at which a picture repeats, shape (e, 2, 2)."""
+    if all(periodic):
+        a, b, c, d = (origin + np.array(corner) @ cell for corner in ((0, 0), (1, 0), (1, 1), (0, 1)))
+        return np.array([[a, b], [b, c], [c, d], [d, a]])
+    begin, end = low.copy(), high.copy()
+    for wall in walls:
+        wall.cut(begin, end)
+    lines = [[[low[0], begin[1]], [low[0], end[1]]], [[high[0], begin[1]], [high[0], end[1]]]] if periodic[0] else []
+    lines += [[[begin[0], low[1]], [end[0], low[1]]], [[begin[0], high[1]], [end[0], high[1]]]] if periodic[1] else []
+    return np.array(lines).reshape(-1, 2, 2)
