@@ -37,10 +37,10 @@ def pairs():
 
 @pytest.mark.slow
 def test_onset_counts_the_pairs_and_states_no_digits_of_zero(faultgouge_here, tmp_path, pairs):
+    (tmp_path / "scene.toml").write_text(toml(UNSTABLE | {"law": {"kn": 2e5, "mu": 0.5}}))
     said = faultgouge_here("onset", "scene.toml", "-o", "onset.json").stdout
-    for mu, count in zip((0.5, 0.4), pairs, strict=True):
-        assert f"mu = {mu}: {BEFORE}: {count} complex pairs; in the fastest motion D grows as exp(" in said
-    assert len(said.splitlines()) == 3  # the last one names the law
+    assert f"mu = 0.5: {BEFORE}: {pairs[0]} complex pairs; in the fastest motion D grows as exp(" in said
+    assert len(said.splitlines()) == 2  # the last one names the law
     found = json.loads((tmp_path / "onset.json").read_text())
     assert (found["fx_c"], found["error"], found["unstable_at_start"]["pairs"]) == (0.0, 0.0, pairs[0])
 
@@ -54,6 +54,7 @@ def test_all_windows_of_each_friction_coefficient_are_where_its_ramp_has_complex
     for each, count in zip(found, pairs, strict=True):
         windows = each["windows"]
         assert f"mu = {each['mu']}: {BEFORE}: {count} complex pairs" in done.stderr
+        assert done.stderr.count("   start") == sum(pairs)
         assert [w["fx_onset"] for w in windows if w["kind"] == "start"] == [0.0] * count
         assert (each["fx_c"], each["unstable_at_start"]["pairs"], each["complete"]) == (0.0, count, True)
         scene = Scene.from_mapping(UNSTABLE | {"law": {"kn": 2e5, "mu": each["mu"]}})
