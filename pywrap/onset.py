@@ -12,13 +12,13 @@ from mpi4py import MPI
 
 from ..analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from ..analysis.arrays import Floats
-from ..analysis.errors import TurningPointError
+from ..analysis.errors import FaultgougeError, TurningPointError
 from ..analysis.motion.eigenvalues import active_coordinates
 from ..analysis.progress import Watch, report_progress, show_progress
 from ..analysis.windows import NoGrowthError, Ranks, full_operator, takes_all_modes
-from ..analysis.windows.onset import RAISE_LOAD
 from .equilibria.quasistatic import Equilibrium
 from .lammps.engine import Engine
+from .load_path import LoadPath
 from .runs.path_error import with_path_error
 from .runs.ramp_loads import ramp_loads
 from .runs.scene_path import scene_path
@@ -128,14 +128,8 @@ def onset_run(
     reached(start)
     with show_progress(watch), Engine(start.packing) as engine:
         path = scene_path(engine, start, scene, onward=True)
-        forces = wanted
-        if whole:
-            report_progress(f"ramp up to F_x = {wanted[-1]:g}")
-            for equilibrium in path.climb(wanted[1:]):
-                reached(equilibrium)
-            forces = np.array([each.fx for each in path.equilibria])
+        forces = _climb(path, wanted, reached) if whole else wanted
         flows = len(forces) < len(wanted)
-        what = "no pair of eigenvalues becomes complex" if damping is None else "no motion grows"
 
         def with_dashpots(packing: Packing) -> Packing:
             assert damping is not None
@@ -158,24 +152,40 @@ def onset_run(
         except TurningPointError:
             raise
         except (OnsetError, NoEquilibriumError) as error:
-            says = str(error).replace(RAISE_LOAD, "raise ramp.until")
-            if flows or not isinstance(error, OnsetError):
-                says = (
-                    f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond: the "
-                    "packing flows before an onset"
-                )
-            undamped = error.undamped if isinstance(error, NoGrowthError) else None
-            if undamped is not None:
-                raise NoGrowthError(says, with_path_error(undamped, path)) from error
-            failed = OnsetError if isinstance(error, OnsetError) and not flows else NoEquilibriumError
-            raise failed(says) from error
-        last = path.equilibria[-1].fx
+            raise _of_scene(error, path, flows, dissipation) from error
+        equilibria = tuple(path.equilibria)
+        last = equilibria[-1].fx
         extra = [] if near_onset is None else [fx for fx in found.fx_c + near_onset if 0 <= fx <= last]
         between = {float(fx): path(float(fx)) for fx in extra}
-        equilibria = tuple(path.equilibria)
         report_progress("the path once more, with other increments")
         found = with_path_error(found, path, with_dashpots)
     return replace(found, mu=mu, equilibria=equilibria, between=between, flows_beyond=last if flows else None)
+
+
+def _climb(path: LoadPath[Equilibrium], loads: Floats, reached: Callable[[Equilibrium], None]) -> Floats:
+    """The loads that have an equilibrium, up to the last one or to where the packing flows."""
+    report_progress(f"ramp up to F_x = {loads[-1]:g}")
+    for equilibrium in path.climb(loads[1:]):
+        reached(equilibrium)
+    return np.array([each.fx for each in path.equilibria])
+
+
+def _of_scene(
+    error: OnsetError | NoEquilibriumError, path: LoadPath[Equilibrium], flows: bool, dissipation: bool
+) -> FaultgougeError:
+    """The error of a search, as the user of a scene reads it."""
+    undamped = error.undamped if isinstance(error, NoGrowthError) else None
+    undamped = None if undamped is None else with_path_error(undamped, path)
+    if flows or not isinstance(error, OnsetError):
+        what = "no motion grows" if dissipation else "no pair of eigenvalues becomes complex"
+        finding = (
+            f"{what} up to F_x = {path.equilibria[-1].fx:.10g}, and no equilibrium was found beyond: the packing flows "
+            "before an onset"
+        )
+        return NoEquilibriumError(finding) if undamped is None else NoGrowthError(finding, undamped=undamped)
+    if undamped is None:
+        return OnsetError(error.finding, "raise ramp.until", error.finer)
+    return NoGrowthError(error.finding, "raise ramp.until", error.finer, undamped)
 
 
 def search_ranks() -> Ranks:

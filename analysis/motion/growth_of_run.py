@@ -141,48 +141,62 @@ def growth_of_run(
         packing = _with_friction(packing, weakened)
         begin = int(np.argmax(weaker))
         t, d = t[begin:], d[begin:]
-    damped = packing.damped
-    rate, pairs, negative = None, 0, 0
-    if len(packing) <= (DISKS_BY_LAPACK // 2 if damped else DISKS_BY_LAPACK):
-        rate, pairs, negative = _damped_growth(packing) if damped else _undamped_growth(packing, dt)
+    predicted = _predict(packing, dt)
+    rate = predicted.rate
     length = float(t[-1] - (t[0] if weakened is not None else 0.0))
-    needed = float(np.log(10 * ABOVE * max(1, 3 * len(packing)) / NOISE_SHARE) / rate) if rate else None
     fitted: Growth | None = None
     if rate != 0 and len(t) > 1:
         try:
             fitted = fit_growth(t, d, *_bounds(packing, t, d, rate, jumped=weakened is not None))
         except ValueError:
             fitted = None
-    why = "" if fitted is not None else _why_not(packing, d, rate, pairs, negative, length, needed, weakened, damped)
-    return GrowthOfRun(fitted, rate, pairs, negative, length, needed, weakened, why)
+    why = "" if fitted is not None else _why_not(packing, d, predicted, length, weakened)
+    return GrowthOfRun(fitted, rate, predicted.pairs, predicted.negative, length, predicted.needed, weakened, why)
 
 
-def _why_not(
-    packing: Packing,
-    msd: Floats,
-    rate: float | None,
-    pairs: int,
-    negative: int,
-    length: float,
-    needed: float | None,
-    weakened: float | None,
-    damped: bool,
-) -> str:
+@dataclass(frozen=True)
+class _Prediction:
+    """What the spectrum of the start says: the growth rate of D if it was computed, and the numbers of what grows."""
+
+    disks: int
+    rate: float | None
+    pairs: int = 0
+    negative: int = 0
+
+    @property
+    def needed(self) -> float | None:
+        """About how long a run has to be for D to leave the noise and be followed; None where nothing grows."""
+        return float(np.log(10 * ABOVE * max(1, 3 * self.disks) / NOISE_SHARE) / self.rate) if self.rate else None
+
+
+def _predict(packing: Packing, dt: float | None) -> _Prediction:
+    """The growth of D by LAPACK, of packings of some hundred disks."""
+    disks = len(packing)
+    if disks > (DISKS_BY_LAPACK // 2 if packing.damped else DISKS_BY_LAPACK):
+        return _Prediction(disks, None)
+    if packing.damped:
+        return _Prediction(disks, *_damped_growth(packing))
+    modes = spectrum(packing)
+    return _Prediction(disks, modes.growth_rate(dt), len(modes.pairs), len(modes.negative))
+
+
+def _why_not(packing: Packing, msd: Floats, predicted: _Prediction, length: float, weakened: float | None) -> str:
     """Why a run shows no growth, in a sentence without its full stop."""
     now = f"with the friction weakened to mu = {weakened:.6g}" if weakened is not None else f"at F_x = {packing.fx:g}"
+    rate, needed = predicted.rate, predicted.needed
     if rate is None:
         return (
             f"D did not grow by a decade above its noise; for more than {DISKS_BY_LAPACK} disks the spectrum is not "
             "computed"
         )
-    if rate == 0 or needed is None:
-        loss = ", dissipation damps all motion" if damped else ""
-        found = "no motion grows" if damped else "no complex pair and no negative eigenvalue"
+    if needed is None:
+        loss = ", dissipation damps all motion" if packing.damped else ""
+        found = "no motion grows" if packing.damped else "no complex pair and no negative eigenvalue"
         bounded = "D jumps to the new equilibrium and stays bounded" if weakened is not None else "D stays bounded"
         return (
             f"nothing grows: {now} the packing is linearly stable ({found}){loss}, and {bounded}, however long the run"
         )
-    unstable = f"{now} the packing is unstable ({_in_words(pairs, negative)}, rate {rate:.6g})"
+    unstable = f"{now} the packing is unstable ({_in_words(predicted.pairs, predicted.negative)}, rate {rate:.6g})"
     if length < needed:
         return (
             f"{unstable}, but the run was too short to see it: {length * rate:.1f} e-foldings in t = {length:.4g}; D "
@@ -211,12 +225,6 @@ def _bounds(packing: Packing, time: Floats, msd: Floats, rate: float | None, jum
     late = time[int(np.argmax(msd >= 0.1 * top))]
     grows_on = rate is not None and (time[-1] - late) * rate < 2 * np.log(10)
     return growing_range(time, msd, min(ceiling, np.nextafter(top, np.inf) if grows_on else BELOW_TOP * top))
-
-
-def _undamped_growth(packing: Packing, dt: float | None) -> tuple[float, int, int]:
-    """Growth rate of D, complex pairs and negative eigenvalues."""
-    modes = spectrum(packing)
-    return modes.growth_rate(dt), len(modes.pairs), len(modes.negative)
 
 
 def unstable_rates(packing: Packing) -> Complexes:

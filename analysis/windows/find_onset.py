@@ -194,7 +194,8 @@ class _OnsetSearch:
 
     def _check_growth(self, windows: tuple[Window, ...], undamped: Onset | None) -> None:
         if not windows:
-            raise NoGrowthError(f"No motion grows up to F_x = {self.loads[-1]:.10g}: {RAISE_LOAD}.", undamped)
+            finding = f"No motion grows up to F_x = {self.loads[-1]:.10g}"
+            raise NoGrowthError(finding, RAISE_LOAD, undamped=undamped)
 
     def _undamped_windows(self) -> tuple[tuple[Window, ...], Increments, Spectrum | None, float | None]:
         """Windows without dissipation, increments in doubt, the spectrum at the smallest load if that is known, and the

@@ -15,22 +15,43 @@ from ..uncertain_digits import with_uncertainty
 from .edges import Increments, Window
 
 RAISE_LOAD = "raise the largest load"
-"""What a sentence advises where nothing grows up to the last load."""
 
 
 class OnsetError(FaultgougeError):
-    """No complex pair appears on the given loads."""
+    """No complex pair appears on the given loads.
+
+    Parameters
+    ----------
+    finding : str
+        What was sought, up to which load, and not found.
+    larger : str, optional
+        How the user gets larger loads, as advice.
+    finer : bool
+        Whether smaller increments may show an onset, too.
+    """
+
+    def __init__(self, finding: str, larger: str = "", finer: bool = False) -> None:
+        super().__init__(finding, larger, finer)
+        self.finding, self.larger, self.finer = finding, larger, finer
+
+    def __str__(self) -> str:
+        advice = ", or ".join(
+            (["take smaller increments"] if self.finer else []) + ([self.larger] if self.larger else [])
+        )
+        return f"{self.finding}: {advice}." if advice else self.finding
 
     @classmethod
     def among(cls, modes: tuple[int, int] | None, last: float, doubtful: Increments) -> "OnsetError":
-        """The sentence for some modes, or all, up to the last load."""
+        """The error of a search among some modes, or all, up to the last load."""
         which = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
         if not doubtful:
-            return cls(f"No pair of eigenvalues{which} is complex up to F_x = {last:.10g}: {RAISE_LOAD}.")
+            return cls(f"No pair of eigenvalues{which} is complex up to F_x = {last:.10g}", RAISE_LOAD)
         below, above = doubtful[0]
         return cls(
             f"No pair of eigenvalues{which} was found to become complex up to F_x = {last:.10g}, but one was expected "
-            f"between {below:.10g} and {above:.10g}: take smaller increments, or {RAISE_LOAD}."
+            f"between {below:.10g} and {above:.10g}",
+            RAISE_LOAD,
+            finer=True,
         )
 
 
@@ -39,14 +60,14 @@ class NoGrowthError(OnsetError):
 
     Parameters
     ----------
-    says : str
-        The sentence.
+    finding, larger, finer
+        As of :class:`OnsetError`.
     undamped : Onset or None
         The onset without dissipation on the same loads.
     """
 
-    def __init__(self, says: str, undamped: "Onset | None") -> None:
-        super().__init__(says)
+    def __init__(self, finding: str, larger: str = "", finer: bool = False, undamped: "Onset | None" = None) -> None:
+        super().__init__(finding, larger, finer)
         self.undamped = undamped
 
 

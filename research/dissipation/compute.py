@@ -179,5 +179,5 @@ def _first_window(path: LoadPath[Equilibrium]) -> Window:
     window = first_undamped_window(path)
     if window is None:
         last = path.equilibria[-1].fx
-        raise OnsetError(f"No pair of eigenvalues is complex up to F_x = {last:.10g}: raise ramp.until.")
+        raise OnsetError(f"No pair of eigenvalues is complex up to F_x = {last:.10g}", "raise ramp.until")
     return window

@@ -11,6 +11,7 @@ From the folder of the repository.
 
 import sys
 from collections.abc import Iterable
+from operator import itemgetter
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -142,13 +143,13 @@ def full_seeds(rows: list[dict[str, Any]]) -> int:
 
 def other_cells(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The first and the last tilt of the cells of other sizes and other friction, as far as they have been computed."""
-    found = []
+    found, key_of = [], itemgetter("count", "mu", "d", "law", "tilt")
     for count, mu, _, laws, dimensions, _ in CELLS:
         for d in dimensions if (count, mu) != USUAL else ():
             for law in laws:
                 for tilt in (TILTS[0], TILTS[-1]):
                     key = (count, mu, d, law, tilt)
-                    own = [row for row in rows if tuple(row[k] for k in ("count", "mu", "d", "law", "tilt")) == key]
+                    own = [row for row in rows if key_of(row) == key]
                     if own:
                         found.append({"count": count, "mu": mu, "d": d, "law": law, "tilt": tilt} | cell(own))
     return found
@@ -161,12 +162,12 @@ def flows(row: dict[str, Any]) -> bool:
 
 def to_flow(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Packings that are tilted until they flow: how many have pairs, and of how many modes, at each tilt."""
-    found = []
+    found, key_of = [], itemgetter("count", "mu", "d", "law")
     for cell in (each for each in CELLS if each.tilts == STEEP):
         for d in cell.dimensions:
             for law in cell.laws:
                 key = (cell.particles, cell.mu, d, law)
-                own = [row for row in rows if tuple(row[k] for k in ("count", "mu", "d", "law")) == key]
+                own = [row for row in rows if key_of(row) == key]
                 at = [[row for row in own if row["tilt"] == tilt and row["rests"]] for tilt in STEEP]
                 flowing = [row["tilt"] for row in own if flows(row)]
                 found.append(

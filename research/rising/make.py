@@ -22,7 +22,7 @@ from faultgouge.figures import render, save, styled
 from faultgouge.studies.statistics import share
 from research.laws.both_laws import RESTITUTIONS as WEAKEST_FIRST
 from research.modes.loss import GROWS as LINEAR
-from research.modes.sets import sets
+from research.modes.sets import STANDARD
 from research.rising import onsets
 from research.rising.compute import (
     COMPARED,
@@ -52,7 +52,7 @@ LAWS = HERE.parent / "laws" / "tables" / "force_100.jsonl"
 QUALITIES = (50, 100, 200, 300)
 """Q of a loss that takes omega/Q of each mode; rock has 50 to 300."""
 
-FY = float(sets()["force 100"].scene["load"]["fy"])
+FY = float(STANDARD["load"]["fy"])
 
 LATEST = 8
 """Windows over which the vibration of a start is a mean, and which are compared with as many before."""

@@ -20,7 +20,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib.metadata import version
@@ -139,9 +139,9 @@ class Sweep:
         if count > MOST_POINTS:
             raise SceneError(f"{name}: {count} scenes are more than {MOST_POINTS}: make several sweeps of it.")
         sweep = cls(str(task), axes, dict(mapping.get("scene", {})), code, folder)
-        says = [point.says for point in sweep.points]
-        if all(each is not None for each in says):  # what is wrong with every scene is refused before any work is done
-            raise SceneError(f"{name}: no point of the sweep is a scene that can be run: {says[0]}")
+        # what is wrong with every scene is refused before any work is done; the first good one is enough to know
+        if all(point.says is not None for point in sweep._each_point()):
+            raise SceneError(f"{name}: no point of the sweep is a scene that can be run: {sweep.points[0].says}")
         return sweep
 
     @property
@@ -157,7 +157,10 @@ class Sweep:
     @cached_property
     def points(self) -> tuple[SweepPoint, ...]:
         """Every point, in the order of the table."""
-        return tuple(self._point(number, values) for number, values in enumerate(product(*self.axes.values())))
+        return tuple(self._each_point())
+
+    def _each_point(self) -> Iterator[SweepPoint]:
+        return (self._point(number, values) for number, values in enumerate(product(*self.axes.values())))
 
     def _point(self, number: int, chosen: tuple[Any, ...]) -> SweepPoint:
         values: dict[str, Any] = {}

@@ -65,8 +65,11 @@ def equilibria(path):
 @pytest.mark.ranks
 @pytest.mark.parametrize(
     ("command", "ranks", "at", "group"),
-    [("ramp", 1, 4, False), ("ramp", 2, 4, False), ("perturb", 1, 1, True)],
-    ids=["one rank", "two ranks", "all processes, as a terminal does"],
+    [
+        pytest.param("ramp", 1, 4, False, marks=pytest.mark.long, id="one rank"),
+        pytest.param("ramp", 2, 4, False, id="two ranks"),
+        pytest.param("perturb", 1, 1, True, id="all processes, as a terminal does"),
+    ],
 )
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 @pytest.mark.slow
@@ -151,7 +154,7 @@ run 2000000000
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_an_import_leaves_nothing(tmp_path, monkeypatch, number):
     """LAMMPS runs for hours without an instruction of Python, and is ended in the midst of its run."""
     temporary = tmp_path / "temporary"
@@ -343,7 +346,7 @@ def with_failing_engine(folder, ranks, script, *arguments):
 @pytest.mark.ranks
 @pytest.mark.parametrize(
     ("ranks", "rank", "call"),
-    [(1, -1, 1), (2, 1, 1), *(pytest.param(2, rank, 30, marks=pytest.mark.long) for rank in (-1, 0))],
+    [(1, -1, 1), *(pytest.param(2, *each, marks=pytest.mark.long) for each in ((1, 1), (-1, 30), (0, 30)))],
 )
 @pytest.mark.slow
 def test_its_sentence_reaches_the_command(settled, ranks, rank, call):

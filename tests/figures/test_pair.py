@@ -11,13 +11,18 @@ from faultgouge.pywrap import Scene
 from faultgouge.pywrap.onset import onset_run
 
 
+@pytest.fixture(scope="module")
+def run():
+    """The onset on a ramp of 17 loads."""
+    changed = {"packing": SMALL["packing"] | {"seed": 3}, "ramp": {"step": 0.01, "until": 0.16}}
+    return onset_run(Scene.from_mapping(SMALL | changed), mu=1.0)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False])
-def test_the_drawn_branches_meet_at_the_onset(known):
-    """To a pixel of a picture, with a ramp of 17 loads; the onset itself is the root of the discriminant, solved for
-    with equilibria close to it."""
-    changed = {"packing": SMALL["packing"] | {"seed": 3}, "ramp": {"step": 0.01, "until": 0.16}}
-    run = onset_run(Scene.from_mapping(SMALL | changed), mu=1.0)
+def test_the_drawn_branches_meet_at_the_onset(run, known):
+    """To a pixel of a picture; the onset itself is the root of the discriminant, solved for with equilibria close to
+    it."""
     first = run.windows[0]
     packings = [each.packing for each in run.equilibria]
     pairs = follow_eigenvalues(packings).pairs

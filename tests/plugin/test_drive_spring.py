@@ -90,7 +90,7 @@ def test_layer_that_is_held_does_not_move(packing):
         assert np.array_equal(first.position[packing.top, 0], last.position[packing.top, 0])
 
 
-FAST = {"time": 0.15, "velocity": 60.0, "spring": 500.0, "states": 0.04, "every": 1}
+FAST = {"force_tolerance": 1e-3, "time": 0.15, "velocity": 60.0, "spring": 500.0, "states": 0.04, "every": 1}
 RUNS = {
     "spring": FAST,
     "protocol": {**FAST, "protocol": "60 0.1 0 0.02 -60 0.03"},
@@ -104,10 +104,11 @@ RUNS = {
 @pytest.mark.parametrize("run", RUNS)
 @pytest.mark.slow
 def test_deck_runs_alone_and_the_same_on_ranks(lmp, tmp_path, run, precision):
-    """A layer that goes round the period."""
+    """A layer that goes round the period; on three ranks in `make long`, as they share two cores."""
+    others = 3 if (run, precision) == ("spring", "compensated") else 2
     (tmp_path / "record.txt").write_text("# time value\n0 0\n0.1 1\n0.2 -1\n")
     ends = []
-    for ranks in (1, 3) if run == "spring" else (1, 2):
+    for ranks in (1, others):
         done = lmp(DECKS / "drive.in", ranks=ranks, decks=DECKS, precision=precision, **RUNS[run])
         assert "WARNING" not in done.stdout
         rows = np.loadtxt(tmp_path / "drive.series")

@@ -15,7 +15,7 @@ fix             move all nve/disc 1.0 ${drag} ${compensated}
 # a layer that is torn off: contacts slide, open and close, disks go round the periodic box, and the
 # neighbour lists are built some 180 times
 RUN = """
-run             1000
+run             500
 write_dump      all custom {} id x y ${{low}} vx vy omegaz d_theta f_floor[3] modify sort id format float %.17g
 """
 FIRST, SECOND = RUN.format("middle"), RUN.format("end")
@@ -103,7 +103,7 @@ def test_same_trajectory(trajectory, unchanged, changes):
 def test_restart_in_a_new_process(trajectory, unchanged, variables, lmp, tmp_path, ranks, acts):
     """Without more; with a signal, which goes by the time of the run, which a restart file keeps; and with friction
     that has weakened, which the restart file keeps as the last forces had it."""
-    rows = (f"{0.1 * k} {(-1) ** k * 0.3}" for k in range(41))
+    rows = (f"{0.1 * k} {(-1) ** k * 0.3}" for k in range(21))
     (tmp_path / "wave.txt").write_text("\n".join(rows))
     extra = ""
     if acts == "weaken":
@@ -120,5 +120,5 @@ def test_restart_in_a_new_process(trajectory, unchanged, variables, lmp, tmp_pat
 @pytest.mark.parametrize("variables", ["compensated", "harmonic, damped, compensated"], indirect=True)
 def test_compensated_run_in_one_piece_or_two(lmp, tmp_path, unchanged, variables):
     """Disks are wrapped into the box at every set-up: on the grid that is exact."""
-    lmp(START + SECOND.replace("1000", "2000"), **variables)
+    lmp(START + SECOND.replace("500", "1000"), **variables)
     assert (tmp_path / "end").read_text() == unchanged[1]

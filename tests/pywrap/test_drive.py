@@ -221,8 +221,8 @@ cn = 60.0
 [drive]
 spring = 10.0
 velocity = 5e-3
-until = 3.0
-states = 0.5
+until = 0.6
+states = 0.2
 """
     (tmp_path / "scene.toml").write_text(text)
     results = []

@@ -124,8 +124,9 @@ def test_time_step_of_a_large_packing_is_that_of_all_eigenvalues(large):
 
 
 @pytest.mark.ranks
-@pytest.mark.slow
+@pytest.mark.long
 def test_same_packing_on_two_ranks(large, tmp_path):
+    """`tests/docs/test_examples.py` has the same of 40 disks, in `make test`."""
     script = (
         "import sys, numpy as np\n"
         "from mpi4py import MPI\n"

@@ -71,7 +71,7 @@ def window(ramp):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("cn", "ct"), [(1.0, 0.0), (0.0, 1.0)])
+@pytest.mark.parametrize(("cn", "ct"), [pytest.param(1.0, 0.0, marks=pytest.mark.long), (0.0, 1.0)])
 def test_the_limit_of_weak_dashpots_and_its_frequency(ramp, window, cn, ct):
     predicted = weak_limit(ramp, loads_of(ramp), window, cn, ct)
     assert predicted.fx < window.fx_onset
@@ -104,7 +104,7 @@ def test_drag_shifts_the_onset_to_where_the_growth_exceeds_it(ramp, window):
     assert 2 * fastest == pytest.approx(1 / tau, rel=1e-4)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_onset_just_before_the_last_load_is_found():
     """The last load lies a millionth of F_x beyond the onset, which is less than small pencils know."""
     scene = with_seed(SCENE, 15)

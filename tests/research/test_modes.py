@@ -49,11 +49,11 @@ def test_the_page_comes_out_of_the_tables(tmp_path):
     "name",
     [
         "force 50",
-        "force 100",
-        pytest.param("force 200", marks=pytest.mark.long),
-        "pressure 50",
-        "friction 50",
         "harmonic",
+        *(
+            pytest.param(each, marks=pytest.mark.long)
+            for each in ("force 100", "force 200", "pressure 50", "friction 50")
+        ),
     ],
 )
 def test_a_seed_is_the_packing_of_the_table(name, tmp_path):

@@ -6,7 +6,7 @@ from faultgouge.pywrap import Scene
 from research.triggering.make import SCENE, choose_seed
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_shipped_packing_is_the_one_of_the_rule():
     """`python -m research.triggering.make` begins with seed 1."""
     scene = Scene.from_toml(SCENE)

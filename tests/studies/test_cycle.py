@@ -40,7 +40,7 @@ def make_run(path, **drive):
 
 @pytest.fixture(scope="module")
 def slow(tmp_path_factory):
-    return make_run(tmp_path_factory.mktemp("slow") / "drive.h5", velocity=1e-3, until=20.0, states=5.0)
+    return make_run(tmp_path_factory.mktemp("slow") / "drive.h5", velocity=1e-3, until=20.0, states=10.0)
 
 
 def linear_displacement(packing, spring, rate, times):

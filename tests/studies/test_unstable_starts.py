@@ -6,7 +6,7 @@ import pytest
 from reference_layer import toml
 
 from faultgouge.analysis import spectrum
-from faultgouge.pywrap import Scene, settle
+from faultgouge.pywrap import Scene, ramp, settle
 from faultgouge.studies.statistics import sign_test
 from faultgouge.studies.sweep.triggering import triggering
 from faultgouge.studies.sweep.triggering_summary import in_words, summary
@@ -37,16 +37,31 @@ def pairs():
 
 @pytest.mark.slow
 def test_onset_counts_the_pairs_and_states_no_digits_of_zero(faultgouge_here, tmp_path, pairs):
+    (tmp_path / "scene.toml").write_text(toml(UNSTABLE | {"law": {"kn": 2e5, "mu": 0.5}}))
     said = faultgouge_here("onset", "scene.toml", "-o", "onset.json").stdout
-    for mu, count in zip((0.5, 0.4), pairs, strict=True):
-        assert f"mu = {mu}: {BEFORE}: {count} complex pairs; in the fastest motion D grows as exp(" in said
-    assert len(said.splitlines()) == 3  # the last one names the law
-    (tmp_path / "one.toml").write_text(toml(UNSTABLE | {"law": {"kn": 2e5, "mu": 0.5}}))
-    table = [line for line in faultgouge_here("onset", "one.toml", "--all").stdout.splitlines() if "start" in line]
-    assert len(table) == pairs[0]
-    assert {line.split()[0] for line in table} == {"0"}
+    assert f"mu = 0.5: {BEFORE}: {pairs[0]} complex pairs; in the fastest motion D grows as exp(" in said
+    assert len(said.splitlines()) == 2  # the last one names the law
     found = json.loads((tmp_path / "onset.json").read_text())
     assert (found["fx_c"], found["error"], found["unstable_at_start"]["pairs"]) == (0.0, 0.0, pairs[0])
+
+
+@pytest.mark.slow
+def test_all_windows_of_each_friction_coefficient_are_where_its_ramp_has_complex_pairs(faultgouge_here, pairs):
+    """As many windows hold a load as LAPACK finds pairs in the equilibrium there; those of the start begin at zero."""
+    done = faultgouge_here("onset", "scene.toml", "--all", "--json")
+    found = json.loads(done.stdout)["each_mu"]
+    assert [each["mu"] for each in found] == UNSTABLE["law"]["mu"]
+    for each, count in zip(found, pairs, strict=True):
+        windows = each["windows"]
+        assert f"mu = {each['mu']}: {BEFORE}: {count} complex pairs" in done.stderr
+        assert done.stderr.count("   start") == sum(pairs)
+        assert [w["fx_onset"] for w in windows if w["kind"] == "start"] == [0.0] * count
+        assert (each["fx_c"], each["unstable_at_start"]["pairs"], each["complete"]) == (0.0, count, True)
+        scene = Scene.from_mapping(UNSTABLE | {"law": {"kn": 2e5, "mu": each["mu"]}})
+        for state in ramp(scene):
+            held = [w for w in windows if w["fx_onset"] <= state.fx and (w["fx_end"] is None or state.fx < w["fx_end"])]
+            assert len(held) == len(spectrum(state.packing).pairs)
+        assert any(w["kind"] != "start" for w in windows)
 
 
 @pytest.mark.slow

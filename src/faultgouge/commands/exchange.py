@@ -121,11 +121,16 @@ def import_(
         return
     if slides or balance is not None:
         raise typer.BadParameter("--slides and --balance are for a LAMMPS deck (.in): leave them out")
+    laws = {"kn": kn, "kt": _number_or_text(kt), "mu": mu, "exponent": exponent}
+    disks = _place_disks(file, frame, floor, width, contacts)
+    packing = _packing(disks, top, scene, laws | {"fy": fy, "fx": fx, "inertia_factor": inertia})
+    _import_disks(file, output, disks, top, packing, relax)
+
+
+def _import_disks(file: Path, output: Path, disks: Disks, top: str | None, packing: Packing, relax: bool) -> None:
+    """Store a packing in balance, and say what it is."""
     from faultgouge.analysis.files.formats.upper_layer import layer_remark
 
-    disks = _place_disks(file, frame, floor, width, contacts)
-    laws = {"kn": kn, "kt": _number_or_text(kt), "mu": mu, "exponent": exponent}
-    packing = _packing(disks, top, scene, laws | {"fy": fy, "fx": fx, "inertia_factor": inertia})
     for remark in (disks.remark, layer_remark(disks, top, packing.top)):
         if remark:
             say(f"{file}: {remark}")

@@ -111,6 +111,10 @@ def test_a_killed_run_keeps_its_frames(tmp_path, states):
         np.testing.assert_array_equal(run.series("msd")["value"], [[1e-20, 1], [2e-20, 2], [3e-20, 3]])
 
 
+HERTZ = pytest.mark.parametrize("cluster", [1.5], indirect=True, ids=["Hertz"])
+"""What a broken file says does not depend on the law."""
+
+
 @pytest.fixture
 def sound(tmp_path, states):
     path = tmp_path / "run.h5"
@@ -130,6 +134,7 @@ def test_frames_of_a_trajectory_carry_the_load_of_its_equilibrium(sound, states)
         )
 
 
+@HERTZ
 def test_what_an_error_leaves_half_done_is_not_saved(sound, states):
     def cut_short():
         with RunFile(sound, "a") as run, run.change():
@@ -157,6 +162,7 @@ def test_a_write_that_fails_keeps_what_was_there_and_leaves_nothing_else(tmp_pat
     assert list(tmp_path.iterdir()) == [path]
 
 
+@HERTZ
 def test_every_flipped_byte_is_noticed(sound):
     content = sound.read_bytes()
     rng = np.random.default_rng(1)
@@ -176,6 +182,7 @@ def without_checksum(path):
     path.write_bytes(path.read_bytes()[512:])
 
 
+@HERTZ
 def test_a_file_without_a_checksum_is_read_and_not_continued(sound, states):
     without_checksum(sound)
     with RunFile(sound) as run:
@@ -197,6 +204,7 @@ def replace_dataset(name, value, place=None):
     return edit
 
 
+@HERTZ
 @pytest.mark.parametrize(
     "edit",
     [
@@ -254,6 +262,7 @@ def test_a_file_holds_one_set_of_disks_and_of_names(sound, states):
         assert len(run) == 4
 
 
+@HERTZ
 @pytest.mark.parametrize("content", [None, b"", b"not HDF5", "truncated", "foreign", "other h5md"])
 def test_broken_missing_and_foreign_files(sound, content):
     if content == "truncated":

@@ -119,7 +119,9 @@ def test_what_grows_from_the_beginning_says_so():
     assert 0.15 < window.fx_end < 0.25
 
 
-@pytest.mark.parametrize(("cn", "onset", "digits"), [(1.0, 0.0218328, 1e-7), (10.0, 0.02235, 1e-5)])
+@pytest.mark.parametrize(
+    ("cn", "onset", "digits"), [pytest.param(1.0, 0.0218328, 1e-7, marks=pytest.mark.long), (10.0, 0.02235, 1e-5)]
+)
 @pytest.mark.slow
 def test_reference_packing_with_normal_dashpots(path, cn, onset, digits):
     """The onsets that an independent computation had found, and LAPACK's root of the same to 1e-9."""

@@ -79,7 +79,7 @@ def whole(search):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.long), 3])
+@pytest.mark.parametrize("ranks", [1, *(pytest.param(n, marks=pytest.mark.long) for n in (2, 3))])
 def test_a_search_goes_on_to_the_bit(search, whole, tmp_path, ranks):
     """On any number of ranks; then all is known."""
     expected, all_said = whole

@@ -57,8 +57,18 @@ def look_inside(windows):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("dissipation", [0.0, pytest.param(1e-4, marks=pytest.mark.long), 1e-2, 0.3])
-@pytest.mark.parametrize("increments", [1, 3])
+@pytest.mark.parametrize(
+    ("increments", "dissipation"),
+    [
+        (3, 0.0),
+        (1, 1e-2),
+        (3, 0.3),
+        *(
+            pytest.param(*each, marks=pytest.mark.long)
+            for each in ((1, 0.0), (1, 1e-4), (3, 1e-4), (3, 1e-2), (1, 0.3))
+        ),
+    ],
+)
 def test_as_many_windows_are_open_at_each_load_as_motions_grow(increments, dissipation):
     """Windows that begin and end within an increment, several of them, and gaps between two windows of one motion."""
     found = 0

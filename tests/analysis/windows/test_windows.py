@@ -1,5 +1,6 @@
 """Windows of complex eigenvalues, on families of matrices whose windows are known, and along a ramp."""
 
+import pickle
 from dataclasses import replace
 from io import StringIO
 
@@ -17,7 +18,7 @@ from faultgouge.analysis import (
     find_onset,
 )
 from faultgouge.analysis.uncertain_digits import with_uncertainty
-from faultgouge.analysis.windows import Limits, System, SystemModes, force_bearing, full_operator
+from faultgouge.analysis.windows import Limits, NoGrowthError, System, SystemModes, force_bearing, full_operator
 from faultgouge.analysis.windows.between import Few, deepest_dip
 from faultgouge.analysis.windows.screens.pairs import PairScreen
 from faultgouge.analysis.windows.search import windows_along
@@ -166,6 +167,16 @@ def test_no_onset_is_said_so(path, disks):
     """By the search of a small packing, and by that of a large one."""
     with pytest.raises(OnsetError, match=r"up to F_x = 0\.003: raise the largest load"):
         find_onset(path, path.grid[:4], limits=Limits(all_windows=disks))
+
+
+@pytest.mark.parametrize("error", [OnsetError, NoGrowthError])
+def test_the_error_of_no_onset_gives_each_user_his_own_advice(error):
+    """Also where it comes from another process."""
+    found = pickle.loads(pickle.dumps(error("Nothing grows up to F_x = 1", "raise the largest load", finer=True)))
+    assert str(found) == "Nothing grows up to F_x = 1: take smaller increments, or raise the largest load."
+    of_a_scene = error(found.finding, "raise ramp.until", found.finer)
+    assert str(of_a_scene) == "Nothing grows up to F_x = 1: take smaller increments, or raise ramp.until."
+    assert str(error("The packing flows")) == "The packing flows"
 
 
 @pytest.mark.parametrize("mu", [1.0, pytest.param(0.8, marks=pytest.mark.long)])
