@@ -201,17 +201,21 @@ def settle_for_drive(scene: Scene, communicator: MPI.Comm | None = None, watch: 
     closely would move it, by any way along x where nothing but friction holds it.
     """
     section = scene.packing
-    if not isinstance(section, GeneratedPacking):
-        return settle_bed(scene)
-    if section.settle_friction:
+    if isinstance(section, GeneratedPacking) and section.settle_friction:
         return settle(scene, communicator=communicator, watch=watch).packing
-    packing = settle(scene.model_copy(update={"precision": "double"}), 0.0, communicator, watch).packing
-    contacts = Contacts(packing.contacts.i, packing.contacts.j, np.zeros(len(packing.contacts)))
-    packing = replace(packing, law=law_of(scene, scene.law.mus[0]), contacts=contacts)
+    if isinstance(section, GeneratedPacking):
+        packing = settle(scene.model_copy(update={"precision": "double"}), 0.0, communicator, watch).packing
+        contacts = Contacts(packing.contacts.i, packing.contacts.j, np.zeros(len(packing.contacts)))
+        packing = replace(packing, law=law_of(scene, scene.law.mus[0]), contacts=contacts)
+    else:
+        packing = settle_bed(scene)
     if scene.precision == "double":
         return packing
-    low = replace(contacts, slip_low=np.zeros(len(contacts)))
-    return replace(packing, contacts=low, position_low=np.zeros_like(packing.position))
+    contacts = packing.contacts
+    if contacts.slip_low is None:
+        contacts = replace(contacts, slip_low=np.zeros(len(contacts)))
+    low = np.zeros_like(packing.position) if packing.position_low is None else packing.position_low
+    return replace(packing, contacts=contacts, position_low=low)
 
 
 def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = None) -> list[str]:

@@ -9,17 +9,18 @@ loaded in increments of 1e-3 F_y, either with the slider from the beginning (law
 ("total"), at 0.1, 0.2 and 0.3 F_y, with dashpots of the restitutions 0.9 and 0.97 (C_T = 2/7 C_N). *Poured*: layers of
 50 spheres under LAMMPS's own laws on slopes of 0.2 and 0.3, with three stiffnesses and dashpots of one restitution.
 
-**The rule.** Packings are those of the seeds 1, 2, 3, ... in this order, all of them, with all that is asked of one
-seed before the next; the number of seeds is what the time allowed.
+**The rule.** Packings are those of the seeds 1, 2, 3, ... in this order, none left out: first all `SEEDS` at
+`COMPARED`, then all other loads and restitutions of one seed before the next, as many seeds as the time allows. Of the
+poured packings all that is asked of one seed comes before the next.
 
-**Beside LAMMPS.** At 0.2 F_y and the restitution 0.9 the plugin integrates the layer of the slider under a load that
-rises at the rates `RATES` per disk of the layer. A drag fades out before velocities are measured, as in
-:mod:`faultgouge.analysis.motion.rising_load`.
+**Beside LAMMPS.** LAMMPS integrates what one-sided motion follows, from the same two starts and over the same spans
+(:mod:`.lammps_motion`): each layer of the slider at the smallest of `RATES`, at 0.2 F_y and the restitution 0.9 at all
+of these and with so large a friction that no contact is at the bound; each packing of spheres while its slope rises.
 """
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -27,15 +28,14 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
-from faultgouge.analysis import Configuration, Packing, Signal, Stability, stability
-from faultgouge.analysis.motion.rising_load import DRAG, FADE
-from faultgouge.pywrap import Engine, Scene, dashpot, settle, time_step
+from faultgouge.analysis import Configuration, Floats, Packing, Stability, stability
+from faultgouge.pywrap import Scene, dashpot, settle
 from research.lammps_laws.compute import GAMMA, KN, MU, pour, rest
 from research.laws.both_laws import as_slider, at_loads
 from research.modes.loss import impact_velocity, with_dashpots
 from research.modes.sets import sets
+from research.rising.lammps_motion import Windows, rise_in_plugin, rise_on_slope
 from research.tables import read_rows
 
 SEEDS = 20
@@ -49,8 +49,11 @@ COMPARED = (0.2, 0.9)
 RATES = (3e-4, 3e-5, 3e-6)
 """Rates of the load in LAMMPS, force / time: over the 60 units of time of a run the load rises by 2e-2 at the most."""
 
-WINDOWS, STAGES, LOOKS = 24, 40, 400
-"""Windows of a run, stages in which the drag fades, and looks at velocities in each of the last two windows."""
+STARTS = (True, False)
+"""Whether the drag that fades out acts on rotations."""
+
+SLOPE_RATE = 1e-5
+"""Rate at which a slope rises in LAMMPS, 1 / time."""
 
 POURED_LAWS = (
     "granular hertz, mindlin/force",
@@ -64,12 +67,13 @@ restitution. Those of the linear law go as 1/k_n, and dashpots as its root."""
 SLOPES, POURED_SEEDS = (0.2, 0.3), 5
 
 
-def layers(seed: int) -> Iterator[dict[str, Any]]:
-    """All rows of the layers of one seed."""
+def layers(seed: int, cells: Sequence[tuple[float, float]]) -> Iterator[dict[str, Any]]:
+    """The rows of the layers of one seed, of some loads and restitutions; and where a ramp ended before them."""
     base = sets()["force 100"].scene
     packing, fy = base.get("packing", {}) | {"seed": seed}, base["load"]["fy"]
-    changes = {"packing": packing, "ramp": {"step": 1e-3 * fy, "until": max(LOADS) * fy}}
-    scene = Scene.from_mapping(base | changes | {"modes": {"fx_over_fy": list(LOADS)}})
+    loads = sorted({load for load, _ in cells})
+    changes = {"packing": packing, "ramp": {"step": 1e-3 * fy, "until": loads[-1] * fy}}
+    scene = Scene.from_mapping(base | changes | {"modes": {"fx_over_fy": loads}})
     start = settle(scene)
     for history in HISTORIES:
         law = scene.law.model_copy(update={"history": history})
@@ -82,27 +86,40 @@ def layers(seed: int) -> Iterator[dict[str, Any]]:
 
         told = at_loads(scene.model_copy(update={"law": law}), own, keep)
         key = {"seed": seed, "law": history}
-        for load, each in zip(told["loads"], found, strict=True):
-            for restitution in RESTITUTIONS:
+        at = {load["fx_over_fy"]: each for load, each in zip(told["loads"], found, strict=True)}
+        for load, restitution in cells:
+            if load in at:
                 begin = time.process_time()
                 cn = dashpot(scene.law.kn, restitution, 1.0, impact_velocity(scene))
-                lossy = with_dashpots(each, cn)
-                # linear motion under a rising load follows, or grows as it does at rest
-                row = verdict(stability(lossy, rise="fx" if history == "coulomb" else None), lossy.configuration)
-                if history == "coulomb" and (load["fx_over_fy"], restitution) == COMPARED:
-                    row["lammps"] = {str(rate): rise_in_lammps(lossy, rate) for rate in RATES}
-                    stuck = replace(lossy, law=replace(lossy.law, mu=100.0))
-                    row["control"] = rise_in_lammps(stuck, min(RATES))
-                where = {"fx_over_fy": load["fx_over_fy"], "restitution": restitution}
+                lossy = with_dashpots(at[load], cn)
+                row = verdict(stability(lossy, rise="fx"), lossy.configuration)
+                if history == "coulomb" and row["rising"]:
+                    compared = (load, restitution) == COMPARED
+                    row |= beside(lossy, row["rising"], RATES if compared else RATES[-1:], control=compared)
+                where = {"fx_over_fy": load, "restitution": restitution}
                 yield key | where | row | {"cpu_seconds": time.process_time() - begin}
-        if len(found) < len(LOADS):
+        if len(found) < len(loads):
             yield key | {"ends": told["ends"], "reach": told["reach"]}
+
+
+def compute_layers(table: Path, watch: Any = print) -> None:
+    """Add the layers that a table lacks, in the order of the rule; what is written is of whole seeds."""
+    others = [cell for cell in product(LOADS, RESTITUTIONS) if cell != COMPARED]
+    for cells in ([COMPARED], others):
+        known = {row["seed"] for row in read(table) if (row.get("fx_over_fy"), row.get("restitution")) in cells}
+        for seed in range(1, SEEDS + 1):
+            if seed not in known:
+                append(table, list(layers(seed, cells)))
+                watch(f"seed {seed}, {len(cells)} cells", flush=True)
 
 
 def verdict(found: Stability, configuration: Configuration) -> dict[str, Any]:
     """What is kept of a verdict."""
     told = found.as_dict()
-    kept = {name: told[name] for name in ("stable", "growth_rate", "at_bound", "one_sided", "rising", "reasons")}
+    kept = {
+        name: told[name]
+        for name in ("stable", "growth_rate", "at_bound", "one_sided", "rising", "not_followed", "reasons")
+    }
     overlap = configuration.contacts.overlap
     return kept | {
         "contacts": found.contacts,
@@ -114,48 +131,20 @@ def verdict(found: Stability, configuration: Configuration) -> dict[str, Any]:
     }
 
 
-def rise_in_lammps(packing: Packing, rate: float) -> dict[str, float]:
-    """Drift and vibration over the rate of a load that rises, as the plugin integrates it: the last two windows."""
-    drift, vibration = np.sqrt(np.mean(np.square(windows_in_lammps(packing, rate)[-2:]), axis=0)).tolist()
-    return {"drift": drift, "vibration": vibration}
+def beside(packing: Packing, rising: dict[str, Any], rates: Sequence[float], control: bool) -> dict[str, Any]:
+    """LAMMPS's motion from both starts at each rate; and at the smallest one with so large a friction that none slides.
 
-
-def windows_in_lammps(packing: Packing, rate: float, spins: bool = False, windows: int = WINDOWS) -> list[list[float]]:
-    """Drift and vibration over the rate, as the plugin integrates it, in each window after the drag has faded out.
-
-    LAMMPS's fix viscous does not act on rotations; with `spins` they are slowed down, too, between parts of the run.
+    The time is that for which one-sided motion was followed, and so are its spans.
     """
-    dt = time_step(packing)
-    chunk = 300 * dt / 0.05  # as of one-sided motion: `time_step` is 0.05 of the stable one
-    look = max(1, round(chunk / LOOKS / dt))
-    steps = look * LOOKS
-    parts = 10 if spins else 1
-    end = 2 * windows * chunk
-    signal = Signal(np.array([0.0, end]), np.array([0.0, rate * end]))
-    values = []
-    with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(dt, signal=signal) as dynamics:
-        lmp, part = engine.lammps, FADE * steps // STAGES // parts
-        for stage in range(STAGES):
-            drag = DRAG / (steps * dt) * (1 - (stage + 0.5) / STAGES) ** 2
-            lmp.command(f"fix fade all viscous {drag!r}")
-            for _ in range(parts):
-                lmp.command(f"run {part} post no")
-                if spins:
-                    lmp.numpy.extract_atom("omega")[: len(packing)] *= np.exp(-drag * part * dt)
-        lmp.command("unfix fade")
-        lmp.command("run 0 post no")
-        for _ in range(windows - FADE):
-            start = dynamics.advance(1).position
-            squares = np.zeros_like(start)
-            for _ in range(LOOKS):
-                motion = dynamics.advance(look)
-                squares += motion.velocity**2 / LOOKS
-            moved = motion.position - start
-            if packing.box_length is not None:
-                moved[:, 0] -= packing.box_length * np.round(moved[:, 0] / packing.box_length)
-            mean = moved / (steps * dt)
-            values.append([np.mean(mean**2), np.mean(np.maximum(squares - mean**2, 0.0))])
-    return (np.sqrt(values) / rate).tolist()
+    windows = Windows.of(packing.configuration, rising)
+    found: dict[str, Any] = {
+        "windows": [windows.count, windows.span],
+        "lammps": {str(rate): [rise_in_plugin(packing, rate, windows, spins) for spins in STARTS] for rate in rates},
+    }
+    if control:
+        stuck = replace(packing, law=replace(packing.law, mu=100.0))
+        found["control"] = rise_in_plugin(stuck, min(rates), windows, True)
+    return found
 
 
 def poured(law: str, kn: float, slope: float, seed: int) -> dict[str, Any]:
@@ -167,9 +156,20 @@ def poured(law: str, kn: float, slope: float, seed: int) -> dict[str, Any]:
         lmp = pour(law, 3, 50, MU, seed, Path(folder) / "log", gamma, kn)
         lmp.command(f"variable slope equal {slope}")
         found = rest(lmp)
+        row: dict[str, Any] = {"rests": found is not None}
+        if found is not None:
+            row |= verdict(stability(found, rise=steeper(found, slope)), found)
+            if row["rising"]:
+                windows = Windows.of(found, row["rising"])
+                row["lammps"] = [rise_on_slope(lmp, len(found), slope, SLOPE_RATE, windows, spins) for spins in STARTS]
         lmp.close()
-    row = {"rests": False} if found is None else {"rests": True} | verdict(stability(found), found)
     return key | row | {"cpu_seconds": time.process_time() - begin}
+
+
+def steeper(found: Configuration, slope: float) -> Floats:
+    """Forces per increase of the slope: gravity (slope, 0, -1), of length 1, turns."""
+    change = np.array([1.0, 0.0, slope]) / (1 + slope**2) ** 1.5
+    return np.asarray(found.mass[:, None] * change)
 
 
 def compute_poured(table: Path, watch: Any = print) -> None:

@@ -112,13 +112,14 @@ def test_deck_alone_is_the_same_to_the_bit(scene, lmp, tmp_path, precision):
 
 @pytest.mark.ranks
 @pytest.mark.slow
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_stored_packing_is_drawn_as_it_is(lmp, tmp_path, ranks):
+@pytest.mark.parametrize(("ranks", "precision"), [(1, "double"), (2, "double"), (1, "compensated")])
+def test_stored_packing_is_drawn_as_it_is(lmp, tmp_path, ranks, precision):
     """The packing of the decks, which is in balance to 1e-10: the command and the deck as it stands end alike."""
     shipped = {"file": str(DECKS / "packing100.data"), "top": "type:2"}
     drive = {"spring": 10.0, "velocity": 1e-3, "until": 2.0, "states": 2.0}
-    run_to_end(Scene.from_mapping(BASE | {"packing": shipped, "drive": drive}), tmp_path / "drive.h5")
-    lmp(DECKS / "drive.in", ranks=ranks, decks=DECKS, time=2.0)
+    scene = Scene.from_mapping(BASE | {"packing": shipped, "drive": drive, "precision": precision})
+    run_to_end(scene, tmp_path / "drive.h5")
+    lmp(DECKS / "drive.in", ranks=ranks, decks=DECKS, time=2.0, precision=precision)
     dumped, (row,) = read_dump(tmp_path / "drive.end.disks"), np.loadtxt(tmp_path / "drive.series", ndmin=2)[-1:]
     with RunFile(tmp_path / "drive.h5") as file:
         np.testing.assert_array_equal(dumped.position, file.packing(-1).position)

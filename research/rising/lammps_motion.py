@@ -1,0 +1,129 @@
+"""Motion under a load that rises as LAMMPS integrates it, from the two starts of the one-sided motion.
+
+A drag fades out in the first `FADE` windows, on all coordinates or not on rotations, as in
+:mod:`faultgouge.analysis.motion.rising_load`: between parts of the run velocities are multiplied by what the drag
+leaves of them. Drift and vibration are then those of the same span of windows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from faultgouge.analysis import Configuration, Floats, Packing, Signal
+from faultgouge.analysis.motion.one_sided import OneSidedSystem
+from faultgouge.analysis.motion.one_sided_outcome import STEPS_OF_CHUNK, VERDICT_STEP
+from faultgouge.analysis.motion.rising_load import DRAG, FADE
+from faultgouge.pywrap import Engine, in_a_copy
+
+STEPS_OF_LOOK, LOOKS = 15, 400
+"""Time steps between two looks at velocities, each some 0.05 of the stable one, and looks in a window."""
+
+DEFAULT = 40, 36
+"""Windows of a run, and of its span, where the motion beside it was solved for and not followed."""
+
+
+@dataclass(frozen=True)
+class Windows:
+    """The windows of a motion that is followed.
+
+    Attributes
+    ----------
+    length : float
+        Of one of them, time.
+    count, span : int
+        How many there are, and of how many at the end drift and vibration are.
+    """
+
+    length: float
+    count: int
+    span: int
+
+    @classmethod
+    def of(cls, configuration: Configuration, rising: Mapping[str, Any]) -> Windows:
+        """Those of one-sided motion, `Stability.rising`."""
+        system = OneSidedSystem.of(configuration, VERDICT_STEP)
+        length = STEPS_OF_CHUNK * system.time_step / system.step_share
+        if rising["time"] is None:
+            return cls(length, *DEFAULT)
+        return cls(length, round(rising["time"] / length), round(rising["span"] / length))
+
+    @property
+    def time_step(self) -> float:
+        """Of LAMMPS, time."""
+        return self.length / (STEPS_OF_LOOK * LOOKS)
+
+
+def rise_in_plugin(packing: Packing, rate: float, windows: Windows, spins: bool) -> dict[str, float]:
+    """Drift and vibration of a layer over the rate of the force on each of its disks, as the plugin integrates it.
+
+    Parameters
+    ----------
+    packing : Packing
+        The layer with its dashpots.
+    rate : float
+        Force / time.
+    windows : Windows
+        Of this motion.
+    spins : bool
+        Whether the drag acts on rotations, too.
+    """
+    end = 2 * windows.count * windows.length
+    signal = Signal(np.array([0.0, end]), np.array([0.0, rate * end]))
+    with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(windows.time_step, signal=signal):
+        return drift_and_vibration(engine.lammps, len(packing), windows, spins, rate)
+
+
+def rise_on_slope(lmp: Any, count: int, slope: float, rate: float, windows: Windows, spins: bool) -> dict[str, float]:
+    """The same of poured particles at rest, of the deck of `pour`, whose slope rises; in a copy of this LAMMPS."""
+
+    def follow() -> dict[str, float]:
+        for line in (
+            "log none", "thermo 0", "unfix drag", "unfix spin", "reset_timestep 0", f"timestep {windows.time_step!r}",
+            f"variable slope equal {slope!r}+{rate!r}*dt*step", "velocity all set 0 0 0",
+        ):  # fmt: skip
+            lmp.command(line)
+        lmp.numpy.extract_atom("omega")[:count] = 0.0
+        return drift_and_vibration(lmp, count, windows, spins, rate)
+
+    return in_a_copy(follow)
+
+
+def drift_and_vibration(lmp: Any, count: int, windows: Windows, spins: bool, rate: float) -> dict[str, float]:
+    """Root mean squares over particles and axes, over the rate, in a LAMMPS whose load rises.
+
+    Particles move by less than half a periodic box between two looks.
+    """
+    dimension = lmp.extract_setting("dimension")
+    low, high, *_ = lmp.extract_box()
+    box = np.subtract(high, low)[:dimension]
+
+    def by_id(name: str) -> Floats:
+        order = np.argsort(lmp.numpy.extract_atom("id")[:count])
+        return np.asarray(lmp.numpy.extract_atom(name)[order, :dimension], dtype=float)
+
+    lmp.command("run 0 post no")
+    for look in range(FADE * LOOKS):
+        lmp.command(f"run {STEPS_OF_LOOK} pre no post no")
+        left = np.exp(-DRAG / LOOKS * (1 - (look + 1) / LOOKS / FADE) ** 2)
+        for name in ("v", "omega") if spins else ("v",):
+            lmp.numpy.extract_atom(name)[:count] *= left
+    span = windows.span
+    lmp.command(f"run {(windows.count - span - FADE) * STEPS_OF_LOOK * LOOKS} pre no post no")
+    place = by_id("x")
+    moved, squares = np.zeros_like(place), np.zeros_like(place)
+    for _ in range(span * LOOKS):
+        lmp.command(f"run {STEPS_OF_LOOK} pre no post no")
+        here = by_id("x")
+        step = here - place
+        moved += step - box * np.round(step / box)
+        squares += by_id("v") ** 2
+        place = here
+    mean = moved / (span * windows.length)
+    left_over = np.maximum(squares / (span * LOOKS) - mean**2, 0.0)
+    drift, vibration = (float(np.sqrt(np.mean(each)) / rate) for each in (mean**2, left_over))
+    return {"drift": drift, "vibration": vibration}
