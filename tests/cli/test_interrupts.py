@@ -103,8 +103,8 @@ def simulates(folder):
 @pytest.mark.parametrize(
     ("command", "says"),
     [
-        ("onset scene.toml -o onset.json", "nothing was written, and the same command starts from the beginning"),
-        ("explain scene.toml", "nothing was written, and the same command starts from the beginning"),
+        ("onset scene.toml -o onset.json", "nothing was written: give the same command again"),
+        ("explain scene.toml", "nothing was written: give the same command again"),
         (
             "reproduce scene.toml -o out",
             "what is in out so far is kept; the same command starts from the beginning and replaces it",
