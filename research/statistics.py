@@ -1,11 +1,13 @@
 """Intervals of what resampled packings give, for the pages of research."""
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import TypeVar
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from faultgouge.analysis import Floats, Indices
+from faultgouge.studies.statistics import median
 
 Values = TypeVar("Values", Indices, Floats)
 
@@ -16,6 +18,19 @@ def interval(value: Sequence[float | None] | None, digits: str = ".2g", beyond: 
         return "-"
     middle, low, high = (beyond if each is None or np.isinf(each) else format(each, digits) for each in value)
     return f"{middle} ({low} to {high})"
+
+
+def count_of(share: Mapping[str, Any]) -> str:
+    """A count of so many with the interval of its share, "5 of 20 (11 to 47 %)"; "-" of none."""
+    if share["share"] is None:
+        return "-"
+    return f"{share['count']} of {share['of']} ({100 * share['low']:.0f} to {100 * share['high']:.0f} %)"
+
+
+def middle(values: ArrayLike) -> list[float] | None:
+    """Median with its 95 % interval, from resampling; None of fewer than two numbers."""
+    found = np.asarray(values, dtype=float)
+    return median(found) if len(found) > 1 else None
 
 
 def resample(groups: Sequence[Values], draws: int) -> Iterator[list[Values]]:

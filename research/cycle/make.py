@@ -26,8 +26,8 @@ from faultgouge.figures import render
 from faultgouge.studies.statistics import share
 from research.cycle import clock, further, springs
 from research.cycle.compute import DISKS, LAWS, LOOKED_AT, MANY, UNTIL, compute, compute_many
-from research.statistics import interval
-from research.tables import add_seeds, read_rows
+from research.statistics import count_of, interval, middle
+from research.tables import add_seeds, differing, read_rows
 
 HERE = Path(__file__).parent
 TABLE, MANY_TABLE = "cycles.jsonl", "cycles_400.jsonl"
@@ -174,15 +174,15 @@ def by_size(few: Sequence[Row], many: Sequence[Row]) -> list[dict[str, Any]]:
             drops = [slip["force_before"] - slip["force_after"] for slip in slips]
             found.append(
                 {"law": law, "disks": disks, "runs": len(own), "slips": len(slips)}
-                | {"before": further.middle([slip["force_before"] for slip in slips]), "drop": further.middle(drops)}
-                | {"slip": further.middle([slip["slip"] for slip in slips]), "apart": further.middle(apart)}
+                | {"before": middle([slip["force_before"] for slip in slips]), "drop": middle(drops)}
+                | {"slip": middle([slip["slip"] for slip in slips]), "apart": middle(apart)}
                 | {"largest": max(drops, default=None)}
             )
     return found
 
 
-def of_many(rows: Sequence[Row]) -> dict[str, Any]:
-    """Counts of the states of runs of `MANY` disks, by the law."""
+def of_states(rows: Sequence[Row]) -> dict[str, Any]:
+    """Counts of the states before slips and of their controls, by the law."""
     laws = [law for law in LAWS if any(row["law"] == law for row in rows)]
     return {
         "laws": laws,
@@ -195,42 +195,29 @@ def of_many(rows: Sequence[Row]) -> dict[str, Any]:
 
 def numbers(rows: Sequence[Row], many: Sequence[Row] = ()) -> dict[str, Any]:
     """All numbers of the page."""
-    laws = [law for law in LAWS if any(row["law"] == law for row in rows)]
-    every = {law: [row for row in rows if row["law"] == law] for law in laws}
-    better = {law: concordance(every[law]) for law in laws}
-    return {
+    found = of_states(rows)
+    every = {law: [row for row in rows if row["law"] == law] for law in found["laws"]}
+    better = {law: concordance(every[law]) for law in every}
+    states = [state for row in rows for state in row["states"]]
+    return found | {
         "runs": [sizes(row) for row in rows],
-        "laws": laws,
-        "seeds": {law: [row["seed"] for row in every[law]] for law in laws},
-        "slips": {law: sum(len(row["slips"]) for row in every[law]) for law in laws},
-        "before": {law: counts(rows, law, "before") for law in laws},
-        "control": {law: counts(rows, law, "control") for law in laws},
-        "paired": {law: before_or_control(rows, law) for law in laws},
+        "slips": {law: sum(len(row["slips"]) for row in every[law]) for law in every},
         "concordance": better,
-        "sooner": [each["says"] for law in laws for each in better[law] if each["over_force"][1] > 0],
-        "resting": share(
-            sum(state["rests"] for row in rows for state in row["states"]), sum(len(row["states"]) for row in rows)
-        ),
+        "sooner": [each["says"] for law in every for each in better[law] if each["over_force"][1] > 0],
+        "resting": share(sum(state["rests"] for state in states), len(states)),
         "by_size": by_size(rows, many),
-        "many": of_many(many),
+        "many": of_states(many),
         "disks": MANY,
         "looked_at": LOOKED_AT,
-        "residual": float(np.median([state["residual"] for row in rows for state in row["states"]])),
+        "residual": float(np.median([state["residual"] for state in states])),
     }
-
-
-def percent(part: dict[str, Any]) -> str:
-    """A share with its interval."""
-    if part["share"] is None:
-        return "-"
-    return f"{part['count']} of {part['of']} ({100 * part['low']:.0f} to {100 * part['high']:.0f} %)"
 
 
 def write_page(folder: Path = HERE) -> Path:
     """Write README.md of a folder from its table."""
     found = numbers(*(read_rows(folder / "tables" / name) for name in (TABLE, MANY_TABLE)))
     (folder / "README.md").write_text(
-        render("research.cycle", "README.md.j2", **found, percent=percent, interval=interval)
+        render("research.cycle", "README.md.j2", **found, percent=count_of, interval=interval)
     )
     return folder / "README.md"
 
@@ -243,12 +230,10 @@ def check() -> list[str]:
         compute(again, Path(folder), range(1, 2), LAWS[:1])
         new = read_rows(again)[0]
     names = ("time", "force", "damped_sliding", "lowest_sliding", "pairs_sliding")
-    pairs = zip(known["states"], new["states"], strict=True)
     return [
-        f"t = {old['time']:g}: {name}"
-        for old, state in pairs
-        for name in names
-        if not np.isclose(old[name], state[name], rtol=AGREES)
+        f"t = {old['time']:g}: {each}"
+        for old, state in zip(known["states"], new["states"], strict=True)
+        for each in differing(old, state, names, AGREES)
     ]
 
 

@@ -18,7 +18,6 @@ poured packings all that is asked of one seed comes before the next.
 of these and with so large a friction that no contact is at the bound; each packing of spheres while its slope rises.
 """
 
-import json
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -31,14 +30,17 @@ import numpy as np
 
 from faultgouge.analysis import Configuration, Floats, Packing, Stability, stability
 from faultgouge.pywrap import Scene, dashpot, settle
+from faultgouge.studies.result_rows import append_row
 from research.lammps_laws.compute import GAMMA, KN, MU, pour, rest
 from research.laws.both_laws import as_slider, at_loads
 from research.modes.loss import impact_velocity, with_dashpots
 from research.modes.sets import sets
-from research.rising.lammps_motion import Windows, rise_in_plugin, rise_on_slope
-from research.tables import read_rows
+from research.rising.lammps_motion import Windows, drift_and_vibration, rise_in_plugin, rise_on_slope
+from research.tables import known_rows
 
-SEEDS = 20
+SEEDS, FIRST = 20, (1, 11, 15)
+"""Seeds, and those that come first: 11 and 15 vibrated in LAMMPS otherwise than one-sided motion from one start."""
+
 LOADS = (0.1, 0.2, 0.3)
 RESTITUTIONS = (0.9, 0.97)
 HISTORIES = ("coulomb", "total")
@@ -67,38 +69,50 @@ restitution. Those of the linear law go as 1/k_n, and dashpots as its root."""
 SLOPES, POURED_SEEDS = (0.2, 0.3), 5
 
 
+def at_rest(seed: int, history: str, loads: Sequence[float]) -> tuple[Scene, dict[float, Packing], dict[str, Any]]:
+    """The scene of a layer, its equilibria by the load, F_x/F_y, and how its ramp ended."""
+    base = sets()["force 100"].scene
+    fy = base["load"]["fy"]
+    changes = {
+        "packing": base.get("packing", {}) | {"seed": seed},
+        "ramp": {"step": 1e-3 * fy, "until": loads[-1] * fy},
+    }
+    scene = Scene.from_mapping(base | changes | {"modes": {"fx_over_fy": list(loads)}})
+    start, law = settle(scene), scene.law.model_copy(update={"history": history})
+    if history == "coulomb":
+        start = replace(start, packing=as_slider(start.packing))
+    found = list[Packing]()
+
+    def keep(packing: Packing) -> dict[str, Any]:
+        found.append(packing)
+        return {}
+
+    told = at_loads(scene.model_copy(update={"law": law}), start, keep)
+    return scene, {load["fx_over_fy"]: each for load, each in zip(told["loads"], found, strict=True)}, told
+
+
+def with_restitution(packing: Packing, scene: Scene, restitution: float) -> Packing:
+    """A layer with the dashpots of a restitution."""
+    return with_dashpots(packing, dashpot(scene.law.kn, restitution, 1.0, impact_velocity(scene)))
+
+
 def layers(seed: int, cells: Sequence[tuple[float, float]]) -> Iterator[dict[str, Any]]:
     """The rows of the layers of one seed, of some loads and restitutions; and where a ramp ended before them."""
-    base = sets()["force 100"].scene
-    packing, fy = base.get("packing", {}) | {"seed": seed}, base["load"]["fy"]
     loads = sorted({load for load, _ in cells})
-    changes = {"packing": packing, "ramp": {"step": 1e-3 * fy, "until": loads[-1] * fy}}
-    scene = Scene.from_mapping(base | changes | {"modes": {"fx_over_fy": loads}})
-    start = settle(scene)
     for history in HISTORIES:
-        law = scene.law.model_copy(update={"history": history})
-        own = replace(start, packing=as_slider(start.packing)) if history == "coulomb" else start
-        found = list[Packing]()
-
-        def keep(packing: Packing, found: list[Packing] = found) -> dict[str, Any]:
-            found.append(packing)
-            return {}
-
-        told = at_loads(scene.model_copy(update={"law": law}), own, keep)
         key = {"seed": seed, "law": history}
-        at = {load["fx_over_fy"]: each for load, each in zip(told["loads"], found, strict=True)}
+        scene, at, told = at_rest(seed, history, loads)
         for load, restitution in cells:
             if load in at:
                 begin = time.process_time()
-                cn = dashpot(scene.law.kn, restitution, 1.0, impact_velocity(scene))
-                lossy = with_dashpots(at[load], cn)
+                lossy = with_restitution(at[load], scene, restitution)
                 row = verdict(stability(lossy, rise="fx"), lossy.configuration)
                 if history == "coulomb" and row["rising"]:
                     compared = (load, restitution) == COMPARED
                     row |= beside(lossy, row["rising"], RATES if compared else RATES[-1:], control=compared)
                 where = {"fx_over_fy": load, "restitution": restitution}
                 yield key | where | row | {"cpu_seconds": time.process_time() - begin}
-        if len(found) < len(loads):
+        if len(at) < len(loads):
             yield key | {"ends": told["ends"], "reach": told["reach"]}
 
 
@@ -106,10 +120,11 @@ def compute_layers(table: Path, watch: Any = print) -> None:
     """Add the layers that a table lacks, in the order of the rule; what is written is of whole seeds."""
     others = [cell for cell in product(LOADS, RESTITUTIONS) if cell != COMPARED]
     for cells in ([COMPARED], others):
-        known = {row["seed"] for row in read(table) if (row.get("fx_over_fy"), row.get("restitution")) in cells}
-        for seed in range(1, SEEDS + 1):
+        known = {row["seed"] for row in known_rows(table) if (row.get("fx_over_fy"), row.get("restitution")) in cells}
+        for seed in sorted(range(1, SEEDS + 1), key=lambda seed: (seed not in FIRST, seed)):
             if seed not in known:
-                append(table, list(layers(seed, cells)))
+                for row in list(layers(seed, cells)):
+                    append_row(table, row)
                 watch(f"seed {seed}, {len(cells)} cells", flush=True)
 
 
@@ -137,13 +152,17 @@ def beside(packing: Packing, rising: dict[str, Any], rates: Sequence[float], con
     The time is that for which one-sided motion was followed, and so are its spans.
     """
     windows = Windows.of(packing.configuration, rising)
+
+    def lammps(packing: Packing, rate: float, spins: bool) -> dict[str, float]:
+        parts = rise_in_plugin(packing, rate, windows, spins)[-windows.span :]
+        return drift_and_vibration(parts, windows.length, rate)
+
     found: dict[str, Any] = {
         "windows": [windows.count, windows.span],
-        "lammps": {str(rate): [rise_in_plugin(packing, rate, windows, spins) for spins in STARTS] for rate in rates},
+        "lammps": {str(rate): [lammps(packing, rate, spins) for spins in STARTS] for rate in rates},
     }
     if control:
-        stuck = replace(packing, law=replace(packing.law, mu=100.0))
-        found["control"] = rise_in_plugin(stuck, min(rates), windows, True)
+        found["control"] = lammps(replace(packing, law=replace(packing.law, mu=100.0)), min(rates), True)
     return found
 
 
@@ -161,7 +180,10 @@ def poured(law: str, kn: float, slope: float, seed: int) -> dict[str, Any]:
             row |= verdict(stability(found, rise=steeper(found, slope)), found)
             if row["rising"]:
                 windows = Windows.of(found, row["rising"])
-                row["lammps"] = [rise_on_slope(lmp, len(found), slope, SLOPE_RATE, windows, spins) for spins in STARTS]
+                motions = [rise_on_slope(lmp, len(found), slope, SLOPE_RATE, windows, spins) for spins in STARTS]
+                row["lammps"] = [
+                    drift_and_vibration(parts[-windows.span :], windows.length, SLOPE_RATE) for parts in motions
+                ]
         lmp.close()
     return key | row | {"cpu_seconds": time.process_time() - begin}
 
@@ -175,20 +197,9 @@ def steeper(found: Configuration, slope: float) -> Floats:
 def compute_poured(table: Path, watch: Any = print) -> None:
     """Add the packings of spheres that a table lacks, seed by seed."""
     names = ("law", "kn", "slope", "seed")
-    known = {tuple(row[name] for name in names) for row in read(table)}
+    known = {tuple(row[name] for name in names) for row in known_rows(table)}
     for seed in range(1, POURED_SEEDS + 1):
         for law, kn, slope in product(POURED_LAWS, STIFFNESSES, SLOPES):
             if (law, kn, slope, seed) not in known:
-                append(table, [poured(law, kn, slope, seed)])
+                append_row(table, poured(law, kn, slope, seed))
                 watch(f"{law}, kn = {kn:g}, slope {slope}, seed {seed}", flush=True)
-
-
-def append(table: Path, rows: list[dict[str, Any]]) -> None:
-    """Add rows to a table."""
-    with table.open("a") as file:
-        file.writelines(json.dumps(row) + "\n" for row in rows)
-
-
-def read(table: Path) -> list[dict[str, Any]]:
-    """The rows of a table; none where there is no table."""
-    return read_rows(table) if table.exists() else []

@@ -7,7 +7,7 @@ leaves of them. Drift and vibration are then those of the same span of windows.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,15 +58,15 @@ class Windows:
         return self.length / (STEPS_OF_LOOK * LOOKS)
 
 
-def rise_in_plugin(packing: Packing, rate: float, windows: Windows, spins: bool) -> dict[str, float]:
-    """Drift and vibration of a layer over the rate of the force on each of its disks, as the plugin integrates it.
+def rise_in_plugin(packing: Packing, rate: float, windows: Windows, spins: bool) -> list[tuple[Floats, Floats]]:
+    """The windows of a layer, `windows_in`, under a load that rises, as the plugin integrates it.
 
     Parameters
     ----------
     packing : Packing
         The layer with its dashpots.
     rate : float
-        Force / time.
+        Of the force on each disk of the upper layer, force / time.
     windows : Windows
         Of this motion.
     spins : bool
@@ -75,26 +75,37 @@ def rise_in_plugin(packing: Packing, rate: float, windows: Windows, spins: bool)
     end = 2 * windows.count * windows.length
     signal = Signal(np.array([0.0, end]), np.array([0.0, rate * end]))
     with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(windows.time_step, signal=signal):
-        return drift_and_vibration(engine.lammps, len(packing), windows, spins, rate)
+        return list(windows_in(engine.lammps, len(packing), windows, spins))
 
 
-def rise_on_slope(lmp: Any, count: int, slope: float, rate: float, windows: Windows, spins: bool) -> dict[str, float]:
+def rise_on_slope(
+    lmp: Any, count: int, slope: float, rate: float, windows: Windows, spins: bool
+) -> list[tuple[Floats, Floats]]:
     """The same of poured particles at rest, of the deck of `pour`, whose slope rises; in a copy of this LAMMPS."""
 
-    def follow() -> dict[str, float]:
+    def follow() -> list[tuple[Floats, Floats]]:
         for line in (
             "log none", "thermo 0", "unfix drag", "unfix spin", "reset_timestep 0", f"timestep {windows.time_step!r}",
             f"variable slope equal {slope!r}+{rate!r}*dt*step", "velocity all set 0 0 0",
         ):  # fmt: skip
             lmp.command(line)
         lmp.numpy.extract_atom("omega")[:count] = 0.0
-        return drift_and_vibration(lmp, count, windows, spins, rate)
+        return list(windows_in(lmp, count, windows, spins))
 
     return in_a_copy(follow)
 
 
-def drift_and_vibration(lmp: Any, count: int, windows: Windows, spins: bool, rate: float) -> dict[str, float]:
-    """Root mean squares over particles and axes, over the rate, in a LAMMPS whose load rises.
+def drift_and_vibration(parts: Sequence[tuple[Floats, Floats]], length: float, rate: float) -> dict[str, float]:
+    """Root mean squares over particles and axes, over the rate, of windows that follow each other, each so long."""
+    moved, squares = np.mean(parts, axis=0)
+    mean = moved / length
+    left = np.maximum(squares - mean**2, 0.0)
+    drift, vibration = (float(np.sqrt(np.mean(each)) / rate) for each in (mean**2, left))
+    return {"drift": drift, "vibration": vibration}
+
+
+def windows_in(lmp: Any, count: int, windows: Windows, spins: bool) -> Iterator[tuple[Floats, Floats]]:
+    """How far each particle moves, and the mean squares of its velocities, in each window after the drag.
 
     Particles move by less than half a periodic box between two looks.
     """
@@ -112,18 +123,14 @@ def drift_and_vibration(lmp: Any, count: int, windows: Windows, spins: bool, rat
         left = np.exp(-DRAG / LOOKS * (1 - (look + 1) / LOOKS / FADE) ** 2)
         for name in ("v", "omega") if spins else ("v",):
             lmp.numpy.extract_atom(name)[:count] *= left
-    span = windows.span
-    lmp.command(f"run {(windows.count - span - FADE) * STEPS_OF_LOOK * LOOKS} pre no post no")
     place = by_id("x")
-    moved, squares = np.zeros_like(place), np.zeros_like(place)
-    for _ in range(span * LOOKS):
-        lmp.command(f"run {STEPS_OF_LOOK} pre no post no")
-        here = by_id("x")
-        step = here - place
-        moved += step - box * np.round(step / box)
-        squares += by_id("v") ** 2
-        place = here
-    mean = moved / (span * windows.length)
-    left_over = np.maximum(squares / (span * LOOKS) - mean**2, 0.0)
-    drift, vibration = (float(np.sqrt(np.mean(each)) / rate) for each in (mean**2, left_over))
-    return {"drift": drift, "vibration": vibration}
+    for _ in range(windows.count - FADE):
+        moved, squares = np.zeros_like(place), np.zeros_like(place)
+        for _ in range(LOOKS):
+            lmp.command(f"run {STEPS_OF_LOOK} pre no post no")
+            here = by_id("x")
+            step = here - place
+            moved += step - box * np.round(step / box)
+            squares += by_id("v") ** 2 / LOOKS
+            place = here
+        yield moved, squares
