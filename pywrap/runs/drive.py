@@ -61,7 +61,7 @@ SLOW_ENOUGH, TOO_FAST = 100.0, 10.0
 """Periods of the slowest vibration in which the spring loads the layer to mu F_y: below the first a run is warned, and
 below the second refused."""
 
-FEWEST_STEPS = 10
+STEPS_A_PULSE = 10
 """Time steps in a period of a pulse: velocity Verlet then samples it to some per cent."""
 
 DILATED = 1.5
@@ -373,7 +373,7 @@ def _check_time_step(settings: Drive, start: Packing, dt: float) -> None:
 def _check_signal(settings: Drive, signal: Signal, dt: float) -> None:
     """Refuse a signal that time steps would not follow."""
     says = f"and the time step is {dt:.3g}: the run would not follow it, so give a slower signal"
-    if settings.omega is not None and 2 * math.pi / settings.omega < FEWEST_STEPS * dt:
+    if settings.omega is not None and 2 * math.pi / settings.omega < STEPS_A_PULSE * dt:
         raise SceneError(f"drive.omega = {settings.omega:g} has a period of {2 * math.pi / settings.omega:.3g}, {says}")
     if settings.signal != "pulse" and signal.shortest < dt:
         raise SceneError(f"drive.signal has rows that are {signal.shortest:.3g} apart, {says}")

@@ -14,7 +14,7 @@ loaded in increments of 1e-3 F_y, either with the slider from the beginning (law
 poured packings all that is asked of one seed comes before the next.
 
 **Beside LAMMPS.** LAMMPS integrates what one-sided motion follows, from the same two starts and over the same spans
-(:mod:`.lammps_motion`): each layer of the slider at the smallest of `RATES`, at 0.2 F_y and the restitution 0.9 at all
+(:mod:`.windows`): each layer of the slider at the smallest of `RATES`, at 0.2 F_y and the restitution 0.9 at all
 of these and with so large a friction that no contact is at the bound; each packing of spheres while its slope rises.
 """
 
@@ -35,11 +35,15 @@ from research.lammps_laws.compute import GAMMA, KN, MU, pour, rest
 from research.laws.both_laws import as_slider, at_loads
 from research.modes.loss import impact_velocity, with_dashpots
 from research.modes.sets import sets
-from research.rising.lammps_motion import Windows, drift_and_vibration, rise_in_plugin, rise_on_slope
+from research.rising.windows import Windows, drift_and_vibration, rise_in_plugin, rise_on_slope
 from research.tables import known_rows
 
-SEEDS, FIRST = 20, (1, 11, 15)
-"""Seeds, and those that come first: 11 and 15 vibrated in LAMMPS otherwise than one-sided motion from one start."""
+SEEDS = 20
+APART = (11, 15)
+"""The seeds that vibrated in LAMMPS otherwise than one-sided motion from one start."""
+
+FIRST = (1, *APART)
+"""The seeds that come first."""
 
 LOADS = (0.1, 0.2, 0.3)
 RESTITUTIONS = (0.9, 0.97)

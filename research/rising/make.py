@@ -25,6 +25,7 @@ from research.modes.loss import GROWS as LINEAR
 from research.modes.sets import sets
 from research.rising import onsets
 from research.rising.compute import (
+    APART,
     COMPARED,
     FIRST,
     HISTORIES,
@@ -41,7 +42,7 @@ from research.rising.compute import (
     layers,
     poured,
 )
-from research.rising.starts import APART, order, rows_of
+from research.rising.starts import order, rows_of
 from research.statistics import count_of
 from research.tables import add_seeds, differing, known_rows
 

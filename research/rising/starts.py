@@ -11,19 +11,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from itertools import islice
 from typing import Any
 
-import numpy as np
-
-from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
-from faultgouge.analysis.motion.one_sided_outcome import STEPS_OF_CHUNK, VERDICT_STEP
-from faultgouge.analysis.motion.rising_load import FADE, windows_under_load
-from research.rising.compute import COMPARED, RATES, STARTS, at_rest, with_restitution
-from research.rising.lammps_motion import Windows, drift_and_vibration, rise_in_plugin
-
-APART = (11, 15)
-"""The seeds that are looked at first."""
+from research.rising.compute import APART, COMPARED, RATES, STARTS, at_rest, with_restitution
+from research.rising.windows import FADE, Windows, drift_and_vibration, follow_one_sided, rise_in_plugin
 
 FOLLOWED = 60
 
@@ -33,13 +24,7 @@ def rows_of(seed: int) -> Iterator[dict[str, Any]]:
     begin, (load, restitution) = time.process_time(), COMPARED
     scene, at, _ = at_rest(seed, "coulomb", [load])
     packing = with_restitution(at[load], scene, restitution)
-    system = OneSidedSystem.of(packing, VERDICT_STEP)
-    chunk = STEPS_OF_CHUNK * system.time_step / system.step_share
-    force = np.zeros((len(packing), 2))
-    force[:, 0] = packing.top
-    direction = forces_on_coordinates(packing.configuration, force)
-    followed = list(islice(windows_under_load(system, direction, chunk), FOLLOWED))[FADE:]
-    windows = np.array([window.drift_and_vibration(system) for window in followed])
+    chunk, windows = follow_one_sided(packing, FOLLOWED)
     followed_there = Windows(chunk, FOLLOWED, FOLLOWED - FADE)
     motions = [rise_in_plugin(packing, min(RATES), followed_there, spins) for spins in STARTS]
     lammps = [[drift_and_vibration([part], chunk, min(RATES)) for part in motion] for motion in motions]

@@ -2,9 +2,9 @@
 
 import pytest
 
-from research.rising.compute import RATES, RESTITUTIONS
+from research.rising.compute import APART, RATES, RESTITUTIONS
 from research.rising.make import HERE, ONSETS, STARTS, VIBRATES, check, numbers, write_page
-from research.rising.starts import APART, order
+from research.rising.starts import order
 from research.tables import read_rows
 
 FOUND = numbers()

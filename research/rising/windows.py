@@ -1,7 +1,7 @@
-"""Motion under a load that rises as LAMMPS integrates it, from the two starts of the one-sided motion.
+"""Windows of the motion under a load that rises: one-sided, and as LAMMPS integrates it from the same two starts.
 
 A drag fades out in the first `FADE` windows, on all coordinates or not on rotations, as in
-:mod:`faultgouge.analysis.motion.rising_load`: between parts of the run velocities are multiplied by what the drag
+:mod:`faultgouge.analysis.motion.rising_load`: between parts of LAMMPS's run velocities are multiplied by what the drag
 leaves of them. Drift and vibration are then those of the same span of windows.
 """
 
@@ -9,15 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from faultgouge.analysis import Configuration, Floats, Packing, Signal
-from faultgouge.analysis.motion.one_sided import OneSidedSystem
+from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
 from faultgouge.analysis.motion.one_sided_outcome import STEPS_OF_CHUNK, VERDICT_STEP
-from faultgouge.analysis.motion.rising_load import DRAG, FADE
+from faultgouge.analysis.motion.rising_load import DRAG, FADE, windows_under_load
 from faultgouge.pywrap import Engine, in_a_copy
 
 STEPS_OF_LOOK, LOOKS = 15, 400
@@ -46,8 +47,7 @@ class Windows:
     @classmethod
     def of(cls, configuration: Configuration, rising: Mapping[str, Any]) -> Windows:
         """Those of one-sided motion, `Stability.rising`."""
-        system = OneSidedSystem.of(configuration, VERDICT_STEP)
-        length = STEPS_OF_CHUNK * system.time_step / system.step_share
+        length = _length(OneSidedSystem.of(configuration, VERDICT_STEP))
         if rising["time"] is None:
             return cls(length, *DEFAULT)
         return cls(length, round(rising["time"] / length), round(rising["span"] / length))
@@ -56,6 +56,20 @@ class Windows:
     def time_step(self) -> float:
         """Of LAMMPS, time."""
         return self.length / (STEPS_OF_LOOK * LOOKS)
+
+
+def _length(system: OneSidedSystem) -> float:
+    return STEPS_OF_CHUNK * system.time_step / system.step_share
+
+
+def follow_one_sided(packing: Packing, count: int) -> tuple[float, Floats]:
+    """Length of a window, and drift and vibration of a layer in each window after the drag, shape (windows, 2, S)."""
+    system = OneSidedSystem.of(packing.configuration, VERDICT_STEP)
+    force = np.zeros((len(packing), 2))
+    force[:, 0] = packing.top
+    direction = forces_on_coordinates(packing.configuration, force)
+    followed = list(islice(windows_under_load(system, direction, _length(system)), count))[FADE:]
+    return _length(system), np.array([window.drift_and_vibration(system) for window in followed])
 
 
 def rise_in_plugin(packing: Packing, rate: float, windows: Windows, spins: bool) -> list[tuple[Floats, Floats]]:
