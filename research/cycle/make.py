@@ -26,7 +26,7 @@ from faultgouge.figures import render
 from faultgouge.studies.statistics import share
 from research.cycle import clock, further, springs
 from research.cycle.compute import DISKS, LAWS, LOOKED_AT, MANY, UNTIL, compute, compute_many
-from research.statistics import count_of, interval, middle
+from research.statistics import DRAWS, count_of, interval, median_over_runs, share_over_runs
 from research.tables import add_seeds, differing, read_rows
 
 HERE = Path(__file__).parent
@@ -47,9 +47,6 @@ FORETELLERS = {
 }
 """What may foretell a slip, with its name on the page."""
 
-DRAWS = 2000
-"""Resampled sets of runs for an interval."""
-
 AGREES = 1e-6
 """Relative difference of numbers that are computed again on the same machine."""
 
@@ -68,11 +65,11 @@ def begins_with(state: Row) -> dict[str, bool]:
 
 def counts(rows: Sequence[Row], law: str, kind: str) -> dict[str, dict[str, Any]]:
     """Of how many states of a kind each instability is there, with intervals."""
-    states = [
-        begins_with(state) for row in rows if row["law"] == law for state in row["states"] if state["kind"] == kind
+    runs = [
+        [begins_with(state) for state in row["states"] if state["kind"] == kind] for row in rows if row["law"] == law
     ]
     names = ("sticking", "sliding", "fold", "growth alone", "neither")
-    return {name: share(sum(state[name] for state in states), len(states)) for name in names}
+    return {name: share_over_runs([[state[name] for state in run] for run in runs]) for name in names}
 
 
 def before_or_control(rows: Sequence[Row], law: str) -> dict[str, dict[str, Any]]:
@@ -169,14 +166,19 @@ def by_size(few: Sequence[Row], many: Sequence[Row]) -> list[dict[str, Any]]:
     for law in LAWS:
         for disks, rows in ((DISKS, few), (MANY, many)):
             own = [row for row in rows if row["law"] == law]
-            slips = [slip for row in own for slip in row["slips"]]
-            apart = [gap for row in own for gap in np.diff([slip["begins"] for slip in row["slips"]])]
-            drops = [slip["force_before"] - slip["force_after"] for slip in slips]
+            runs = [row["slips"] for row in own]
+            drops = [[slip["force_before"] - slip["force_after"] for slip in run] for run in runs]
             found.append(
-                {"law": law, "disks": disks, "runs": len(own), "slips": len(slips)}
-                | {"before": middle([slip["force_before"] for slip in slips]), "drop": middle(drops)}
-                | {"slip": middle([slip["slip"] for slip in slips]), "apart": middle(apart)}
-                | {"largest": max(drops, default=None)}
+                {"law": law, "disks": disks, "runs": len(own), "slips": sum(map(len, runs))}
+                | {
+                    name: median_over_runs([[slip[column] for slip in run] for run in runs])
+                    for name, column in (("before", "force_before"), ("slip", "slip"))
+                }
+                | {
+                    "drop": median_over_runs(drops),
+                    "apart": median_over_runs([np.diff([slip["begins"] for slip in run]) for run in runs]),
+                    "largest": max((drop for run in drops for drop in run), default=None),
+                }
             )
     return found
 
