@@ -19,7 +19,7 @@ from faultgouge.analysis import Configuration, Floats, Packing, Signal
 from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
 from faultgouge.analysis.motion.one_sided_outcome import STEPS_OF_CHUNK, VERDICT_STEP
 from faultgouge.analysis.motion.rising_load import DRAG, FADE, windows_under_load
-from faultgouge.pywrap import Engine, in_a_copy
+from faultgouge.pywrap import Engine
 
 STEPS_OF_LOOK, LOOKS = 15, 400
 """Time steps between two looks at velocities, each some 0.05 of the stable one, and looks in a window."""
@@ -90,23 +90,6 @@ def rise_in_plugin(packing: Packing, rate: float, windows: Windows, spins: bool)
     signal = Signal(np.array([0.0, end]), np.array([0.0, rate * end]))
     with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(windows.time_step, signal=signal):
         return list(windows_in(engine.lammps, len(packing), windows, spins))
-
-
-def rise_on_slope(
-    lmp: Any, count: int, slope: float, rate: float, windows: Windows, spins: bool
-) -> list[tuple[Floats, Floats]]:
-    """The same of poured particles at rest, of the deck of `pour`, whose slope rises; in a copy of this LAMMPS."""
-
-    def follow() -> list[tuple[Floats, Floats]]:
-        for line in (
-            "log none", "thermo 0", "unfix drag", "unfix spin", "reset_timestep 0", f"timestep {windows.time_step!r}",
-            f"variable slope equal {slope!r}+{rate!r}*dt*step", "velocity all set 0 0 0",
-        ):  # fmt: skip
-            lmp.command(line)
-        lmp.numpy.extract_atom("omega")[:count] = 0.0
-        return list(windows_in(lmp, count, windows, spins))
-
-    return in_a_copy(follow)
 
 
 def drift_and_vibration(parts: Sequence[tuple[Floats, Floats]], length: float, rate: float) -> dict[str, float]:
