@@ -51,7 +51,7 @@ COMPARED = (0.2, 0.9)
 """F_x/F_y and restitution of the layers that LAMMPS integrates at all rates, and without contacts at the bound."""
 
 RATES = (3e-4, 3e-5, 3e-6)
-"""Rates of the load in LAMMPS, force / time: over 100 units of time, the longest run, the load rises by 3e-2 at the most."""
+"""Rates of the load in LAMMPS, force / time: over 100 units of time, the longest run, it rises by 3e-2 at the most."""
 
 STARTS = (True, False)
 """Whether the drag that fades out acts on rotations."""
