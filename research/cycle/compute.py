@@ -1,7 +1,7 @@
 """Driven runs with both laws, and the eigenvalues of some of their states.
 
 **The rule.** `scene` has the numbers of scenes/drive.toml. Seeds 1, 2, 3, ... in this order, each with the smoothed
-law (history `total`) and then with the standard one (`coulomb`), as many as a quarter of an hour allows; every run that
+law (history `total`) and then with the standard one (`coulomb`), as many as the time allows; every run that
 was over counts, with its slips or without. The choice of states was written down before their eigenvalues were
 computed; what counts as growth, and the tests, were settled after four seeds had been seen.
 
