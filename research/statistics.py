@@ -1,11 +1,13 @@
 """Intervals of what resampled packings give, for the pages of research."""
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import TypeVar
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from faultgouge.analysis import Floats, Indices
+from faultgouge.studies.statistics import median, share
 
 Values = TypeVar("Values", Indices, Floats)
 
@@ -16,6 +18,56 @@ def interval(value: Sequence[float | None] | None, digits: str = ".2g", beyond: 
         return "-"
     middle, low, high = (beyond if each is None or np.isinf(each) else format(each, digits) for each in value)
     return f"{middle} ({low} to {high})"
+
+
+def count_of(share: Mapping[str, Any]) -> str:
+    """A count of so many with the interval of its share, "5 of 20 (11 to 47 %)"; "-" of none."""
+    if share["share"] is None:
+        return "-"
+    return f"{share['count']} of {share['of']} ({100 * share['low']:.0f} to {100 * share['high']:.0f} %)"
+
+
+def middle(values: ArrayLike) -> list[float] | None:
+    """Median with its 95 % interval, from resampling; None of fewer than two numbers."""
+    found = np.asarray(values, dtype=float)
+    return median(found) if len(found) > 1 else None
+
+
+DRAWS = 2000
+"""Resampled sets of runs for an interval."""
+
+
+def _ends_over_runs(runs: Sequence[Floats], of: Callable[[Floats], float]) -> tuple[float, float]:
+    """The 95 % interval of a number of all values, from resampled runs: values of one run may depend on each other."""
+    known = [run for run in runs if len(run)]
+    chosen = np.random.default_rng(0).integers(len(known), size=(DRAWS, len(known)))
+    drawn = [of(np.concatenate([known[each] for each in draw])) for draw in chosen]
+    low, high = np.quantile(drawn, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def share_over_runs(runs: Sequence[Sequence[bool]]) -> dict[str, Any]:
+    """A share of what several runs have, as `share`, whose interval is the wider of two.
+
+    One is that of resampled runs, and the other takes all values as independent: few runs, or runs that are all alike,
+    make the first one too narrow.
+    """
+    values = [np.asarray(run, dtype=float) for run in runs]
+    found = share(int(sum(run.sum() for run in values)), sum(map(len, values)))
+    if found["of"]:
+        low, high = _ends_over_runs(values, np.mean)
+        found |= {"low": min(low, found["low"]), "high": max(high, found["high"])}
+    return found
+
+
+def median_over_runs(runs: Sequence[Sequence[float]]) -> list[float] | None:
+    """A median of what several runs have, as `middle`, whose interval is the wider of the same two."""
+    values = [np.asarray(run, dtype=float) for run in runs]
+    found = middle(np.concatenate(values)) if values else None
+    if found is None:
+        return None
+    low, high = _ends_over_runs(values, np.median)
+    return [found[0], min(low, found[1]), max(high, found[2])]
 
 
 def resample(groups: Sequence[Values], draws: int) -> Iterator[list[Values]]:

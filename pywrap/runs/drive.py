@@ -18,15 +18,25 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from ...analysis import Contacts, FaultgougeError, Packing, dynamical_matrix, layer_force, nearest_modes
+from ...analysis import (
+    Contacts,
+    FaultgougeError,
+    Packing,
+    dynamical_matrix,
+    layer_force,
+    nearest_modes,
+    stable_timestep,
+)
 from ...analysis.arrays import Floats
 from ...analysis.factors.sparse_lu import general_lu
+from ...analysis.motion.signals import Signal
 from ...analysis.motion.slips import Slip, SlipDetector
 from ...analysis.progress import Watch
 from ..lammps.dynamics import Dynamics
@@ -35,9 +45,9 @@ from ..scenes.drive_section import Drive
 from ..scenes.packing_section import GeneratedPacking
 from ..scenes.scene import Scene
 from ..scenes.validation import SceneError, require_section
-from ..settling.settle import law_of, settle
+from ..settling.settle import law_of, settle, settle_bed
 from .run_iterator import run_of_scene
-from .undamped import Checkpoint, time_step
+from .undamped import Checkpoint
 
 LOADED, MOVED = 0.016, 0.01
 """Where a scene does not say when states are stored: share of mu F_y by which the spring loads a layer that sticks from
@@ -50,6 +60,9 @@ SAMPLES_A_PERIOD, SAMPLES_A_PART = 20, 10
 SLOW_ENOUGH, TOO_FAST = 100.0, 10.0
 """Periods of the slowest vibration in which the spring loads the layer to mu F_y: below the first a run is warned, and
 below the second refused."""
+
+STEPS_A_PULSE = 10
+"""Time steps in a period of a pulse: velocity Verlet then samples it to some per cent."""
 
 DILATED = 1.5
 """Height of the layer, in units of that at the beginning, above which it has left the bed."""
@@ -183,29 +196,39 @@ def settle_for_drive(scene: Scene, communicator: MPI.Comm | None = None, watch: 
     """Settle the packing of a scene at F_x = 0, where its slips begin at zero.
 
     Friction bears nothing in a packing that has settled without friction: slips and low parts of coordinates are those
-    that rounding leaves, and are left out, so that a data file describes the packing for the deck drive.in.
+    that rounding leaves, and are left out, so that a data file describes the packing for the deck drive.in. A stored
+    packing is taken as it is, to the bit, with its slips, as the deck takes that of a data file: to balance it more
+    closely would move it, by any way along x where nothing but friction holds it.
     """
     section = scene.packing
     if isinstance(section, GeneratedPacking) and section.settle_friction:
         return settle(scene, communicator=communicator, watch=watch).packing
-    packing = settle(scene.model_copy(update={"precision": "double"}), 0.0, communicator, watch).packing
-    contacts = Contacts(packing.contacts.i, packing.contacts.j, np.zeros(len(packing.contacts)))
-    packing = replace(packing, law=law_of(scene, scene.law.mus[0]), contacts=contacts)
+    if isinstance(section, GeneratedPacking):
+        packing = settle(scene.model_copy(update={"precision": "double"}), 0.0, communicator, watch).packing
+        contacts = Contacts(packing.contacts.i, packing.contacts.j, np.zeros(len(packing.contacts)))
+        packing = replace(packing, law=law_of(scene, scene.law.mus[0]), contacts=contacts)
+    else:
+        packing = settle_bed(scene)
     if scene.precision == "double":
         return packing
-    low = replace(contacts, slip_low=np.zeros(len(contacts)))
-    return replace(packing, contacts=low, position_low=np.zeros_like(packing.position))
+    contacts = packing.contacts
+    if contacts.slip_low is None:
+        contacts = replace(contacts, slip_low=np.zeros(len(contacts)))
+    low = np.zeros_like(packing.position) if packing.position_low is None else packing.position_low
+    return replace(packing, contacts=contacts, position_low=low)
 
 
-def check_drive(scene: Scene, start: Packing) -> list[str]:
+def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = None) -> list[str]:
     """Warnings about a drive that may not stick and slip.
 
     Raises
     ------
     SceneError
-        If the drive is not slow against the vibrations of the layer.
+        If the drive is not slow against the vibrations of the layer, or time steps do not follow it.
     """
     settings, warnings = require_section(scene.drive, "drive"), list[str]()
+    with _driven(settings, start, communicator):
+        pass
     if settings.spring == "rigid":
         return warnings
     matrix, active = dynamical_matrix(start)
@@ -274,17 +297,8 @@ def drive(
     """
     settings = require_section(scene.drive, "drive")
     start = settle_for_drive(scene, communicator) if start is None else start
-    signal = settings.forcing()
-    with (
-        Engine(start, communicator) as engine,
-        engine.driven(settings.spring, settings.stages, signal, settings.on) as dynamics,
-    ):
-        if signal is not None and settings.signal != "pulse" and signal.shortest < dynamics.time_step:
-            raise SceneError(
-                f"drive.signal has rows that are {signal.shortest:.3g} apart, and the time step is "
-                f"{dynamics.time_step:.3g}: the run would not follow it, so give a slower signal"
-            )
-        plan = Plan.of(settings, start, time_step(start, dynamics.time_step))
+    with _driven(settings, start, communicator) as (engine, dynamics):
+        plan = Plan.of(settings, start, dynamics.time_step)
         detector = slip_detector(settings, start)
         slips = sum(detector.add(*_of_detector(row)) is not None for row in known) if detector else 0
         last, past = 0, deque[DriveState]()
@@ -322,6 +336,47 @@ def drive(
                 dynamics.resume(step, reached)  # as a run does that is continued from here
                 if keep is not None:
                     keep(Checkpoint(step, reached))
+
+
+@contextmanager
+def _driven(settings: Drive, start: Packing, communicator: MPI.Comm | None = None) -> Iterator[tuple[Engine, Dynamics]]:
+    """LAMMPS with the drive, at its beginning; refused if its time steps do not follow signal, spring and dashpots."""
+    signal = settings.forcing()
+    with (
+        Engine(start, communicator) as engine,
+        engine.driven(settings.spring, settings.stages, signal, settings.on) as dynamics,
+    ):
+        if signal is not None:
+            _check_signal(settings, signal, dynamics.time_step)
+        _check_time_step(settings, start, dynamics.time_step)
+        yield engine, dynamics
+
+
+def _check_time_step(settings: Drive, start: Packing, dt: float) -> None:
+    """Refuse a spring or dashpots with which the time step of the deck would blow up, and a layer that leaps."""
+    leap = settings.fastest * dt
+    if settings.spring == "rigid" and leap > start.radius.min():
+        raise SceneError(
+            f"the layer moves at {settings.fastest:g} by {leap:.3g} in a time step of {dt:.3g}, farther than the "
+            f"smallest radius {start.radius.min():g}: lower drive.velocity"
+        )
+    drawn = start if settings.spring == "rigid" else replace(start, spring=settings.spring)
+    limit = float(stable_timestep(drawn))
+    if dt >= limit:
+        lower = "damping.cn and damping.ct" if dt >= float(stable_timestep(start)) else "drive.spring"
+        raise SceneError(
+            f"the time step of the run is {dt:.3g}, and the limit {limit:.3g}, above which every run of this packing "
+            f"blows up: lower {lower}"
+        )
+
+
+def _check_signal(settings: Drive, signal: Signal, dt: float) -> None:
+    """Refuse a signal that time steps would not follow."""
+    says = f"and the time step is {dt:.3g}: the run would not follow it, so give a slower signal"
+    if settings.omega is not None and 2 * math.pi / settings.omega < STEPS_A_PULSE * dt:
+        raise SceneError(f"drive.omega = {settings.omega:g} has a period of {2 * math.pi / settings.omega:.3g}, {says}")
+    if settings.signal != "pulse" and signal.shortest < dt:
+        raise SceneError(f"drive.signal has rows that are {signal.shortest:.3g} apart, {says}")
 
 
 def strays(packing: Packing, start: Packing) -> NDArray[np.bool_]:

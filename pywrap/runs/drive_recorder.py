@@ -7,7 +7,9 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
 from mpi4py import MPI
+from scipy.special import stdtrit
 
 from ...analysis import RunFile
 from ...analysis.files.atomic_write import lock_output
@@ -21,6 +23,13 @@ from .undamped import Checkpoint
 
 SERIES = "drive"
 """Name of the series in the file."""
+
+NOISES = 3
+"""Runs with noise beside one with a signal. Of the advances by noise in research/cycle, the largest that one run has
+covers 71 of 100 of the others of the same slip, and the error by three of them 96."""
+
+CONFIDENCE = 0.95
+"""Of the error of a clock advance."""
 
 COMPARABLE = 0.5
 """Least force drop of a slip with a signal that is compared with one without, in units of the drop of the latter."""
@@ -177,6 +186,31 @@ def clock_advance(path: Path, other: Path) -> float | None:
         settings = drive_of(with_signal)
         assert settings is not None
         return advance_of(slips_in(with_signal), slips_in(without), settings.at or 0.0)
+
+
+def advance_error(noise: Sequence[float | None], row: float) -> float | None:
+    """The error of a clock advance, time: `CONFIDENCE` of the advances by a signal that does nothing are within it.
+
+    A signal as small as rounding moves the slip, too, and no run is the undisturbed one: what noise does is drawn
+    anew for each run. So the error is that of one more draw, by Student's distribution.
+
+    Parameters
+    ----------
+    noise : sequence of float or None
+        Clock advances by noise; None where no slip follows.
+    row : float
+        Time between two rows of a series, which no advance is better than.
+
+    Returns
+    -------
+    float or None
+        None if no slip follows in one of the runs with noise.
+    """
+    known = [each for each in noise if each is not None]
+    if len(known) < len(noise) or not known:
+        return None
+    quantile = float(stdtrit(len(known), 0.5 + CONFIDENCE / 2))
+    return max(row, quantile * float(np.sqrt(np.mean(np.square(known)))))
 
 
 def advance_of(slips: Sequence[Slip], without: Sequence[Slip], at: float) -> float | None:

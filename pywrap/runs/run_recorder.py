@@ -230,8 +230,8 @@ class Record:
         file = self._file
         if file is None or not file.saved or len(file) == 0:
             return
-        goes_on = "is complete" if file.complete else "the same command continues from there"
-        self._said(f"{self.path} holds {self._contents(file)}{more}; {goes_on}", self.path)
+        goes_on = ", and is complete" if file.complete else "; the same command continues from there"
+        self._said(f"{self.path} holds {self._contents(file)}{more}{goes_on}", self.path)
 
     def _contents(self, file: RunFile) -> str:
         """The contents of the file, in words."""

@@ -118,11 +118,6 @@ class Drive(Section):
                     return key, 'stands without signal: give signal = "pulse" or a file'
         elif self.at is None:
             return "at", "is missing: give the time at which the signal begins"
-        elif self.until is not None and self.at >= self.until:
-            return (
-                "at",
-                f"= {self.at:g} is after the end of the run, until = {self.until:g}: let the signal begin before",
-            )
         elif (self.signal == "pulse") != (self.omega is not None):
             return "omega", 'is the frequency of signal = "pulse": give both or neither'
         return None
@@ -151,9 +146,9 @@ class Drive(Section):
         """The same drive without its signal."""
         return self.model_copy(update={"signal": None, "at": None, "omega": None, "scale": 1.0, "on": "layer"})
 
-    def with_noise(self) -> Drive:
-        """The same drive with its signal as small as noise."""
-        return self.model_copy(update={"scale": PROBE_SCALE})
+    def with_noise(self, number: int = 1) -> Drive:
+        """The same drive with its signal as small as noise; each number is another noise."""
+        return self.model_copy(update={"scale": number * PROBE_SCALE})
 
     def forcing(self) -> Signal | None:
         """The signal as LAMMPS takes it, the force on a disk or the acceleration of the floor, by time of the run."""

@@ -175,7 +175,9 @@ class StoredPacking(Section):
         try:
             upper_layer(read_disks(self.file, self.frame), self.top)
         except BadInputError as error:
-            raise refusal_sentence("file", f'= "{self.file.name}" is refused: {str(error).rstrip(".")}') from None
+            # the sentence is that of the command `import`
+            says = str(error).rstrip(".").replace("add --top,", "give packing.top:").replace("--top", "packing.top =")
+            raise refusal_sentence("file", f'= "{self.file.name}" is refused: {says}') from None
         return self
 
     def packing(self, law: MindlinLaw, **more: Any) -> Packing:

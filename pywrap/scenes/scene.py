@@ -72,6 +72,11 @@ class Scene(SceneKeys):
             raise refusal_sentence("damping.ct", says)
         if self.drive and self.law.mus[0] == 0:
             raise refusal_sentence("drive", "needs friction, which holds the layer: give law.mu a value above 0")
+        if self.drive and self.drive.at is not None:
+            end = self.drive.length(self.law.mus[0] * self.load.fy)
+            if self.drive.at >= end:
+                says = f"= {self.drive.at:g} is after the end of the run, {end:g}: let the signal begin before"
+                raise refusal_sentence("drive.at", says)
         if self.drive and self.drive.spring == "rigid" and self.damping and self.damping.tau is not None:
             says = "would slow down a layer that is moved rigidly: leave it out, or give drive.spring a stiffness"
             raise refusal_sentence("damping.tau", says)

@@ -1,7 +1,7 @@
 """Driven runs with both laws, and the eigenvalues of some of their states.
 
 **The rule.** `scene` has the numbers of scenes/drive.toml. Seeds 1, 2, 3, ... in this order, each with the smoothed
-law (history `total`) and then with the standard one (`coulomb`), as many as a quarter of an hour allows; every run that
+law (history `total`) and then with the standard one (`coulomb`), as many as the time allows; every run that
 was over counts, with its slips or without. The choice of states was written down before their eigenvalues were
 computed; what counts as growth, and the tests, were settled after four seeds had been seen.
 
@@ -35,7 +35,7 @@ from faultgouge.pywrap.runs.drive_recorder import DriveRecord, slips_in
 from faultgouge.studies.cycle import cycle_state
 from faultgouge.studies.result_rows import append_row
 from research.modes.sets import WIDTH
-from research.tables import read_rows
+from research.tables import known_rows
 
 LAWS = ("total", "coulomb")
 SPRING = 10.0
@@ -88,7 +88,7 @@ def compute_many(table: Path, runs: Path, seeds: range) -> None:
 
 
 def _compute_run(table: Path, runs: Path, seed: int, law: str, disks: int) -> None:
-    if table.exists() and any((row["seed"], row["law"]) == (seed, law) for row in read_rows(table)):
+    if any((row["seed"], row["law"]) == (seed, law) for row in known_rows(table)):
         return
     runs.mkdir(parents=True, exist_ok=True)
     begin, path = process_time(), runs / f"{law}_{seed}.h5"

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from faultgouge.figures import render
-from faultgouge.studies.statistics import median, share
+from faultgouge.studies.statistics import share
 from research.cycle import clock
 from research.cycle.clock import FREQUENCIES, HEIGHTS, PHASES
 from research.cycle.compute import LAWS
 from research.cycle.springs import SHARES, SPRINGS, row_of
-from research.statistics import interval
-from research.tables import read_rows
+from research.statistics import count_of, interval, middle
+from research.tables import differing, read_rows
 
 HERE = Path(__file__).parent
 SPRINGS_TABLE, CLOCK_TABLE = "springs.jsonl", "clock.jsonl"
@@ -32,6 +32,9 @@ ROW = 0.1
 
 LONG = 0.05
 """Length of a slip from which it is called long."""
+
+AGREES = 1e-6
+"""Relative difference of numbers that are computed again on the same machine."""
 
 FULL, HALF = 0.9, 0.5
 """Clock advance over the wait that was left when the pulse began: of a full one the slip comes with the pulse."""
@@ -61,11 +64,6 @@ def sizes(rows: Sequence[Row]) -> list[Row]:
                 }
             )
     return found
-
-
-def middle(values: Any) -> list[float] | None:
-    """Median with its 95 % interval, from resampling; None of nothing."""
-    return median(np.asarray(values)) if len(values) > 1 else None
 
 
 def verdicts(rows: Sequence[Row], springs: Sequence[float]) -> list[Row]:
@@ -186,36 +184,22 @@ def check() -> list[str]:
     springs_known, clock_known = (read_rows(HERE / "tables" / name) for name in (SPRINGS_TABLE, CLOCK_TABLE))
     run = springs_known[0]
     again = row_of(run["seed"], run["law"], run["spring"])
-    wrong = [f"springs, seed {run['seed']}: {again['slips']}"] if not _agree(run["slips"], again["slips"]) else []
-    few = len(clock_known) // 12
-    for old, new in zip(clock_known[:few], clock.rows_of(clock_known[0]["seed"]), strict=False):
-        names = [name for name in ("begins", "advance") if name in old]
-        if not _agree([{name: old[name] for name in names}], [{name: new[name] for name in names}]):
-            wrong.append(f"pulses: {new}")
-    return wrong
-
-
-def _agree(known: Sequence[Row], again: Sequence[Row]) -> bool:
-    """Whether numbers are the same as before but for the last digits."""
-    return len(known) == len(again) and all(
-        old[name] == new[name]
-        or (None not in (old[name], new[name]) and bool(np.isclose(old[name], new[name], rtol=1e-6, atol=1e-9)))
-        for old, new in zip(known, again, strict=True)
-        for name in old
-    )
-
-
-def count(value: Row) -> str:
-    """A count of so many with the interval of the share."""
-    if value["share"] is None:
-        return "-"
-    return f"{value['count']} of {value['of']} ({100 * value['low']:.0f} to {100 * value['high']:.0f} %)"
+    pairs = [
+        *((old, new, tuple(old)) for old, new in zip(run["slips"], again["slips"], strict=True)),
+        *(
+            (old, new, ("begins", "advance"))
+            for old, new in zip(
+                clock_known[: len(clock_known) // 12], clock.rows_of(clock_known[0]["seed"]), strict=False
+            )
+        ),
+    ]
+    return [each for old, new, names in pairs for each in differing(old, new, names, AGREES)]
 
 
 def write_further(folder: Path = HERE) -> Path:
     """Write further.md of a folder from its tables."""
     found = numbers(folder)
     (folder / "further.md").write_text(
-        render("research.cycle", "further.md.j2", **found, count=count, interval=interval)
+        render("research.cycle", "further.md.j2", **found, count=count_of, interval=interval)
     )
     return folder / "further.md"

@@ -26,8 +26,8 @@ from faultgouge.figures import render
 from faultgouge.studies.statistics import share
 from research.cycle import clock, further, springs
 from research.cycle.compute import DISKS, LAWS, LOOKED_AT, MANY, UNTIL, compute, compute_many
-from research.statistics import interval
-from research.tables import add_seeds, read_rows
+from research.statistics import DRAWS, count_of, interval, median_over_runs, share_over_runs
+from research.tables import add_seeds, differing, read_rows
 
 HERE = Path(__file__).parent
 TABLE, MANY_TABLE = "cycles.jsonl", "cycles_400.jsonl"
@@ -47,9 +47,6 @@ FORETELLERS = {
 }
 """What may foretell a slip, with its name on the page."""
 
-DRAWS = 2000
-"""Resampled sets of runs for an interval."""
-
 AGREES = 1e-6
 """Relative difference of numbers that are computed again on the same machine."""
 
@@ -68,11 +65,11 @@ def begins_with(state: Row) -> dict[str, bool]:
 
 def counts(rows: Sequence[Row], law: str, kind: str) -> dict[str, dict[str, Any]]:
     """Of how many states of a kind each instability is there, with intervals."""
-    states = [
-        begins_with(state) for row in rows if row["law"] == law for state in row["states"] if state["kind"] == kind
+    runs = [
+        [begins_with(state) for state in row["states"] if state["kind"] == kind] for row in rows if row["law"] == law
     ]
     names = ("sticking", "sliding", "fold", "growth alone", "neither")
-    return {name: share(sum(state[name] for state in states), len(states)) for name in names}
+    return {name: share_over_runs([[state[name] for state in run] for run in runs]) for name in names}
 
 
 def before_or_control(rows: Sequence[Row], law: str) -> dict[str, dict[str, Any]]:
@@ -169,20 +166,25 @@ def by_size(few: Sequence[Row], many: Sequence[Row]) -> list[dict[str, Any]]:
     for law in LAWS:
         for disks, rows in ((DISKS, few), (MANY, many)):
             own = [row for row in rows if row["law"] == law]
-            slips = [slip for row in own for slip in row["slips"]]
-            apart = [gap for row in own for gap in np.diff([slip["begins"] for slip in row["slips"]])]
-            drops = [slip["force_before"] - slip["force_after"] for slip in slips]
+            runs = [row["slips"] for row in own]
+            drops = [[slip["force_before"] - slip["force_after"] for slip in run] for run in runs]
             found.append(
-                {"law": law, "disks": disks, "runs": len(own), "slips": len(slips)}
-                | {"before": further.middle([slip["force_before"] for slip in slips]), "drop": further.middle(drops)}
-                | {"slip": further.middle([slip["slip"] for slip in slips]), "apart": further.middle(apart)}
-                | {"largest": max(drops, default=None)}
+                {"law": law, "disks": disks, "runs": len(own), "slips": sum(map(len, runs))}
+                | {
+                    name: median_over_runs([[slip[column] for slip in run] for run in runs])
+                    for name, column in (("before", "force_before"), ("slip", "slip"))
+                }
+                | {
+                    "drop": median_over_runs(drops),
+                    "apart": median_over_runs([np.diff([slip["begins"] for slip in run]) for run in runs]),
+                    "largest": max((drop for run in drops for drop in run), default=None),
+                }
             )
     return found
 
 
-def of_many(rows: Sequence[Row]) -> dict[str, Any]:
-    """Counts of the states of runs of `MANY` disks, by the law."""
+def of_states(rows: Sequence[Row]) -> dict[str, Any]:
+    """Counts of the states before slips and of their controls, by the law."""
     laws = [law for law in LAWS if any(row["law"] == law for row in rows)]
     return {
         "laws": laws,
@@ -195,42 +197,29 @@ def of_many(rows: Sequence[Row]) -> dict[str, Any]:
 
 def numbers(rows: Sequence[Row], many: Sequence[Row] = ()) -> dict[str, Any]:
     """All numbers of the page."""
-    laws = [law for law in LAWS if any(row["law"] == law for row in rows)]
-    every = {law: [row for row in rows if row["law"] == law] for law in laws}
-    better = {law: concordance(every[law]) for law in laws}
-    return {
+    found = of_states(rows)
+    every = {law: [row for row in rows if row["law"] == law] for law in found["laws"]}
+    better = {law: concordance(every[law]) for law in every}
+    states = [state for row in rows for state in row["states"]]
+    return found | {
         "runs": [sizes(row) for row in rows],
-        "laws": laws,
-        "seeds": {law: [row["seed"] for row in every[law]] for law in laws},
-        "slips": {law: sum(len(row["slips"]) for row in every[law]) for law in laws},
-        "before": {law: counts(rows, law, "before") for law in laws},
-        "control": {law: counts(rows, law, "control") for law in laws},
-        "paired": {law: before_or_control(rows, law) for law in laws},
+        "slips": {law: sum(len(row["slips"]) for row in every[law]) for law in every},
         "concordance": better,
-        "sooner": [each["says"] for law in laws for each in better[law] if each["over_force"][1] > 0],
-        "resting": share(
-            sum(state["rests"] for row in rows for state in row["states"]), sum(len(row["states"]) for row in rows)
-        ),
+        "sooner": [each["says"] for law in every for each in better[law] if each["over_force"][1] > 0],
+        "resting": share(sum(state["rests"] for state in states), len(states)),
         "by_size": by_size(rows, many),
-        "many": of_many(many),
+        "many": of_states(many),
         "disks": MANY,
         "looked_at": LOOKED_AT,
-        "residual": float(np.median([state["residual"] for row in rows for state in row["states"]])),
+        "residual": float(np.median([state["residual"] for state in states])),
     }
-
-
-def percent(part: dict[str, Any]) -> str:
-    """A share with its interval."""
-    if part["share"] is None:
-        return "-"
-    return f"{part['count']} of {part['of']} ({100 * part['low']:.0f} to {100 * part['high']:.0f} %)"
 
 
 def write_page(folder: Path = HERE) -> Path:
     """Write README.md of a folder from its table."""
     found = numbers(*(read_rows(folder / "tables" / name) for name in (TABLE, MANY_TABLE)))
     (folder / "README.md").write_text(
-        render("research.cycle", "README.md.j2", **found, percent=percent, interval=interval)
+        render("research.cycle", "README.md.j2", **found, percent=count_of, interval=interval)
     )
     return folder / "README.md"
 
@@ -243,12 +232,10 @@ def check() -> list[str]:
         compute(again, Path(folder), range(1, 2), LAWS[:1])
         new = read_rows(again)[0]
     names = ("time", "force", "damped_sliding", "lowest_sliding", "pairs_sliding")
-    pairs = zip(known["states"], new["states"], strict=True)
     return [
-        f"t = {old['time']:g}: {name}"
-        for old, state in pairs
-        for name in names
-        if not np.isclose(old[name], state[name], rtol=AGREES)
+        f"t = {old['time']:g}: {each}"
+        for old, state in zip(known["states"], new["states"], strict=True)
+        for each in differing(old, state, names, AGREES)
     ]
 
 

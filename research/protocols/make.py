@@ -32,7 +32,7 @@ from research.protocols.compute import (
     weak_rows_of,
 )
 from research.statistics import interval
-from research.tables import add_seeds, read_rows
+from research.tables import add_seeds, differing, read_rows
 
 HERE = Path(__file__).parent
 TABLE, WEAK = "protocols.jsonl", "dashpots.jsonl"
@@ -131,12 +131,12 @@ def write_page(folder: Path = HERE) -> Path:
 def check() -> list[str]:
     """Rows of the first seed computed again that differ from the table."""
     known = [row for row in read_rows(HERE / "tables" / TABLE) if row["seed"] == 1]
-    wrong = []
-    for old, new in zip(known, rows_of(1), strict=True):
-        names = [name for name in ("mean", "largest", "held", "compaction", "friction") if name in old]
-        if not all(np.allclose(old[name], new[name], rtol=AGREES, atol=1e-12) for name in names):
-            wrong.append(f"{old['kind']}: {[(name, old[name], new[name]) for name in names]}")
-    return wrong
+    names = ("mean", "largest", "held", "compaction", "friction")
+    return [
+        f"{old['kind']}: {each}"
+        for old, new in zip(known, rows_of(1), strict=True)
+        for each in differing(old, new, names, AGREES)
+    ]
 
 
 if __name__ == "__main__":

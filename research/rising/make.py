@@ -25,7 +25,9 @@ from research.modes.loss import GROWS as LINEAR
 from research.modes.sets import STANDARD
 from research.rising import onsets
 from research.rising.compute import (
+    APART,
     COMPARED,
+    FIRST,
     HISTORIES,
     LOADS,
     POURED_LAWS,
@@ -35,18 +37,21 @@ from research.rising.compute import (
     SEEDS,
     SLOPES,
     STIFFNESSES,
+    compute_layers,
     compute_poured,
     layers,
     poured,
-    read,
 )
-from research.rising.starts import APART, order, rows_of
-from research.tables import add_seeds
+from research.rising.starts import order, rows_of
+from research.statistics import count_of
+from research.tables import add_seeds, differing, known_rows
 
 HERE = Path(__file__).parent
-LAYERS, POURED, STARTS, ONSETS = (
-    HERE / "tables" / f"{name}.jsonl" for name in ("layers", "poured", "starts", "onsets")
+LAYERS, ONE_START, POURED, STARTS, ONSETS = (
+    HERE / "tables" / f"{name}.jsonl" for name in ("layers", "layers_one_start", "poured", "starts", "onsets")
 )
+"""Rows of `ONE_START` stand for those that `LAYERS` lacks still: drift and vibration from one start, over windows."""
+
 LAWS = HERE.parent / "laws" / "tables" / "force_100.jsonl"
 
 QUALITIES = (50, 100, 200, 300)
@@ -87,38 +92,103 @@ def outcomes(rows: list[Row]) -> dict[str, Any]:
     return found
 
 
+def starts_of(rising: Row) -> list[Row]:
+    """Drift and vibration from each start that was followed."""
+    return [rising, *([rising["other_start"]] if rising.get("other_start") else [])]
+
+
+def does(rising: Row) -> str:
+    """Whether a layer vibrates, from one of its starts at least, follows the load from all, or is not known to."""
+    steady = [_vibrates(each) for each in starts_of(rising) if each["steady"]]
+    if any(steady):
+        return "vibrate"
+    return "follow" if len(steady) == len(starts_of(rising)) else "open"
+
+
 def under_the_load(rows: list[Row]) -> dict[str, Any]:
-    """How many layers vibrate under a load that rises, and how much."""
+    """How many layers vibrate under a load that rises, and how much: the most of both starts."""
     known = [row["rising"] for row in rows if row["rising"]]
-    ratio = [each["vibration"] / each["drift"] for each in known]
-    steady = [r for r, each in zip(ratio, known, strict=True) if each["steady"] and r > VIBRATES]
+    done = [does(each) for each in known]
+    steady = [
+        max(each["vibration"] / each["drift"] for each in starts_of(rising) if each["steady"])
+        for rising, what in zip(known, done, strict=True)
+        if what == "vibrate"
+    ]
     return {
         "asked": len(known),
-        "vibrate": share(len(steady), len(known)),
-        "follow": share(
-            sum(each["steady"] and r <= VIBRATES for r, each in zip(ratio, known, strict=True)), len(known)
-        ),
-        "open": sum(not each["steady"] for each in known),
+        "two_starts": sum("span" in each for each in known),
+        "vibrate": share(done.count("vibrate"), len(known)),
+        "follow": share(done.count("follow"), len(known)),
+        "open": done.count("open"),
         "ratio": [float(np.median(steady)), min(steady), max(steady)] if steady else None,
     }
 
 
 def beside_lammps(rows: list[Row]) -> dict[str, Any]:
-    """Each layer that LAMMPS integrates, and the differences at the smallest rate."""
+    """Each layer that LAMMPS integrates, from one start and over windows."""
     slow = str(min(RATES))
     shown = [row | {"ratio": row["rising"]["vibration"] / row["rising"]["drift"]} for row in rows if "lammps" in row]
     both = [row for row in shown if row["rising"]["steady"] and row["ratio"] > VIBRATES]
-    vibrates = [row["lammps"][slow]["vibration"] > VIBRATES * row["lammps"][slow]["drift"] for row in shown]
     near = [row["lammps"][slow]["vibration"] / row["rising"]["vibration"] for row in both]
     apart = [(row["seed"], ratio) for row, ratio in zip(both, near, strict=True) if not 1 / NEAR < ratio < NEAR]
     return {
         "rows": shown,
-        "compared": len(shown),
-        "vibrate": sum(vibrates),
-        "control": sum(row["control"]["vibration"] > VIBRATES * row["control"]["drift"] for row in shown),
         "near": [float(np.median(near)), min(near), max(near)] if near else None,
         "both": len(both),
         "apart": apart,
+    }
+
+
+def in_lammps(rows: list[Row]) -> Row:
+    """How many layers vibrate in LAMMPS at the smallest rate, from a start at least, and with a large friction."""
+    slow = [row["lammps"][str(min(RATES))] for row in rows]
+    motions = [each if isinstance(each, list) else [each] for each in slow]
+    return {
+        "layers": len(rows),
+        "vibrate": sum(any(_vibrates(each) for each in starts) for starts in motions),
+        "control": sum(_vibrates(row["control"]) for row in rows),
+    }
+
+
+def _vibrates(motion: Row) -> bool:
+    return bool(motion["vibration"] > VIBRATES * motion["drift"])
+
+
+def from_two_starts(rows: list[Row]) -> list[Row]:
+    """Motion from each start beside LAMMPS's from the same start and over the same span, at all rates.
+
+    `risen` is by how much the load rises in the run at each rate, as a share of what changes the first contact.
+    """
+    found = []
+    for row in rows:
+        rising = row["rising"]
+        for number, one_sided in enumerate(starts_of(rising)):
+            lammps = {rate: each[number] for rate, each in row["lammps"].items()}
+            slow = lammps[str(min(RATES))]["vibration"]
+            found.append(
+                {name: row[name] for name in ("seed", "at_bound", "fx_over_fy", "restitution")}
+                | {
+                    "start": number,
+                    "one_sided": one_sided,
+                    "lammps": lammps,
+                    "vibrates": one_sided["steady"] and _vibrates(one_sided),
+                    "ratio": slow / one_sided["vibration"],
+                    "within": abs(slow - one_sided["vibration"]) <= 2 * one_sided["vibration_error"],
+                    "next_change": rising["next_change"],
+                    "risen": {rate: float(rate) * rising["time"] / rising["next_change"] for rate in lammps},
+                    "control": row.get("control"),
+                }
+            )
+    return found
+
+
+def vibrating(rows: list[Row]) -> dict[str, Any]:
+    """LAMMPS's vibration at the smallest rate over that of one-sided motion, of all starts that vibrate."""
+    own = [row for row in rows if row["vibrates"]]
+    ratio = [row["ratio"] for row in own]
+    return {
+        "within": share(sum(row["within"] for row in own), len(own)),
+        "ratio": [float(np.median(ratio)), min(ratio), max(ratio)] if ratio else None,
     }
 
 
@@ -211,10 +281,25 @@ def figure_of_starts(rows: list[Row]) -> Figure:
     return figure
 
 
+def key_of(row: Row) -> tuple[Any, ...]:
+    """What a row of the layers is of."""
+    return tuple(row.get(name) for name in ("seed", "law", "fx_over_fy", "restitution"))
+
+
+def rows_of_layers() -> tuple[list[Row], list[Row]]:
+    """The rows from two starts, and those that are from one start still."""
+    new = known_rows(LAYERS)
+    done = {key_of(row) for row in new}
+    return new, [row for row in known_rows(ONE_START) if key_of(row) not in done]
+
+
 def numbers() -> dict[str, Any]:
     """All numbers of the page."""
-    every, spheres, starts, laws, firsts = (read(table) for table in (LAYERS, POURED, STARTS, LAWS, ONSETS))
+    spheres, starts, laws, firsts = (known_rows(table) for table in (POURED, STARTS, LAWS, ONSETS))
+    new, old = rows_of_layers()
+    every = new + old
     rows = [row for row in every if "stable" in row]
+    from_both = from_two_starts([row for row in new if "lammps" in row])
     cells = []
     for load in LOADS:
         for law in HISTORIES:
@@ -241,7 +326,13 @@ def numbers() -> dict[str, Any]:
         "seeds": max((row["seed"] for row in every), default=0),
         "asked": SEEDS,
         "ended": [row for row in every if "stable" not in row],
-        "lammps": beside_lammps(rows),
+        "renewed": [sum("stable" in row for row in new), len(rows)],
+        "both_starts": [row for row in from_both if (row["fx_over_fy"], row["restitution"]) == COMPARED],
+        "elsewhere": [row for row in from_both if (row["fx_over_fy"], row["restitution"]) != COMPARED],
+        "vibrating": vibrating(from_both),
+        "lammps": beside_lammps([row for row in old if "stable" in row]),
+        "in_lammps": in_lammps([row for row in rows if "control" in row]),
+        "first": FIRST,
         "rates": RATES,
         "starts": of_two_starts(starts),
         "over_loss": over_loss(laws, cells),
@@ -262,9 +353,14 @@ def count(value: dict[str, Any]) -> str:
     return f"{value['count']} of {value['of']}"
 
 
-def part(value: dict[str, Any]) -> str:
-    """A count with the interval of its share, in per cent."""
-    return f"{count(value)} ({100 * value['low']:.0f} to {100 * value['high']:.0f} %)"
+def thousandths(value: float) -> str:
+    """A number in units of 1e-3."""
+    return format(1e3 * value, ".3g")
+
+
+def plus_minus(motion: Row, name: str) -> str:
+    """Drift or vibration with its error, in units of 1e-3."""
+    return f"{thousandths(motion[name])} \u00b1 {1e3 * motion[f'{name}_error']:.1g}"
 
 
 def spread(value: list[float] | None, digits: str = ".2g") -> str:
@@ -280,39 +376,42 @@ def write_page(folder: Path = HERE) -> Path:
     found = numbers()
     at = {each["law"]: each["counts"] for each in found["over_quality"] if each["load"] == COMPARED[0]}
     contrast = [at[law][q] for q in (QUALITIES[0], QUALITIES[-1]) for law in ("smooth", "loaded")]
-    words = {"count": count, "spread": spread, "part": part, "contrast": contrast, "at": COMPARED}
+    words = {
+        "thousandths": thousandths,
+        "plus_minus": plus_minus,
+        "count": count,
+        "spread": spread,
+        "part": count_of,
+        "contrast": contrast,
+        "at": COMPARED,
+    }
     text = render("research.rising", "README.md.j2", **found, **words)
     (folder / "README.md").write_text(text)
     (folder / "pictures").mkdir(exist_ok=True)
-    _, vectors = save(figure_of_starts(read(STARTS)), folder / "pictures" / "starts")
+    _, vectors = save(figure_of_starts(known_rows(STARTS)), folder / "pictures" / "starts")
     vectors.unlink()  # the page shows dots, and the lines of this file are many
     return folder / "README.md"
 
 
 def check() -> list[str]:
     """The rows of the first seed, and the first tenth of the spheres, computed again, that differ from the tables."""
-    names = ("law", "fx_over_fy", "restitution")
-    known = {tuple(row[name] for name in names): row for row in read(LAYERS) if row["seed"] == 1 and "stable" in row}
-    wrong = []
-    for row in layers(1):
-        key = tuple(row[name] for name in names)
-        same = row["stable"] is known[key]["stable"] and np.isclose(
-            row["sticking"], known[key]["sticking"], rtol=AGREES
-        )
-        if not same:
-            wrong.append(f"{key}: {row['stable']}, {row['sticking']:.6g}; before {known[key]['stable']}")
-    spheres = read(POURED)
+    known = {key_of(row): row for row in known_rows(LAYERS) if row["seed"] == 1 and "stable" in row}
+    cells = sorted({(load, restitution) for _, _, load, restitution in known})
+    pairs = [(known[key_of(row)], row) for row in layers(1, cells) if "stable" in row]
+    spheres = known_rows(POURED)
     for old in spheres[: len(spheres) // 10]:
-        new = poured(*(old[name] for name in ("law", "kn", "slope", "seed")))
-        if any(old[name] != new[name] for name in ("rests", "stable") if name in old):
-            wrong.append(f"{new}; before {old}")
-    return wrong
+        pairs.append((old, poured(*(old[name] for name in ("law", "kn", "slope", "seed")))))
+    return [
+        f"{key_of(old)}: {each}"
+        for old, new in pairs
+        for each in differing(old, new, ("rests", "stable", "sticking"), AGREES)
+    ]
 
 
 if __name__ == "__main__":
     match sys.argv[1:]:
         case ["layers"]:
-            add_seeds(LAYERS, range(1, SEEDS + 1), layers)
+            compute_layers(LAYERS)
         case ["poured"]:
             compute_poured(POURED)
         case ["starts", seeds]:

@@ -19,7 +19,7 @@ from faultgouge.figures import INK, render, save, styled
 from faultgouge.studies.result_rows import row_columns
 from faultgouge.studies.statistics import median, share
 from research.modes.loss import GROWS
-from research.statistics import interval
+from research.statistics import count_of, interval
 from research.tables import read_rows
 from research.yielding.compute import CONTROLLED_RATE, LOADINGS, LOSSES, SHARES, TIME
 
@@ -157,13 +157,6 @@ def from_the_bound(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def percent(part: dict[str, Any]) -> str:
-    """A share with its interval, "3 of 20 (5 to 36 %)"; "-" of nothing."""
-    if part["share"] is None:
-        return "-"
-    return f"{part['count']} of {part['of']} ({100 * part['low']:.0f} to {100 * part['high']:.0f} %)"
-
-
 @styled
 def figure(found: dict[str, Any]) -> Figure:
     """Static and dynamic yield over loss, of either size; share of layers of 100 disks without rest over the load."""
@@ -216,7 +209,7 @@ def write_page(folder: Path) -> Path:
         standard=standard(read_rows(tables / "standard_100.jsonl")),
         **from_the_bound(read_rows(tables / "sliding_100.jsonl")),
         interval=interval,
-        percent=percent,
+        percent=count_of,
     )
     (folder / "README.md").write_text(page)
     return folder / "README.md"
@@ -301,7 +294,7 @@ def write_lasting(folder: Path) -> Path:
     page = render(
         "research.yielding",
         "further.md.j2",
-        percent=percent,
+        percent=count_of,
         lossy=lossy,
         again=count_vibrating_draws(rows, read_rows(further) if further.exists() else []),
         standard=standard(read_rows(tables / "standard_100.jsonl")),

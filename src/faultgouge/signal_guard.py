@@ -42,7 +42,7 @@ SIGNALS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # `nohup` has a command go on without its terminal
     SIGNALS[signal.SIGHUP] = "the terminal or the connection was closed"
 
-NOTHING = "nothing was written, and the same command starts from the beginning"
+NOTHING = "nothing was written: give the same command again"
 _shared = mmap.mmap(-1, 4096)
 """Shared by guard and work: what an interrupt leaves, as UTF-8, a place and words that each end with a zero, `CLOSED`
 and `ENDED`."""

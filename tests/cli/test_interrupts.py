@@ -106,8 +106,8 @@ def simulates(folder):
 @pytest.mark.parametrize(
     ("command", "says"),
     [
-        ("onset scene.toml -o onset.json", "nothing was written, and the same command starts from the beginning"),
-        ("explain scene.toml", "nothing was written, and the same command starts from the beginning"),
+        ("onset scene.toml -o onset.json", "nothing was written: give the same command again"),
+        ("explain scene.toml", "nothing was written: give the same command again"),
         (
             "reproduce scene.toml -o out",
             "what is in out so far is kept; the same command starts from the beginning and replaces it",
@@ -265,7 +265,7 @@ GUARDED = "import os, sys; from faultgouge.signal_guard import guarded; guarded(
 @pytest.mark.parametrize(
     ("script", "code", "says"),
     [
-        (IN_A_CLASS, 130, "Error: interrupted: nothing was written, and the same command starts from the beginning.\n"),
+        (IN_A_CLASS, 130, "Error: interrupted: nothing was written: give the same command again.\n"),
         (GUARDED.format("os.abort()"), 1, "a library has ended the command (SIGABRT)"),
         (GUARDED.format("os.kill(os.getpid(), 11)"), 1, "a library has ended the command (SIGSEGV)"),
         (GUARDED.format("os.kill(os.getpid(), 9)"), 137, "killed from outside, possibly for lack of memory"),

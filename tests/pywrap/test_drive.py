@@ -1,6 +1,7 @@
 """A layer that a spring draws: the command, the deck and an interrupted run are one run, to the bit."""
 
 import json
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -12,7 +13,14 @@ from faultgouge.pywrap import Equilibrium, Scene, SceneError
 from faultgouge.pywrap.lammps.data_file import data_file
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
-from faultgouge.pywrap.runs.drive_recorder import DriveRecord, clock_advance, slips_in
+from faultgouge.pywrap.runs.drive_recorder import (
+    CONFIDENCE,
+    NOISES,
+    DriveRecord,
+    advance_error,
+    clock_advance,
+    slips_in,
+)
 from faultgouge.pywrap.runs.run_recorder import Record
 
 BASE = {
@@ -102,6 +110,38 @@ def test_deck_alone_is_the_same_to_the_bit(scene, lmp, tmp_path, precision):
     assert rows[-1, 4:] == pytest.approx([last["thickness"][-1], last["kinetic_energy"][-1]], rel=few)
 
 
+@pytest.mark.ranks
+@pytest.mark.slow
+@pytest.mark.parametrize(("ranks", "precision"), [(1, "double"), (2, "double"), (1, "compensated")])
+def test_stored_packing_is_drawn_as_it_is(lmp, tmp_path, ranks, precision):
+    """The packing of the decks, which is in balance to 1e-10: the command and the deck as it stands end alike."""
+    shipped = {"file": str(DECKS / "packing100.data"), "top": "type:2"}
+    drive = {"spring": 10.0, "velocity": 1e-3, "until": 2.0, "states": 2.0}
+    scene = Scene.from_mapping(BASE | {"packing": shipped, "drive": drive, "precision": precision})
+    run_to_end(scene, tmp_path / "drive.h5")
+    lmp(DECKS / "drive.in", ranks=ranks, decks=DECKS, time=2.0, precision=precision)
+    dumped, (row,) = read_dump(tmp_path / "drive.end.disks"), np.loadtxt(tmp_path / "drive.series", ndmin=2)[-1:]
+    with RunFile(tmp_path / "drive.h5") as file:
+        np.testing.assert_array_equal(dumped.position, file.packing(-1).position)
+        np.testing.assert_array_equal(dumped.contacts.slip, file.packing(-1).contacts.slip)
+        assert row[1] <= file.series("drive")["time"][-1]
+
+
+def test_stored_packing_keeps_its_slips(scene, tmp_path):
+    """Friction bears a packing that has settled with friction; without its slips it would rearrange."""
+    wanted = scene(**THROWN)
+    whole = settle_for_drive(wanted)
+    slips = 1e-7 * np.random.default_rng(0).standard_normal(len(whole.contacts))
+    held = replace(whole, contacts=whole.contacts.slipped(slips))
+    with RunFile.create(tmp_path / "held.h5", held, {}) as file:
+        file.append(held)
+        file.save()
+    stored = wanted.packing.model_copy(update={"file": tmp_path / "held.h5"})
+    start = settle_for_drive(wanted.model_copy(update={"packing": stored}))
+    np.testing.assert_array_equal(start.contacts.slip, slips)
+    np.testing.assert_array_equal(start.position, whole.position)
+
+
 def series_of(scene, path):
     """The series of a whole run."""
     run_to_end(scene, path)
@@ -164,6 +204,11 @@ def test_rigid_layer_has_force_and_no_slips(scene, tmp_path):
         ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "signal": "pulse", "omega": 1.0}, "drive.at is missing"),
         ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "signal": "pulse", "at": 0.5}, "drive.omega is the freq"),
         ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "signal": "pulse", "omega": 1.0, "at": 1.0}, "after the end"),
+        ({"spring": 10.0, "protocol": [[1e-3, 2.0]], "signal": "pulse", "omega": 1.0, "at": 3.0}, "after the end"),
+        (
+            {"spring": 10.0, "velocity": 1e-3, "slips": 1, "signal": "pulse", "omega": 1.0, "at": 601.0},
+            "of the run, 600",
+        ),
         ({"spring": 10.0, "velocity": 1e-3, "untill": 1.0}, "until"),
     ],
 )
@@ -204,6 +249,23 @@ def test_drive_that_is_fast_or_stiff_is_warned_or_refused(scene):
     assert "slow driving takes 100 or more" in fast
     (stiff,) = check_drive(scene(spring=1e4, velocity=1e-6, until=1.0), start)
     assert "is stiffer than the layer" in stiff
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"drive": {"spring": 1e9, "velocity": 1e-11}}, "blows up: lower drive.spring"),
+        ({"damping": {"cn": 1e6}}, "blows up: lower damping.cn and damping.ct"),
+        ({"drive": {"spring": "rigid", "velocity": 1e3}}, "farther than the smallest radius 0.5: lower drive.velocity"),
+        ({"drive": {"signal": "pulse", "at": 0.5, "omega": 1e9}}, "has a period of 6.28e-09, and the time step is"),
+    ],
+)
+def test_drive_that_time_steps_do_not_follow_is_refused_before_it_begins(scene, change, says):
+    wanted = scene(**{"spring": 10.0, "velocity": 1e-3, "until": 1.0} | change.get("drive", {}))
+    if "damping" in change:
+        wanted = Scene.from_mapping(wanted.model_dump(exclude_none=True) | change)
+    with pytest.raises(SceneError, match=says):
+        check_drive(wanted, settle_for_drive(wanted))
 
 
 @pytest.mark.ranks
@@ -253,7 +315,7 @@ def test_signal_changes_nothing_until_it_comes(scene, tmp_path):
     for name in ("with", "noise"):
         same = series[name]["displacement"] == series["without"]["displacement"]
         assert same[time < 0.06].all()
-        assert not same[-1]
+        assert not same.all()
     apart = np.abs(series["with"]["displacement"] - series["without"]["displacement"]).max()
     assert apart > 1e-4
 
@@ -306,3 +368,46 @@ def test_clock_advance_is_the_time_between_comparable_slips(scene, tmp_path):
     assert advance == pytest.approx(20.0, abs=0.2)
     store("none.h5", wanted.drive.without_signal(), [(30.0, 0.05)])
     assert clock_advance(tmp_path / "with.h5", tmp_path / "none.h5") is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scale", [0.0, 1e-11])
+def test_signal_that_does_nothing_has_no_clock_advance_beyond_its_error(faultgouge_here, tmp_path, scale):
+    """The layer of seed 1 with the standard law, shortly before its first slip; without a force runs are the same."""
+    text = f"""[packing]
+seed = 1
+[law]
+kn = 2e5
+history = "coulomb"
+[load]
+fy = 3.0
+[damping]
+cn = 60.0
+ct = 17.0
+[drive]
+spring = 10.0
+velocity = 1e-3
+until = 75
+signal = "pulse"
+at = 50
+omega = 2.0
+scale = {scale}
+"""
+    (tmp_path / "scene.toml").write_text(text)
+    told = json.loads(faultgouge_here("drive", "scene.toml", "-o", "d.h5", "--json").stdout)
+    assert told["slips"]
+    assert len(told["clock_advances_of_noise"]) == NOISES
+    assert abs(told["clock_advance"]) <= told["clock_advance_error"]
+    if scale == 0:
+        assert told["clock_advance"] == 0
+    with RunFile(tmp_path / "d.h5") as file:
+        assert told["clock_advance_error"] >= np.diff(file.series("drive")["time"]).min()
+
+
+def test_error_of_a_clock_advance_is_that_of_one_more_draw():
+    """Of many draws of three and one more, as many are covered as is said; a row of the series is the least error."""
+    draws = 2.0 * np.random.default_rng(0).standard_normal((4000, NOISES + 1))
+    covered = [abs(last) <= advance_error(noise, 1e-9) for *noise, last in draws.tolist()]
+    assert np.mean(covered) == pytest.approx(CONFIDENCE, abs=0.015)  # four standard errors
+    assert advance_error([0.0, 0.0, 0.0], 0.1) == 0.1
+    assert advance_error([0.0, None, 0.0], 0.1) is None

@@ -9,9 +9,12 @@ from pathlib import Path
 import pytest
 from reference_layer import REFERENCE
 
+from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.scenes.command_sections import COMMANDS
 from faultgouge.pywrap.scenes.impossible import refuse_endless
 from faultgouge.pywrap.scenes.scene import Scene, SceneError
+
+SHIPPED = str(DECKS / "packing100.data")
 
 ROOT = Path(__file__).parents[2]
 
@@ -198,6 +201,9 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ({"law.mu": 0.0, "friction.v_ss": 1.0}, "friction has no mu to weaken"),
         ({"law": {"kt": 1.0}}, "law.kt stands without kn: give kn"),
         ({"packing": {"file": str(REFERENCE), "seed": 1}}, "packing.seed cannot stand beside packing.file"),
+        # of a scene, and not of `import`
+        ({"packing": {"file": SHIPPED}}, "which disks are the upper layer: give packing.top: 12 (the highest"),
+        ({"packing": {"file": SHIPPED, "top": "y>1000"}}, "the upper layer holds no disk (packing.top = y>1000)"),
     ],
     ids=lambda value: str(value)[:60],
 )

@@ -103,39 +103,50 @@ def _run(
 
 
 def _others(output: Path, scene: Scene) -> dict[str, tuple[Path, Scene]]:
-    """Of a drive with a signal: the runs without the signal, and with one as small as noise."""
+    """Of a drive with a signal: the runs without the signal, and with signals as small as noise."""
     settings = scene.drive
     assert settings is not None
     if settings.signal is None:
         return {}
-    changed = {"without": settings.without_signal(), "noise": settings.with_noise()}
+    from faultgouge.pywrap.runs.drive_recorder import NOISES
+
+    noises = {f"noise{number}": settings.with_noise(number) for number in range(1, NOISES + 1)}
+    changed = {"without": settings.without_signal()} | noises
     return {
         name: (output.with_suffix(f".{name}{output.suffix}"), scene.model_copy(update={"drive": drive}))
         for name, drive in changed.items()
     }
 
 
-def _advances(output: Path, others: dict[str, Path]) -> dict[str, float | None]:
+def _advances(output: Path, others: dict[str, Path]) -> dict[str, Any]:
     """How much earlier the next slip is, with the signal and with noise; nothing without a signal."""
-    from faultgouge.pywrap.runs.drive_recorder import clock_advance
+    from faultgouge.analysis import RunFile
+    from faultgouge.pywrap.runs.drive_recorder import SERIES, advance_error, clock_advance
 
     if not others:
         return {}
+    without = others["without"]
+    noise = [clock_advance(path, without) for name, path in others.items() if name != "without"]
+    with RunFile(output) as file:
+        first, second = file.series(SERIES)["time"][:2]
     return {
-        "clock_advance": clock_advance(output, others["without"]),
-        "clock_advance_of_noise": clock_advance(others["noise"], others["without"]),
+        "clock_advance": clock_advance(output, without),
+        "clock_advance_error": advance_error(noise, float(second - first)),
+        "clock_advances_of_noise": noise,
     }
 
 
 def _advance_in_words(result: dict[str, Any]) -> str:
-    advance, noise = result["clock_advance"], result["clock_advance_of_noise"]
+    advance, error = result["clock_advance"], result["clock_advance_error"]
     if advance is None:
         return "clock advance: not known, since no slip follows the signal, with or without it; let the run be longer"
     side = "earlier" if advance >= 0 else "later"
     earlier = f"the next slip of comparable size is {abs(advance):.4g} {side} than without the signal"
-    if noise is None:
+    if error is None:
         return f"{earlier}; with noise none follows in the run"
-    return f"{earlier}; noise of 1e-12 moves it by {abs(noise):.2g}"
+    alone = ", which noise alone may do" if abs(advance) <= error else ""
+    runs = len(result["clock_advances_of_noise"])
+    return f"{earlier}, \u00b1 {error:.2g} (95 %, of {runs} runs with noise of 1e-12){alone}"
 
 
 def _result(path: Path, scene: Scene) -> dict[str, Any]:
