@@ -176,7 +176,7 @@ def by_size(few: Sequence[Row], many: Sequence[Row]) -> list[dict[str, Any]]:
                 }
                 | {
                     "drop": median_over_runs(drops),
-                    "apart": median_over_runs([np.diff([slip["begins"] for slip in run]) for run in runs]),
+                    "apart": median_over_runs([np.diff([slip["begins"] for slip in run]).tolist() for run in runs]),
                     "largest": max((drop for run in drops for drop in run), default=None),
                 }
             )
