@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, eye_array
 from scipy.spatial import cKDTree
 
 from ...analysis.arrays import Floats, Indices
@@ -88,7 +89,9 @@ def _bonded(lmp: Any, ids: Indices) -> tuple[Indices, Indices]:
 
 
 class Colours:
-    """Which bodies are displaced together: no particle is a neighbour of two of them.
+    """Which bodies are displaced together: no particle feels two of them.
+
+    A particle feels its neighbours; with a `reach` of 2, their neighbours, too.
 
     Attributes
     ----------
@@ -98,7 +101,7 @@ class Colours:
         The body that each particle feels, -1 if it feels none.
     """
 
-    def __init__(self, particles: Particles, pairs: Pairs, near: float) -> None:
+    def __init__(self, particles: Particles, pairs: Pairs, near: float, reach: int = 1) -> None:
         count = len(particles.ids)
         moved = particles.constraint.tocoo()
         leads: list[set[int]] = [set() for _ in range(count)]
@@ -106,11 +109,13 @@ class Colours:
             leads[leader].add(int(particle))
         free = np.zeros(count, np.bool_)
         free[moved.row % count] = True
-        feels = [{k} for k in range(count)]
-        touch = (pairs.acts | (pairs.gap < near)) & free[pairs.i] & free[pairs.j]
-        for i, j in zip(pairs.i[touch].tolist(), pairs.j[touch].tolist(), strict=True):
-            feels[i].add(j)
-            feels[j].add(i)
+        touch = pairs.acts | (pairs.gap < near)
+        one, other = np.concatenate([pairs.i[touch], pairs.j[touch]]), np.concatenate([pairs.j[touch], pairs.i[touch]])
+        neighbours = csr_array((np.ones(len(one)), (one, other)), shape=(count, count)) + eye_array(count, format="csr")
+        reached = neighbours
+        for _ in range(reach - 1):
+            reached = reached @ neighbours
+        feels = [set(row[free[row]].tolist()) for row in np.split(reached.indices, reached.indptr[1:-1])]
         taken: list[set[int]] = [set() for _ in range(count)]
         self.members: list[list[int]] = []
         self.owner: list[Indices] = []

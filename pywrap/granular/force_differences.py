@@ -10,19 +10,23 @@ All of it happens in copies of the process (:mod:`~faultgouge.pywrap.granular.fo
 as it is. Particles without a common neighbour are displaced together (:mod:`~faultgouge.pywrap.granular.colours`).
 
 **Error.** Slopes of both sides are extrapolated from the steps h/2 and h. A displacement, and a velocity, of all
-particles at once in random directions are then compared with K q and C v. The difference is the error; neighbours of
-which nothing is known would show in it.
+particles at once in random directions are then compared with K q and C v. The difference is the error. Where a model
+has forces depend on all contacts of a particle (mdr), a particle feels the neighbours of its neighbours: if the error
+says so, particles are displaced together that are farther apart.
 
 **One-sided derivatives.** A contact at Coulomb's bound, one that is about to open or close, and a law with two
-derivatives have another derivative forwards than backwards. K is the mean of both, and the jump between them is said. A
-displacement may also be too long for a contact that is far weaker than the others: where a force is not linear a finer
-one is tried.
+derivatives have another derivative forwards than backwards. K is the mean of both, and the jump between them is said.
+There two displacements do not add up, and the error is no reason to refuse the rest.
+
+**Weak contacts.** A displacement may be too long for a contact whose force is far below the mean one: the contact opens
+within it, or slides, and then its stiffness seems to be next to nothing. The random direction is taken at ever shorter
+displacements, too. Where it differs there, or where forces are not linear, shorter ones are tried.
 
 **Bodies.** q = P Q, where several coordinates move as one. The columns of K are displacements of Q, and its rows sums
 of forces on the coordinates that Q moves.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -62,9 +66,14 @@ SIDES = 1e-3
 leaves 1e-5 of one."""
 
 SHORTER = 0.03
-"""Size of a shorter displacement, as a share of the first one, where a force is not linear: a contact whose force is
-far below the mean one slides within the first, as those of cohesive particles do that pull about as much as they
-push."""
+"""Size of the next shorter displacement, as a share of the one before: contacts of cohesive particles, which pull about
+as much as they push, may bear a force 1e-5 of the mean one, and slide within 1e-7 of an overlap."""
+
+SHORTEST_OF_COORDINATE = 1e-11
+"""Shortest displacement as a share of the largest coordinate: the rounding of a coordinate is 1e-5 of it."""
+
+SHORTEST_VELOCITY = 1e-6
+"""Lowest velocity as a share of the first one: the rounding of forces is 1e-6 of their differences."""
 
 TOO_LARGE = 0.1
 """Error, relative to the largest entry, beyond which the differences describe nothing."""
@@ -123,22 +132,50 @@ def _measure(lmp: Any, particles: Particles, force: float | None) -> ForceDiffer
     lmp.command(f"timestep {SLOW * timestep:.17g}")
     lmp.command("thermo_style custom step")
     by_place = Probe(lmp, particles, SLOW * timestep, (0.5, 1.0))
-    stiffness, jump, error = _derivative(by_place, colours, step)
+    lengths = _sizes(step, SHORTEST_OF_COORDINATE * float(np.abs(particles.position).max()))
+    found = _derivative(by_place, colours, lengths)
+    if found.unexplained > SIDES:
+        farther = Colours(particles, pairs, 4 * step, reach=2)
+        other = _derivative(by_place, farther, lengths)
+        if other.unexplained < 0.5 * found.unexplained:
+            colours, found = farther, other
     by_velocity = Probe(lmp, particles, None, (1.0,))
     if force is None:
-        force = step * float(np.abs(stiffness.data).max(initial=0.0)) / SHARE_OF_OVERLAP
+        force = step * float(np.abs(found.matrix.data).max(initial=0.0)) / SHARE_OF_OVERLAP
     speed = _speed(by_velocity, step / timestep, PUSH * force)
     if speed == 0.0:
-        _refuse_errors(particles, error)
-        return ForceDifferences(stiffness, csr_array(stiffness.shape), float(error.max()), jump)
-    damping, jump_of_c, error_of_c = _derivative(by_velocity, colours, speed)
-    error = np.maximum(error, error_of_c)
-    _refuse_errors(particles, error)
-    return ForceDifferences(stiffness, damping, float(error.max()), np.maximum(jump, jump_of_c))
+        _refuse_errors(particles, found)
+        return ForceDifferences(found.matrix, csr_array(found.matrix.shape), float(found.error.max()), found.jump)
+    damping = _derivative(by_velocity, colours, _sizes(speed, SHORTEST_VELOCITY * speed))
+    jump, error = np.maximum(found.jump, damping.jump), np.maximum(found.error, damping.error)
+    _refuse_errors(particles, found._replace(jump=jump, error=error))
+    return ForceDifferences(found.matrix, damping.matrix, float(error.max()), jump)
 
 
-def _refuse_errors(particles: Particles, error: Floats) -> None:
-    """Refuse operators that describe nothing, with the particle where the error, shape (N,), is largest."""
+def _sizes(first: float, last: float) -> list[float]:
+    """Ever shorter displacements, or lower velocities."""
+    found = [first]
+    while SHORTER * found[-1] > last:
+        found.append(SHORTER * found[-1])
+    return found
+
+
+class _Derivative(NamedTuple):
+    """-dF/dQ, and the jumps of it and its error by particle, shape (N,) each, as shares of its largest entry."""
+
+    matrix: csr_array
+    jump: Floats
+    error: Floats
+
+    @property
+    def unexplained(self) -> float:
+        """Largest error where no force is one-sided."""
+        return float(np.where(self.jump > 0, 0.0, self.error).max())
+
+
+def _refuse_errors(particles: Particles, found: _Derivative) -> None:
+    """Refuse operators that describe nothing, with the particle where the error is largest."""
+    error = np.where(found.jump > 0, 0.0, found.error)
     worst = int(np.argmax(error))
     if error[worst] <= TOO_LARGE:
         return
@@ -179,18 +216,45 @@ def _speed(by_velocity: "Probe", speed: float, force: float) -> float:
     return speed
 
 
-def _derivative(probe: Probe, colours: Colours, step: float) -> tuple[csr_array, Floats, Floats]:
-    """-dF/dQ by steps of this size, and jumps of it and the error by particle, shape (N,)."""
-    size, count = probe.particles.constraint.shape[0], len(probe.particles.ids)
-    axis = count * np.arange(size // count)
+def _derivative(probe: Probe, colours: Colours, sizes: list[float]) -> _Derivative:
+    """-dF/dQ by steps of the first size, and by shorter ones where these say otherwise."""
+    particles = probe.particles
+    count, size = len(particles.ids), particles.constraint.shape[0]
+    directions, owners = _directions(colours, count, size // count)
+    random = np.random.Generator(np.random.PCG64(0)).uniform(-1, 1, size)
+    *found, first = _slopes(probe, [*directions, random], sizes[0])
+    last = _slopes(probe, [random], sizes[-1])[0]
+    matrix, jump = _assemble(particles, found, owners)
+    differs = _error(particles, matrix, random, last) > SIDES
+    largest = max(np.abs(each.mean).max() for each in (*found, first))
+    rough = [
+        k for k, each in enumerate(found) if each.uneven.max() > SIDES * largest or np.any(owners[k][differs] >= 0)
+    ]
+    if rough:
+        both = replace(probe, sizes=(0.5, 1.0))  # how far a force is from a linear one
+        for each in sizes if len(probe.sizes) == 1 else sizes[1:]:
+            for k, slope in zip(rough, _slopes(both, [directions[k] for k in rough], each), strict=True):
+                found[k] = slope if each == sizes[0] else _more_linear(found[k], slope, owners[k])
+        matrix, jump = _assemble(particles, found, owners)
+    errors = [_error(particles, matrix, random, slope) for slope in (first, last)]
+    return _Derivative(matrix, jump, np.where(differs, errors[1], errors[0]))
+
+
+def _directions(colours: Colours, count: int, axes: int) -> tuple[list[Floats], list[Indices]]:
+    """A unit displacement of each colour along each axis, shape (axes N,), and the body that each particle feels in it,
+    shape (N,), -1 for none."""
     directions = []
     for members in colours.members:
-        for k in axis:
-            directions.append(np.zeros(size))
-            directions[-1][k + np.array(members)] = step
-    random = step * np.random.Generator(np.random.PCG64(0)).uniform(-1, 1, size)
-    owners = [owner for owner in colours.owner for _ in axis]
-    *found, last = _slopes(probe, [*directions, random], [*owners, np.arange(count)], step)
+        for axis in range(axes):
+            directions.append(np.zeros(axes * count))
+            directions[-1][axis * count + np.array(members)] = 1.0
+    return directions, [owner for owner in colours.owner for _ in range(axes)]
+
+
+def _assemble(particles: Particles, found: list["_Slope"], owners: list[Indices]) -> tuple[csr_array, Floats]:
+    """-dF/dQ of the slopes along all directions, and its jumps."""
+    size, count = particles.constraint.shape[0], len(particles.ids)
+    axis = count * np.arange(size // count)
     rows, columns, values, jump = [], [], [], np.zeros(count)
     for k, (slope, owner) in enumerate(zip(found, owners, strict=True)):
         felt = np.flatnonzero(owner >= 0)
@@ -199,14 +263,24 @@ def _derivative(probe: Probe, colours: Colours, step: float) -> tuple[csr_array,
         columns.append(np.broadcast_to(axis[k % len(axis)] + owner[felt], where.shape).ravel())
         values.append(-slope.mean[where].ravel())
         jump[felt] = np.maximum(jump[felt], np.abs(slope.jump[where]).max(axis=0))
-    moved = csr_array(probe.particles.constraint != 0).astype(np.float64).T
     raw = coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(size, size))
-    matrix = csr_array(moved @ raw.tocsr())
+    matrix = csr_array(_sums(particles) @ raw.tocsr())
     matrix.eliminate_zeros()
-    forces = moved @ last.mean
-    largest, felt = np.abs(matrix.data).max(initial=0.0), np.abs(forces).max(initial=0.0)
-    error = np.abs(forces + matrix @ random / step).reshape(-1, count).max(axis=0) / (felt or 1.0)
-    return matrix, np.where(jump > SIDES * largest, jump, 0.0) / (largest or 1.0), error
+    matrix.sort_indices()
+    largest = np.abs(matrix.data).max(initial=0.0)
+    return matrix, np.where(jump > SIDES * largest, jump, 0.0) / (largest or 1.0)
+
+
+def _sums(particles: Particles) -> csr_array:
+    """What sums forces on coordinates that move as one."""
+    return csr_array(csr_array(particles.constraint != 0).astype(np.float64).T)
+
+
+def _error(particles: Particles, matrix: csr_array, direction: Floats, slope: "_Slope") -> Floats:
+    """Difference of a slope along a direction from that of a matrix, as a share of the largest; shape (N,)."""
+    forces = _sums(particles) @ slope.mean
+    felt = float(np.abs(forces).max(initial=0.0))
+    return np.asarray(np.abs(forces + matrix @ direction).reshape(-1, len(particles.ids)).max(axis=0) / (felt or 1.0))
 
 
 class _Slope(NamedTuple):
@@ -223,18 +297,9 @@ class _Slope(NamedTuple):
         return np.maximum(np.abs(self.jump), np.abs(self.bend))
 
 
-def _slopes(probe: Probe, directions: list[Floats], owners: list[Indices], step: float) -> list[_Slope]:
-    """Slopes along directions of this size, or along finer ones where forces are far more linear there.
-
-    `owners` has the body that each particle feels in a direction, shape (N,), -1 for none.
-    """
-    found = [_slope(each, probe.sizes, step) for each in probe.each(directions)]
-    largest = max(np.abs(each.mean).max() for each in found)
-    uneven = [k for k, each in enumerate(found) if each.uneven.max() > SIDES * largest]
-    if uneven:
-        for k, each in zip(uneven, probe.each([SHORTER * directions[k] for k in uneven]), strict=True):
-            found[k] = _more_linear(found[k], _slope(each, probe.sizes, SHORTER * step), owners[k])
-    return found
+def _slopes(probe: Probe, directions: list[Floats], size: float) -> list[_Slope]:
+    """Slopes along unit directions, by steps of a size."""
+    return [_slope(each, probe.sizes, size) for each in probe.each([size * q for q in directions])]
 
 
 def _more_linear(one: _Slope, other: _Slope, owner: Indices) -> _Slope:
