@@ -8,10 +8,11 @@ from .granular_commands import MOBILE, WALLS, NotLinearisedError, without_suffix
 from .look_in_a_copy import DRAG, INSERTS, PER_STEP
 
 PASSIVE = (
-    *WALLS, *PER_STEP, *DRAG, *INSERTS, *MOBILE, "gravity", "enforce2d", "NEIGH_HISTORY", "slip/history",
-    "low/parts", "dashpot/velocities", "keep/histories", "store", "STORE", "DUMMY", "property/atom",
+    *WALLS, *PER_STEP, *DRAG, *INSERTS, *MOBILE, "gravity", "enforce2d", "slip/history", "low/parts",
+    "dashpot/velocities", "keep/histories", "store", "property/atom",
 )  # fmt: skip
-"""Fixes, by the beginnings of their styles, whose action is in K, or constant, or none."""
+"""Fixes, by the beginnings of their styles, whose action is in K, or constant, or none; so are those that LAMMPS makes
+for itself, whose styles are in capitals (GRANULAR/MDR): styles of pairs need them."""
 
 HOLDING = {
     "spring": "pulls at particles as contacts do not tell: leave it out",
@@ -38,7 +39,7 @@ def acting_fixes(styles: dict[str, str]) -> dict[str, str]:
     found = {}
     for name, style in styles.items():
         plain = without_suffix(style)
-        if plain.startswith(PASSIVE):
+        if plain.startswith(PASSIVE) or plain.isupper():
             continue
         says = [text for begin, text in ACTING.items() if plain.startswith(begin)]
         found[name] = f"fix {name} {style} {(says or ['acts on particles as contacts do not tell: unfix it'])[0]}"

@@ -69,8 +69,12 @@ SHORTER = 0.03
 """Size of the next shorter displacement, as a share of the one before: contacts of cohesive particles, which pull about
 as much as they push, may bear a force 1e-5 of the mean one, and slide within 1e-7 of an overlap."""
 
-SHORTEST_OF_COORDINATE = 1e-11
-"""Shortest displacement as a share of the largest coordinate: the rounding of a coordinate is 1e-5 of it."""
+SHORTEST_OF_COORDINATE, SHORTEST_OF_OVERLAP = 1e-11, 1e-6
+"""Shortest displacement as a share of the largest coordinate, whose rounding is 1e-5 of it, and of the median overlap:
+the history that `granular` does not turn is 6e-4 of mu of the difference."""
+
+DIFFERS = 1e-2
+"""Error of the shortest displacement, as a share of the largest force, from which on shorter ones are tried."""
 
 SHORTEST_VELOCITY = 1e-6
 """Lowest velocity as a share of the first one: the rounding of forces is 1e-6 of their differences."""
@@ -132,7 +136,7 @@ def _measure(lmp: Any, particles: Particles, force: float | None) -> ForceDiffer
     lmp.command(f"timestep {SLOW * timestep:.17g}")
     lmp.command("thermo_style custom step")
     by_place = Probe(lmp, particles, SLOW * timestep, (0.5, 1.0))
-    lengths = _sizes(step, SHORTEST_OF_COORDINATE * float(np.abs(particles.position).max()))
+    lengths = _sizes(step, _shortest(particles, pairs))
     found = _derivative(by_place, colours, lengths)
     if found.unexplained > SIDES:
         farther = Colours(particles, pairs, 4 * step, reach=2)
@@ -153,11 +157,16 @@ def _measure(lmp: Any, particles: Particles, force: float | None) -> ForceDiffer
 
 
 def _sizes(first: float, last: float) -> list[float]:
-    """Ever shorter displacements, or lower velocities."""
-    found = [first]
-    while SHORTER * found[-1] > last:
-        found.append(SHORTER * found[-1])
-    return found
+    """Ever shorter displacements, or lower velocities, from the first to the last one."""
+    count = max(0, int(np.ceil(np.log(last / first) / np.log(SHORTER))))
+    return [float(each) for each in np.geomspace(first, last, count + 1)] if count else [first]
+
+
+def _shortest(particles: Particles, pairs: Pairs) -> float:
+    """The shortest displacement with which forces are not rounded."""
+    overlaps = -pairs.gap[pairs.gap < 0]
+    usual = float(np.median(overlaps)) if len(overlaps) else 0.0
+    return max(SHORTEST_OF_COORDINATE * float(np.abs(particles.position).max()), SHORTEST_OF_OVERLAP * usual)
 
 
 class _Derivative(NamedTuple):
@@ -225,19 +234,43 @@ def _derivative(probe: Probe, colours: Colours, sizes: list[float]) -> _Derivati
     *found, first = _slopes(probe, [*directions, random], sizes[0])
     last = _slopes(probe, [random], sizes[-1])[0]
     matrix, jump = _assemble(particles, found, owners)
-    differs = _error(particles, matrix, random, last) > SIDES
+    differs = _error(particles, matrix, random, last) > DIFFERS
     largest = max(np.abs(each.mean).max() for each in (*found, first))
     rough = [
         k for k, each in enumerate(found) if each.uneven.max() > SIDES * largest or np.any(owners[k][differs] >= 0)
     ]
     if rough:
-        both = replace(probe, sizes=(0.5, 1.0))  # how far a force is from a linear one
-        for each in sizes if len(probe.sizes) == 1 else sizes[1:]:
-            for k, slope in zip(rough, _slopes(both, [directions[k] for k in rough], each), strict=True):
-                found[k] = slope if each == sizes[0] else _more_linear(found[k], slope, owners[k])
+        insists = {k for k in rough if np.any(owners[k][differs] >= 0)}
+        shorter = _shorter(probe, {k: directions[k] for k in rough}, owners, sizes, insists, SIDES * largest)
+        found = [shorter.get(k, each) for k, each in enumerate(found)]
         matrix, jump = _assemble(particles, found, owners)
     errors = [_error(particles, matrix, random, slope) for slope in (first, last)]
-    return _Derivative(matrix, jump, np.where(differs, errors[1], errors[0]))
+    return _Derivative(matrix, jump, np.minimum(*errors))
+
+
+def _shorter(
+    probe: Probe,
+    directions: dict[int, Floats],
+    owners: list[Indices],
+    sizes: list[float],
+    insists: set[int],
+    same: float,
+) -> dict[int, "_Slope"]:
+    """Slopes along directions by ever shorter steps, where these are far more linear.
+
+    A shorter step that says the same, as at a contact which slides on one side, ends the search along a direction, but
+    for those on which one `insists`.
+    """
+    probe = replace(probe, sizes=(0.5, 1.0))  # how far a force is from a linear one
+    last = dict(zip(directions, _slopes(probe, list(directions.values()), sizes[0]), strict=True))
+    found = dict(last)
+    for size in sizes[1:]:
+        slopes = dict(zip(last, _slopes(probe, [directions[k] for k in last], size), strict=True))
+        found |= {k: _more_linear(found[k], slope, owners[k]) for k, slope in slopes.items()}
+        last = {k: slope for k, slope in slopes.items() if k in insists or slope.apart(last[k]) > same}
+        if not last:
+            break
+    return found
 
 
 def _directions(colours: Colours, count: int, axes: int) -> tuple[list[Floats], list[Indices]]:
@@ -295,6 +328,10 @@ class _Slope(NamedTuple):
     def uneven(self) -> Floats:
         """How far the force is from a linear function of the size, shape (axes N,)."""
         return np.maximum(np.abs(self.jump), np.abs(self.bend))
+
+    def apart(self, other: "_Slope") -> float:
+        """Largest difference of two slopes, of one side or the other."""
+        return float((np.abs(self.mean - other.mean) + np.abs(self.jump - other.jump)).max())
 
 
 def _slopes(probe: Probe, directions: list[Floats], size: float) -> list[_Slope]:

@@ -122,11 +122,12 @@ def test_particles_that_nearly_touch(lammps_with, gap):
     assert np.abs(added[:9, :9] - mean[:9, :9]).max() < 1e-3 * 1e4
 
 
-def test_a_weak_contact_among_strong_ones(lammps_with):
-    """The displacement that suits the others opens it; a finer one does not."""
+@pytest.mark.parametrize("overlap", [1e-6, 4e-8])
+def test_a_weak_contact_among_strong_ones(lammps_with, overlap):
+    """The displacement that suits the others opens it, and has it slide; a finer one does not."""
     from faultgouge.pywrap import from_lammps
 
-    places = (0.0, 0.99, 1.98, 2.98 - 1e-6)
+    places = (0.0, 0.99, 1.98, 2.98 - overlap)
     lmp = lammps_with("""
 units lj
 atom_style sphere
@@ -147,6 +148,87 @@ run 0
     assert not len(found.one_sided_particles)
     assert found.operator_error < 1e-5
     assert apart(stiffness_matrix(found), stiffness_matrix(laws)) < 1e-6
+
+
+BOX = """
+units lj
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -10 10 -10 10 -10 10 units box
+create_box 1 box
+{spheres}
+set group all diameter 1 density 1
+pair_style gran/hooke/history 4e3 NULL 100 NULL 0.5 1
+pair_coeff * *
+region inner block -6 6 -6 6 -6 6 units box
+fix inner all wall/gran/region hooke/history 4e3 NULL 100 NULL 0.5 1 region inner
+fix move all nve/sphere
+fix load all gravity 1 vector {down}
+fix drag all viscous 1
+timestep 0.004
+run 20000
+"""
+
+
+@pytest.mark.parametrize("kisses", [False, True])
+def test_spheres_in_an_edge_and_in_a_corner_of_a_region(lammps_with, kisses):
+    """With friction at two and three faces; or at a face that bears nothing, which is about to open."""
+    from faultgouge.pywrap import from_lammps
+
+    spheres = "create_atoms 1 single -5.5 -5.5 -5.5\ncreate_atoms 1 single -4.5 -5.5 -5.5"
+    lmp = lammps_with(BOX.format(spheres=spheres, down="0 -0.4 -1" if kisses else "-0.5 -0.4 -1"))
+    found = from_lammps(lmp)
+    verdict = stability(found)
+    if kisses:  # nothing presses the spheres along x
+        assert list(found.ids[found.one_sided_particles]) == [1, 2]
+        assert verdict.stable is None
+    else:
+        assert found.operator_error < 1e-6
+        assert found.proof < 1e-5
+        assert verdict.stable
+
+
+COLUMN = """
+units si
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -3 3 -3 3 -1 8 units box
+create_box 1 box
+create_atoms 1 single 0 0 0.49 units box
+create_atoms 1 single 0 0 1.45 units box
+create_atoms 1 single 0 0 2.41 units box
+create_atoms 1 single 0 0 3.37 units box
+set group all diameter 1.0 density 1
+pair_style granular
+pair_coeff * * {model}
+region die block -3 3 -3 3 0 3.86 units box
+fix die all wall/gran/region granular {model} region die
+fix move all nve
+fix hold all setforce 0.0 0.0 NULL
+fix drag all viscous 5
+timestep 1e-3
+thermo 100000
+run 20000
+"""
+
+
+@pytest.mark.slow
+def test_forces_that_depend_on_all_contacts_of_a_particle(lammps_with):
+    """In a die the model mdr has a particle's volume resist: its neighbours feel one another through it."""
+    from faultgouge.pywrap import from_lammps
+
+    model = "mdr 1e4 0.3 3e3 0.0 1.0 0.2 damping mdr 1 tangential linear_history 3e3 1.0 0.7"
+    found = from_lammps(lammps_with(COLUMN.format(model=model)))
+    assert found.operator_error < 1e-5
+    assert found.proof < 1e-3  # the volume acts one step late
+    along = abs(stiffness_matrix(found).toarray()[8:12, 8:12])
+    far = np.abs(np.subtract.outer(np.arange(4), np.arange(4)))
+    assert along[far == 2].min() > 0.01 * along.max()
+    assert along[far == 3].max() == 0.0
 
 
 def test_particles_far_apart_that_something_couples(lammps_with):
