@@ -140,7 +140,7 @@ def _measure(lmp: Any, particles: Particles, force: float | None) -> ForceDiffer
     found = _derivative(by_place, colours, lengths)
     if found.unexplained > SIDES:
         farther = Colours(particles, pairs, 4 * step, reach=2)
-        other = _derivative(by_place, farther, lengths)
+        other = _derivative(replace(by_place, settles=True), farther, lengths)
         if other.unexplained < 0.5 * found.unexplained:
             colours, found = farther, other
     by_velocity = Probe(lmp, particles, None, (1.0,))

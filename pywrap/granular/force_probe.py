@@ -106,13 +106,15 @@ Sides = tuple[Floats, list[tuple[Floats, Floats]]]
 class Probe:
     """Forces of a LAMMPS, which is a copy, along displacements, or velocities where `duration` is None.
 
-    `duration` is the length of a step, and `sizes` the shares of a displacement at which forces are taken.
+    `duration` is the length of a step, and `sizes` the shares of a displacement at which forces are taken. If
+    `settles`, a step without motion follows each displacement, for models that act one step late.
     """
 
     lmp: Any
     particles: Particles
     duration: float | None
     sizes: tuple[float, ...]
+    settles: bool = False
 
     def each(self, directions: list[Floats]) -> list[Sides]:
         """Forces along each direction Q, from the state in which LAMMPS is.
@@ -160,6 +162,9 @@ class Probe:
         set_coordinate_velocity(self.lmp, self.particles, moves / self.duration if self.duration else moves)
         step = "run 1 post no" if self.particles.bodies else "run 1 pre no post no"
         self.lmp.command(step if self.duration else "run 0 post no")
+        if self.settles:
+            set_coordinate_velocity(self.lmp, self.particles, 0.0 * moves)
+            self.lmp.command(step)
         return _forces(self.lmp, self.particles)
 
     def _positions(self) -> Floats:
