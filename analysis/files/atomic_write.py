@@ -131,10 +131,10 @@ def _check_changeable(path: Path) -> None:
 
 
 @contextmanager
-def lock_output(path: Path) -> Iterator[None]:
+def lock_output(path: Path) -> Iterator[Path | None]:
     """Keep other processes from writing a file, or into a folder: they find a lock, which goes with this process.
 
-    The lock is a file beside the file, or in the folder, and is removed in the end. A device has none.
+    The lock is a file beside the file, or in the folder, which is yielded and removed in the end. A device has none.
 
     Raises
     ------
@@ -143,12 +143,12 @@ def lock_output(path: Path) -> Iterator[None]:
     """
     target = Path(os.path.realpath(path))
     if target.exists() and not (target.is_file() or target.is_dir()):
-        yield
+        yield None
         return
     lock = target / ".lock" if target.is_dir() else target.with_name(f".{target.name[:LONGEST_NAME]}.lock")
     stream = _take_lock(lock, path)
     try:
-        yield
+        yield lock
     finally:
         with suppress(OSError):
             lock.unlink()

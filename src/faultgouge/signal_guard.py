@@ -17,6 +17,7 @@ one rank has ended. The guards therefore end `SECONDS_TO_END`, and the work afte
 
 from __future__ import annotations
 
+import fcntl
 import mmap
 import os
 import signal
@@ -47,6 +48,9 @@ _shared = mmap.mmap(-1, 4096)
 """Shared by guard and work: what an interrupt leaves, as UTF-8, a place and words that each end with a zero, `CLOSED`
 and `ENDED`."""
 
+_lock = mmap.mmap(-1, 4096)
+"""Shared by guard and work: the name of the lock file that goes with the work, which ends in a zero."""
+
 CLOSED, ENDED = 4094, 4095
 """The bytes of the shared memory that are not zero once the work has closed its files after a signal, and once it has
 come to its end and has said what there is to say."""
@@ -69,6 +73,11 @@ def keeps(words: str, path: str | os.PathLike[str] = "") -> None:
     """Set what is said at an interrupt: what is kept, and how to go on; and the file or folder that must be there."""
     place = os.path.abspath(path) if path else ""
     _shared[:CLOSED] = f"{place}\0{words}".encode(errors="surrogateescape")[: CLOSED - 1].ljust(CLOSED, b"\0")
+
+
+def holds(lock: str | os.PathLike[str]) -> None:
+    """Set which lock file the guard removes if a library ends the work, which then cannot do so."""
+    _lock[:] = os.fsencode(os.path.abspath(lock))[: len(_lock) - 1].ljust(len(_lock), b"\0")
 
 
 def has_ended() -> None:
@@ -173,6 +182,8 @@ def _end(status: int, now: float) -> NoReturn:
     code = os.waitstatus_to_exitcode(status)
     if code - 128 in set(SIGNALS):
         _interrupted(code - 128, now)
+    if code < 0 or not _shared[ENDED]:
+        _remove_lock()
     if code == -signal.SIGKILL:
         _say(f"killed from outside, possibly for lack of memory: {_kept()}")
         os._exit(128 + signal.SIGKILL)
@@ -190,6 +201,13 @@ def _end(status: int, now: float) -> NoReturn:
             )
         os._exit(1)
     os._exit(code)
+
+
+def _remove_lock() -> None:
+    """Remove the lock file of a work that is gone, unless another work has taken it."""
+    with suppress(OSError), open(_lock[:].rstrip(b"\0"), "rb") as stream:
+        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        os.unlink(stream.name)
 
 
 def _kept() -> str:

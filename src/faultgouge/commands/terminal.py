@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from ..mpi_rank import is_root
+from ..signal_guard import holds
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
@@ -182,8 +183,8 @@ def lock_output(context: typer.Context, output: Path, *inputs: Path) -> None:
     from faultgouge.analysis.files.atomic_write import lock_output as lock
 
     check_output(output, *inputs)
-    if is_root():
-        context.with_resource(lock(output))
+    if is_root() and (taken := context.with_resource(lock(output))):
+        holds(taken)
 
 
 @contextmanager
