@@ -172,7 +172,8 @@ def bring_to_rest(
             if force == 0.0 or residual <= max(balance * force, rounding):
                 found = look()
                 force = scale(found)
-                falls = force == 0.0 and bool(np.any(forces))  # what touches nothing has no residual
+                # what touches nothing has no residual; without a load, LAMMPS's forces are those of the drag
+                falls = force == 0.0 and np.linalg.norm(forces + drag_forces) > 0.5 * np.linalg.norm(drag_forces)
                 if found.residual <= max(balance * force, rounding) and not falls:
                     set_velocity(lmp, found, np.zeros(found.coordinates))
                     return found, rate

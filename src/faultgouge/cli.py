@@ -12,6 +12,8 @@ def main() -> NoReturn:
     # one thread for BLAS: its threads cost more than they bring at these sizes, and change the last digits of a solve
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+    # threads of a deck's `package omp` sleep while they wait: where other processes want the cores, they wait long
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     if os.name == "nt":
         raise SystemExit("Error: faultgouge does not run on Windows itself: install Linux's wheel in WSL.")
     _open_streams()

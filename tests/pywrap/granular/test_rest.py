@@ -127,6 +127,16 @@ def test_what_falls_is_not_at_rest(lammps_with):
     assert len(from_lammps(lmp).contacts) == 1
 
 
+def test_what_flies_without_a_load_comes_to_rest(lammps_with):
+    """It touches nothing, and drag alone acts on it."""
+    from faultgouge import relax
+
+    lmp = lammps_with(BALL.format(z=4.0, wall="", more="velocity all set 0.1 0 0.2"))
+    lmp.command("unfix load")
+    assert relax(lmp, steps=20_000) == 0.0
+    assert np.all(lmp.numpy.extract_atom("v")[:1] == 0.0)
+
+
 def test_a_packing_of_rrespa(lammps_with):
     """Its copies take steps of velocity Verlet; the instance goes on with its own."""
     from faultgouge.pywrap import from_lammps
