@@ -31,6 +31,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
 from ...analysis.arrays import Floats, Indices
@@ -240,8 +241,7 @@ def _derivative(probe: Probe, colours: Colours, sizes: list[float]) -> _Derivati
         k for k, each in enumerate(found) if each.uneven.max() > SIDES * largest or np.any(owners[k][differs] >= 0)
     ]
     if rough:
-        insists = {k for k in rough if np.any(owners[k][differs] >= 0)}
-        shorter = _shorter(probe, {k: directions[k] for k in rough}, owners, sizes, insists, SIDES * largest)
+        shorter = _shorter(probe, {k: directions[k] for k in rough}, owners, sizes, differs, SIDES * largest)
         found = [shorter.get(k, each) for k, each in enumerate(found)]
         matrix, jump = _assemble(particles, found, owners)
     errors = [_error(particles, matrix, random, slope) for slope in (first, last)]
@@ -253,21 +253,24 @@ def _shorter(
     directions: dict[int, Floats],
     owners: list[Indices],
     sizes: list[float],
-    insists: set[int],
+    differs: NDArray[np.bool_],
     same: float,
 ) -> dict[int, "_Slope"]:
-    """Slopes along directions by ever shorter steps, where these are far more linear.
+    """Slopes along directions by ever shorter steps, where these are far more linear, and by the shortest on all that
+    feel a body whose motion `differs` there, shape (N,).
 
-    A shorter step that says the same, as at a contact which slides on one side, ends the search along a direction, but
-    for those on which one `insists`.
+    A shorter step that says the same, as at a contact which slides on one side, ends the search along a direction where
+    nothing differs.
     """
     probe = replace(probe, sizes=(0.5, 1.0))  # how far a force is from a linear one
     last = dict(zip(directions, _slopes(probe, list(directions.values()), sizes[0]), strict=True))
     found = dict(last)
     for size in sizes[1:]:
         slopes = dict(zip(last, _slopes(probe, [directions[k] for k in last], size), strict=True))
-        found |= {k: _more_linear(found[k], slope, owners[k]) for k, slope in slopes.items()}
-        last = {k: slope for k, slope in slopes.items() if k in insists or slope.apart(last[k]) > same}
+        found |= {k: _more_linear(found[k], slope, owners[k], differs) for k, slope in slopes.items()}
+        last = {
+            k: slope for k, slope in slopes.items() if np.any(owners[k][differs] >= 0) or slope.apart(last[k]) > same
+        }
         if not last:
             break
     return found
@@ -339,13 +342,16 @@ def _slopes(probe: Probe, directions: list[Floats], size: float) -> list[_Slope]
     return [_slope(each, probe.sizes, size) for each in probe.each([size * q for q in directions])]
 
 
-def _more_linear(one: _Slope, other: _Slope, owner: Indices) -> _Slope:
-    """The other slopes on all that feel a body, where they are far more linear."""
+def _more_linear(one: _Slope, other: _Slope, owner: Indices, differs: NDArray[np.bool_]) -> _Slope:
+    """The other slopes on all that feel a body, where they are far more linear, or where one of these particles
+    differs."""
     bodies = np.tile(owner, len(one.mean) // len(owner))
     most = np.zeros((2, len(owner) + 1))  # the last is that of no body
     for uneven, slope in zip(most, (one, other), strict=True):
         np.maximum.at(uneven, bodies, slope.uneven)
-    better = (most[1] < 0.5 * most[0])[bodies]
+    better = most[1] < 0.5 * most[0]
+    better[owner[differs & (owner >= 0)]] = True
+    better = better[bodies]
     return _Slope(*(np.where(better, new, old) for old, new in zip(one, other, strict=True)))
 
 

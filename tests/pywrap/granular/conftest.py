@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from granular_packings import ALMOST_NONE, command, instance, start, with_law
+from granular_packings import ALMOST_NONE, TWO, command, instance, start, with_law
 
 
 @pytest.fixture
@@ -21,6 +21,17 @@ def lammps_with(tmp_path) -> Iterator[Callable[..., Any]]:
     yield make
     for each in made:
         each.close()
+
+
+@pytest.fixture
+def two(lammps_with):
+    """Makes two spheres that touch, with some commands; a LAMMPS without a log, and what it was told of contacts."""
+
+    def make(pair: str, coefficients: str, more: str = ""):
+        told = [f"pair_style {pair}", *(f"pair_coeff {each}" for each in coefficients.split(";")), *more.splitlines()]
+        return lammps_with(TWO + "\n".join([*told, "run 0"]), log=None), told
+
+    return make
 
 
 @pytest.fixture(scope="session")

@@ -43,6 +43,24 @@ ALMOST_NONE = "1e-12"
 """A dashpot: LAMMPS's walls have forces that are no numbers with one of 0."""
 
 
+TWO = """
+units lj
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -4 4 -4 4 0 8 units box
+create_box 1 box
+create_atoms 1 single 0 0 0.495 units box
+create_atoms 1 single 0 0.6 1.275 units box
+set group all diameter 1.0
+set group all density 1
+thermo_style custom step
+"""
+MOVES = "\nfix move all nve/sphere"
+HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
+
+
 def instance(*arguments: str):
     """LAMMPS on the ranks of this process, with the plugin."""
     from faultgouge.pywrap import Engine  # loads what is needed, in order

@@ -1,4 +1,4 @@
-"""Configurations of LAMMPS's own packings: LAMMPS's motion beside exp(t G), b of two spheres, and refusals."""
+"""Configurations of LAMMPS's own packings: LAMMPS's motion beside exp(t G), b of two spheres, and odd packings."""
 
 import os
 import subprocess
@@ -6,12 +6,14 @@ import sys
 
 import numpy as np
 import pytest
-from granular_packings import ALMOST_NONE, LAWS, RESCALED, command, start, with_law
+from granular_packings import ALMOST_NONE, HERTZ, LAWS, MOVES, RESCALED, command, start, with_law
 from packing_snapshot import snapshot_of
 
 from faultgouge.analysis import damping_matrix, largest_frequency, spectrum, stable_timestep, stiffness_matrix
 
 FAST = ("gran/hertz/history", True, 3), ("gran/hertz/history", False, 2), ("mindlin", False, 2)
+
+
 CASES = [
     pytest.param(
         law, damped, d, id=f"{law}-{'dashpots' if damped else 'elastic'}-{d}",
@@ -97,96 +99,6 @@ group one id 1
         assert np.log(after / before) / overlaps == pytest.approx(expected, abs=1e-6)
 
 
-@pytest.fixture
-def two(lammps_with):
-    """Makes two spheres that touch, with some commands; a LAMMPS without a log, and what it was told of contacts."""
-
-    def make(pair: str, coefficients: str, more: str = ""):
-        told = [f"pair_style {pair}", *(f"pair_coeff {each}" for each in coefficients.split(";")), *more.splitlines()]
-        return lammps_with(TWO + "\n".join([*told, "run 0"]), log=None), told
-
-    return make
-
-
-TWO = """
-units lj
-atom_style sphere
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -4 4 -4 4 0 8 units box
-create_box 1 box
-create_atoms 1 single 0 0 0.495 units box
-create_atoms 1 single 0 0.6 1.275 units box
-set group all diameter 1.0
-set group all density 1
-thermo_style custom step
-"""
-
-
-MOVES = "\nfix move all nve/sphere"
-HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
-
-
-@pytest.mark.parametrize(
-    ("pair", "coefficients", "more", "says"),
-    [
-        (HERTZ, "* *", "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL shear x 1 contacts" + MOVES,
-         "without shear"),
-        (HERTZ, "* *", "fix r all rigid group 1 all", "together in bodies that may rotate"),
-        (HERTZ, "* *", "fix m all move linear 0 0 0", "unfix it, and let the packing come to rest"),
-        (HERTZ, "* *", "fix s all setforce 0 1 NULL" + MOVES, "drives particles"),
-        (HERTZ, "* *", "", "Nothing moves"),
-        (HERTZ, "* *", MOVES + "\nfix again all nve/sphere", "fix move and fix again both move 2 particles"),
-        (HERTZ, "* *", MOVES + "\nfix again all nve", "fix move and fix again both move 2 particles"),
-        (HERTZ, "* *", MOVES, "The packing moves: the residual of particle [12] at .* and 1 more is out of balance"),
-    ],
-)  # fmt: skip
-def test_what_is_refused(two, pair, coefficients, more, says):
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
-    lmp, told = two(pair, coefficients, more.strip())
-    with pytest.raises(NotTakenError, match=says) as refusal:
-        from_lammps(lmp, told)
-    assert "\n" not in str(refusal.value)
-
-
-def test_commands_that_are_not_those_of_the_instance(two):
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
-    lmp, told = two(HERTZ, "* *", MOVES.strip())
-    with pytest.raises(NotTakenError, match=r"no log to read its commands from: give the lines pair_style"):
-        from_lammps(lmp)
-    other = [told[0].replace("1e5", "2e5"), *told[1:]]
-    with pytest.raises(NotTakenError, match=r"normal forces of the contacts of types 1 and 1 are not those"):
-        from_lammps(lmp, other)
-    with pytest.raises(NotTakenError, match=r"pair_style gran/hooke/history, and the instance has gran/hertz"):
-        from_lammps(lmp, ["pair_style gran/hooke/history 1 1 1 1 1 1"])
-    with pytest.raises(NotTakenError, match="has a variable: write its number"):
-        from_lammps(lmp, ["pair_style gran/hertz/history ${kn} 1 1 1 1 1"])
-    with pytest.raises(NotTakenError, match="no pair_style"):
-        from_lammps(lmp, told[2:])
-    with pytest.raises(NotTakenError, match=r"do not stand alone \(LAMMPS stopped: .*\): give the lines") as refusal:
-        from_lammps(lmp, [told[0], "pair_coeff A A", *told[2:]])
-    assert "\n" not in str(refusal.value)
-    # a comment is none of the command, and one text is as good as many lines
-    whole = from_lammps(lmp, "\n".join([*told[:-1], f"{told[-1]}  # ${{comment}}"]), balance=np.inf)
-    assert whole == from_lammps(lmp, told, balance=np.inf)
-
-
-@pytest.mark.parametrize("given", ["", " hertz/history 1e5 NULL 1 1 0.5 1", " hertz/history 1e5 NULL 1 1 0.5 1 zplane"])
-def test_a_line_of_a_wall_that_is_not_whole(two, given):
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
-    wall = "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL"
-    lmp, told = two(HERTZ, "* *", wall + MOVES)
-    lines = [f"fix w all wall/gran{given}" if line == wall else line for line in told]
-    with pytest.raises(
-        NotTakenError, match=r"^The line of fix w wall/gran does not say where the wall is: give all of"
-    ):
-        from_lammps(lmp, lines, balance=np.inf)
-
-
 def test_an_error_in_a_copy_is_that_of_this_process():
     """It is not laid to LAMMPS."""
     from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy
@@ -202,16 +114,6 @@ def test_a_run_that_fix_halt_has_ended(two):
     lmp, told = two(HERTZ, "* *", MOVES.strip())
     command(lmp, "variable one equal 1\nfix stop all halt 1 v_one > 0 message no\nrun 10")
     assert len(from_lammps(lmp, told, balance=np.inf).contacts) == 1
-
-
-def test_commands_of_a_log_that_a_deck_has_begun(two, tmp_path):
-    """A log of the command `log` does not begin with the version of LAMMPS."""
-    from faultgouge.pywrap import from_lammps
-
-    lmp, told = two(HERTZ, "* *", MOVES.strip())
-    lmp.command(f'log "{tmp_path}/own.log"')
-    command(lmp, "\n".join(told))
-    assert len(from_lammps(lmp, balance=np.inf).contacts) == 1
 
 
 @pytest.mark.parametrize("law", ["mindlin", "gran/hertz/history"])
@@ -500,72 +402,6 @@ def test_a_narrow_slot(two, width):
     assert one.tangential_stiffness == pytest.approx(3e4 * np.sqrt(0.5 * one.overlap), rel=1e-9)
     for name in ("overlap", "normal_stiffness", "tangential_stiffness", "normal_dashpot", "friction"):
         assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-9)
-
-
-def test_a_log_that_two_instances_write(two, lammps_with, tmp_path):
-    """The commands in it may be those of the other one."""
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
-    lmp, told = two(HERTZ, "* *", MOVES.strip())
-    lmp.command(f'log "{tmp_path}/log.lammps"')
-    command(lmp, "\n".join(told))
-    lammps_with()
-    with pytest.raises(NotTakenError, match=r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
-        from_lammps(lmp, balance=np.inf)
-
-
-INTERRUPTED = """
-import os, signal, sys, threading
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
-sys.path.insert(0, {tests!r})
-import time
-from granular_packings import command, instance, start, with_law
-from faultgouge.pywrap import compare_motion, from_lammps
-
-lmp = instance(None)
-start(lmp, 3, 18)
-with_law(lmp, "gran/hertz/history", 3, "100", "100", ("", ""))
-command(lmp, "fix load all gravity 1.0 vector 0.1 0 -1\\nfix move all nve/sphere\\ntimestep 0.002\\nrun 3000")
-given = ["pair_style gran/hertz/history 3e3 NULL 100 100 3.0 1", "fix move all nve/sphere",
-         "fix floor all wall/gran hertz/history 3e3 9e2 100 100 3.0 1 zplane 0 NULL contacts"]
-found = from_lammps(lmp, given, balance=1e9)
-fork = os.fork
-
-
-def ctrl_c():
-    os.killpg(os.getpgid(0), signal.SIGINT)
-
-
-def fork_before_ctrl_c():
-    child = fork()
-    if child:
-        ctrl_c()
-        time.sleep(0.1)
-    return child
-
-
-if {at_the_fork}:
-    os.fork = fork_before_ctrl_c
-else:
-    threading.Timer(1.0, ctrl_c).start()
-try:
-    compare_motion(lmp, found, 1e6, 1e-5, timestep=1e-3)
-except KeyboardInterrupt:
-    try:
-        os.waitpid(-1, 0)
-    except ChildProcessError:
-        print("no copy is left")
-"""
-
-
-@pytest.mark.parametrize("at_the_fork", [False, True])
-def test_ctrl_c_ends_the_copy(tmp_path, at_the_fork):
-    """A copy that would run for days; Ctrl-C of a terminal goes to the program and to its copies."""
-    from pathlib import Path
-
-    words = [sys.executable, "-c", INTERRUPTED.format(tests=str(Path(__file__).parent), at_the_fork=at_the_fork)]
-    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60, start_new_session=True)
-    assert done.stdout.split("\n")[-2:] == ["no copy is left", ""], done.stderr
 
 
 def test_what_moves_may_be_looked_at(two, tmp_path):

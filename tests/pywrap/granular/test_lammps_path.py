@@ -2,8 +2,6 @@
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -322,55 +320,3 @@ def test_a_copy_that_relaxes_ends_with_the_path(layer, tmp_path):
     while Path(f"/proc/{copy.read_text()}").exists():
         assert time.monotonic() < deadline
         time.sleep(0.02)
-
-
-INTERRUPTED = """
-import os, signal, sys, threading, time
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
-sys.path.insert(0, {tests!r})
-from granular_packings import command, instance, start, with_law
-from faultgouge.pywrap import lammps_path
-
-lmp = instance(None)
-start(lmp, 3, 18)
-with_law(lmp, "gran/hertz/history", 3, "100", "100", ("", ""))
-command(lmp, "fix load all gravity 1.0 vector 0.1 0 -1\\nfix move all nve/sphere\\ntimestep 0.002\\nrun 3000")
-given = ["pair_style gran/hertz/history 3e3 NULL 100 100 3.0 1", "fix move all nve/sphere",
-         "fix floor all wall/gran hertz/history 3e3 9e2 100 100 3.0 1 zplane 0 NULL contacts"]
-
-
-def tilt(lmp, value):
-    if value > 0.15:
-        time.sleep(60)
-    lmp.command(f"fix load all gravity 1.0 vector {{value}} 0 -1")
-
-
-with lammps_path(lmp, tilt, commands=given) as path:
-    first = path(0.1)
-    threading.Timer(1.0, lambda: os.killpg(os.getpgid(0), signal.SIGINT)).start()
-    began = time.monotonic()
-    try:
-        path(0.2)
-    except KeyboardInterrupt:
-        print(f"{{time.monotonic() - began < 30}}")
-    print(path(0.1) == first, abs(path(0.05).fx - 0.05) < 1e-12)
-time.sleep(0.2)
-group = [each for each in os.listdir("/proc") if each.isdigit() and each != str(os.getpid())]
-alive = []
-for each in group:
-    try:
-        with open(f"/proc/{{each}}/stat") as stat:
-            state, _, of = stat.read().rpartition(")")[2].split()[:3]
-    except OSError:
-        continue
-    if int(of) == os.getpgid(0) and state != "Z":
-        alive.append(each)
-print(alive)
-"""
-
-
-def test_ctrl_c_ends_a_relaxation_and_leaves_the_path(tmp_path):
-    """Ctrl-C of a terminal goes to the program and to all copies; loads that were reached stay, and no copy is left."""
-    words = [sys.executable, "-c", INTERRUPTED.format(tests=str(Path(__file__).parent))]
-    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=100, start_new_session=True)
-    assert done.stdout.splitlines()[-3:] == ["True", "True True", "[]"], done.stderr

@@ -1,0 +1,101 @@
+"""Ctrl-C while copies of the process work: it goes to the program and to its copies, of which none is left."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SET_UP = """
+import os, signal, sys, threading, time
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
+sys.path.insert(0, {tests!r})
+from granular_packings import command, instance, start, with_law
+from faultgouge.pywrap import compare_motion, from_lammps, lammps_path
+
+lmp = instance(None)
+start(lmp, 3, 18)
+with_law(lmp, "gran/hertz/history", 3, "100", "100", ("", ""))
+command(lmp, "fix load all gravity 1.0 vector 0.1 0 -1\\nfix move all nve/sphere\\ntimestep 0.002\\nrun 3000")
+given = ["pair_style gran/hertz/history 3e3 NULL 100 100 3.0 1", "fix move all nve/sphere",
+         "fix floor all wall/gran hertz/history 3e3 9e2 100 100 3.0 1 zplane 0 NULL contacts"]
+
+
+def ctrl_c():
+    os.killpg(os.getpgid(0), signal.SIGINT)
+"""
+
+MOTION = """
+found = from_lammps(lmp, given, balance=1e9)
+fork = os.fork
+
+
+def fork_before_ctrl_c():
+    child = fork()
+    if child:
+        ctrl_c()
+        time.sleep(0.1)
+    return child
+
+
+if at_the_fork:
+    os.fork = fork_before_ctrl_c
+else:
+    threading.Timer(1.0, ctrl_c).start()
+try:
+    compare_motion(lmp, found, 1e6, 1e-5, timestep=1e-3)
+except KeyboardInterrupt:
+    try:
+        os.waitpid(-1, 0)
+    except ChildProcessError:
+        print("no copy is left")
+"""
+
+PATH = """
+def tilt(lmp, value):
+    if value > 0.15:
+        time.sleep(60)
+    lmp.command(f"fix load all gravity 1.0 vector {value} 0 -1")
+
+
+with lammps_path(lmp, tilt, commands=given) as path:
+    first = path(0.1)
+    threading.Timer(1.0, ctrl_c).start()
+    began = time.monotonic()
+    try:
+        path(0.2)
+    except KeyboardInterrupt:
+        print(f"{time.monotonic() - began < 30}")
+    print(path(0.1) == first, abs(path(0.05).fx - 0.05) < 1e-12)
+time.sleep(0.2)
+group = [each for each in os.listdir("/proc") if each.isdigit() and each != str(os.getpid())]
+alive = []
+for each in group:
+    try:
+        with open(f"/proc/{each}/stat") as stat:
+            state, _, of = stat.read().rpartition(")")[2].split()[:3]
+    except OSError:
+        continue
+    if int(of) == os.getpgid(0) and state != "Z":
+        alive.append(each)
+print(alive)
+"""
+
+
+def lines_of(folder: Path, script: str) -> list[str]:
+    """What a script prints, as a program with a group of processes of its own."""
+    words = [sys.executable, "-c", SET_UP.format(tests=str(Path(__file__).parent)) + script]
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=100, start_new_session=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+@pytest.mark.parametrize("at_the_fork", [False, True])
+def test_ctrl_c_ends_the_copy(tmp_path, at_the_fork):
+    """A copy that would run for days."""
+    assert lines_of(tmp_path, f"\nat_the_fork = {at_the_fork}\n{MOTION}")[-1] == "no copy is left"
+
+
+def test_ctrl_c_ends_a_relaxation_and_leaves_the_path(tmp_path):
+    """Loads that were reached stay."""
+    assert lines_of(tmp_path, PATH)[-3:] == ["True", "True True", "[]"]
