@@ -203,3 +203,27 @@ def test_a_spring_of_each_sphere_is_in_the_operator(cell):
     added = stiffness_matrix(found) - stiffness_matrix(laws)
     expected = np.concatenate([np.full(3 * len(found), 7.0), np.zeros(3 * len(found))])
     assert np.abs(added.toarray() - np.diag(expected)).max() < 1e-5 * abs(laws.contacts.normal_stiffness).max()
+
+
+def test_a_spring_of_a_lid_is_in_the_operator(cell):
+    """fix spring pulls at the centre of mass of spheres that move as one: its constant is in one entry of K, and LAMMPS
+    moves so."""
+    from faultgouge import relax
+    from faultgouge.pywrap import compare_motion, from_lammps
+
+    lid = f"fix body lid nve\n{CONFINED}\nfix pull lid spring tether 700.0 1.7 NULL NULL 0.0"
+    lmp = cell(f"{lid}\nfix stiff lid aveforce 0.0 0.0 0.0")
+    relax(lmp)
+    found = from_lammps(lmp)
+    assert found.operators == "differences"
+    assert found.operator_error < 1e-5
+    assert found.proof < 1e-5
+    runs = [compare_motion(lmp, found, 0.02, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
+    rest = 2 * runs[1].velocity - runs[0].velocity - runs[0].linear_velocity
+    assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
+    command(lmp, "unfix pull")
+    without = from_lammps(lmp, differences=True, balance=np.inf)
+    added, leader = found.stiffness - without.stiffness, int(np.flatnonzero(found.kind == 2)[0])
+    assert added[leader, leader] == pytest.approx(700.0, rel=1e-4)
+    added[leader, leader] = 0.0
+    assert abs(added).max() < 1e-6 * abs(found.stiffness).max()
