@@ -256,8 +256,8 @@ def _shorter(
     differs: NDArray[np.bool_],
     same: float,
 ) -> dict[int, "_Slope"]:
-    """Slopes along directions by ever shorter steps, where these are far more linear, and by the shortest on all that
-    feel a body whose motion `differs` there, shape (N,).
+    """Slopes along directions by ever shorter steps, where these are far more linear; and on all that feel a body whose
+    motion `differs` at the shortest, shape (N,), where they are linear.
 
     A shorter step that says the same, as at a contact which slides on one side, ends the search along a direction where
     nothing differs.
@@ -267,7 +267,7 @@ def _shorter(
     found = dict(last)
     for size in sizes[1:]:
         slopes = dict(zip(last, _slopes(probe, [directions[k] for k in last], size), strict=True))
-        found |= {k: _more_linear(found[k], slope, owners[k], differs) for k, slope in slopes.items()}
+        found |= {k: _more_linear(found[k], slope, owners[k], differs, same) for k, slope in slopes.items()}
         last = {
             k: slope for k, slope in slopes.items() if np.any(owners[k][differs] >= 0) or slope.apart(last[k]) > same
         }
@@ -342,15 +342,14 @@ def _slopes(probe: Probe, directions: list[Floats], size: float) -> list[_Slope]
     return [_slope(each, probe.sizes, size) for each in probe.each([size * q for q in directions])]
 
 
-def _more_linear(one: _Slope, other: _Slope, owner: Indices, differs: NDArray[np.bool_]) -> _Slope:
-    """The other slopes on all that feel a body, where they are far more linear, or where one of these particles
-    differs."""
+def _more_linear(one: _Slope, other: _Slope, owner: Indices, differs: NDArray[np.bool_], same: float) -> _Slope:
+    """The other slopes on all that feel a body, where they are far more linear, or linear where a particle differs."""
     bodies = np.tile(owner, len(one.mean) // len(owner))
     most = np.zeros((2, len(owner) + 1))  # the last is that of no body
     for uneven, slope in zip(most, (one, other), strict=True):
         np.maximum.at(uneven, bodies, slope.uneven)
-    better = most[1] < 0.5 * most[0]
-    better[owner[differs & (owner >= 0)]] = True
+    seen = np.isin(np.arange(len(owner) + 1), owner[differs & (owner >= 0)])
+    better = (most[1] < 0.5 * most[0]) | (seen & (most[1] <= same))
     better = better[bodies]
     return _Slope(*(np.where(better, new, old) for old, new in zip(one, other, strict=True)))
 
