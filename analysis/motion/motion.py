@@ -25,7 +25,6 @@ from scipy.sparse import bsr_array, csr_array
 
 from ..arrays import Floats, Indices
 from ..configuration import Configuration, HasConfiguration
-from ..operators.damping import operators
 from ..operators.sliders import sliders_of, with_sticking_contacts
 from ..operators.stiffness import stiffness_matrix
 from .eigenvalues import (
@@ -142,7 +141,7 @@ class Motion:
         """
         configuration = packing.configuration if sliding is None else with_sticking_contacts(packing.configuration)
         if dissipation and configuration.damped:
-            k, c = operators(configuration)
+            k, c = configuration.assembled_operators()
         else:
             k = stiffness_matrix(configuration)
             c = csr_array(k.shape)
