@@ -110,9 +110,13 @@ class Krylov:
             value = complex(real, imaginary)
             return bool(np.abs(chosen - value).min() < np.abs(others - value).min(initial=np.inf))
 
-        _, vectors, count = schur(self.square, output="real", sort=is_chosen, check_finite=False)
+        apart = f"{len(wanted)} eigenvalues are not set apart from {len(others)} others of one space"
+        try:
+            _, vectors, count = schur(self.square, output="real", sort=is_chosen, check_finite=False)
+        except np.linalg.LinAlgError as error:  # rounding has moved one of a cluster
+            raise SpectrumError(apart) from error
         if count != len(wanted):
-            raise SpectrumError(f"{len(wanted)} eigenvalues are not set apart from {len(others)} others of one space")
+            raise SpectrumError(apart)
         return np.asarray(self.basis[: self.used].T @ vectors[:, :count])
 
 

@@ -80,12 +80,16 @@ FREE_FORCE = 1e-12
 class DecayingMotion(Protocol):
     """What is asked of a Motion."""
 
-    configuration: Configuration
-    active: Indices
-    root_mass: Floats
-    stiffness: csr_array
-    damping: csr_array
-
+    @property
+    def configuration(self) -> Configuration: ...
+    @property
+    def active(self) -> Indices: ...
+    @property
+    def root_mass(self) -> Floats: ...
+    @property
+    def stiffness(self) -> csr_array: ...
+    @property
+    def damping(self) -> csr_array: ...
     @property
     def dissipative(self) -> bool: ...
     @property
