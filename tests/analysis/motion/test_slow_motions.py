@@ -93,6 +93,7 @@ def test_the_space_of_slow_motions_is_invariant(damped):
     assert np.abs(image - v @ (v.T @ image)).max() < 1e-6 * largest
 
 
+@pytest.mark.slow
 def test_rates_of_a_packing_beyond_lapack_have_its_slowest_decay(damped, monkeypatch):
     expected = Motion.of(damped).rates
     assert not expected.grows.any()
@@ -105,6 +106,7 @@ def test_rates_of_a_packing_beyond_lapack_have_its_slowest_decay(damped, monkeyp
     assert found.searched == 0
 
 
+@pytest.mark.slow
 def test_dashpots_too_weak_for_the_time_leave_a_rate_below_which_growth_may_hide(reference_packing, monkeypatch):
     monkeypatch.setattr(module, "DENSE_DAMPED", 100)
     monkeypatch.setattr(decay_module, "WORK_OF_DECAY", 1e8)
@@ -114,6 +116,7 @@ def test_dashpots_too_weak_for_the_time_leave_a_rate_below_which_growth_may_hide
     assert found.searched > -found.growth_rate > 0
 
 
+@pytest.mark.slow
 def test_motions_that_no_force_opposes_are_counted_however_many_are_alike(monkeypatch):
     """Spheres on a plane roll along two axes, each by itself: a zero of more motions than a block holds."""
     apart = row_of_spheres(20, pressed=0.0)
@@ -125,6 +128,7 @@ def test_motions_that_no_force_opposes_are_counted_however_many_are_alike(monkey
     assert found.growth_rate == pytest.approx(expected.growth_rate, rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pressed", [1e-2, 2.0])
 def test_a_row_of_equal_spheres_that_buckles_is_unstable_beyond_lapack(pressed, monkeypatch):
     """Of eigenvalues that are nearly alike any that grows decides; the rate is the fastest that was found."""
