@@ -60,7 +60,7 @@ PERIODS_OF_LARGE = 2e6
 vector. It takes three seconds without dissipation, fourteen with it, and 35 where many motions grow alike and none
 converges."""
 
-MOST_PERIODS = 300.0
+LONGEST_SEARCH = 300.0
 """The most of them."""
 
 FREE_SHARE = 1e-6
@@ -210,7 +210,7 @@ class Motion:
     def _fastest(self) -> Rates:
         """Of motions that surely grow; the others are not known."""
         damping = self.in_blocks(self.damping) if self.dissipative else None
-        length = min(MOST_PERIODS, PERIODS_OF_LARGE / len(self.active))
+        length = min(LONGEST_SEARCH, PERIODS_OF_LARGE / len(self.active))
         periods = min(30.0, length), length
         found = fastest_growing(self.in_blocks(self.stiffness), damping, count=1, periods=periods, rough=True)
         values = found.values if self.dissipative else 1j * np.sqrt(found.values.astype(complex))

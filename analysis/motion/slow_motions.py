@@ -32,7 +32,7 @@ from ..factors.sparse_lu import general_lu
 from ..progress import report_progress
 from .block_arnoldi import Krylov, SpectrumError, ritz_values
 
-SHIFT = 3e-3
+SLOW_SHIFT = 3e-3
 """sigma as a share of the largest frequency: below the slowest motions of 10,000 spheres, and far enough from motions
 that no force opposes for factors of ten digits."""
 
@@ -45,7 +45,7 @@ FIRST_SLOW, MOST_SLOW = 80, 640
 BYTES_OF_SPACE = 4e8
 """Memory of a space."""
 
-ACCURATE = 1e-9
+SLOW_ACCURACY = 1e-9
 """Error of eigenvalues, to first order, as a share of the largest frequency."""
 
 FREE_OF_SLOW = 1e-5
@@ -134,7 +134,7 @@ def slow_motions(
     """
     size = matrix.shape[0]
     largest = float(np.sqrt(abs(matrix).sum(axis=1).max()))
-    shift = SHIFT * largest
+    shift = SLOW_SHIFT * largest
     factors = general_lu(csc_array(matrix + shift * damping + shift**2 * eye_array(size)))
 
     def inverse(columns: Floats) -> Floats:
@@ -191,7 +191,7 @@ def _inside(krylov: Krylov, shift: float, largest: float, reference: float, alon
     """The eigenvalues up to the first one that has not converged."""
     values, overlap, errors = ritz_values(krylov, shift)
     is_free = np.abs(values) < FREE_OF_SLOW * largest
-    failed = np.flatnonzero((errors > ACCURATE * largest * overlap) & ~is_free)
+    failed = np.flatnonzero((errors > SLOW_ACCURACY * largest * overlap) & ~is_free)
     count = int(failed[0]) if len(failed) else len(values)
     while count:
         try:
@@ -206,4 +206,4 @@ def _inside(krylov: Krylov, shift: float, largest: float, reference: float, alon
     known = known[~free & (known.imag >= 0)]
     known = known[np.argsort(-known.real, kind="stable")]
     count_free = alone.shape[1] + int(free.sum() + 1) // 2
-    return SlowMotions(known, count_free, radius, reference, 10 * ACCURATE * largest, alone, basis)
+    return SlowMotions(known, count_free, radius, reference, 10 * SLOW_ACCURACY * largest, alone, basis)
