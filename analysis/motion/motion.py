@@ -61,7 +61,7 @@ vector. It takes three seconds without dissipation, fourteen with it, and 35 whe
 converges."""
 
 LONGEST_SEARCH = 300.0
-"""The most of them."""
+"""Periods of the fastest motion at the most."""
 
 FREE_SHARE = 1e-6
 """Eigenvalues s below this share of the largest are those of motions that no force opposes: rounding leaves sqrt(u) of
