@@ -62,8 +62,8 @@ STEP = 2e4
 """Multiplications that could be done in the time that a step takes besides its own."""
 
 FACTORED = {2: 400_000, 3: 80_000}
-"""Coordinates up to which there are factors, by dimension. Of 10,000 spheres in a layer of five or six they take 3 s and
-0.2 GB, and with the vectors of slow motions 1 GB; of a cube of spheres they are larger."""
+"""Coordinates up to which there are factors, by dimension. Of 10,000 spheres in a layer of five or six they take 3 s
+and 0.2 GB, and with the vectors of slow motions 1 GB; of a cube of spheres they are larger."""
 
 GROWN = 5.0
 """Decades of |u|^2 above its least from which growth is looked at."""
