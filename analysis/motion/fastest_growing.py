@@ -62,9 +62,6 @@ APPEARS = 1e-2
 CONVERGED = 1e-5
 """Relative residual of eigenvalues with which the search ends."""
 
-ROUGHLY = 1e-2
-"""The same of rates that need not have more digits, relative to each."""
-
 GROWTH_OVER_RESIDUAL = 10.0
 """Growth over what the residual may change, from which an eigenvalue is a growing one when the search ends otherwise.
 Many motions that grow nearly alike converge slowly."""
@@ -110,7 +107,6 @@ def fastest_growing(
     damping: csr_array | bsr_array | None = None,
     count: int = 8,
     periods: tuple[float, float] = (30.0, 1000.0),
-    rough: bool = False,
 ) -> FastestGrowth:
     """Find the fastest growing motions.
 
@@ -125,9 +121,6 @@ def fastest_growing(
     periods : tuple of (float, float)
         The first and the longest time that is looked at, in periods of the fastest motion. What grows more slowly than
         about 3 over the longest time is not looked for.
-    rough : bool
-        Whether the search ends once rates are right to a hundredth. Many motions that grow nearly alike converge
-        slowly, and any of them shows growth.
 
     Returns
     -------
@@ -154,7 +147,7 @@ def fastest_growing(
     while True:
         step = motion.propagator(2 * np.pi * length / motion.frequency)
         report_progress(f"motion over {length:.0f} periods, {step.products} products each")
-        space, krylov = _search(motion, step, start, count, rough)
+        space, krylov = _search(motion, step, start, count)
         products += step.products * krylov.used
         if space.found >= count or length == periods[1]:
             return space.result(count, products)
@@ -322,13 +315,12 @@ class _Space:
     values: Complexes
     vectors: Complexes
     residuals: Floats
-    converged: NDArray[np.bool_]
     limit: float
 
     @property
     def found(self) -> int:
         """Motions, one of each pair, that grow faster than the limit and have converged, without a gap."""
-        failed = np.flatnonzero(~self.converged)
+        failed = np.flatnonzero(self.residuals > CONVERGED)
         return int(failed[0]) if len(failed) else len(self.values)
 
     def next_start(self, start: Floats) -> Floats:
@@ -356,21 +348,21 @@ class _Space:
         )
 
 
-def _search(motion: Equation, step: Step, start: Floats, count: int, rough: bool) -> tuple[_Space, Krylov]:
-    """What grows over a time."""
+def _search(motion: Equation, step: Step, start: Floats, count: int) -> tuple[_Space, Krylov]:
+    """The motions that grow over a time, and the Krylov space in which they are found."""
     block = len(start)
     krylov = Krylov(step.apply, start, MOST_BLOCKS * block)
     blocks = FIRST_BLOCKS
     while True:
         krylov.extend(blocks * block)
         chance = np.log(2 * np.sqrt(motion.size) / (CHANCE * APPEARS)) / (krylov.used // block)
-        space = _growing(motion, step, krylov, float(chance), count, rough)
+        space = _growing(motion, step, krylov, float(chance), count)
         if space.found >= count or krylov.full or (len(space.values) == 0 and blocks >= FIRST_BLOCKS):
             return space, krylov
         blocks += 3
 
 
-def _growing(motion: Equation, step: Step, krylov: Krylov, chance: float, count: int, rough: bool) -> _Space:
+def _growing(motion: Equation, step: Step, krylov: Krylov, chance: float, count: int) -> _Space:
     """The motions of a space that stand out, solved for anew in the space of these."""
     theta, small = eig(krylov.square)
     order = np.argsort(-np.abs(theta), kind="stable")[: 2 * count + 6]  # both of a pair count
@@ -385,8 +377,7 @@ def _growing(motion: Equation, step: Step, krylov: Krylov, chance: float, count:
     grows = grows[np.argsort(-rates[grows], kind="stable")]
     values, x = values[grows], x[:, grows]
     residuals = np.linalg.norm(image @ x - (basis @ x) * values, axis=0) / np.abs(values)
-    converged = motion.uncertainty(values, residuals) <= ROUGHLY * rates[grows] if rough else residuals <= CONVERGED
-    return _Space(motion, step, fastest, values, basis @ x, residuals, converged, limit)
+    return _Space(motion, step, fastest, values, basis @ x, residuals, limit)
 
 
 def _real_basis(vectors: Complexes) -> Floats:

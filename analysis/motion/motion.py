@@ -212,7 +212,7 @@ class Motion:
         damping = self.in_blocks(self.damping) if self.dissipative else None
         length = min(LONGEST_SEARCH, PERIODS_OF_LARGE / len(self.active))
         periods = min(30.0, length), length
-        found = fastest_growing(self.in_blocks(self.stiffness), damping, count=1, periods=periods, rough=True)
+        found = fastest_growing(self.in_blocks(self.stiffness), damping, count=1, periods=periods)
         values = found.values if self.dissipative else 1j * np.sqrt(found.values.astype(complex))
         values = np.where(values.real < 0, -values, values)
         return Rates(values, np.ones(len(values), bool), 0, found.limit)

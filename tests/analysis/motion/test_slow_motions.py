@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from linearised import dissipative, motion_matrix
 
-from faultgouge.analysis import Configuration, LinearisedContacts, stability
+from faultgouge.analysis import Configuration, LinearisedContacts
 from faultgouge.analysis.motion import decay as decay_module
 from faultgouge.analysis.motion import motion as module
+from faultgouge.analysis.motion.decay import follow_decay
 from faultgouge.analysis.motion.motion import Motion
 from faultgouge.analysis.motion.slow_motions import slow_motions
 
@@ -129,12 +130,9 @@ def test_motions_that_no_force_opposes_are_counted_however_many_are_alike(monkey
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("pressed", [1e-2, 2.0])
-def test_a_row_of_equal_spheres_that_buckles_is_unstable_beyond_lapack(pressed, monkeypatch):
-    """Of eigenvalues that are nearly alike any that grows decides; the rate is the fastest that was found."""
-    row = row_of_spheres(40, pressed)
-    expected = stability(row)
-    monkeypatch.setattr(module, "DENSE_DAMPED", 100)
-    found = stability(row)
-    assert found.stable is expected.stable is False
-    assert found.growth_rate == pytest.approx(expected.growth_rate, rel=1e-2)
+def test_slow_motions_of_a_row_that_buckles_grow_as_those_of_lapack():
+    """Eigenvalues that are nearly alike, of more motions than a block holds."""
+    row = row_of_spheres(40, 1e-2)
+    found = follow_decay(Motion.of(row))
+    assert found.grows is True
+    assert found.growth_rate == pytest.approx(Motion.of(row).rates.growth_rate, rel=1e-6)
