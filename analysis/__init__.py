@@ -3,7 +3,7 @@
 All functions take a :class:`Packing`; operators, spectra and functions based on these also take a
 :class:`Configuration`.
 The physics is in the docstrings of the modules: `law` (the contact law), `contacts`, `geometry`, `packing` (forces),
-`stiffness` and `linearised_contacts` (the stability operator), `spectrum` (its eigenvalues), `damping` (the damping
+`stiffness` and `assembly` (the stability operator), `spectrum` (its eigenvalues), `damping` (the damping
 matrix), `onset` (where eigenvalues become complex), `growth` (growth in a run). `runfile`, `dumps` and `files` read and
 write packings.
 """

@@ -3,7 +3,7 @@ r"""A packing of another code, in two or three dimensions, with its contacts to 
 Any contact law enters the operators through a few numbers at each contact: the normal, the distance and the lever arms;
 the normal and the tangential force; and the derivatives of both.
 :class:`~faultgouge.analysis.contacts.LinearisedContacts` has them, `Configuration` adds the particles, and
-:mod:`~faultgouge.analysis.operators.linearised_contacts` assembles the operators.
+:mod:`~faultgouge.analysis.assembly` assembles the operators from them.
 
 **Coordinates** are translations and rotations as lengths, :math:`R\theta`, axis by axis:
 (x.., y.., R theta..) of disks and (x.., y.., z.., R theta_x.., R theta_y.., R theta_z..) of spheres. Vectors always
@@ -25,7 +25,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
 from .arrays import (
     Floats,
@@ -41,6 +41,7 @@ from .arrays import (
     set_frozen,
     square,
 )
+from .assembly import ContactBlocks, as_springs, spring_of_layer
 from .contacts import UNIT, LinearisedContacts, refuse_first
 from .counted import counted
 
@@ -323,6 +324,57 @@ class Configuration:
             return matrix
         return csr_array((self.constraint != 0).astype(np.float64).T @ matrix @ self.constraint)
 
+    def assembled_stiffness(
+        self,
+        *,
+        form: str = "consistent",
+        coupled: NDArray[np.bool_] | None = None,
+        parting: ArrayLike = 0.5,
+        sliding: ArrayLike = False,
+    ) -> csr_array:
+        """K = -dF/dq; see :func:`~faultgouge.analysis.stiffness_matrix`.
+
+        Raises
+        ------
+        ValueError
+            If an option does not apply.
+        """
+        if form == "paper" or coupled is not None:
+            raise ValueError("The operator of a Configuration is the consistent one, of all of its contacts.")
+        if self.stiffness is None:
+            return self._with_spring(ContactBlocks.of(self, self.contacts).matrix(self.contacts, parting))
+        if np.any(np.asarray(parting) != 0.5) or np.any(sliding):
+            raise ValueError(
+                "K of this configuration is a difference of forces, the mean of closing and parting, and of both "
+                "sides of Coulomb's bound: leave parting and sliding out."
+            )
+        return self.stiffness.copy()
+
+    def assembled_damping(self, sliding: ArrayLike = False) -> csr_array:
+        """C = -dF/d(dq/dt); see :func:`~faultgouge.analysis.damping_matrix`."""
+        return self._damping(ContactBlocks.of(self, self.contacts)) if self.damping is None else self.damping.copy()
+
+    def assembled_operators(self) -> tuple[csr_array, csr_array]:
+        """K and C, whose pattern is the same: it is found once."""
+        if self.stiffness is not None:
+            return self.assembled_stiffness(), self.assembled_damping()
+        blocks = ContactBlocks.of(self, self.contacts)
+        return self._with_spring(blocks.matrix(self.contacts)), self._damping(blocks)
+
+    def _with_spring(self, matrix: csr_array) -> csr_array:
+        """K of contacts and of the spring that draws the layer, of the coordinates that lead."""
+        if self.spring:
+            matrix = csr_array(matrix + spring_of_layer(self.spring, self.top, self.coordinates))
+        return self.project(matrix)
+
+    def _damping(self, blocks: ContactBlocks) -> csr_array:
+        """C of dashpots and drag."""
+        matrix = self.project(blocks.matrix(as_springs(self.contacts)))
+        if not self.drag_rate:
+            return matrix
+        moves = np.ones(matrix.shape[0]) if self.constraint is None else self.coordinate_free
+        return csr_array(matrix + diags_array(self.drag_rate * self.coordinate_mass * moves))
+
     @cached_property
     def net_force(self) -> Floats:
         """Force and torque on each particle, its load included, shape (N, 2, 3)."""
@@ -449,4 +501,13 @@ class HasConfiguration(Protocol):
     @property
     def contact_states(self) -> bytes: ...
     def loaded(self, least: float) -> "HasConfiguration": ...
+    def assembled_stiffness(
+        self,
+        *,
+        form: Literal["consistent", "paper"] = ...,
+        coupled: NDArray[np.bool_] | None = ...,
+        parting: ArrayLike = ...,
+        sliding: ArrayLike = ...,
+    ) -> csr_array: ...
+    def assembled_damping(self, sliding: ArrayLike = ...) -> csr_array: ...
     def __len__(self) -> int: ...

@@ -35,6 +35,7 @@ FLOORS = {
         ("counted", "uncertain_digits", "errors", "progress", "table_display"),
         ("arrays",),
         ("contacts",),
+        ("assembly",),
         ("configuration",),
         ("packing",),
         ("operators",),

@@ -27,7 +27,7 @@ from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import LinearOperator, gmres
 
-from ..operators.stiffness import SIGNS
+from ..packing.disk_operators import SIGNS
 from ..packing.packing import Floats, Indices
 from .sparse_lu import Factors, SingularMatrixError, minimum_degree, symmetric_lu
 
@@ -79,7 +79,7 @@ class Band:
         Parameters
         ----------
         terms : ndarray, shape (3, 3, C)
-            The numbers of each contact, see :func:`~faultgouge.analysis.operators.stiffness.contact_terms`.
+            The numbers of each contact, see :func:`~faultgouge.analysis.packing.disk_operators.contact_terms`.
         """
         shape = len(self.coordinates), 3 * self.width + 1
         values = (SIGNS[..., None] * terms).ravel()

@@ -13,6 +13,10 @@ demand.
 A, and the sum of their squares the trace of :math:`A^2`. Two neighbouring discs must also find the same eigenvalues
 where they overlap. Where one of these is violated, the slices that have the fewest eigenvalues beside what S has are
 found again from other shifts, with larger blocks, one after the other. If this does not help there is an error.
+
+**Islands.** Coordinates that are not coupled to all others, such as those of identical cells apart, have equal
+eigenvalues, more than a block has vectors. Each island has slices of its own, or is small enough for
+LAPACK.
 """
 
 from collections.abc import Callable
@@ -21,7 +25,9 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eig
 from scipy.sparse import csc_array, csr_array
+from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Complexes, Floats
 from ..factors.inertia import count_places, factor_shifted, places_of_numbers
@@ -51,6 +57,8 @@ class SliceSizes:
     """Error of the trace, in mean distances of eigenvalues, as of all errors together."""
     largest: int = 12
     """Vectors of a space at the most, in units of `own`."""
+    least: int = 540
+    """Coordinates up to which LAPACK finds all: a space of the largest size would hold them, in no less time."""
 
 
 SIZES = SliceSizes()
@@ -117,6 +125,31 @@ def all_eigenvalues(matrix: csr_array, sizes: SliceSizes = SIZES) -> AllEigenval
     SpectrumError
         If not all are found.
     """
+    count, island = connected_components(matrix, directed=False)
+    if count == 1:
+        return _of_island(matrix, sizes)
+    values, parts = [], []
+    for places in np.split(np.argsort(island, kind="stable"), np.cumsum(np.bincount(island))[:-1]):
+        found = _of_island(csr_array(matrix[places][:, places]), sizes)
+        values.append(found.values)
+        parts.append(found.marked.placed(places, matrix.shape[0]))
+    every = np.concatenate(values)
+    return AllEigenvalues(every[np.lexsort((every.imag, every.real))], Modes.joined(parts))
+
+
+def _of_island(matrix: csr_array, sizes: SliceSizes) -> AllEigenvalues:
+    """Of coordinates that are all coupled: in slices, or by LAPACK if they are few."""
+    if matrix.shape[0] > sizes.least:
+        return _of_slices(matrix, sizes)
+    values, left, right = eig(matrix.toarray(), left=True, right=True)
+    marked = (values.imag > 0) | ((values.imag == 0) & (values.real < 0))
+    marked |= (values.imag == 0) & (np.abs(np.sum(left.conj() * right, axis=0)) < sizes.oblique)
+    order = np.lexsort((values.imag, values.real))
+    return AllEigenvalues(values[order], Modes(values[marked], right[:, marked], left[:, marked]))
+
+
+def _of_slices(matrix: csr_array, sizes: SliceSizes) -> AllEigenvalues:
+    """Of many coordinates."""
     spectrum = _SlicedSpectrum.of(matrix, sizes)
     slices = []
     first = 3 * sizes.own
@@ -177,6 +210,8 @@ class _SlicedSpectrum:
         ends = [_widest_gap(sign * (values.real - shift), sign * (end - shift), disc.radius)
                 for sign, end in ((-1, low), (1, high))]  # fmt: skip
         chosen &= (values.real > shift - ends[0]) & (values.real < shift + ends[1])
+        # of a cluster all or none: rounding says which of its eigenvalues are negative
+        chosen |= np.abs(values[:, None] - values[chosen]).min(axis=1, initial=np.inf) < sizes.complete * self.spacing
         if not chosen.any():
             return SpectrumSlice(shift, disc.radius, values, Modes.none(len(self.order))), disc.enough(reach)
         marked = disc.marked(chosen, accuracy)
@@ -239,9 +274,7 @@ class _SlicedSpectrum:
             known = part.vectors
             own = (known.values.real >= low) & (known.values.real < high) & (known.values.imag >= 0)
             parts.append(Modes(known.values[own], known.right[:, own], known.left[:, own]))
-        right, left = (np.concatenate([getattr(part, side) for part in parts], axis=1) for side in ("right", "left"))
-        place = np.argsort(self.order)
-        marked = Modes(np.concatenate([part.values for part in parts]), right[place], left[place])
+        marked = Modes.joined(parts).placed(self.order, len(self.order))
         return AllEigenvalues(values[np.lexsort((values.imag, values.real))], marked)
 
 

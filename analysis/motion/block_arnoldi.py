@@ -81,8 +81,11 @@ class Krylov:
             vectors, rest = qr(image.T, mode="economic", overwrite_a=True, check_finite=False)
             if np.abs(np.diag(rest)).min() < DEPENDENT * np.abs(np.diag(rest)).max(initial=1e-300):
                 # a direction that rounding has chosen: any serves that is orthogonal to all before
-                image = vectors.T - (vectors.T @ self.basis[:known].T) @ self.basis[:known]
-                vectors = qr(image.T, mode="economic", overwrite_a=True, check_finite=False)[0]
+                part = vectors.T @ self.basis[:known].T
+                image = vectors.T - part @ self.basis[:known]
+                vectors, turned = qr(image.T, mode="economic", overwrite_a=True, check_finite=False)
+                self.projection[:known, last] += part.T @ rest
+                rest = turned @ rest  # the others have changed their signs
             self.basis[known : known + self.block] = vectors.T
             self.projection[known : known + self.block, last] = rest
             self.used = known
@@ -110,9 +113,13 @@ class Krylov:
             value = complex(real, imaginary)
             return bool(np.abs(chosen - value).min() < np.abs(others - value).min(initial=np.inf))
 
-        _, vectors, count = schur(self.square, output="real", sort=is_chosen, check_finite=False)
+        apart = f"{len(wanted)} eigenvalues are not set apart from {len(others)} others of one space"
+        try:
+            _, vectors, count = schur(self.square, output="real", sort=is_chosen, check_finite=False)
+        except np.linalg.LinAlgError as error:  # rounding has moved one of a cluster
+            raise SpectrumError(apart) from error
         if count != len(wanted):
-            raise SpectrumError(f"{len(wanted)} eigenvalues are not set apart from {len(others)} others of one space")
+            raise SpectrumError(apart)
         return np.asarray(self.basis[: self.used].T @ vectors[:, :count])
 
 

@@ -13,8 +13,12 @@ exp(g t) with
 .. math:: g = \frac2t \ln\frac{|u(t)|}\delta .
 
 This holds for every :math:`\omega_0`; a low one makes :math:`|u|` fall soonest, since slow motions are the last.
-Motion that no force opposes never decays. The common motion of all particles along an axis that no force opposes, as in
-a periodic box, is left out of u(0); other motion of this kind leaves the answer open.
+
+**Slow motions** decay last, as dashpots take little from them, and motion that no force opposes never decays. They are
+found one by one before (:mod:`~faultgouge.analysis.motion.slow_motions`), and what is followed is orthogonal to their
+space, so that all other eigenvalues decide how it decays. Where a packing is too large for sparse factors, nothing is
+found before; the common motion of all particles along an axis that no force opposes, as in a periodic box, is then left
+out of u(0), and other motion of this kind leaves the answer open.
 
 Steps are those of velocity Verlet with dashpots at the velocity of the half step, in which motion without loss neither
 grows nor decays; in longer steps what grows in spite of dashpots grows faster. If :math:`|u|` passes its least and
@@ -23,15 +27,19 @@ two rates say the true one and its error. A step takes one product with A and on
 proportional to the number of coordinates.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
 
 import numpy as np
-from scipy.sparse import bsr_array
+from scipy.sparse import bsr_array, csr_array
 
-from ..arrays import Floats
+from ..arrays import Complexes, Floats, Indices
+from ..configuration import Configuration
+from ..counted import counted
+from ..factors.sparse_lu import SingularMatrixError
 from ..progress import report_progress
 from .fastest_growing import CHANCE
-from .motion import Motion
+from .slow_motions import SlowMotions, slow_motions
 from .stable_timestep import stable_timestep
 
 DECAY_STEP = 0.6
@@ -50,6 +58,13 @@ STEPS_BETWEEN_SQUARES = 7
 WORK_OF_DECAY = 2e11
 """Multiplications with entries of A and G: three minutes."""
 
+STEP = 2e4
+"""Multiplications that could be done in the time that a step takes besides its own."""
+
+FACTORED = {2: 400_000, 3: 80_000}
+"""Coordinates up to which there are factors, by dimension. Of 10,000 spheres in a layer of five or six they take 3 s
+and 0.2 GB, and with the vectors of slow motions 1 GB; of a cube of spheres they are larger."""
+
 GROWN = 5.0
 """Decades of |u|^2 above its least from which growth is looked at."""
 
@@ -63,7 +78,27 @@ FREE_FORCE = 1e-12
 """Force on a common displacement, as a share of the largest entry of A, that is no force."""
 
 
-@dataclass(frozen=True)
+class DecayingMotion(Protocol):
+    """What is asked of a Motion."""
+
+    @property
+    def configuration(self) -> Configuration: ...
+    @property
+    def active(self) -> Indices: ...
+    @property
+    def root_mass(self) -> Floats: ...
+    @property
+    def stiffness(self) -> csr_array: ...
+    @property
+    def damping(self) -> csr_array: ...
+    @property
+    def dissipative(self) -> bool: ...
+    @property
+    def particle(self) -> Indices: ...
+    def in_blocks(self, matrix: csr_array) -> bsr_array: ...
+
+
+@dataclass(frozen=True, eq=False)
 class Decay:
     """Fate of a random state.
 
@@ -80,6 +115,10 @@ class Decay:
         Growth rate of D, 1 / time, up to which growth may not have been seen; 0 if nothing grows.
     needed : float or None
         How long it takes to decay far enough, if |u| falls on as in the second half; None if it does not fall.
+    slow : ndarray of complex
+        s of slow motions that are known one by one, the slowest decay first, 1 / time.
+    free : int
+        Motions that no force opposes, as far as they are known.
     """
 
     grows: bool | None
@@ -87,14 +126,21 @@ class Decay:
     time: float
     searched: float
     needed: float | None
+    slow: Complexes = field(default_factory=lambda: np.zeros(0, complex))
+    free: int = 0
 
     def __str__(self) -> str:
-        """The outcome in a sentence."""
+        """What it says."""
+        known = f"{counted(len(self.slow), 'slow motion')} known one by one"
+        if self.grows and not self.time:
+            return f"D as exp({self.growth_rate:.6g} t), the fastest of {known}"
         if self.grows:
             return f"motion from a random state grows, D as exp({self.growth_rate:.2g} t)"
+        state = f"a random state{' without these' if len(self.slow) else ''}"
+        told = f"of {known} the slowest decays with D as exp({self.slowest:.6g} t); " if len(self.slow) else ""
         if self.grows is False:
-            return f"motion from a random state decayed in t = {self.time:.4g} so far that any growth would be seen"
-        told = (
+            return f"{told}motion from {state} decayed in t = {self.time:.4g} so far that any growth would be seen"
+        told += (
             f"no motion was found to grow, and D that grows more slowly than exp({self.searched:.2g} t) would not have "
             f"been seen within t = {self.time:.4g}"
         )
@@ -102,9 +148,18 @@ class Decay:
             return f"{told}, in which motion did not decay"
         return f"{told}; as D falls, as exp({self.growth_rate:.2g} t), `time` = {self.needed:.2g} would do"
 
+    @property
+    def slowest(self) -> float:
+        """2 Re s of the slowest of the known motions, 1 / time."""
+        return 2 * float(self.slow.real.max())
 
-def follow_decay(motion: Motion, time: float | None = None) -> Decay:
-    """Follow the motion from a random state until it has decayed, or grows.
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON."""
+        return vars(self) | {"slow": len(self.slow)}
+
+
+def follow_decay(motion: "DecayingMotion", time: float | None = None) -> Decay:
+    """Find slow motions, and follow all other motion from a random state until it has decayed, or grows.
 
     Parameters
     ----------
@@ -114,8 +169,40 @@ def follow_decay(motion: Motion, time: float | None = None) -> Decay:
         How long at the most; some minutes by default.
     """
     limit = float(stable_timestep(motion.configuration))
-    state = _State.of(motion, REFERENCE * 2 / limit)
-    dt = DECAY_STEP * limit
+    reference, dt = REFERENCE * 2 / limit, DECAY_STEP * limit
+    slow = _slow_motions(motion, reference, dt)
+    if slow is not None and slow.grows.any():
+        return Decay(True, 2 * float(slow.values[0].real), 0.0, 0.0, None, slow.values, slow.free)
+    found = _follow(_State.of(motion, reference, slow), dt, time)
+    if slow is None:
+        return found
+    found = replace(found, slow=slow.values, free=slow.free)
+    if not len(slow.values) or found.grows is not False:
+        return found
+    if found.slowest >= -2 * slow.error:  # it neither decays nor grows beyond its error
+        return replace(found, grows=None, growth_rate=found.slowest, searched=2 * slow.error, needed=None)
+    return replace(found, growth_rate=max(found.growth_rate, found.slowest))
+
+
+def _slow_motions(motion: "DecayingMotion", reference: float, dt: float) -> SlowMotions | None:
+    """As many as pay; None without dissipation, or without factors."""
+    if not motion.dissipative or len(motion.active) > FACTORED[motion.configuration.dimension]:
+        return None
+    entries = motion.stiffness.nnz + motion.damping.nnz + STEP
+    folds = float(np.log(np.sqrt(2 * len(motion.active)) / CHANCE))
+
+    def rest(found: SlowMotions) -> float:
+        rate = -found.rate_beyond
+        return 0.0 if found.grows.any() else folds / rate / dt * entries if 0 < rate < np.inf else np.inf
+
+    try:
+        return slow_motions(motion.stiffness, motion.damping, motion.particle, reference, rest)
+    except SingularMatrixError:
+        return None
+
+
+def _follow(state: "_State", dt: float, time: float | None) -> Decay:
+    """Follow the motion from a random state until it has decayed, or grows."""
     most = WORK_OF_DECAY / state.entries if time is None else time / dt
     wanted, now, logs = 2 * np.log(CHANCE), 0.0, [float(np.log(state.square))]
     for look in range(max(int(np.ceil(most / STEPS_OF_LOOK)), 8)):
@@ -137,25 +224,28 @@ def follow_decay(motion: Motion, time: float | None = None) -> Decay:
 
 @dataclass
 class _State:
-    """z and the velocity half a step before, and the operators; changes in place."""
+    """z and the velocity at one time, and the operators; changes in place."""
 
     stiffness: bsr_array
     damping: bsr_array | None
     reference: float
+    slow: SlowMotions | None
     z: Floats
     v: Floats
 
     @classmethod
-    def of(cls, motion: Motion, reference: float) -> "_State":
-        """At random."""
+    def of(cls, motion: "DecayingMotion", reference: float, slow: SlowMotions | None) -> "_State":
+        """At random, without slow motions."""
         z, v = _random_state(motion)
         damping = motion.in_blocks(motion.damping) if motion.dissipative else None
-        return cls(motion.in_blocks(motion.stiffness), damping, reference, z / reference, v)
+        made = cls(motion.in_blocks(motion.stiffness), damping, reference, slow, z / reference, v)
+        made._leave_slow_motions()
+        return made
 
     @property
     def entries(self) -> int:
-        """Multiplications of a step."""
-        return self.stiffness.nnz + (0 if self.damping is None else self.damping.nnz)
+        """Multiplications of a step, and what takes as long."""
+        return int(STEP) + self.stiffness.nnz + (0 if self.damping is None else self.damping.nnz)
 
     @property
     def square(self) -> float:
@@ -165,18 +255,29 @@ class _State:
     def look(self, dt: float) -> float:
         """Take `STEPS_OF_LOOK` steps: the logarithm of the mean |u|^2 on the way, as |u|^2 of one motion oscillates."""
         squares = []
+        self._push(0.5 * dt)
         for step in range(STEPS_OF_LOOK):
             self.z += dt * self.v
-            force = self.stiffness @ self.z
-            if self.damping is not None:
-                force += self.damping @ self.v
-            self.v -= dt * force
+            self._push(dt if step < STEPS_OF_LOOK - 1 else 0.5 * dt)
             if step % STEPS_BETWEEN_SQUARES == STEPS_BETWEEN_SQUARES - 1:
                 squares.append(self.square)
+        self._leave_slow_motions()
         return float(np.log(np.mean(squares)))
 
+    def _push(self, dt: float) -> None:
+        force = self.stiffness @ self.z
+        if self.damping is not None:
+            force += self.damping @ self.v
+        self.v -= dt * force
 
-def _random_state(motion: Motion) -> tuple[Floats, Floats]:
+    def _leave_slow_motions(self) -> None:
+        """Steps are not exact, so that a little of the slow motions comes back."""
+        if self.slow is not None:
+            state = self.slow.without(np.concatenate([self.reference * self.z, self.v]))
+            self.z, self.v = state[: len(self.z)] / self.reference, state[len(self.z) :].copy()
+
+
+def _random_state(motion: "DecayingMotion") -> tuple[Floats, Floats]:
     """Two vectors of normal random numbers without common motion along axes that no force opposes."""
     state = np.random.Generator(np.random.PCG64(0)).standard_normal((len(motion.active), 2))
     for common in free_translations(motion):
@@ -184,7 +285,7 @@ def _random_state(motion: Motion) -> tuple[Floats, Floats]:
     return state[:, 0].copy(), state[:, 1].copy()
 
 
-def free_translations(motion: Motion) -> list[Floats]:
+def free_translations(motion: "DecayingMotion") -> list[Floats]:
     """Unit vectors of the common motions along an axis that no force opposes, mass-weighted."""
     configuration, count = motion.configuration, len(motion.configuration)
     largest = np.abs(motion.stiffness.data).max(initial=0.0)

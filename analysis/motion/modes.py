@@ -8,6 +8,7 @@ Vectors are in mass-weighted coordinates :math:`M^{1/2} q`, in which the stabili
 Each solver has its own rounding, so that the same mode differs in its last digits.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,7 +16,7 @@ import numpy as np
 from scipy.linalg import eig
 from scipy.sparse import csr_array
 
-from ..arrays import Complexes, Floats
+from ..arrays import Complexes, Floats, Indices
 from ..configuration import HasConfiguration
 from ..operators.stiffness import stiffness_matrix
 from .eigenvalues import SAFETY, active_coordinates, mass_weighted, unit_rounding
@@ -109,6 +110,18 @@ class Modes:
         order = np.lexsort((values.imag, values.real))
         right[active], left[active] = x[:, order], y[:, order]
         return cls(values[order], right, left, axes)
+
+    @classmethod
+    def joined(cls, parts: Sequence["Modes"]) -> "Modes":
+        """Modes of one operator, those of the first part first."""
+        right, left = (np.concatenate([getattr(part, side) for part in parts], axis=1) for side in ("right", "left"))
+        return cls(np.concatenate([part.values for part in parts]), right, left, parts[0].axes)
+
+    def placed(self, places: Indices, size: int) -> "Modes":
+        """As modes of an operator of more coordinates, or in another order: with those at given places."""
+        right, left = np.zeros((2, size, len(self)), dtype=np.complex128)
+        right[places], left[places] = self.right, self.left
+        return Modes(self.values, right, left, self.axes)
 
     def __len__(self) -> int:
         return len(self.values)

@@ -25,9 +25,9 @@ from scipy.sparse import bsr_array, csr_array
 
 from ..arrays import Floats, Indices
 from ..configuration import Configuration, HasConfiguration
-from ..operators.damping import operators
 from ..operators.sliders import sliders_of, with_sticking_contacts
 from ..operators.stiffness import stiffness_matrix
+from .decay import Decay, follow_decay
 from .eigenvalues import (
     SAFETY,
     Complexes,
@@ -39,9 +39,8 @@ from .eigenvalues import (
     zero_uncertainty,
 )
 from .energy_norm import EnergyNorm
-from .fastest_growing import GROWTH_OVER_RESIDUAL, fastest_growing
+from .fastest_growing import fastest_growing
 from .modes import Modes
-from .slowest_decay import slowest_decay
 
 SLICED = 2000
 """Coordinates beyond which `spectrum` takes the eigenvalues of K in slices, and beyond which `Motion` has the fastest
@@ -49,27 +48,20 @@ growing motions alone. Of 870 coordinates of disks LAPACK takes 0.4 of the time 
 with the growth of both the times are the same at 2,000 and at 2,900."""
 
 DENSE_DAMPED = 1000
-"""Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, some seconds; of more those next
-to the imaginary axis and the fastest growing ones."""
+"""Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, some seconds; of more those
+of the fastest growing motions, and of slow ones."""
 
-DISCS_UP_TO = 6000
-"""Coordinates up to which the slowest decay is looked for with dissipation, too: one or two minutes."""
-
-PERIODS_BEYOND_DISCS = 100.0
-"""Periods of the fastest motion in which growth is looked for, where the slowest decay is not known for certain."""
+DECAY_UP_TO = 6000
+"""Coordinates up to which `Motion.rates` finds out whether all other motion decays; of more, who wants to know calls
+:func:`~faultgouge.analysis.motion.decay.follow_decay`, which may take minutes."""
 
 PERIODS_OF_LARGE = 2e6
-"""The same of packings of more coordinates than that, times the number of coordinates, with spaces of one vector. It
-takes three seconds without dissipation, fourteen with it, and 35 where many motions grow alike and none converges."""
+"""Periods of the fastest motion in which growth is looked for, times the number of coordinates, with spaces of one
+vector. It takes three seconds without dissipation, fourteen with it, and 35 where many motions grow alike and none
+converges."""
 
-TIMES = (10.0, 300.0)
-"""The fewest and the most of them, where discs cover the imaginary axis."""
-
-SEEN = 3.5
-"""Rate times t from which growth is seen, see :mod:`~faultgouge.analysis.motion.fastest_growing`."""
-
-GROWTH_OF_DISCS = 1e-7
-"""Re s > 0 of discs is believed from this share of the largest frequency on: it is found to some 1e-9 of that."""
+LONGEST_SEARCH = 300.0
+"""Periods of the fastest motion at the most."""
 
 FREE_SHARE = 1e-6
 """Eigenvalues s below this share of the largest are those of motions that no force opposes: rounding leaves sqrt(u) of
@@ -89,13 +81,24 @@ class Rates:
     free : int
         Number of motions that no force opposes, and that drift.
     searched : float
-        Growth rate of D, 1 / time, below which growth was not looked for; 0 where all eigenvalues are known.
+        Growth rate of D, 1 / time, below which growth was not looked for; 0 where all eigenvalues are known, or nothing
+        else grows.
+    decay : Decay or None
+        What became of a random state, where not all eigenvalues are known.
     """
 
     values: Complexes
     grows: NDArray[np.bool_]
     free: int
     searched: float = 0.0
+    decay: Decay | None = None
+
+    def decided(self, decay: Decay) -> "Rates":
+        """Where no motion was found to grow: with what has become of a random state, and of slow motions."""
+        followed = np.array([0.5 * decay.growth_rate], complex)  # where the slow motions do not say so
+        values = decay.slow if len(decay.slow) and (not decay.grows or decay.slowest > 0) else followed
+        grows = values.real > 0 if decay.grows else np.zeros(len(values), bool)
+        return Rates(values, grows, decay.free, decay.searched, decay)
 
     @property
     def growth_rate(self) -> float:
@@ -142,7 +145,7 @@ class Motion:
         """
         configuration = packing.configuration if sliding is None else with_sticking_contacts(packing.configuration)
         if dissipation and configuration.damped:
-            k, c = operators(configuration)
+            k, c = configuration.assembled_operators()
         else:
             k = stiffness_matrix(configuration)
             c = csr_array(k.shape)
@@ -163,6 +166,11 @@ class Motion:
         return cls(configuration, active, root, a[active][:, active], g[active][:, active])
 
     @property
+    def particle(self) -> Indices:
+        """Whose coordinates they are, shape (E,)."""
+        return self.active % len(self.configuration)
+
+    @property
     def dissipative(self) -> bool:
         """Whether there is dissipation."""
         return self.damping.nnz > 0
@@ -172,7 +180,7 @@ class Motion:
 
         A product with one vector takes half of the time.
         """
-        counts = np.bincount(self.active % len(self.configuration))
+        counts = np.bincount(self.particle)
         counts = np.unique(counts[counts > 0])
         size = int(counts[0]) if len(counts) == 1 else 1
         return bsr_array(matrix, blocksize=(size, size))
@@ -193,38 +201,21 @@ class Motion:
         size = len(self.active)
         if not size:
             return Rates(np.zeros(0, complex), np.zeros(0, bool), 0)
-        if size > (DENSE_DAMPED if self.dissipative else SLICED):
-            return self._next_to_the_axis() if self.dissipative and size <= DISCS_UP_TO else self._fastest()
-        return self._damped_rates() if self.dissipative else self._undamped_rates()
+        if size <= (DENSE_DAMPED if self.dissipative else SLICED):
+            return self._damped_rates() if self.dissipative else self._undamped_rates()
+        found = self._fastest()
+        decides = self.dissipative and size <= DECAY_UP_TO and not found.grows.any()
+        return found.decided(follow_decay(self)) if decides else found
 
     def _fastest(self) -> Rates:
         """Of motions that surely grow; the others are not known."""
         damping = self.in_blocks(self.damping) if self.dissipative else None
-        length = min(TIMES[1], PERIODS_OF_LARGE / len(self.active))
-        found = fastest_growing(self.in_blocks(self.stiffness), damping, count=1, periods=(min(30.0, length), length))
+        length = min(LONGEST_SEARCH, PERIODS_OF_LARGE / len(self.active))
+        periods = min(30.0, length), length
+        found = fastest_growing(self.in_blocks(self.stiffness), damping, count=1, periods=periods)
         values = found.values if self.dissipative else 1j * np.sqrt(found.values.astype(complex))
         values = np.where(values.real < 0, -values, values)
         return Rates(values, np.ones(len(values), bool), 0, found.limit)
-
-    def _next_to_the_axis(self) -> Rates:
-        """Of the motions that decay most slowly or grow slowly, and of those that grow fast."""
-        slow = slowest_decay(self.stiffness, self.damping)
-        frequency = np.sqrt(abs(self.stiffness).sum(axis=1).max())
-        # growth is looked for from where the discs end
-        partly = np.isfinite(slow.covered)
-        width = max(slow.width, np.finfo(float).tiny)  # discs of a packing that collapses may only just touch
-        periods = PERIODS_BEYOND_DISCS if partly else float(np.clip(SEEN * frequency / (4 * np.pi * width), *TIMES))
-        fast = fastest_growing(self.stiffness, self.damping, periods=(min(TIMES[0], periods), periods))
-        apart = np.maximum(GROWTH_OF_DISCS * frequency, GROWTH_OVER_RESIDUAL * fast.residuals * np.abs(fast.values))
-        new = [
-            value
-            for value, far in zip(fast.values, apart, strict=True)
-            if np.abs(slow.values - value).min(initial=np.inf) > far
-        ]
-        values = np.concatenate([slow.values, np.array(new, complex)])
-        values = values[np.argsort(-values.real, kind="stable")]
-        searched = 0.0 if not partly and fast.limit <= 2 * slow.width else fast.limit
-        return Rates(values, values.real > GROWTH_OF_DISCS * frequency, slow.free, searched)
 
     def _undamped_rates(self) -> Rates:
         modes = Modes.of_matrix(self.stiffness)

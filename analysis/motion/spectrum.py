@@ -47,7 +47,8 @@ from scipy.sparse.linalg import eigs
 from ..configuration import HasConfiguration
 from ..counted import counted
 from ..errors import BadInputError
-from ..operators.stiffness import Form, stiffness_matrix
+from ..operators.stiffness import stiffness_matrix
+from ..packing.disk_operators import Form
 from ..packing.packing import Floats, Indices
 from ..progress import report_progress
 from ..table_display import TableDisplay

@@ -284,7 +284,7 @@ class Stability:
             "one_sided": None if self.one_sided is None else _finite(self.one_sided),
             "creep": None if self.creep is None else vars(self.creep),
             "largest_push": self.largest_push,
-            "decay": None if self.decay is None else vars(self.decay),
+            "decay": None if self.decay is None else self.decay.as_dict(),
             "rising": self.rising,
             "sticking": vars(self.sticking),
             "sliding": vars(self.sliding),
@@ -342,6 +342,7 @@ def stability(
     if not doubts:
         system = OneSidedSystem.of(configuration, STEP_OF_LARGE if large else VERDICT_STEP)
         outcome = _small_motion(system, linear, limit, 1 if large else PUSHES)
+    free = linear.sticking.free if outcome.decay is None else outcome.decay.free
     rising, not_followed = None, ""
     if direction is not None:
         if doubts or outcome.grows:
@@ -349,7 +350,7 @@ def stability(
         else:
             decays = outcome.grows is False
             try:
-                rising = motion_under_load(system, direction, limit, free=linear.sticking.free, decays=decays)
+                rising = motion_under_load(system, direction, limit, free=free, decays=decays)
             except NotFollowedError as error:
                 not_followed = str(error)
     contacts, given = configuration.contacts, configuration.stiffness is not None
@@ -362,7 +363,7 @@ def stability(
         largest_push=outcome.largest_push, decay=outcome.decay, rising=rising,
         sticking=outcome.sticking, sliding=LinearNeighbour.of(linear.sliding) if linear.one_sided else outcome.sticking,
         asymmetry={} if given else asymmetry(configuration), dissipative=configuration.damped,
-        free=linear.sticking.free, searched=outcome.sticking.searched, contacts=touching,
+        free=free, searched=outcome.sticking.searched, contacts=touching,
         reasons=tuple(outcome.reasons), not_followed=not_followed,
         remarks=configuration.remarks,
     )  # fmt: skip
@@ -427,18 +428,23 @@ def _small_motion(system: OneSidedSystem, linear: _LinearRates, time: float | No
         outcome = _after_pushes(outcome, follow_pushes(system, outcome.growth_rate, bool(outcome.grows), time, pushes))
     elif outcome.grows is False:
         outcome = _as_contacts_part(outcome, system, time, pushes)
-    if linear.sticking.searched and outcome.grows is False:
-        decay = follow_decay(system.motion, time)
-        says = f"{'with sticking contacts ' if outcome.one_sided else ''}{decay}"
-        outcome = replace(
-            outcome,
-            grows=decay.grows,
-            growth_rate=decay.growth_rate,
-            sticking=LinearNeighbour(decay.growth_rate, decay.searched),
-            reasons=[*outcome.reasons, *([says] if decay.grows is None else [])],
-            decay=decay,
-        )
-    return outcome
+    known = linear.sticking.decay if time is None else None
+    if outcome.grows is False and known is None and linear.sticking.searched:
+        known = follow_decay(system.motion, time)
+    return outcome if known is None or outcome.grows else _after_decay(outcome, known)
+
+
+def _after_decay(outcome: _Outcome, decay: Decay) -> _Outcome:
+    """The outcome where a random state says whether sticking contacts grow."""
+    says = f"{'with sticking contacts ' if outcome.one_sided else ''}{decay}"
+    return replace(
+        outcome,
+        grows=decay.grows if outcome.grows is False else outcome.grows,
+        growth_rate=decay.growth_rate,
+        sticking=LinearNeighbour(decay.growth_rate, decay.searched),
+        reasons=[*outcome.reasons, *([says] if decay.grows is None else [])],
+        decay=decay,
+    )
 
 
 def _as_contacts_part(linear: _Outcome, system: OneSidedSystem, time: float | None, pushes: int) -> _Outcome:

@@ -23,12 +23,8 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import eigs
 
-from ..arrays import derive_frozen
+from ..arrays import Floats, derive_frozen
 from ..configuration import HasConfiguration
-from ..packing.law import Derivatives
-from ..packing.packing import Floats, Packing
-from .linearised_contacts import assembled_damping, assembled_operators
-from .stiffness import assemble_stiffness, contact_terms, stiffness_matrix
 
 
 def damping_matrix(packing: HasConfiguration, sliding: ArrayLike = False) -> csr_array:
@@ -47,28 +43,7 @@ def damping_matrix(packing: HasConfiguration, sliding: ArrayLike = False) -> csr
         Force time / length, in the order (x.., y.., R theta..), or as in :mod:`~faultgouge.analysis.configuration`.
         For a Packing, C is symmetric and positive semidefinite. Without dashpots and drag, C is empty.
     """
-    if not isinstance(packing, Packing):
-        given = packing.configuration.damping
-        return assembled_damping(packing.configuration) if given is None else given.copy()
-    contacts = packing.contacts
-    pairs = len(contacts) - np.count_nonzero(contacts.floor)
-    normal, _, distance, overlap = packing.geometry
-    along, across = packing.law.dashpots(overlap, contacts.slip, sliding)
-    zero = np.zeros_like(along)
-    # N N^T and T T^T are what the normal and the tangential stiffness multiply in K
-    terms = contact_terms(Derivatives(zero, zero, along, -across, zero), normal.T, distance, pairs)
-    matrix = assemble_stiffness(terms, contacts.i, contacts.j[:pairs], len(packing))
-    if packing.drag_time is None:
-        return matrix
-    return csr_array(matrix + diags_array(coordinate_mass(packing) / packing.drag_time))
-
-
-def operators(packing: HasConfiguration) -> tuple[csr_array, csr_array]:
-    """K and C, as `stiffness_matrix` and `damping_matrix` have them; of a Configuration in half of the time."""
-    configuration = packing.configuration
-    if packing is not configuration or configuration.stiffness is not None or configuration.spring:
-        return stiffness_matrix(packing), damping_matrix(packing)
-    return assembled_operators(configuration)
+    return packing.assembled_damping(sliding)
 
 
 def largest_damping_rate(packing: HasConfiguration) -> float:

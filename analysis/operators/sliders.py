@@ -9,7 +9,7 @@ contact stuck, its tangential force along :math:`\mathbf e_c` would pass the bou
     - \mu f_n'\, \mathrm d\delta \\
     Z_c \dot q &= -c_t\, \mathbf e_c \cdot \dot{\mathbf s} - \mu c_n\, \dot\delta
 
-of springs and of dashpots, with the symbols of :mod:`~faultgouge.analysis.operators.linearised_contacts`. The slider
+of springs and of dashpots, with the symbols of :mod:`~faultgouge.analysis.assembly`. The slider
 takes this excess away: small motion of the packing is that of K and C of sticking contacts and of the forces
 :math:`-G p`, where :math:`G_c` is the force on all coordinates of a unit tangential force along :math:`\mathbf e_c`
 and :math:`p_c` is a play operator (backlash; Visintin, Differential Models of Hysteresis, 1994),

@@ -21,6 +21,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array, diags_array
 
 from ..arrays import (
     Floats,
@@ -34,13 +35,15 @@ from ..arrays import (
     same_bits,
     set_frozen,
 )
+from ..assembly import spring_of_layer
 from ..configuration import Configuration
 from ..counted import counted
 from ..errors import BadInputError
 from .compensated import DoubleDouble
 from .contacts import Contacts
+from .disk_operators import Form, assemble_stiffness, contact_terms
 from .geometry import ContactGeometry, check_box, contact_geometry
-from .law import MindlinLaw
+from .law import Derivatives, MindlinLaw
 from .linearise import linearise_contacts
 
 
@@ -393,6 +396,38 @@ class Packing:
         """
         per_disk = np.linalg.norm(self.net_force.reshape(3, -1), axis=0)
         return float(np.delete(per_disk, self.rattlers).max(initial=0.0))
+
+    def assembled_stiffness(
+        self,
+        *,
+        form: Form = "consistent",
+        coupled: NDArray[np.bool_] | None = None,
+        parting: ArrayLike = 0.5,
+        sliding: ArrayLike = False,
+    ) -> csr_array:
+        """K = -dF/dq; see :func:`~faultgouge.analysis.stiffness_matrix`."""
+        law = self.law.derivatives(self.geometry.overlap, self.contacts.slip, parting, sliding)
+        if coupled is not None:
+            law = law._replace(overlap_derivative=np.where(coupled, law.overlap_derivative, 0.0))
+        matrix = self._assembled(law, form)
+        return csr_array(matrix + spring_of_layer(self.spring, self.top, self.coordinates)) if self.spring else matrix
+
+    def assembled_damping(self, sliding: ArrayLike = False) -> csr_array:
+        """C = -dF/d(dq/dt); see :func:`~faultgouge.analysis.damping_matrix`."""
+        along, across = self.law.dashpots(self.geometry.overlap, self.contacts.slip, sliding)
+        zero = np.zeros_like(along)
+        # N N^T and T T^T are what the normal and the tangential stiffness multiply in K
+        matrix = self._assembled(Derivatives(zero, zero, along, -across, zero))
+        return (
+            matrix if self.drag_time is None else csr_array(matrix + diags_array(self.coordinate_mass / self.drag_time))
+        )
+
+    def _assembled(self, law: Derivatives, form: Form = "consistent") -> csr_array:
+        """K of contacts with these derivatives."""
+        c, g = self.contacts, self.geometry
+        pairs = len(c) - np.count_nonzero(c.floor)
+        terms = contact_terms(law, g.normal.T, g.distance, pairs, form)
+        return assemble_stiffness(terms, c.i, c.j[:pairs], len(self))
 
 
 def _check_partners(contacts: Contacts, disks: int) -> None:

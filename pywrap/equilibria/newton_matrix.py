@@ -12,7 +12,7 @@ import numpy as np
 
 from ...analysis.arrays import Floats, Indices
 from ...analysis.factors.linear_solver import Band, BandSolver, Booleans, Solver, SparseSolver
-from ...analysis.operators.stiffness import assemble_stiffness, contact_terms
+from ...analysis.packing.disk_operators import assemble_stiffness, contact_terms
 from ..lammps.contact_graph import ContactGraph
 from ..lammps.trial_state import Trial
 

@@ -33,7 +33,6 @@ from ...analysis.arrays import Floats, Indices
 from ...analysis.counted import counted
 from ...analysis.motion.motion import Motion
 from ...analysis.motion.one_sided import OneSidedSystem
-from ...analysis.operators.damping import operators
 from .acting_fixes import acting_fixes
 from .granular_commands import GIVE_LINES, NotLinearisedError, NotTakenError
 from .lammps_steps import steps_in_a_copy
@@ -196,7 +195,7 @@ class _Comparison:
     @classmethod
     def of(cls, configuration: Configuration, *, extrapolates: bool) -> "_Comparison | None":
         """None if nothing that moves has a contact."""
-        stiffness, damping = operators(configuration)
+        stiffness, damping = configuration.assembled_operators()
         if not stiffness.nnz:
             return None
         k, c = (_largest_row(matrix, configuration) for matrix in (stiffness, damping))

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from known_spectra import complex_block, turned
 from scipy.linalg import eig
 from scipy.optimize import linear_sum_assignment
+from scipy.sparse import block_diag, csr_array
 
 from faultgouge.analysis import spectrum
 from faultgouge.analysis.motion import spectrum as spectrum_module
@@ -17,7 +18,7 @@ from faultgouge.analysis.motion.all_eigenvalues import SliceSizes, all_eigenvalu
 from faultgouge.analysis.motion.block_arnoldi import ShiftedDisc, SpectrumError
 from faultgouge.analysis.progress import show_progress
 
-SMALL = SliceSizes(own=24, block=4)
+SMALL = SliceSizes(own=24, block=4, least=30)
 
 
 def nearest(one, other):
@@ -72,13 +73,30 @@ def test_vectors_are_those_of_lapack():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("copies", [5, 20])
-def test_more_equal_eigenvalues_than_a_block_has_vectors(copies):
+@pytest.mark.parametrize(("copies", "others", "sizes"), [(5, 300, SMALL), (20, 300, SMALL), (20, 150, SliceSizes())])
+def test_more_equal_eigenvalues_than_a_block_has_vectors(copies, others, sizes):
     """As of spheres that spin without a force. A slice that lacks some is found again with larger blocks."""
     rng = np.random.default_rng(copies)
-    real = np.concatenate([np.zeros(copies), np.full(copies, 7.0), rng.uniform(1, 50, 300)])
-    found = all_eigenvalues(turned([np.array([[value]]) for value in real], rng), SMALL)
+    real = np.concatenate([np.zeros(copies), np.full(copies, 7.0), rng.uniform(1, 50, others)])
+    found = all_eigenvalues(turned([np.array([[value]]) for value in real], rng), sizes)
     np.testing.assert_allclose(found.values.real, np.sort(real), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("copies", [3, 40])
+def test_identical_cells_that_do_not_touch_have_each_their_eigenvalues(copies):
+    """More equal ones than any block has vectors, with pairs and negative ones, beside a large island."""
+    rng = np.random.default_rng(copies)
+    cell = np.array([[2.0, 1.0, 0.0], [-1.0, 2.0, 0.3], [0.2, 0.1, -0.5]])
+    large = turned([np.array([[value]]) for value in rng.uniform(1, 50, 150)], rng)
+    whole = csr_array(block_diag([*[cell] * copies, large]))
+    mixed = rng.permutation(whole.shape[0])
+    whole = csr_array(whole[mixed][:, mixed])
+    found, expected = all_eigenvalues(whole, SMALL), np.linalg.eigvals(whole.toarray())
+    assert nearest(found.values, expected).max() < 1e-6
+    marked = found.marked
+    assert len(marked) == 2 * copies
+    np.testing.assert_allclose(whole @ marked.right, marked.right * marked.values, atol=1e-9)
+    np.testing.assert_allclose(whole.T @ marked.left.conj(), marked.left.conj() * marked.values, atol=1e-9)
 
 
 @pytest.fixture

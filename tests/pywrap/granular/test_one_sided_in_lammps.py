@@ -284,7 +284,7 @@ def test_the_verdict_on_a_random_state_is_that_of_lammps(tmp_path, monkeypatch, 
     assert not here.contacts.one_sided.any()
     slowest = stability(here).growth_rate
     monkeypatch.setattr(stability_module, "LARGE", 0)
-    for name, value in {"SLICED": 0, "DENSE_DAMPED": 0, "DISCS_UP_TO": 0, "PERIODS_OF_LARGE": 2e4}.items():
+    for name, value in {"SLICED": 0, "DENSE_DAMPED": 0, "DECAY_UP_TO": 0, "PERIODS_OF_LARGE": 2e4}.items():
         monkeypatch.setattr(motion_module, name, value)
     told = stability(here)
     assert told.decay.grows is not rests

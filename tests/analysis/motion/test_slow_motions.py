@@ -1,0 +1,138 @@
+"""Slow motions and the decay of all others, against LAPACK's eigenvalues of the first-order matrix."""
+
+import numpy as np
+import pytest
+from linearised import dissipative, motion_matrix
+
+from faultgouge.analysis import Configuration, LinearisedContacts
+from faultgouge.analysis.motion import decay as decay_module
+from faultgouge.analysis.motion import motion as module
+from faultgouge.analysis.motion.decay import follow_decay
+from faultgouge.analysis.motion.motion import Motion
+from faultgouge.analysis.motion.slow_motions import slow_motions
+
+
+@pytest.fixture(scope="module", params=[(2.0, 1.0, None), (0.2, 0.1, None), (0.02, 0.01, 30.0)])
+def damped(request, reference_packing):
+    """100 disks with strong and with weak dashpots, and with drag."""
+    cn, ct, drag = request.param
+    return dissipative(reference_packing(1.0), cn, ct, drag)
+
+
+def all_values(packing):
+    """s with Im s >= 0 of motions that a force opposes, the slowest decay first."""
+    values = np.linalg.eigvals(motion_matrix(packing))
+    values = values[(values.imag >= 0) & (np.abs(values) > 1e-5 * np.abs(values).max())]
+    return values[np.argsort(-values.real)]
+
+
+def found_of(motion):
+    """Slow motions of a motion, from one more space than the first."""
+    seen = []
+    frequency = np.sqrt(abs(motion.stiffness).sum(axis=1).max())
+    return slow_motions(
+        motion.stiffness,
+        motion.damping,
+        motion.particle,
+        0.1 * frequency,
+        lambda found: 1e9 * (seen.append(found) or len(seen) < 3),
+    )
+
+
+def row_of_spheres(count, pressed=2.0, dashpot=40.0):
+    """Equal spheres side by side on a plane, between two walls that press them together; apart if `pressed` is 0."""
+    first, others = np.arange(count), np.arange(count - 1)
+    i = np.concatenate([others + 1, first, [0, count - 1]])
+    j = np.concatenate([others, np.full(count + 2, -1)])
+    pair, size = j >= 0, len(i)
+    normal = np.zeros((size, 3))
+    normal[pair, 0] = 1.0
+    normal[count - 1 : -2, 2] = 1.0
+    normal[-2, 0], normal[-1, 0] = 1.0, -1.0
+    force = np.where(np.abs(normal[:, 0]) > 0, pressed, 1.0)
+    load = np.zeros((count, 2, 3))
+    load[:, 0, 2] = -1.0
+    none, ones = np.zeros((size, 3)), np.ones((size, 2))
+    contacts = LinearisedContacts(
+        i=i, j=j, normal=normal, distance=np.where(pair, 1.0, np.inf), overlap=np.full(size, 1e-3),
+        slip_arm=0.5 * ones, lever_arm=0.5 * ones, lever_slope=np.zeros(size),
+        normal_force=force, tangential_force=none,
+        normal_stiffness=np.full(size, 3e3), tangential_stiffness=np.full(size, 2e3), closing=none, parting=none,
+        normal_dashpot=np.full(size, dashpot), tangential_dashpot=np.full(size, 0.5 * dashpot),
+        friction=0.5 * force,
+    )  # fmt: skip
+    place = np.column_stack([first, 0 * first, 0.5 + 0 * first])
+    each = np.ones(count)
+    contacts = contacts.chosen(force > 0)
+    return Configuration(
+        dimension=3, position=place, radius=0.5 * each, mass=each, inertia=0.1 * each, contacts=contacts,
+        box=np.diag([count, 1.0, 1.0]), origin=np.array([-0.5, -0.5, 0.0]), periodic=np.zeros(3, bool), load=load,
+    )  # fmt: skip
+
+
+def test_slow_motions_are_all_of_lapack_below_the_radius(damped):
+    motion, expected = Motion.of(damped), all_values(damped)
+    found = found_of(motion)
+    # rounding of a dense solver, 1e-13 of the largest eigenvalue for a motion that is not well conditioned
+    near = 1e-9 * np.abs(expected).max()
+    inside = expected[np.abs(expected) < 0.999 * found.radius]
+    assert len(inside) > 10
+    for value in inside:
+        assert np.abs(found.values - value).min() < near
+
+
+def test_the_space_of_slow_motions_is_invariant(damped):
+    motion = Motion.of(damped)
+    found = found_of(motion)
+    size, v = len(motion.active), found.basis
+    image = np.concatenate(
+        [found.reference * v[size:], -(motion.stiffness @ v[:size]) / found.reference - motion.damping @ v[size:]]
+    )
+    largest = np.sqrt(abs(motion.stiffness).sum(axis=1).max())
+    np.testing.assert_allclose(v.T @ v, np.eye(v.shape[1]), atol=1e-12)
+    # residuals of the inverse, as its iteration ends
+    assert np.abs(image - v @ (v.T @ image)).max() < 1e-6 * largest
+
+
+@pytest.mark.slow
+def test_rates_of_a_packing_beyond_lapack_have_its_slowest_decay(damped, monkeypatch):
+    expected = Motion.of(damped).rates
+    assert not expected.grows.any()
+    assert expected.growth_rate < 0
+    monkeypatch.setattr(module, "DENSE_DAMPED", 100)
+    found = Motion.of(damped).rates
+    assert not found.grows.any()
+    assert found.growth_rate == pytest.approx(expected.growth_rate, rel=1e-6)
+    assert found.free == expected.free
+    assert found.searched == 0
+
+
+@pytest.mark.slow
+def test_dashpots_too_weak_for_the_time_leave_a_rate_below_which_growth_may_hide(reference_packing, monkeypatch):
+    monkeypatch.setattr(module, "DENSE_DAMPED", 100)
+    monkeypatch.setattr(decay_module, "WORK_OF_DECAY", 1e8)
+    found = Motion.of(dissipative(reference_packing(1.0), 0.002, 0.001, None)).rates
+    assert not found.grows.any()
+    assert found.decay.grows is None
+    assert found.searched > -found.growth_rate > 0
+
+
+@pytest.mark.slow
+def test_motions_that_no_force_opposes_are_counted_however_many_are_alike(monkeypatch):
+    """Spheres on a plane roll along two axes, each by itself: a zero of more motions than a block holds."""
+    apart = row_of_spheres(20, pressed=0.0)
+    expected = Motion.of(apart).rates
+    monkeypatch.setattr(module, "DENSE_DAMPED", 10)
+    found = Motion.of(apart).rates
+    assert found.free == expected.free == 40
+    assert found.searched == 0
+    assert found.growth_rate == pytest.approx(expected.growth_rate, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_slow_motions_of_a_row_that_buckles_grow_as_those_of_lapack():
+    """Eigenvalues that are nearly alike, of more motions than a block holds."""
+    row = row_of_spheres(40, 1e-2)
+    found = follow_decay(Motion.of(row))
+    assert found.grows is True
+    assert found.growth_rate == pytest.approx(Motion.of(row).rates.growth_rate, rel=1e-6)
