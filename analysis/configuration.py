@@ -223,9 +223,9 @@ class Configuration:
         what = counted(len(self), "disk" if self.dimension == 2 else "sphere")
         count, walls = len(self.contacts), int(self.contacts.wall.sum())
         bound = int(self.contacts.at_bound.sum())
-        s = "s" if bound == 1 else ""
-        slide = f", which slide{s}" if self.contacts.sliding.any() else f", which stick{s}" if bound else ""
-        state = f"{walls} with walls, {bound} at Coulomb's bound{slide}"
+        one_sided = ", sticking in K" if self.contacts.one_sided.any() else ""
+        in_k = ", sliding in K" if self.contacts.sliding.any() else one_sided
+        state = f"{walls} with walls, {bound} at Coulomb's bound{in_k}"
         if self.stiffness is not None:
             count_one_sided = len(self.one_sided_particles)
             sided = f", forces on {counted(count_one_sided, 'particle')} one-sided" if count_one_sided else ""

@@ -28,11 +28,11 @@ class Images:
     place : ndarray, shape (n, 3)
         Centres, length.
     particle : ndarray of int, shape (n,)
-        Whose they are.
+        Index of the particle of each image.
     bar : ndarray, shape (c, 2, 3)
         Ends of the bars of contacts, length.
     contact : ndarray of int, shape (c,)
-        Whose they are.
+        Index of the contact of each bar.
     low, high : ndarray, shape (dimension,)
         The frame of the picture of disks; of spheres the box along its periodic edges, and else what lies in it.
     walls : tuple of Wall
@@ -62,27 +62,23 @@ class Images:
         top = float((packing.position[:, 1] + packing.radius).max())
         room = 1.1 if packing.top.any() else 0.3  # for the arrow of the load
         return cls(
-            2,
-            _flat(view.place),
-            view.disk,
-            np.stack([_flat(view.start), _flat(view.end)], axis=1),
-            view.contact,
-            np.array([view.left, view.bottom]),
-            np.array([view.right, top + room * float(packing.radius.min())]),
-            view.walls,
-            np.zeros((0, 3)),
-            bool(len(view.edges)),
+            dimension=2,
+            place=_flat(view.place),
+            particle=view.disk,
+            bar=np.stack([_flat(view.start), _flat(view.end)], axis=1),
+            contact=view.contact,
+            low=np.array([view.left, view.bottom]),
+            high=np.array([view.right, top + room * float(packing.radius.min())]),
+            walls=view.walls,
+            corners=np.zeros((0, 3)),
+            periodic=bool(len(view.edges)),
         )
 
     @classmethod
     def _of_spheres(cls, packing: Configuration) -> "Images":
         """Spheres within the box; of a contact through a periodic side each partner has half."""
-        cell, place, c, branch = (
-            cell_of(packing),
-            within_cell(packing, packing.position),
-            packing.contacts,
-            packing.branch,
-        )
+        cell, place = cell_of(packing), within_cell(packing, packing.position)
+        c, branch = packing.contacts, packing.branch
         bars = np.stack([place[c.i], place[c.i] - branch], axis=1)
         through = np.flatnonzero(
             ~c.wall & (np.linalg.norm(bars[:, 1] - place[c.j], axis=1) > 1e-6 * packing.radius.max())
@@ -100,16 +96,16 @@ class Images:
         begin = np.where(packing.periodic, packing.origin, 0.0) + sum(side[0] for side in sides)
         corners = [begin + sum((number >> k & 1) * sides[k][1] for k in range(3)) for number in range(8)]
         return cls(
-            3,
-            place,
-            np.arange(len(packing)),
-            np.concatenate([bars, again]),
-            np.concatenate([np.arange(len(c)), through]),
-            low,
-            high,
-            walls,
-            np.array(corners),
-            False,
+            dimension=3,
+            place=place,
+            particle=np.arange(len(packing)),
+            bar=np.concatenate([bars, again]),
+            contact=np.concatenate([np.arange(len(c)), through]),
+            low=low,
+            high=high,
+            walls=walls,
+            corners=np.array(corners),
+            periodic=False,
         )
 
     @staticmethod

@@ -193,7 +193,18 @@ def draw_packing(
     -------
     Figure
         The figure of the axes.
+
+    Raises
+    ------
+    BadInputError
+        If axes are no matplotlib axes.
+    ValueError
+        If no such colour is known.
     """
+    if axes is not None and not isinstance(axes, Axes):
+        raise BadInputError(
+            f"draw takes matplotlib's Axes, and no {type(axes).__name__}: draw(packing).savefig(path) writes a file."
+        )
     if color != "none" and color not in COLOURS:
         raise ValueError(f"color = {color!r} is none of {', '.join(COLOURS)}, none.")
     if packing.dimension == 3:

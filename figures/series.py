@@ -49,7 +49,7 @@ def draw_series(
     Figure
     """
     alone, axes = axes is None, Figure(layout="constrained").add_subplot() if axes is None else axes
-    time, values = positive(time, values, times=False)
+    time, values = positive(time, values, log_x=False)
     axes.set_yscale("log")
     axes.plot(time, values, color=to_hex(color), linewidth=0.8, label=label)
     axes.set(xlabel="$t$", ylabel="$D(t)$")
@@ -114,16 +114,16 @@ def _slope(time: Floats, msd: Floats, rate: float, fitted: Growth | None) -> tup
 
 def begin_at_noise(axes: Axes, time: ArrayLike, values: ArrayLike) -> None:
     """The lower end of the axis of a quantity that grows, see `BELOW_NOISE`."""
-    time, values = positive(time, values, times=False)
+    time, values = positive(time, values, log_x=False)
     if len(time):
         noise = values[time <= time[0] + 0.25 * (time[-1] - time[0])]
         axes.set_ylim(bottom=BELOW_NOISE * float(np.median(noise)))
 
 
-def positive(x: ArrayLike, y: ArrayLike, times: bool = True) -> tuple[Floats, Floats]:
-    """The points that logarithmic axes can show; with times = False the first axis is linear."""
+def positive(x: ArrayLike, y: ArrayLike, log_x: bool = True) -> tuple[Floats, Floats]:
+    """The points that logarithmic axes can show; without `log_x` the first axis is linear."""
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    seen = ((x > 0) | (not times)) & (y > 0)
+    seen = ((x > 0) | (not log_x)) & (y > 0)
     return x[seen], y[seen]
 
 

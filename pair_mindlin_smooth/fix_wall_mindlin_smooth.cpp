@@ -290,10 +290,5 @@ double FixWallMindlinSmooth::compute_scalar()
 void *FixWallMindlinSmooth::extract(const char *name, int &dim)
 {
   dim = 0;
-  if (strcmp(name, "kn") == 0) return &law.kn;
-  if (strcmp(name, "kt") == 0) return &law.kt;
-  if (strcmp(name, "mu") == 0) return &law.mu;
-  if (damping && strcmp(name, "cn") == 0) return &law.cn;
-  if (damping && strcmp(name, "ct") == 0) return &law.ct;
-  return nullptr;
+  return law_parameter(law, name, damping);
 }

@@ -53,3 +53,13 @@ void LawReader::read_dashpots(const char *cn, const char *ct)
   if (!law.valid_dashpots())
     error->all(FLERR, "{}: damping CN CT must be finite and not negative (got {} {})", command, cn, ct);
 }
+
+double *LAMMPS_NS::law_parameter(faultgouge::MindlinLaw &law, const char *name, bool damping)
+{
+  if (strcmp(name, "kn") == 0) return &law.kn;
+  if (strcmp(name, "kt") == 0) return &law.kt;
+  if (strcmp(name, "mu") == 0) return &law.mu;
+  if (damping && strcmp(name, "cn") == 0) return &law.cn;
+  if (damping && strcmp(name, "ct") == 0) return &law.ct;
+  return nullptr;
+}

@@ -34,6 +34,9 @@ private:
   faultgouge::MindlinLaw &law;
 };
 
+// what fix adapt changes by its name; dashpots only where the command has the keyword damping
+double *law_parameter(faultgouge::MindlinLaw &law, const char *name, bool damping);
+
 }    // namespace LAMMPS_NS
 
 #endif

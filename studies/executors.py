@@ -23,7 +23,7 @@ Say = Callable[[str], None]
 Progress = Callable[[Iterable[Any], int], Iterable[Any]]
 """A function that takes results as they come, with their number, and passes them on."""
 
-Share = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
+MapRows = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 """`map`, whose results may come in any order."""
 
 

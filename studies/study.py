@@ -20,7 +20,7 @@ from ..figures.pages import render
 from ..figures.style import report_failure, save
 from ..pywrap import Scene
 from ..pywrap.scenes.units import real_units
-from .executors import Progress, Say, Share, open_executor
+from .executors import MapRows, Progress, Say, open_executor
 from .result_rows import Rows
 
 Result = dict[str, Any]
@@ -30,17 +30,17 @@ Figures = Mapping[str, Callable[[], Figure]]
 
 
 def draw_all(figures: Figures, folder: Path, say: Say) -> None:
-    """Draw and save pictures; one that cannot be drawn costs a sentence alone."""
+    """Draw and save pictures; a picture that fails is reported, and the others are drawn."""
     for name, figure in figures.items():
         with report_failure(f"{name}.png", say):
             save(figure(), folder / name)
 
 
 class Work(NamedTuple):
-    """Inputs of a study besides the scene: known rows, workers, and the output of messages."""
+    """Inputs of a study besides the scene: known rows, a map over missing rows, and the output of messages."""
 
     rows: Rows
-    share: Share
+    map_rows: MapRows
     say: Say
     progress: Progress
 
@@ -97,10 +97,10 @@ class SceneStudy:
         with open_executor(workers=1) as pool:
             if MPI.COMM_WORLD.rank != 0:
                 return {}
-            share: Share = map if pool is None else partial(pool.map, unordered=True)
+            map_rows: MapRows = map if pool is None else partial(pool.map, unordered=True)
             make_folder(output)
             rows = Rows(output / f"{self.name}.jsonl", scene, self.beside)
-            found = self.compute(scene, Work(rows, share, say, progress))
+            found = self.compute(scene, Work(rows, map_rows, say, progress))
         real = real_units(scene)
         result = {"scene": scene.resolved(), "units": None if real is None else real.as_dict()} | found
         names = {"result": result, "units": result["units"], **self.page(result)}

@@ -40,7 +40,7 @@ def test_a_scene_may_be_the_path_of_its_file(tmp_path, name):
 
 def test_a_packing_may_be_the_path_of_its_file(cluster_file):
     packing = faultgouge.load(cluster_file)
-    assert str(faultgouge.stability(cluster_file)) == str(faultgouge.stability(packing))
+    assert str(faultgouge.stability(cluster_file)) == repr(faultgouge.stability(packing))
     assert repr(faultgouge.spectrum(str(cluster_file))) == repr(faultgouge.spectrum(packing))
     assert type(faultgouge.draw(cluster_file, color="none")) is type(faultgouge.draw(packing, color="none"))
     for name in ("stability", "spectrum", "draw"):
@@ -48,6 +48,28 @@ def test_a_packing_may_be_the_path_of_its_file(cluster_file):
             getattr(faultgouge, name)(None)
         with pytest.raises(BadInputError, match=r"no Equilibrium: give its \.packing\.$"):
             getattr(faultgouge, name)(Equilibrium.of(packing))
+
+
+def test_a_path_in_a_wrong_place_is_refused_with_the_right_call(cluster_file, tmp_path):
+    with pytest.raises(BadInputError, match=r"and no str: draw\(packing\)\.savefig\(path\) writes a file\.$"):
+        faultgouge.draw(cluster_file, "p q.png")
+    with pytest.raises(BadInputError, match=r"Scene\.from_toml\(path\) reads a file\.$"):
+        faultgouge.Scene("scene.toml")
+    with pytest.raises(BadInputError, match=r"^sweep takes the path of a SWEEP.toml, or a mapping .* no NoneType\.$"):
+        faultgouge.sweep(None, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [("from_lammps", ()), ("relax", ()), ("compare_motion", (None, 1.0, 1e-9)), ("lammps_path", ("",))],
+)
+def test_a_closed_instance_is_refused_in_a_sentence(name, given):
+    from lammps import lammps
+
+    instance = lammps(cmdargs=["-screen", "none", "-log", "none"])
+    instance.close()
+    with pytest.raises(FaultgougeError, match=rf"this one is closed: call {name} before close\(\)\.$"):
+        getattr(faultgouge.pywrap, name)(instance, *given)
 
 
 @pytest.mark.parametrize("name", ["load", "view", "from_lammps", "relax"])

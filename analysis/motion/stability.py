@@ -169,6 +169,8 @@ class Stability:
         """The verdict in sentences, the verdict first."""
         return "\n".join(self.sentences)
 
+    __repr__ = __str__
+
     @property
     def sentences(self) -> tuple[str, ...]:
         """The verdict, what holds without dissipation, what contacts at the bound do, and remarks on the origin."""

@@ -81,14 +81,14 @@ class Contacts:
 
 
 def _canonical(i: Indices, j: Indices) -> bool:
-    """Whether contacts are in the order of storage, each of them once."""
+    """Whether contacts are in the order of storage, and none is listed twice."""
     floor, disks = j == FLOOR, int(i.max(initial=0)) + int(j.max(initial=0)) + 2
     place = np.where(floor, disks * disks, disks * i + j) + np.where(floor, i, 0)
     return bool(np.all((i < j) | floor) and np.all(place[1:] > place[:-1]))
 
 
 def _sort_contacts(i: Indices, j: Indices) -> tuple[Indices, Indices, Indices]:
-    """Contacts in the order of storage, and the place of each before."""
+    """i and j in the order of storage, and the place that each contact had before."""
     floor = j == FLOOR
     first = np.where(floor, i, np.minimum(i, j))
     second = np.where(floor, FLOOR, np.maximum(i, j))

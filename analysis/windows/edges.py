@@ -240,24 +240,24 @@ def _smooth_root(value: Callable[[float], float], below: float, above: float, li
     root = float(brentq(value, below, above, xtol=limits.root * span))
     room = min(root - below, above - root)
     # As near as the noise allows: the function should be straight, and yet stand out of the scatter.
-    distance = min(1e-3 * room, 10 * limits.root * span)
-    while 0 < distance < 0.1 * room:
+    distance = min(limits.points_in_room * room, limits.points * limits.root * span)
+    while 0 < distance < limits.points_farthest * room:
         loads = [float(fx) for fx in root + distance * np.arange(-2.0, 3.0)]
-        found = _root_of_five(loads, np.array([value(fx) for fx in loads]))
+        found = _root_of_five(loads, np.array([value(fx) for fx in loads]), limits)
         if found is not None:
             return SignChange(*found, loads, smooth=True)
-        distance *= 30
+        distance *= limits.points_farther
     return None
 
 
-def _root_of_five(loads: list[float], values: Floats) -> tuple[float, float] | None:
+def _root_of_five(loads: list[float], values: Floats, limits: Limits) -> tuple[float, float] | None:
     """Root and error of a parabola through five equidistant points: two degrees of freedom tell the scatter."""
     middle, distance = loads[2], loads[3] - loads[2]
     curve, residuals, *_ = np.polynomial.polynomial.polyfit(np.arange(-2, 3), values, 2, full=True)
     scatter = float(np.sqrt(residuals[0].sum() / 2)) if residuals[0].size else 0.0
     value, slope = float(curve[0]), float(curve[1])
-    # A step of height 1 has slope 0.3 and scatter 0.3 here.
-    if scatter > 0.1 * abs(slope) or abs(value) > abs(slope) or values[0] * values[-1] >= 0:
+    # a step of height 1 has slope 0.3 and scatter 0.3
+    if scatter > limits.scatter * abs(slope) or abs(value) > abs(slope) or values[0] * values[-1] >= 0:
         return None
     shift = -value / slope * (1 + float(curve[2]) * value / slope**2)  # the parabola's root, to second order
     return middle + shift * distance, 2 * scatter / abs(slope) * distance + float(np.spacing(abs(middle)))

@@ -49,8 +49,18 @@ class Limits:
     # The edge of a window
 
     root: float = 1e-7
-    """Width to which the root of D is bracketed, in increments: a tenth of the distance of the five points about
-    it."""
+    """Width to which the root of D is bracketed, in increments."""
+    points: float = 10.0
+    """First distance of the five points about a root from each other, in widths of its bracket."""
+    points_in_room: float = 1e-3
+    """The same at most, as a share of the distance of the root from the nearer end of the increment."""
+    points_farther: float = 30.0
+    """Factor of the next distance, where the scatter of the five points hides the slope."""
+    points_farthest: float = 0.1
+    """Largest distance, as a share of the distance of the root from the nearer end of the increment."""
+    scatter: float = 0.1
+    """Scatter of the five points about their parabola, in units of their slope, beyond which the function is not
+    smooth there: a step has 1."""
     jump: float = 1e-9
     """Width to which a jump is bracketed, in increments; its place depends on the path's increment by far more."""
     steady: float = 1e-9

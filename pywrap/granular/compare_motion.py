@@ -34,6 +34,7 @@ from ...analysis.arrays import Floats, Indices
 from ...analysis.motion.eigenvalues import active_coordinates, mass_weighted
 from ...analysis.operators.linearised_contacts import rescaling_operators
 from .granular_commands import NotTakenError
+from .instance_queries import require_instance
 from .lammps_steps import steps_in_a_copy
 from .look_in_a_copy import can_copy
 
@@ -117,6 +118,7 @@ def compare_motion(
     BadInputError
         If a time, the step or the amplitude is not positive and finite: nothing would move, and nothing be compared.
     """
+    require_instance(lmp, "compare_motion")
     if not can_copy(lmp):
         raise NotTakenError("compare_motion runs LAMMPS in copies of the process: use one rank and one thread.")
     step = float(lmp.extract_global("dt")) if timestep is None else float(timestep)

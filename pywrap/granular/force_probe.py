@@ -24,12 +24,19 @@ from .lammps_arrays import owned_array
 from .look_in_a_copy import in_a_copy, quieten
 from .translating_bodies import HELD, translating_bodies
 
-RETURNS, RETURNS_IN_ALL, ROUNDS = 1e-5, 1e-3, 1e-13
-"""Changes of forces that ways there and back leave: one and all of them as a share of the forces on the way, and that
-of rounding as a share of those at rest. What turns a history, and back, leaves a share of step / radius."""
+RETURNS = 1e-5
+"""Change of forces that one way there and back may leave, as a share of the forces on the way. A history that turns
+there and back leaves a share of step / radius."""
 
-CHANGES = "histories change on a way there and back"
-"""What one copy says to another: then each displacement needs a copy of its own."""
+RETURNS_IN_ALL = 1e-3
+"""As `RETURNS`, left by all ways together."""
+
+ROUNDS = 1e-13
+"""Rounding of forces, as a share of the largest force at rest."""
+
+
+class HistoryChangeError(NotTakenError):
+    """A way there and back changes histories: each displacement needs a copy of its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,14 +131,12 @@ class Probe:
         """
         try:
             return in_a_copy(partial(self.there_and_back, directions))
-        except NotTakenError as error:
-            if str(error) != CHANGES:
-                raise
-        rest = self._alone(0.0 * directions[0])
-        return [(rest, [(self._alone(s * q), self._alone(-s * q)) for s in self.sizes]) for q in directions]
+        except HistoryChangeError:
+            rest = self._alone(0.0 * directions[0])
+            return [(rest, [(self._alone(s * q), self._alone(-s * q)) for s in self.sizes]) for q in directions]
 
     def there_and_back(self, directions: list[Floats]) -> list[Sides]:
-        """Forces along each direction; a NotTakenError if a way there and back changes the state."""
+        """Forces along each direction; a HistoryChangeError if a way there and back changes the state."""
         first = rest = self._from_rest(0.0 * directions[0])
         found, place = [], self._positions()
         for q in directions:
@@ -140,7 +145,7 @@ class Probe:
                 there, back = self._go(way * q), self._go(-way * q if self.duration else 0.0 * q)
                 left = np.abs(back - [rest, first]).max(axis=1) - ROUNDS * np.abs(first).max()
                 if np.any(left > np.array([RETURNS, RETURNS_IN_ALL]) * np.abs(there - rest).max()):
-                    raise NotTakenError(CHANGES)
+                    raise HistoryChangeError("Histories change on a way there and back.")
                 if self.duration:
                     self._put(place)
                 sides.append(there)

@@ -14,9 +14,11 @@ from .granular_commands import NotTakenError
 
 
 def require_instance(lmp: Any, caller: str) -> None:
-    """Refuse what is no LAMMPS instance."""
+    """Refuse what is no LAMMPS instance, and a closed instance."""
     if not hasattr(lmp, "extract_setting"):
         raise NotTakenError(f"{caller} takes an instance of lammps.lammps, and no {type(lmp).__name__}.")
+    if getattr(lmp, "lmp", None) is None:
+        raise NotTakenError(f"{caller} takes an open instance, and this one is closed: call {caller} before close().")
 
 
 def communicator(lmp: Any) -> MPI.Comm:

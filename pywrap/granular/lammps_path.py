@@ -41,7 +41,7 @@ from .balance import check_balance
 from .configuration_by_laws import KnownLaws
 from .from_lammps import take_configuration
 from .granular_commands import INTEGRATORS, NotTakenError, read_commands, without_suffix
-from .instance_queries import OpenFile, explain_error, log_file, log_of, open_files
+from .instance_queries import OpenFile, explain_error, log_file, log_of, open_files, require_instance
 from .lammps_arrays import owned_array, rows_of, set_velocity
 from .look_in_a_copy import can_copy, in_a_copy, interrupts_wait, quieten, silent_copy
 from .relax import RATE, REST, bring_to_rest
@@ -94,6 +94,7 @@ def lammps_path(
         By ``path(value)``, where the packing flows: its particles have moved by their diameter in the mean, or do not
         come to rest.
     """
+    require_instance(lmp, "lammps_path")
     if not can_copy(lmp):
         raise NotTakenError("lammps_path keeps copies of the process: use one rank and one thread.")
     check_balance(balance)

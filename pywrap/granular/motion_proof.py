@@ -61,7 +61,8 @@ PHASE = 0.5
 """A step times a bound of the fastest rate, twice the fastest rate or so: ten steps are half an oscillation of it."""
 
 COMMON = 1.0
-"""Velocity that all particles share, in units of their random ones: what acts on the momentum is seen by this one."""
+"""Velocity that all particles share, in units of their random ones. A fix that changes the total momentum changes this
+velocity."""
 
 DISPLACED = 1e-3
 """Common displacement in units of the mean radius."""

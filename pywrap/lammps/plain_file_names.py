@@ -6,6 +6,7 @@ receives a name from the user. Files that LAMMPS reads are linked, and files tha
 names in a temporary folder with a plain name.
 """
 
+import atexit
 import os
 import re
 import shutil
@@ -81,13 +82,11 @@ def decks_folder() -> Path:
     """The folder of the deck parts, or a link to it that lasts as long as this process."""
     if is_plain(str(DECKS)):
         return DECKS
-    _KEPT.append(temporary_folder())
-    link = Path(_KEPT[-1].name) / "decks"
+    folder = temporary_folder()
+    atexit.register(folder.cleanup)  # which keeps it until then
+    link = Path(folder.name) / "decks"
     link.symlink_to(DECKS)
     return link
-
-
-_KEPT: list[tempfile.TemporaryDirectory[str]] = []
 
 
 def move_files(folder: Path, stem: Path) -> None:

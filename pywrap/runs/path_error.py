@@ -25,8 +25,8 @@ compared with the path through the middles of its increments, which has the smal
   Two more paths therefore have the increments of the ramp, moved up by a third and by two thirds of an increment. If a
   change at the share :math:`\varphi` of its increment makes an error :math:`c \varphi`, the errors on these paths are
   :math:`c` times :math:`\varphi - 1/3` and :math:`\varphi - 2/3`, modulo 1, and the three onsets span :math:`2c/3`. A
-  contact becomes stiff soon after it closes: of an error that grows as the root of :math:`\varphi` they span
-  :math:`0.42 c` at the least. Twice the span is therefore :math:`c`, the largest loss, or nearly so.
+  contact becomes stiff soon after it closes. If the error grows as the root of :math:`\varphi`, the three onsets span
+  at least :math:`0.42 c`. Twice the span is therefore :math:`c`, the largest loss, or nearly so.
 - Increments in which a contact begins to slide are as long on all these paths. Their error, of order h^2, shows on a
   path through the middles of all increments: :math:`F_h - F_{h/2}` is three quarters of it.
 

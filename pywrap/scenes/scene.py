@@ -42,6 +42,12 @@ from .validation import SceneError, Section, read_toml, refusal_sentence, requir
 class Scene(SceneKeys):
     """A complete and consistent description of a computation: `SceneKeys` whose sections agree with each other."""
 
+    def __new__(cls, *path: object, **sections: object) -> "Scene":
+        """Refuse a path, which pydantic would refuse without advice."""
+        if path:
+            raise SceneError("Scene takes sections by name: Scene.from_toml(path) reads a file.")
+        return super().__new__(cls)
+
     @model_validator(mode="after")
     def _consistent(self) -> "Scene":
         perturb, ramp = self.perturb, self.ramp

@@ -73,24 +73,26 @@ def cell(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def numbers(tables: Path = TABLES) -> dict[str, Any]:
-    """All numbers of the page."""
-    every = read(tables / PACKINGS)
-    rows = [row for row in every if (row["count"], row["mu"]) == USUAL]
-    cells = [
+def by_tilt(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """What each law has at each tilt, in both dimensions."""
+    return [
         {"law": law, "d": d, "tilt": tilt}
         | cell([row for row in rows if (row["law"], row["d"], row["tilt"]) == (law, d, tilt)])
         for d in (2, 3)
         for law in LAWS
         for tilt in TILTS
     ]
-    by_law = []
+
+
+def by_law(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """How far LAMMPS's motion is from K's, and which dashpots the laws ask for, in both dimensions."""
+    found = []
     for d in (2, 3):
         for law in LAWS:
             own = [row for row in rows if (row["law"], row["d"]) == (law, d)]
             moved = [row["motion"] for row in own if "motion" in row]
             asked = [row["damping"] for row in own if row.get("growth_rate") and row.get("damping")]
-            by_law.append(
+            found.append(
                 {
                     "law": law,
                     "d": d,
@@ -100,10 +102,17 @@ def numbers(tables: Path = TABLES) -> dict[str, Any]:
                     "restitution": min((each["restitution"] for each in asked), default=None),
                 }
             )
+    return found
+
+
+def numbers(tables: Path = TABLES) -> dict[str, Any]:
+    """All numbers of the page."""
+    every = read(tables / PACKINGS)
+    rows = [row for row in every if (row["count"], row["mu"]) == USUAL]
     steep = to_flow(every)
     return {
-        "cells": cells,
-        "laws": by_law,
+        "cells": by_tilt(rows),
+        "laws": by_law(rows),
         "others": other_cells(every),
         "tilts": STEEP,
         "steep": steep,
@@ -163,16 +172,16 @@ def flows(row: dict[str, Any]) -> bool:
 def to_flow(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Packings that are tilted until they flow: how many have pairs, and of how many modes, at each tilt."""
     found, key_of = [], itemgetter("count", "mu", "d", "law")
-    for cell in (each for each in CELLS if each.tilts == STEEP):
-        for d in cell.dimensions:
-            for law in cell.laws:
-                key = (cell.particles, cell.mu, d, law)
+    for tilted in (each for each in CELLS if each.tilts == STEEP):
+        for d in tilted.dimensions:
+            for law in tilted.laws:
+                key = (tilted.particles, tilted.mu, d, law)
                 own = [row for row in rows if key_of(row) == key]
                 at = [[row for row in own if row["tilt"] == tilt and row["rests"]] for tilt in STEEP]
                 flowing = [row["tilt"] for row in own if flows(row)]
                 found.append(
                     {
-                        "mu": cell.mu,
+                        "mu": tilted.mu,
                         "d": d,
                         "law": law,
                         "packings": [len(each) for each in at],

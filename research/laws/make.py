@@ -11,10 +11,9 @@ import sys
 from math import ceil
 from pathlib import Path
 
-from faultgouge.studies.sweep import TASKS, Sweep, run_sweep
 from research.laws.page import write_page
 from research.laws.sets import sets
-from research.modes.make import different
+from research.modes.make import compute_seeds, different
 from research.modes.packing_rows import condense, read_known, table_of
 
 HERE = Path(__file__).parent
@@ -32,10 +31,8 @@ def compute(folder: Path, names: list[str], share: float = 1.0, tables: Path | N
         rows = {} if tables is None else read_known(tables, name)
         seeds = [point.values["packing.seed"] for point in sweep.points]
         seeds = [seed for seed in seeds[: ceil(share * len(seeds))] if seed not in rows]
-        if seeds and (not names or name in names):
-            print(f"{name}: {len(seeds)} packings", flush=True)
-            rest = {"task": sweep.task, "sweep": {"packing.seed": seeds}, "scene": sweep.scene}
-            run_sweep(Sweep.from_mapping(rest, TASKS), folder / name.replace(" ", "_"))
+        if not names or name in names:
+            compute_seeds(folder, name, sweep, seeds, workers=1)
 
 
 def check(folder: Path, names: list[str]) -> None:

@@ -28,10 +28,16 @@ def compute(folder: Path, names: list[str], shares: tuple[float, ...] = SHARES, 
         for name, sweep in sets(share).items():
             rows = {} if tables is None else read_known(tables, name)
             seeds = [point.values["packing.seed"] for point in sweep.points if point.values["packing.seed"] not in rows]
-            if seeds and (not names or name in names):
-                print(f"{name}: {len(seeds)} packings", flush=True)
-                rest = {"task": sweep.task, "sweep": {"packing.seed": seeds}, "scene": sweep.scene}
-                run_sweep(Sweep.from_mapping(rest, TASKS), folder / name.replace(" ", "_"), workers=None)
+            if not names or name in names:
+                compute_seeds(folder, name, sweep, seeds, workers=None)
+
+
+def compute_seeds(folder: Path, name: str, sweep: Sweep, seeds: list[int], workers: int | None) -> None:
+    """The packings of some seeds of a set, in its folder."""
+    if seeds:
+        print(f"{name}: {len(seeds)} packings", flush=True)
+        rest = {"task": sweep.task, "sweep": {"packing.seed": seeds}, "scene": sweep.scene}
+        run_sweep(Sweep.from_mapping(rest, TASKS), folder / name.replace(" ", "_"), workers=workers)
 
 
 def check(folder: Path, names: list[str]) -> None:

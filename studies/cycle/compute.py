@@ -29,7 +29,7 @@ from scipy.linalg import lu_factor, lu_solve
 from ...analysis import Configuration, Packing
 from ...analysis.arrays import Complexes, Floats, derive_frozen
 from ...analysis.configuration import HasConfiguration
-from ...analysis.motion.eigenvalues import growing_undamped, in_balance, unit_rounding, zero_uncertainty
+from ...analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, unit_rounding, zero_uncertainty
 from ...analysis.motion.modes import Modes, participation_ratio
 from ...analysis.motion.motion import Motion
 
@@ -130,14 +130,18 @@ def _damped_rate(motion: Motion) -> float:
     values = motion.rates.values
     for s in values[:TRIED]:
         pencil = s * s * np.eye(len(stiffness)) + s * damping + stiffness
-        if _disks(motion, _null_vector(pencil)[:, None])[0] >= LONE_PARTICIPATION:
+        if _disks(motion, null_vector(pencil)[:, None])[0] >= LONE_PARTICIPATION:
             return float(2 * s.real)
     return float(2 * values[min(TRIED, len(values)) - 1].real)
 
 
-def _null_vector(singular: Complexes) -> Complexes:
-    """The vector that a matrix takes to zero but for rounding, by inverse iteration."""
-    factors = lu_factor(singular, check_finite=False)
+def null_vector(singular: Complexes) -> Complexes:
+    """The vector that a matrix takes to zero but for rounding, by inverse iteration.
+
+    A shift by some roundings keeps the pivots of a matrix that is exactly singular from being zero.
+    """
+    shift = SAFETY * unit_rounding(singular) * np.eye(len(singular))
+    factors = lu_factor(singular + shift, check_finite=False)
     vector = np.random.Generator(np.random.PCG64(0)).standard_normal(len(singular)).astype(complex)
     for _ in range(INVERSE_STEPS):
         vector = lu_solve(factors, vector, check_finite=False)

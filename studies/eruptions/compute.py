@@ -45,20 +45,20 @@ DECADES_OF_D = 24.0
 QUIET_TIME = 50.0
 """Times for which a stable packing is watched, in `unit_of_time`."""
 
-LOOKS_AT_RUN = 400
-"""Looks at disks and contacts in a run of the full time, and at least so many in a shorter one."""
+SAMPLES_OF_RUN = 400
+"""Samples of disks and contacts in a run of the full time, and at least so many in a shorter one."""
 
 OVER = 1.5
 """Largest growth of D, from the second quarter to the second half, of a run that is over: D of disks that wander about
 at random would double."""
 
-TENTH = 0.1
+END_OF_GROWTH = 0.1
 """Share of the largest D at which the growth counts as ended."""
 
 WORK_STEPS = 2000
 """Steps over which work is added up: some thirty periods of the fastest mode."""
 
-Look = dict[str, float]
+Sample = dict[str, float]
 """A packing in the course of a run."""
 
 RISE_OF_D = 1e4
@@ -103,23 +103,23 @@ def erupt(start: Start) -> dict[str, Any]:
         fx : load, force on each disk of the upper layer; damped : whether with dashpots or drag; rate : growth rate of
         D from the spectrum, 1 / time, 0 of a stable packing; time : when the run was over; msd, kinetic_energy : the
         largest D, length^2, and the largest kinetic energy; slip : largest displacement of the upper layer along x,
-        length; lost, gained, sliding : most contacts, in any look, that were open, new, or slid; ended : when D first
+        length; lost, gained, sliding : most contacts, in any sample, that were open, new, or slid; ended : when D first
         reached a tenth of its largest value, time, None if it did not grow; ends : what ended the growth, one of
         `Ends`; noise : largest D of the first time unit; balance : kinetic energy less work, in units of the larger of
-        the two and of the kinetic energy; series : the looks as columns.
+        the two and of the kinetic energy; series : the samples as columns.
     """
     with threadpool_limits(1):
         rate = growth_rate(start.packing)
         dt, unit = time_step(start.packing), unit_of_time(start.packing)
-        looks: list[Look] = []
+        samples: list[Sample] = []
         with Engine(start.packing, MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
             watch = _Watch(start)
             for at, motion in _course(dynamics, dt, start.time):
-                looks.append(watch.look(at, motion, engine.packing))
-                if _over(looks, rate, unit) or _flows(looks, start.packing):
+                samples.append(watch.sample(at, motion, engine.packing))
+                if _over(samples, rate, unit) or _flows(samples, start.packing):
                     break
             balance = _balance(dynamics, start.packing)
-    columns: dict[str, Floats] = {name: np.array([each[name] for each in looks]) for name in looks[0]}
+    columns: dict[str, Floats] = {name: np.array([each[name] for each in samples]) for name in samples[0]}
     time = columns["time"]
     return {
         "fx": start.packing.fx,
@@ -129,7 +129,7 @@ def erupt(start: Start) -> dict[str, Any]:
         **{name: float(columns[name].max()) for name in ("msd", "kinetic_energy")},
         "slip": float(np.abs(columns["slip"]).max()),
         **{name: int(columns[name].max()) for name in ("lost", "gained", "sliding")},
-        **_end_of_growth(start, looks, columns, rate, unit),
+        **_end_of_growth(start, samples, columns, rate, unit),
         "noise": _noise(columns, unit),
         "balance": balance,
         "series": {name: column.tolist() for name, column in columns.items()},
@@ -144,30 +144,30 @@ def growth_rate(packing: Packing) -> float:
 
 
 def _course(dynamics: Dynamics, dt: float, longest: float) -> Iterator[tuple[float, MotionState]]:
-    """Looks that are close together at first and further apart later, each at a step of its own."""
+    """Samples that are close together at first and further apart later, each at a step of its own."""
     last = int(longest / dt)
-    early = np.geomspace(min(100, last), last, LOOKS_AT_RUN).astype(np.int64)
-    steps = np.union1d(early, np.linspace(min(100, last), last, LOOKS_AT_RUN).astype(np.int64))
+    early = np.geomspace(min(100, last), last, SAMPLES_OF_RUN).astype(np.int64)
+    steps = np.union1d(early, np.linspace(min(100, last), last, SAMPLES_OF_RUN).astype(np.int64))
     done = 0
     for step in steps.tolist():
         yield step * dt, dynamics.advance(step - done)
         done = step
 
 
-def _over(looks: list[Look], rate: float, unit: float) -> bool:
+def _over(samples: list[Sample], rate: float, unit: float) -> bool:
     """Whether a run is over, see the module."""
-    t = looks[-1]["time"]
+    t = samples[-1]["time"]
     if rate == 0:
         return t >= QUIET_TIME * unit
     if t < DECADES_OF_D * np.log(10) / rate:
         return False
-    quarter = max((each["msd"] for each in looks if t / 4 < each["time"] <= t / 2), default=0.0)
-    half = max(each["msd"] for each in looks if each["time"] > t / 2)
+    quarter = max((each["msd"] for each in samples if t / 4 < each["time"] <= t / 2), default=0.0)
+    half = max(each["msd"] for each in samples if each["time"] > t / 2)
     return half <= OVER * quarter
 
 
-def _flows(looks: list[Look], packing: Packing) -> bool:
-    return abs(looks[-1]["slip"]) > 2 * packing.radius.max()
+def _flows(samples: list[Sample], packing: Packing) -> bool:
+    return abs(samples[-1]["slip"]) > 2 * packing.radius.max()
 
 
 class _Watch:
@@ -180,7 +180,7 @@ class _Watch:
         self._contacts = contact_pairs(carrying)
         self._slid = _sliding_pairs(carrying)
 
-    def look(self, time: float, motion: MotionState, now: Packing) -> Look:
+    def sample(self, time: float, motion: MotionState, now: Packing) -> Sample:
         """The packing at one time.
 
         Time, D, mean displacement of the upper layer along x, kinetic energy of translation and rotation; contacts of
@@ -225,17 +225,17 @@ def _noise(columns: dict[str, Floats], unit: float) -> float:
 
 
 def _end_of_growth(
-    start: Start, looks: list[Look], columns: dict[str, Floats], rate: float, unit: float
+    start: Start, samples: list[Sample], columns: dict[str, Floats], rate: float, unit: float
 ) -> dict[str, Any]:
     """When and by what the growth ended, see the module."""
     ended: float | None = None
     drift = WALK * start.packing.coordinate_rounding**2 * columns["time"][-1] / time_step(start.packing)
     ends: Ends = "stable" if columns["msd"].max() <= max(RISE_OF_D * _noise(columns, unit), drift) else "rises"
     if rate > 0:
-        place = int(np.argmax(columns["msd"] >= TENTH * columns["msd"].max()))
+        place = int(np.argmax(columns["msd"] >= END_OF_GROWTH * columns["msd"].max()))
         ended = float(columns["time"][place])
         upto = slice(0, place + 1)
         ends = "opens" if columns["lost"][upto].any() else "slides" if columns["sliding"][upto].any() else "law"
-        if not _over(looks, rate, unit):
+        if not _over(samples, rate, unit):
             ends = "cut off"
-    return {"ended": ended, "ends": "flows" if _flows(looks, start.packing) else ends}
+    return {"ended": ended, "ends": "flows" if _flows(samples, start.packing) else ends}

@@ -38,7 +38,7 @@ def _compute(scene: Scene, work: Work) -> Result:
         starts = [each for each in starts if rows.find(fx=each.packing.fx, longest=time, damped=each.damped) is None]
         if flows_beyond is not None:
             work.say(f"no equilibrium beyond F_x = {flows_beyond:g}: the loads above are left out")
-        for found in work.progress(work.share(erupt, starts), len(starts)):
+        for found in work.progress(work.map_rows(erupt, starts), len(starts)):
             rows.append(longest=time, **found)
             work.say(
                 f"F_x = {found['fx']:g}: D up to {found['msd']:.2g}, the layer slips by {found['slip']:.2g}, "

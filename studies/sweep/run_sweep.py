@@ -61,7 +61,16 @@ def sweep(
         The folder of the rows, and of their table.
     workers, executor, say
         As of :func:`run_sweep`, which also says what is returned and raised.
+
+    Raises
+    ------
+    SceneError
+        If the request is neither path nor mapping, or describes no sweep.
     """
+    if not isinstance(request, (str, Path, Mapping)):
+        raise SceneError(
+            f"sweep takes the path of a SWEEP.toml, or a mapping of its contents, and no {type(request).__name__}."
+        )
     wanted = Sweep.from_mapping(request, TASKS) if isinstance(request, Mapping) else Sweep.from_toml(request, TASKS)
     return run_sweep(wanted, Path(output), workers=workers, executor=executor, say=say)
 

@@ -49,9 +49,9 @@ class UserFunction:
     function : callable
         Takes a scene, and the settled packing if `takes_settled`.
     takes_settled : bool
-        Whether it has a second parameter.
+        Whether the function has a second parameter.
     code : str
-        Sixteen hexadecimal digits that stand for the code of its file and of what that imports of its own.
+        Sixteen hexadecimal digits: a hash of the code of its file, and of its own modules that the file imports.
     """
 
     name: str

@@ -109,7 +109,7 @@ def _bisect_map(scene: Scene, predicted: list[Row], work: Work) -> list[Row]:
     if missing:
         packings = equilibria(scene, {each["fx"] for each in wanted})  # all: the path is that of one run of the command
         waves = [Wave(scene, packings[each["fx"]], each) for each in missing]
-        for found in work.progress(work.share(bisect_amplitude, waves), len(waves)):
+        for found in work.progress(work.map_rows(bisect_amplitude, waves), len(waves)):
             work.rows.append(kind="measured", **found)
             at = f"omega = {found['omega']:.4g} at {found['distance']:g}"
             work.say(f"{at}: triggers from {middle(found['below'], found['above']):.4g} on in LAMMPS")

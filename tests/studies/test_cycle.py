@@ -13,7 +13,7 @@ from faultgouge.analysis.motion.motion import Motion
 from faultgouge.pywrap import Equilibrium, Scene, SceneError
 from faultgouge.pywrap.runs.drive import settle_for_drive
 from faultgouge.pywrap.runs.drive_recorder import SERIES, DriveRecord
-from faultgouge.studies.cycle.compute import cycle_state, drawn
+from faultgouge.studies.cycle.compute import cycle_state, drawn, null_vector
 from faultgouge.studies.cycle.study import CYCLE_COLUMNS, cycle
 
 SPRING = 10.0
@@ -36,6 +36,13 @@ def make_run(path, **drive):
             pass
         record.finish()
     return path
+
+
+@pytest.mark.filterwarnings("error")
+def test_matrix_without_rounding_has_a_null_vector():
+    vector = null_vector(np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 3.0]], complex))
+    assert np.allclose(np.abs(vector), [np.sqrt(0.5), np.sqrt(0.5), 0], atol=1e-12)
+    assert abs(vector[0] + vector[1]) < 1e-12
 
 
 @pytest.fixture(scope="module")

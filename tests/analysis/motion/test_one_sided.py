@@ -213,6 +213,14 @@ def test_the_verdict_says_what_contacts_of_a_smoothed_law_do_at_the_bound(count,
     assert found.sentences[-1].endswith(says)
 
 
+def test_a_configuration_says_what_its_stiffness_takes_contacts_at_the_bound_for():
+    configuration = _three().configuration
+    assert configuration.contacts.one_sided.any()
+    assert "at Coulomb's bound, sticking in K, 0 rattlers" in repr(configuration)
+    contacts = derive_frozen(configuration.contacts, sliding=configuration.contacts.at_bound)
+    assert "at Coulomb's bound, sliding in K, 0 rattlers" in repr(derive_frozen(configuration, contacts=contacts))
+
+
 def test_large_packings_have_the_verdict_of_small_ones(monkeypatch):
     """By searches, and one push in longer steps that is followed until nothing that grows is left."""
     lossy = replace(_three(), law=replace(_three().law, cn=40.0, ct=20.0)).configuration
