@@ -21,10 +21,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig, eigvals
-from scipy.sparse import bsr_array, csr_array
+from scipy.sparse import bsr_array, csc_array, csr_array, eye_array
 
 from ..arrays import Floats, Indices
 from ..configuration import Configuration, HasConfiguration
+from ..factors.sparse_lu import SingularMatrixError, general_lu
 from ..operators.sliders import sliders_of, with_sticking_contacts
 from ..operators.stiffness import stiffness_matrix
 from .decay import Decay, follow_decay
@@ -39,7 +40,7 @@ from .eigenvalues import (
     zero_uncertainty,
 )
 from .energy_norm import EnergyNorm
-from .fastest_growing import fastest_growing
+from .fastest_growing import CONVERGED, fastest_growing
 from .modes import Modes
 
 SLICED = 2000
@@ -59,6 +60,9 @@ PERIODS_OF_LARGE = 2e6
 """Periods of the fastest motion in which growth is looked for, times the number of coordinates, with spaces of one
 vector. It takes three seconds without dissipation, fourteen with it, and 35 where many motions grow alike and none
 converges."""
+
+VALUE_STEPS, VALUE_ERROR = 12, 1e-9
+"""Steps of Newton's method at the most, and the relative change of s after which it ends."""
 
 LONGEST_SEARCH = 300.0
 """Periods of the fastest motion at the most."""
@@ -214,8 +218,31 @@ class Motion:
         periods = min(30.0, length), length
         found = fastest_growing(self.in_blocks(self.stiffness), damping, count=1, periods=periods)
         values = found.values if self.dissipative else 1j * np.sqrt(found.values.astype(complex))
+        if self.dissipative and len(values) and found.residuals[0] > CONVERGED:
+            values = self._value_about(found.vectors[:, 0], values, 0.5 * found.limit)
         values = np.where(values.real < 0, -values, values)
         return Rates(values, np.ones(len(values), bool), 0, found.limit)
+
+    def _value_about(self, shape: Complexes, otherwise: Complexes, least: float) -> Complexes:
+        """s of a motion of about this shape, in an array of one: Newton's method for (s^2 + s G + A) x = 0.
+
+        A search that has not converged, as many motions grow nearly alike, has s with an error of its own size, but
+        knows the `least` Re s of the fastest.
+        """
+        a, g, x = self.stiffness, self.damping, shape / np.linalg.norm(shape)
+        s = max(np.roots([1.0, np.vdot(x, g @ x), np.vdot(x, a @ x)]), key=lambda root: root.real)
+        s += max(least - s.real, 0.0)
+        for _ in range(VALUE_STEPS):
+            try:
+                factors = general_lu(csc_array(a + s * g + s * s * eye_array(len(x))))
+            except SingularMatrixError:
+                break
+            y = factors.solve(g @ x + 2 * s * x)
+            step = 1 / np.vdot(x, y)
+            s, x = s - step, y / np.linalg.norm(y)
+            if abs(step) <= VALUE_ERROR * abs(s):
+                break
+        return np.array([s]) if s.real > 0 else otherwise
 
     def _undamped_rates(self) -> Rates:
         modes = Modes.of_matrix(self.stiffness)
@@ -240,7 +267,24 @@ class Motion:
             # vectors take three times as long as eigenvalues
             values, left, right = eig(z, left=True, check_finite=False)
             grows = growing(values, np.abs(np.sum(left.conj() * right, axis=0)), rounding)
-        free = ~grows & (np.abs(values) <= FREE_SHARE * largest)
+        drifts = self._drifts(z, values, grows)
+        grows &= ~drifts
+        free = drifts | (~grows & (np.abs(values) <= FREE_SHARE * largest))
         order = np.flatnonzero((values.imag >= 0) & ~free)
         order = order[np.argsort(-values[order].real, kind="stable")]
         return Rates(values[order], grows[order], int(free.sum()) // 2)
+
+    def _drifts(self, z: Floats, values: Complexes, grows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which s that seem to grow are those of motions that no force opposes, as forces are not in balance.
+
+        The imbalance leaves such a motion an eigenvalue -s (s + g) of A, with the damping g that the motion feels.
+        """
+        zero = zero_uncertainty(self.configuration, operator_rounding(self.configuration, self.stiffness.data))
+        drifts = grows & (np.abs(values) ** 2 <= zero)
+        if drifts.any():
+            vectors = eig(z, check_finite=False)
+            for k in np.flatnonzero(drifts):
+                velocity = vectors[1][len(self.active) :, np.argmin(np.abs(vectors[0] - values[k]))]
+                loss = np.vdot(velocity, self.damping @ velocity) / np.vdot(velocity, velocity)
+                drifts[k] = abs(values[k] * (values[k] + loss)) <= zero
+        return np.asarray(drifts)

@@ -525,7 +525,10 @@ def _without_dissipation(configuration: Configuration, found: Spectrum | None) -
 def _direction(configuration: Configuration, rise: str | ArrayLike) -> Floats:
     """Forces per unit of time on all coordinates, shape (coordinates, 1)."""
     if not isinstance(rise, str):
-        return forces_on_coordinates(configuration, rise)
+        forces = forces_on_coordinates(configuration, rise)
+        if not forces.any():
+            raise ValueError("rise is a force on no particle: give the forces by which the load rises, not all zero.")
+        return forces
     if rise != "fx" or not configuration.top.any():
         raise ValueError('rise is "fx" of a packing with an upper layer, or an array of forces, shape (N, d).')
     forces = np.zeros((len(configuration), configuration.dimension))

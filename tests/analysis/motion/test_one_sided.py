@@ -191,6 +191,8 @@ def test_stability_of_three_disks():
     assert rising["span"] in (pytest.approx(3.0), pytest.approx(1.5))
     with pytest.raises(ValueError, match="upper layer"):
         stability(at_rest, rise="fx")
+    with pytest.raises(ValueError, match="a force on no particle"):
+        stability(at_rest, rise=np.zeros((3, 2)))
 
 
 @pytest.mark.parametrize(("scales", "stable"), [((1e-7, 1e-9), None), ((1e-9, np.inf), True)])

@@ -5,6 +5,7 @@ import pytest
 from linearised import dissipative, motion_matrix
 
 from faultgouge.analysis import Configuration, LinearisedContacts
+from faultgouge.analysis.contacts import PER_CONTACT
 from faultgouge.analysis.motion import decay as decay_module
 from faultgouge.analysis.motion import motion as module
 from faultgouge.analysis.motion.decay import follow_decay
@@ -136,3 +137,42 @@ def test_slow_motions_of_a_row_that_buckles_grow_as_those_of_lapack():
     found = follow_decay(Motion.of(row))
     assert found.grows is True
     assert found.growth_rate == pytest.approx(Motion.of(row).rates.growth_rate, rel=1e-6)
+
+
+def with_a_pair_out_of_balance(row, force):
+    """A row on a plane, and two spheres beside it that push each other apart a little, and turn round each other."""
+    c, count = row.contacts, len(row)
+    given = {name: getattr(c, name) for name in PER_CONTACT}
+    more = {name: values[:1] for name, values in given.items()}
+    more |= {"i": [count + 1], "j": [count], "normal_force": [force], "friction": [0.5 * force]}
+    more |= {"normal": [[1.0, 0.0, 0.0]], "distance": [1.0]}
+    contacts = LinearisedContacts(**{name: np.concatenate([given[name], more[name]]) for name in given})
+    each = {name: np.append(getattr(row, name), getattr(row, name)[:2]) for name in ("radius", "mass", "inertia")}
+    return Configuration(
+        dimension=3, position=np.vstack([row.position, np.add(row.position[:2], [0.0, 5.0, 0.0])]), contacts=contacts,
+        box=row.box, origin=row.origin, periodic=row.periodic,
+        load=np.concatenate([row.load, np.zeros((2, 2, 3))]), **each,
+    )  # fmt: skip
+
+
+def test_motion_that_no_force_opposes_does_not_grow_by_a_force_out_of_balance():
+    """1e-9 of the forces leaves it an eigenvalue of A below zero, and s next to the root of that."""
+    row = with_a_pair_out_of_balance(row_of_spheres(3, 0.0), 1e-9)
+    balanced = with_a_pair_out_of_balance(row_of_spheres(3, 0.0), 1e-16)
+    expected, found = Motion.of(balanced).rates, Motion.of(row).rates
+    assert row.residual == pytest.approx(1e-9)
+    assert 1e-6 < np.linalg.eigvals(Motion.of(row).first_order).real.max() < 1e-4
+    assert not found.grows.any()
+    assert found.free == expected.free > 6
+    assert found.growth_rate == pytest.approx(expected.growth_rate, rel=1e-6)
+
+
+@pytest.mark.long
+def test_a_search_that_has_not_converged_has_a_rate_of_lapack(monkeypatch):
+    """Rates of the row that buckles differ by 3e-5 and less: a short search mixes their motions."""
+    row = row_of_spheres(40, 1e-2)
+    expected = Motion.of(row).rates.values
+    monkeypatch.setattr(module, "DENSE_DAMPED", 10)
+    (found,) = Motion.of(row).rates.values
+    assert np.abs(expected - found).min() < 1e-6 * abs(found)
+    assert found.real == pytest.approx(expected.real.max(), rel=1e-2)
