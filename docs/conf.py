@@ -111,6 +111,22 @@ def add_address(app, docname, source):
         source[0] = re.sub(r"<!-- git clone.*?-->", line, source[0])
 
 
+def find_documented(app, pagename, templatename, context, doctree):
+    """Links from sources to pages: viewcode has one module name for all objects of a file, and some are of another."""
+    objects = app.env.get_domain("py").objects
+
+    def to_object(link):
+        _, page, name = link.groups()
+        words = name.split(".")
+        of_page = [each for each, entry in objects.items() if page.endswith(f"{entry.docname}.html")]
+        ends = ["." + ".".join(words[k:]) for k in range(1, len(words))] if name not in of_page else []
+        found = (each for end in ends for each in of_page if each.endswith(end))
+        return link[0].replace(f"#{name}", f"#{next(found, name)}")
+
+    if pagename.startswith("_modules/"):
+        context["body"] = re.sub(r'(class="viewcode-back" href=")([^"#]+)#([^"]+)', to_object, context["body"])
+
+
 def make_live_pages(app, exception):
     """The pages of `faultgouge view`: of a scene that ships with the package, and of three disks of the tutorial."""
     if exception is not None or app.builder.format != "html":
@@ -133,6 +149,7 @@ def setup(app):
     app.connect("source-read", add_address)
     app.connect("build-finished", make_live_pages)
     app.connect("doctree-read", keep_numbers_whole)
+    app.connect("html-page-context", find_documented)
     app.connect("autodoc-process-docstring", keep_first_line, priority=90)
     app.connect("autodoc-process-docstring", keep_bars, priority=100)
     app.connect("autodoc-skip-member", leave_out_aliases)
