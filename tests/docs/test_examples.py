@@ -78,7 +78,7 @@ def test_spheres(printed):
     """Nothing grows, and the packing follows a load that rises: what vibrates is a hundredth of the drift at most."""
     text = printed("spheres")
     assert number(text, "<Configuration:") == 30
-    assert "stable: every motion decays" in text
+    assert "stable: every vibration decays" in text
     assert 0 < number(text, "vibration") < 0.01 * number(text, "drift")
 
 

@@ -485,16 +485,22 @@ def test_a_push_beyond_the_stated_size_moves_otherwise(far_from_the_bound):
 @pytest.mark.long
 def test_the_standard_law_under_a_load_that_rises(layer):
     """The layer vibrates for ever in proportion to the rate: as one-sided motion says, and not with more friction."""
-    from research.rising.compute import rise_in_lammps
+    from research.rising.windows import Windows, drift_and_vibration, rise_in_plugin
+
+    def in_lammps(packing, rate, rising):
+        windows = Windows.of(packing.configuration, rising)
+        parts = rise_in_plugin(packing, rate, windows, spins=True)[-windows.span :]
+        return drift_and_vibration(parts, windows.length, rate)
 
     told = stability(layer, rise="fx")
     assert told.stable is True
     assert told.rising["steady"]
     assert told.rising["vibration"] > 0.05 * told.rising["drift"]
     for rate in (1e-5, 1e-6):
-        found = rise_in_lammps(layer, rate)
+        found = in_lammps(layer, rate, told.rising)
         assert found["vibration"] == pytest.approx(told.rising["vibration"], rel=0.2)
         assert found["drift"] == pytest.approx(told.rising["drift"], rel=0.05)
     sticks = replace(layer, law=replace(layer.law, mu=100.0))
-    for each in (stability(sticks, rise="fx").rising, rise_in_lammps(sticks, 1e-5)):
+    rising = stability(sticks, rise="fx").rising
+    for each in (rising, in_lammps(sticks, 1e-5, rising)):
         assert each["vibration"] < 0.01 * each["drift"]
