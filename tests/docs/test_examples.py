@@ -75,11 +75,12 @@ def test_deck(printed):
 
 @pytest.mark.long
 def test_spheres(printed):
-    """Nothing grows, and the packing follows a load that rises: what vibrates is a hundredth of the drift at most."""
+    """Nothing grows, and the packing follows a load that rises: without contacts at the bound it does not vibrate."""
     text = printed("spheres")
     assert number(text, "<Configuration:") == 30
     assert "stable: every vibration decays" in text
-    assert 0 < number(text, "vibration") < 0.01 * number(text, "drift")
+    assert "vibration 0; until the load has risen" in text
+    assert number(text, "drift") > 0
 
 
 def test_table_of_another_code(printed):
