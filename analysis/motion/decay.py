@@ -158,7 +158,7 @@ class Decay:
         return vars(self) | {"slow": len(self.slow)}
 
 
-def follow_decay(motion: "DecayingMotion", time: float | None = None) -> Decay:
+def follow_decay(motion: DecayingMotion, time: float | None = None) -> Decay:
     """Find slow motions, and follow all other motion from a random state until it has decayed, or grows.
 
     Parameters
@@ -184,7 +184,7 @@ def follow_decay(motion: "DecayingMotion", time: float | None = None) -> Decay:
     return replace(found, growth_rate=max(found.growth_rate, found.slowest))
 
 
-def _slow_motions(motion: "DecayingMotion", reference: float, dt: float) -> SlowMotions | None:
+def _slow_motions(motion: DecayingMotion, reference: float, dt: float) -> SlowMotions | None:
     """As many as pay; None without dissipation, or without factors."""
     if not motion.dissipative or len(motion.active) > FACTORED[motion.configuration.dimension]:
         return None
@@ -234,7 +234,7 @@ class _State:
     v: Floats
 
     @classmethod
-    def of(cls, motion: "DecayingMotion", reference: float, slow: SlowMotions | None) -> "_State":
+    def of(cls, motion: DecayingMotion, reference: float, slow: SlowMotions | None) -> "_State":
         """At random, without slow motions."""
         z, v = _random_state(motion)
         damping = motion.in_blocks(motion.damping) if motion.dissipative else None
@@ -277,7 +277,7 @@ class _State:
             self.z, self.v = state[: len(self.z)] / self.reference, state[len(self.z) :].copy()
 
 
-def _random_state(motion: "DecayingMotion") -> tuple[Floats, Floats]:
+def _random_state(motion: DecayingMotion) -> tuple[Floats, Floats]:
     """Two vectors of normal random numbers without common motion along axes that no force opposes."""
     state = np.random.Generator(np.random.PCG64(0)).standard_normal((len(motion.active), 2))
     for common in free_translations(motion):
@@ -285,7 +285,7 @@ def _random_state(motion: "DecayingMotion") -> tuple[Floats, Floats]:
     return state[:, 0].copy(), state[:, 1].copy()
 
 
-def free_translations(motion: "DecayingMotion") -> list[Floats]:
+def free_translations(motion: DecayingMotion) -> list[Floats]:
     """Unit vectors of the common motions along an axis that no force opposes, mass-weighted."""
     configuration, count = motion.configuration, len(motion.configuration)
     largest = np.abs(motion.stiffness.data).max(initial=0.0)

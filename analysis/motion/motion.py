@@ -28,7 +28,7 @@ from ..configuration import Configuration, HasConfiguration
 from ..factors.sparse_lu import SingularMatrixError, general_lu
 from ..operators.sliders import sliders_of, with_sticking_contacts
 from ..operators.stiffness import stiffness_matrix
-from .decay import Decay, follow_decay
+from .decay import FACTORED, Decay, follow_decay
 from .eigenvalues import (
     SAFETY,
     Complexes,
@@ -218,7 +218,8 @@ class Motion:
         periods = min(30.0, length), length
         found = fastest_growing(self.in_blocks(self.stiffness), damping, count=1, periods=periods)
         values = found.values if self.dissipative else 1j * np.sqrt(found.values.astype(complex))
-        if self.dissipative and len(values) and found.residuals[0] > CONVERGED:
+        small = len(self.active) <= FACTORED[self.configuration.dimension]
+        if self.dissipative and small and len(values) and found.residuals[0] > CONVERGED:
             values = self._value_about(found.vectors[:, 0], values, 0.5 * found.limit)
         values = np.where(values.real < 0, -values, values)
         return Rates(values, np.ones(len(values), bool), 0, found.limit)
@@ -227,7 +228,8 @@ class Motion:
         """s of a motion of about this shape, in an array of one: Newton's method for (s^2 + s G + A) x = 0.
 
         A search that has not converged, as many motions grow nearly alike, has s with an error of its own size, but
-        knows the `least` Re s of the fastest.
+        knows the `least` Re s of the fastest. If Newton's method does not converge to a motion that grows, the result
+        is `otherwise`, the s of the search.
         """
         a, g, x = self.stiffness, self.damping, shape / np.linalg.norm(shape)
         s = max(np.roots([1.0, np.vdot(x, g @ x), np.vdot(x, a @ x)]), key=lambda root: root.real)
@@ -241,8 +243,8 @@ class Motion:
             step = 1 / np.vdot(x, y)
             s, x = s - step, y / np.linalg.norm(y)
             if abs(step) <= VALUE_ERROR * abs(s):
-                break
-        return np.array([s]) if s.real > 0 else otherwise
+                return np.array([s]) if s.real > 0 else otherwise
+        return otherwise
 
     def _undamped_rates(self) -> Rates:
         modes = Modes.of_matrix(self.stiffness)

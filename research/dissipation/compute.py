@@ -69,6 +69,7 @@ def windows_with(
     """The first windows with dashpots or drag, as of `Packing.with_dissipation`; `look` is a load to be looked at."""
 
     def system(fx: float) -> System:
+        # numbers by name, of which mypy does not know which may be None
         return System.of(path(fx).with_dissipation(**dissipation), dissipation=True)  # type: ignore[arg-type]
 
     def between(below: float, above: float) -> list[float]:
