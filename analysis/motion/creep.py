@@ -15,7 +15,7 @@ import numpy as np
 
 from ..progress import report_progress
 from .one_sided import CLOSE_STEP, OneSidedSystem
-from .one_sided_outcome import STEPS_OF_CHUNK, mean_square_displacements, random_pushes
+from .one_sided_outcome import STEPS_OF_CHUNK, random_pushes
 
 CHUNKS = 4
 """Spans of `STEPS_OF_CHUNK` stable steps that the motion is followed: forty periods of a slow mode."""
@@ -74,7 +74,7 @@ def follow_creep(system: OneSidedSystem, pushes: int, time: float | None = None)
             system.take_steps(state, whole / LOOKS / count, count)
         added.append(both.z - mean.z)
     report_progress(f"creep: followed for t = {whole:.4g}")
-    sizes = np.array([mean_square_displacements(system, each).max() for each in added])
-    velocity = np.sqrt(mean_square_displacements(system, added[-1] - added[LOOKS // 2]).max()) / (whole / 2)
+    sizes = np.array([system.mean_square_displacement(each).max() for each in added])
+    velocity = np.sqrt(system.mean_square_displacement(added[-1] - added[LOOKS // 2]).max()) / (whole / 2)
     grows = not sizes[-1] < 10.0**GROWS * sizes[1]
     return Creep(float(sizes.max()), whole, float(velocity), grows)

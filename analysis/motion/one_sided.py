@@ -54,6 +54,10 @@ CLOSE_STEP = 0.3
 CLOSE_LOOKS = 1000
 """Close looks, over some ten periods of a slow mode. Contacts go farthest at the beginning."""
 
+LEFT_ALONE = 10.0
+"""Displacement by a push over that by the residual forces, from which on the push counts: D then is right to a fifth,
+and to a hundredth where the two displacements have nothing in common."""
+
 
 @dataclass(frozen=True, eq=False)
 class OneSidedMotion:
@@ -69,8 +73,8 @@ class OneSidedMotion:
         p of each contact at the bound: the tangential force that its slider has taken away, force.
     scales : tuple of float
         Between which multiples of the push, or of the rate, the motion holds, as it was seen in `CLOSE_LOOKS` at its
-        beginning and at these times: with smaller ones contacts that count as at the bound do not reach it, and with
-        larger ones others do, or open.
+        beginning and at these times: with smaller ones contacts that count as at the bound do not reach it, or the
+        residual forces move the packing as well, and with larger ones other contacts reach the bound, or open.
     """
 
     times: Floats
@@ -99,37 +103,60 @@ class OneSidedState:
 
 @dataclass(eq=False)
 class ContactReach:
-    """How far a motion takes contacts: the largest products of margins with displacements that were seen, shape (R, P),
-    and p of sliders, shape (B, P)."""
+    """How far a motion goes, and takes contacts: the largest D, shape (P,), and products of margins with displacements,
+    shape (R, P), that were seen, and p of sliders, shape (B, P).
+
+    `alone` is that of the motion of the residual forces, which nothing pushes."""
 
     system: "OneSidedSystem"
+    size: Floats | None = None
     farthest: Floats | None = None
     slid: Floats | None = None
+    alone: "ContactReach | None" = None
 
     def look(self, state: OneSidedState) -> None:
         """Look at the motion once more."""
-        now = self.system.margins[0] @ state.z
+        size, now = self.system.mean_square_displacement(state.z), self.system.margins[0] @ state.z
+        self.size = size if self.size is None else np.maximum(self.size, size)
         self.farthest = now if self.farthest is None else np.maximum(self.farthest, now)
         self.slid = state.p.copy()
 
     def look_closely(self, start: OneSidedState, time: float = np.inf, rise: Floats | None = None) -> None:
-        """Look at the beginning of a motion up to a time, step by step; the state stays as it is."""
-        state = OneSidedState(start.time, *(each.copy() for each in (start.z, start.v, start.p, start.r)))
-        step = CLOSE_STEP / self.system.step_share * self.system.time_step
+        """Look at the beginning of a motion up to a time, step by step, and at that of the residual forces; the state
+        stays as it is."""
+        system, self.alone = self.system, ContactReach(self.system)
+        step = CLOSE_STEP / system.step_share * system.time_step
         count = int(min(CLOSE_LOOKS, np.ceil((time - start.time) / step)))
-        load = None if rise is None else self.system.on_active(rise)
-        self.system.take_steps(state, step, count, rise=load, look=self.look)
+        state = OneSidedState(start.time, *(each.copy() for each in (start.z, start.v, start.p, start.r)))
+        system.take_steps(state, step, count, rise=None if rise is None else system.on_active(rise), look=self.look)
+        still = system.start(np.zeros((system.motion.configuration.coordinates, 1)))
+        system.take_steps(still, step, count, constant=system.residual_force, look=self.alone.look)
 
     @property
-    def scales(self) -> tuple[float, float]:
-        """Multiples of the motion from which on sliders have slipped by more than was missing to the bound, and up to
-        which no other contact reaches the bound or opens."""
-        if self.farthest is None or self.slid is None:
-            return 0.0, np.inf
+    def residual_scale(self) -> float:
+        """The multiple of the motion that goes as far as the residual forces move the packing."""
+        if self.size is None or self.alone is None or self.alone.size is None:
+            return 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return float(np.nan_to_num(np.sqrt(self.alone.size / self.size), nan=0.0).max(initial=0.0))
+
+    @property
+    def least_scale(self) -> float:
+        """The multiple from which on sliders have slipped by more than was missing to the bound, and residual forces
+        do not count; infinite if these alone take another contact to the bound, or open one."""
+        if self.alone is not None and self.alone.largest_scale < 1:
+            return np.inf
+        missing = 0.0 if self.slid is None else least_scale(self.system, self.slid)
+        return max(missing, LEFT_ALONE * self.residual_scale)
+
+    @property
+    def largest_scale(self) -> float:
+        """The multiple up to which no contact that is not at the bound reaches the bound or opens."""
+        if self.farthest is None:
+            return np.inf
         with np.errstate(divide="ignore", invalid="ignore"):
             limit = self.system.margins[1][:, None] / self.farthest
-        most = float(limit[self.farthest > 0].min(initial=np.inf))
-        return least_scale(self.system, self.slid), most
+        return float(limit[self.farthest > 0].min(initial=np.inf))
 
 
 def least_scale(system: "OneSidedSystem", slid: Floats) -> float:
@@ -181,6 +208,11 @@ class OneSidedSystem:
         m = self.motion
         shape = (m.configuration.coordinates, len(m.active))
         return csr_array((1 / m.root_mass, (m.active, np.arange(len(m.active)))), shape=shape)
+
+    @cached_property
+    def residual_force(self) -> Floats:
+        """Mass-weighted forces that are left where the packing is said to rest, shape (E, 1)."""
+        return self.on_active(self.motion.configuration.coordinate_force[:, None])
 
     def on_active(self, forces: Floats) -> Floats:
         """Mass-weighted forces, shape (E, P), of forces on all coordinates, shape (coordinates, P)."""
@@ -343,6 +375,10 @@ class OneSidedSystem:
             force -= grip @ np.maximum(state.p, whole)
         return force
 
+    def mean_square_displacement(self, z: Floats) -> Floats:
+        """D of mass-weighted coordinates in columns, shape (P,)."""
+        return np.asarray(np.sum(self.displacement(z) ** 2, axis=1).mean(axis=0))
+
     def displacement(self, z: Floats) -> Floats:
         """Displacements of the particles, shape (N, d, P), of mass-weighted coordinates."""
         c = self.motion.configuration
@@ -402,7 +438,7 @@ def one_sided_motion(
         reach.look(state)
         seen.append((system.displacement(state.z)[..., 0], system.displacement(state.v)[..., 0], state.p[:, 0].copy()))
     displacement, speed, slid = (np.array(each) for each in zip(*seen, strict=True))
-    return OneSidedMotion(time, displacement, speed, slid, reach.scales)
+    return OneSidedMotion(time, displacement, speed, slid, (reach.least_scale, reach.largest_scale))
 
 
 def forces_on_coordinates(configuration: Configuration, forces: ArrayLike) -> Floats:

@@ -92,7 +92,7 @@ def follow_pushes(
         for look in range(LOOKS_PER_CHUNK):
             system.advance(state, chunk * (number + (look + 1) / LOOKS_PER_CHUNK))
             times.append(state.time)
-            sizes.append(mean_square_displacements(system, state.z))
+            sizes.append(system.mean_square_displacement(state.z))
             slid.append(state.p.copy())
             reach.look(state)
         seen = np.array(times), np.array(sizes)
@@ -112,7 +112,8 @@ def follow_pushes(
         "amplification": float(d.max()),
         "time": float(t[-1]),
         "pushes": 2 * pushes,
-        "scales": reach.scales,
+        "scales": (reach.least_scale, reach.largest_scale),
+        "residual_push": reach.residual_scale,
     }
 
 
@@ -123,11 +124,6 @@ def random_pushes(configuration: Configuration, pushes: int) -> Floats:
     moving = configuration.dimension * len(configuration)
     push[:moving] = rng.standard_normal((moving, pushes))
     return np.hstack([push, -push])
-
-
-def mean_square_displacements(system: OneSidedSystem, z: Floats) -> Floats:
-    """D of mass-weighted displacements in columns, shape (P,)."""
-    return np.asarray(np.sum(system.displacement(z) ** 2, axis=1).mean(axis=0))
 
 
 def _outcome(time: Floats, size: Floats, slid: list[Floats], sticking_grows: bool) -> bool | None:

@@ -33,7 +33,7 @@ from .creep import Creep, follow_creep
 from .decay import Decay, follow_decay
 from .motion import Motion, Rates
 from .no_verdict import no_verdict
-from .one_sided import ContactReach, OneSidedSystem, forces_on_coordinates
+from .one_sided import LEFT_ALONE, ContactReach, OneSidedSystem, forces_on_coordinates
 from .one_sided_outcome import PUSHES, STEP_OF_LARGE, VERDICT_STEP, follow_pushes, random_pushes
 from .rising_load import NotFollowedError, motion_under_load, vibrate_otherwise
 from .spectrum import Spectrum, spectrum
@@ -41,6 +41,11 @@ from .spectrum import Spectrum, spectrum
 LARGE = 6000
 """Coordinates beyond which the fastest growing motions stand for all eigenvalues, and one push and its opposite for
 several, in larger steps."""
+
+UNSETTLED = (
+    "its residual forces alone take a contact to Coulomb's bound, or open one: bring the packing to rest more closely"
+)
+"""Why there is no verdict where the residual forces alone change a contact."""
 
 STILL_CREEPS = 0.01
 """Share of the displacement by vibration that the second half of the time added, from which on it is said to go on."""
@@ -108,14 +113,18 @@ class Stability:
         grows (True, False, None); growth_rate and its error; searched (growth rate of D below which growth would not
         have been seen; 0 where grows is known); amplification (largest D over the mean square velocity of the push
         along an axis, time^2, while contacts slid: what moves on may take D further); time (how long), pushes (how
-        many); scales (between which velocities of the push along an axis this holds: with smaller ones contacts that
-        count as at the bound do not reach it, with larger ones others do, or open). None without contacts that slide
-        on one side.
+        many); residual_push (as below); scales (between which velocities of the push along an axis this holds: with
+        smaller ones contacts that count as at the bound do not reach it, or the residual forces move the packing as
+        well, with larger ones others do, or open; the first is infinite if the residual forces alone take another
+        contact so far). None without contacts that slide on one side.
     creep : Creep or None
         How far a push carries particles if contacts have two derivatives, and none is at the bound.
     largest_push : float or None
         Where motion does not grow, and no contact slides on one side: velocity of a push along an axis up to which
         contacts neither reach the bound nor open. None where K is given.
+    residual_push : float
+        Velocity of a push along an axis that moves the particles as far as the residual forces do, where `largest_push`
+        is known.
     decay : Decay or None
         What became of a random state with sticking contacts; None where eigenvalues decide.
     rising : dict or None
@@ -152,6 +161,7 @@ class Stability:
     one_sided: dict[str, Any] | None
     creep: Creep | None
     largest_push: float | None
+    residual_push: float
     decay: Decay | None
     rising: dict[str, Any] | None
     sticking: LinearNeighbour
@@ -253,14 +263,22 @@ class Stability:
     def _scales(self) -> Iterator[str]:
         if self.stable and self.largest_push is not None:
             yield (
-                f"holds for pushes up to {self.largest_push:.1g} (velocity along an axis), which open no contact and "
-                "take none to Coulomb's bound"
+                f"holds for pushes of {LEFT_ALONE * self.residual_push:.1g} to {self.largest_push:.1g} (velocity along "
+                "an axis): below, residual forces count; above, contacts open or slide"
             )
-        least, most = (0.0, 0.0) if self.one_sided is None else self.one_sided["scales"]
-        if self.one_sided is not None and self.one_sided["grows"] is False and least < most:
+        if self.one_sided is None or self.one_sided["grows"] is not False:
+            return
+        least, most = self.one_sided["scales"]
+        if least < most:
             yield (
-                f"this is the motion after pushes from {least:.1g} to {most:.1g} (velocity along an axis): below, "
-                "contacts that count as at the bound do not reach it, and above, others do, or open"
+                f"this is the motion after pushes of {least:.1g} to {most:.1g} (velocity along an axis): below, "
+                "contacts that count as at the bound do not reach it, or residual forces count; above, others reach "
+                "it, or open"
+            )
+        elif self.stable:
+            yield (
+                f"no push is small enough for this motion (below {most:.1g}, where no other contact reaches the bound "
+                f"or opens) and large enough (above {least:.1g}, where residual forces do not count)"
             )
 
     @property
@@ -286,6 +304,7 @@ class Stability:
             "one_sided": None if self.one_sided is None else _finite(self.one_sided),
             "creep": None if self.creep is None else vars(self.creep),
             "largest_push": self.largest_push,
+            "residual_push": self.residual_push,
             "decay": None if self.decay is None else self.decay.as_dict(),
             "rising": self.rising,
             "sticking": vars(self.sticking),
@@ -362,7 +381,7 @@ def stability(
     return Stability(
         stable=not outcome.grows if known else None, growth_rate=outcome.growth_rate, undamped=linear.undamped,
         at_bound=int(contacts.at_bound.sum()), one_sided=outcome.one_sided, creep=outcome.creep,
-        largest_push=outcome.largest_push, decay=outcome.decay, rising=rising,
+        largest_push=outcome.largest_push, residual_push=outcome.residual_push, decay=outcome.decay, rising=rising,
         sticking=outcome.sticking, sliding=LinearNeighbour.of(linear.sliding) if linear.one_sided else outcome.sticking,
         asymmetry={} if given else asymmetry(configuration), dissipative=configuration.damped,
         free=free, searched=outcome.sticking.searched, contacts=touching,
@@ -413,6 +432,7 @@ class _Outcome:
     one_sided: dict[str, Any] | None = None
     creep: Creep | None = None
     largest_push: float | None = None
+    residual_push: float = 0.0
     decay: Decay | None = None
 
     @classmethod
@@ -456,8 +476,11 @@ def _as_contacts_part(linear: _Outcome, system: OneSidedSystem, time: float | No
         return linear
     reach = ContactReach(system)
     reach.look_closely(system.start(random_pushes(configuration, 1)))
-    most = reach.scales[1]
-    found = replace(linear, largest_push=most if np.isfinite(most) else None)
+    if np.isinf(reach.least_scale):
+        return replace(linear, reasons=[*linear.reasons, UNSETTLED])
+    most = reach.largest_scale
+    largest = most if np.isfinite(most) else None
+    found = replace(linear, largest_push=largest, residual_push=reach.residual_scale)
     if system.remembers_nothing:
         return found
     creep = follow_creep(system, pushes, time)
@@ -477,7 +500,9 @@ def _after_pushes(sticks: _Outcome, found: dict[str, Any]) -> _Outcome:
             f"{found['amplification']:.3g} times the mean square velocity of the push, and D that grows more slowly "
             f"than exp({found['searched']:.2g} t) would not have been seen"
         )
-    elif not found["grows"] and least >= most:
+    elif not found["grows"] and np.isinf(least):
+        reasons.append(UNSETTLED)
+    elif not found["grows"] and least >= most and least > LEFT_ALONE * found["residual_push"]:
         reasons.append(
             f"contacts that count as at Coulomb's bound reach it after pushes above {least:.1g} (velocity along an "
             f"axis) alone, and others reach it, or open, after pushes above {most:.1g}: bring the packing to rest more "
