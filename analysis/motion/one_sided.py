@@ -30,6 +30,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import expm
 from scipy.sparse import block_array, bsr_array, csr_array, eye_array
 from scipy.sparse.linalg import expm_multiply
 
@@ -379,11 +380,31 @@ class OneSidedSystem:
         """D of mass-weighted coordinates in columns, shape (P,)."""
         return np.asarray(np.sum(self.displacement(z) ** 2, axis=1).mean(axis=0))
 
-    def displacement(self, z: Floats) -> Floats:
-        """Displacements of the particles, shape (N, d, P), of mass-weighted coordinates."""
+    def free_flight(self, velocity: Floats, rise: Floats | None, time: float) -> Floats:
+        """Displacements and velocities of the coordinates that no contact acts on, zero of the others.
+
+        Parameters
+        ----------
+        velocity : ndarray, shape (coordinates, P)
+            At t = 0.
+        rise : ndarray, shape (coordinates, P), optional
+            Forces per time.
+        time : float
+            After which time, shape of the result (2, coordinates, P).
+        """
         c = self.motion.configuration
-        q = self._weight @ z if c.constraint is None else c.constraint @ (self._weight @ z)
-        q = q.reshape(c.axes, len(c), -1)[: c.dimension]
+        flies = c.coordinate_free.copy()
+        flies[self.motion.active] = False
+        drag = c.drag_rate if self.motion.dissipative else 0.0
+        of_both = expm(time * np.array([[0, 1, 0, 0], [0, -drag, 1, 0], [0, 0, 0, 1], [0, 0, 0, 0]]))[:2]
+        gain = np.zeros_like(velocity) if rise is None else rise / c.coordinate_mass[:, None]
+        return np.array([np.where(flies[:, None], v * velocity + g * gain, 0.0) for _, v, _, g in of_both])
+
+    def displacement(self, z: Floats, flight: Floats | float = 0.0) -> Floats:
+        """Displacements of the particles, shape (N, d, P), of mass-weighted coordinates, and of `free_flight`."""
+        c = self.motion.configuration
+        q = self._weight @ z + flight
+        q = (q if c.constraint is None else c.constraint @ q).reshape(c.axes, len(c), -1)[: c.dimension]
         return np.asarray(np.moveaxis(q, 0, 1))
 
 
@@ -417,6 +438,7 @@ def one_sided_motion(
     Returns
     -------
     OneSidedMotion
+        Particles that touch nothing fly on, with their drag.
 
     Raises
     ------
@@ -428,7 +450,8 @@ def one_sided_motion(
     if time.ndim != 1 or not np.all(np.isfinite(time)) or np.any(np.diff(time, prepend=0.0) < 0):
         raise ValueError("The times of a motion are finite, not negative, and in increasing order.")
     system = OneSidedSystem.of(configuration)
-    state = system.start(_of_all_coordinates(configuration, "velocity", velocity))
+    push = _of_all_coordinates(configuration, "velocity", velocity)
+    state = system.start(push)
     load = None if rise is None else forces_on_coordinates(configuration, rise)
     seen, reach = [], ContactReach(system)
     reach.look_closely(state, float(time[-1]), load)
@@ -436,7 +459,11 @@ def one_sided_motion(
     for each in time:
         advance(state, float(each), load)
         reach.look(state)
-        seen.append((system.displacement(state.z)[..., 0], system.displacement(state.v)[..., 0], state.p[:, 0].copy()))
+        flight = system.free_flight(push, load, float(each))
+        moved, speed = (
+            system.displacement(z, free)[..., 0] for z, free in zip((state.z, state.v), flight, strict=True)
+        )
+        seen.append((moved, speed, state.p[:, 0].copy()))
     displacement, speed, slid = (np.array(each) for each in zip(*seen, strict=True))
     return OneSidedMotion(time, displacement, speed, slid, (reach.least_scale, reach.largest_scale))
 

@@ -2,8 +2,10 @@ r"""What becomes of one-sided motion: it grows, rests or has not settled.
 
 Motions begin with random pushes of all particles alike, and with their opposites, since one-sided motion is not odd. A
 motion *grows* if D has gained `DECADES` and still gains at a steady rate; it *rests* if the sliders have come to rest
-and the packing with sticking contacts does not grow, since then the motion is linear and decays for ever. Otherwise the
-motion has not settled. The time is `STEPS_OF_CHUNK` stable time steps as often as needed, up to `WORK` multiplications.
+and the packing with sticking contacts does not grow, since then the motion is linear and decays for ever. Where the
+slowest vibration decays slowly, contacts slip on with it: the motion rests, too, if the slips of four spans of time
+each fall about as fast as this vibration, and what is left is little. Otherwise the motion has not settled. The time is
+`STEPS_OF_CHUNK` stable time steps as often as needed, up to `WORK` multiplications.
 """
 
 from collections.abc import Callable
@@ -58,6 +60,16 @@ LATE = 12
 packing of spheres."""
 
 
+SPANS = 8
+"""Spans of the time, over the last four of which slips are to fall with the slowest vibration."""
+
+FALLS = 0.5
+"""Least rate at which slips fall, as a share of that of the slowest vibration: their sums of spans are uneven."""
+
+LEFT = 0.05
+"""Slip that may be left, as a share of all slip; D then changes by less than a tenth."""
+
+
 def window_and_most(system: OneSidedSystem, columns: int, time: float | None) -> tuple[float, int]:
     """Time of a window, and how many there are at most."""
     chunk = STEPS_OF_CHUNK * system.time_step / system.step_share
@@ -97,7 +109,10 @@ def follow_pushes(
             reach.look(state)
         seen = np.array(times), np.array(sizes)
         report_progress(f"one-sided motion: t = {state.time:.4g}, D = {seen[1][-1].max():.3g} push^2")
-        grows = _outcome(*seen, slid, sticking_grows)
+        grows, left = _outcome(*seen, slid, sticking_grows), 0.0
+        if grows is None and sticking < 0 and not sticking_grows:
+            left = _slip_left(slid, float(np.exp(0.5 * sticking * state.time / SPANS)))
+            grows = False if left < LEFT else None
         if time is None and grows is not None:
             break
         if not np.all(np.isfinite(seen[1][-1])):
@@ -110,6 +125,7 @@ def follow_pushes(
         "error": error if grows else None,
         "searched": float(DECADES * np.log(10) / t[-1]) if grows is None else 0.0,
         "amplification": float(d.max()),
+        "slip_left": left if grows is False else None,
         "time": float(t[-1]),
         "pushes": 2 * pushes,
         "scales": (reach.least_scale, reach.largest_scale),
@@ -150,6 +166,30 @@ def _slip_dies(half: Floats, three: Floats, end: Floats, over: Callable[..., Flo
     whole, before, after = (over(np.abs(slip), axis=0) for slip in (end, three - half, end - three))
     falls = (after <= 0.5 * before) | (after <= np.finfo(float).eps * whole)
     return np.asarray(falls & (before <= SETTLED * whole))
+
+
+def _slip_left(slid: list[Floats], decay: float) -> float:
+    """Slip that is still to come, as a share of all slip, at most; infinite if slips do not fall with vibration.
+
+    Parameters
+    ----------
+    slid : list of ndarray, shape (B, P)
+        p at equal times.
+    decay : float
+        Factor by which the slowest vibration falls in one of `SPANS` spans.
+    """
+    if len(slid) <= 2 * LOOKS_PER_CHUNK:
+        return np.inf
+    places = np.linspace(0, len(slid) - 1, SPANS + 1).round().astype(int)
+    whole = np.array([slid[place].sum(axis=0) for place in places])
+    steps = np.diff(whole, axis=0)[SPANS // 2 :]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = np.nan_to_num(steps[1:] / steps[:-1], nan=0.0)
+    if np.any(ratios > decay**FALLS):
+        return np.inf
+    slowest = np.maximum(ratios.max(axis=0), decay)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return float(np.nan_to_num(steps[-1] * slowest / (1 - slowest) / whole[-1], nan=0.0).max())
 
 
 def _still_grows(time: Floats, gained: Floats) -> bool:

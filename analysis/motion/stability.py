@@ -112,11 +112,12 @@ class Stability:
     one_sided : dict or None
         grows (True, False, None); growth_rate and its error; searched (growth rate of D below which growth would not
         have been seen; 0 where grows is known); amplification (largest D over the mean square velocity of the push
-        along an axis, time^2, while contacts slid: what moves on may take D further); time (how long), pushes (how
-        many); residual_push (as below); scales (between which velocities of the push along an axis this holds: with
-        smaller ones contacts that count as at the bound do not reach it, or the residual forces move the packing as
-        well, with larger ones others do, or open; the first is infinite if the residual forces alone take another
-        contact so far). None without contacts that slide on one side.
+        along an axis, time^2, while contacts slid: what moves on may take D further); slip_left (how much of their slip
+        may be still to come, as a share; 0 if they have stopped); time (how long), pushes (how many); residual_push (as
+        below); scales (between which velocities of the push along an axis this holds: with smaller ones contacts that
+        count as at the bound do not reach it, or the residual forces move the packing as well, with larger ones others
+        do, or open; the first is infinite if the residual forces alone take another contact so far). None without
+        contacts that slide on one side.
     creep : Creep or None
         How far a push carries particles if contacts have two derivatives, and none is at the bound.
     largest_push : float or None
@@ -202,11 +203,14 @@ class Stability:
                 return f"unstable: small motion grows{how}: {self.decay}"
             return f"unstable: small motion grows{how}, D as exp({self.growth_rate:.6g} t)"
         if self.one_sided is not None:
-            pushes, size, time = (self.one_sided[name] for name in ("pushes", "amplification", "time"))
+            names = ("pushes", "amplification", "time", "slip_left")
+            pushes, size, time, left = (self.one_sided[name] for name in names)
+            until = "until the contacts have stopped sliding" if not left else "while contacts slide"
+            on = f", and they slide on by {left:.1%} at most as vibration decays" if left else ""
             sticks = f"; with sticking contacts {self.decay}" if self.decay else ""
             return (
                 f"stable: each of {pushes} pushes comes to rest{free}; D reaches {size:.3g} times the mean square "
-                f"velocity of the push until the contacts have stopped sliding (followed for t = {time:.4g}){sticks}"
+                f"velocity of the push {until} (followed for t = {time:.4g}{on}){sticks}"
             )
         if self.decay is not None:
             return f"stable: {self.decay}{free}"

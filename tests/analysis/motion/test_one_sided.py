@@ -484,3 +484,30 @@ def test_a_body_moves_as_one(bound):
     moving = stability(body, rise=rise).rising
     assert moving["drift"] == pytest.approx(rate / k * np.sqrt(2 / (2 * n)), rel=1e-6)
     assert moving["other_start"] is None
+
+
+@pytest.mark.parametrize("drag_time", [None, 2.0])
+def test_a_disk_that_touches_nothing_flies_on(bound, drag_time):
+    """With the drag v = v_0 exp(-t/tau); under a load that rises without drag x = v_0 t + g t^3 / 6 m."""
+    n, times = len(bound), np.array([0.5, 1.0, 3.0])
+    with_rattler = replace(
+        bound,
+        position=np.vstack([bound.position, bound.position.max(axis=0) + 20.0]),
+        radius=np.append(bound.radius, 0.5),
+        angle=np.append(bound.angle, 0.0),
+        top=np.append(bound.top, False),
+        mass=np.append(bound.mass, 4.0),
+        drag_time=drag_time,
+    )
+    assert list(with_rattler.rattlers) == [n]
+    velocity, rise = np.ones((n + 1, 2)), np.full((n + 1, 2), 3.0)
+    found = one_sided_motion(with_rattler, velocity, times=times)
+    decay = np.exp(-times / drag_time) if drag_time else np.ones(3)
+    flight = drag_time * (1 - decay) if drag_time else times
+    np.testing.assert_allclose(found.displacement[:, n, 0], flight, rtol=1e-12)
+    np.testing.assert_allclose(found.velocity[:, n, 1], decay, rtol=1e-12)
+    others = one_sided_motion(replace(bound, drag_time=drag_time), velocity[:n], times=times)
+    np.testing.assert_allclose(found.displacement[:, :n], others.displacement, atol=1e-12)
+    if drag_time is None:
+        drawn = one_sided_motion(with_rattler, velocity, rise, times=times)
+        np.testing.assert_allclose(drawn.displacement[:, n, 1], times + 3 * times**3 / 6 / 4.0, rtol=1e-12)
