@@ -64,8 +64,9 @@ from .eigenvalues import (
     zero_uncertainty,
 )
 from .modes import Mode, Modes, growth_rate
-from .motion import SLICED, Motion, Rates
+from .motion import Motion
 from .no_verdict import no_verdict
+from .rates import SLICED, Rates, rates_of
 
 DENSE_LARGEST = 900
 """Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
@@ -132,7 +133,7 @@ class Spectrum(TableDisplay):
         if self._doubts:
             return f"not known whether the packing is stable: {'; '.join(self._doubts)}; {alone}"
         if contacts.one_sided.any():
-            stick, slide = (Motion.of(self.packing, sliding=on).rates.growth_rate for on in (False, True))
+            stick, slide = (rates_of(Motion.of(self.packing, sliding=on)).growth_rate for on in (False, True))
             count = int(contacts.one_sided.sum())
             slides = "slides on ahead and sticks" if count == 1 else "slide on ahead and stick"
             return (
@@ -181,7 +182,7 @@ class Spectrum(TableDisplay):
 
     @cached_property
     def _damped(self) -> Rates | None:
-        return Motion.of(self.packing).rates if self.packing.configuration.damped else None
+        return rates_of(Motion.of(self.packing)) if self.packing.configuration.damped else None
 
     @property
     def free(self) -> int:
