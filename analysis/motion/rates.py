@@ -10,13 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig, eigvals
-from scipy.sparse import csc_array, eye_array
 
 from ..arrays import Complexes, Floats
-from ..factors.sparse_lu import SingularMatrixError, general_lu
-from .decay import FACTORED, Decay, follow_decay
+from .decay import Decay, follow_decay
 from .eigenvalues import SAFETY, growing, growing_undamped, operator_rounding, zero_uncertainty
-from .fastest_growing import CONVERGED, fastest_growing
+from .fastest_growing import fastest_growing
 from .modes import Modes
 from .motion import Motion
 
@@ -37,9 +35,6 @@ PERIODS_OF_LARGE = 2e6
 """Periods of the fastest motion in which growth is looked for, times the number of coordinates, with spaces of one
 vector. It takes three seconds without dissipation, fourteen with it, and 35 where many motions grow alike and none
 converges."""
-
-VALUE_STEPS, VALUE_ERROR = 12, 1e-9
-"""Steps of Newton's method at the most, and the relative change of s after which it ends."""
 
 LONGEST_SEARCH = 300.0
 """Periods of the fastest motion at the most."""
@@ -66,6 +61,8 @@ class Rates:
         else grows.
     decay : Decay or None
         What became of a random state, where not all eigenvalues are known.
+    at_least : bool
+        Whether Re s is only known to be no less, as the search for the fastest motion did not converge.
     """
 
     values: Complexes
@@ -73,6 +70,7 @@ class Rates:
     free: int
     searched: float = 0.0
     decay: Decay | None = None
+    at_least: bool = False
 
     def decided(self, decay: Decay) -> "Rates":
         """Where no motion was found to grow: with what has become of a random state, and of slow motions."""
@@ -106,34 +104,10 @@ def _fastest(motion: Motion) -> Rates:
     periods = min(30.0, length), length
     found = fastest_growing(motion.in_blocks(motion.stiffness), damping, count=1, periods=periods)
     values = found.values if motion.dissipative else 1j * np.sqrt(found.values.astype(complex))
-    small = len(motion.active) <= FACTORED[motion.configuration.dimension]
-    if motion.dissipative and small and len(values) and found.residuals[0] > CONVERGED:
-        values = _value_about(motion, found.vectors[:, 0], values, 0.5 * found.limit)
     values = np.where(values.real < 0, -values, values)
-    return Rates(values, np.ones(len(values), bool), 0, found.limit)
-
-
-def _value_about(motion: Motion, shape: Complexes, otherwise: Complexes, least: float) -> Complexes:
-    """s of a motion of about this shape, in an array of one: Newton's method for (s^2 + s G + A) x = 0.
-
-    A search that has not converged, as many motions grow nearly alike, has s with an error of its own size, but
-    knows the `least` Re s of the fastest. If Newton's method does not converge to a motion that grows, the result
-    is `otherwise`, the s of the search.
-    """
-    a, g, x = motion.stiffness, motion.damping, shape / np.linalg.norm(shape)
-    s = max(np.roots([1.0, np.vdot(x, g @ x), np.vdot(x, a @ x)]), key=lambda root: root.real)
-    s += max(least - s.real, 0.0)
-    for _ in range(VALUE_STEPS):
-        try:
-            factors = general_lu(csc_array(a + s * g + s * s * eye_array(len(x))))
-        except SingularMatrixError:
-            break
-        y = factors.solve(g @ x + 2 * s * x)
-        step = 1 / np.vdot(x, y)
-        s, x = s - step, y / np.linalg.norm(y)
-        if abs(step) <= VALUE_ERROR * abs(s):
-            return np.array([s]) if s.real > 0 else otherwise
-    return otherwise
+    if not found.converged:
+        values = np.array(0.5 * found.least + 1j * values.imag)
+    return Rates(values, np.ones(len(values), bool), 0, found.limit, at_least=not found.converged)
 
 
 def _undamped_rates(motion: Motion) -> Rates:

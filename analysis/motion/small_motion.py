@@ -56,7 +56,7 @@ def _without_dissipation(configuration: Configuration, found: Spectrum | None) -
     """Of sticking contacts: what grows without dissipation, and its eigenvalues s."""
     if found is None:
         rates = rates_of(Motion.of(configuration, dissipation=False))
-        return WithoutDissipation(rates.growth_rate, None, None), rates
+        return WithoutDissipation(rates.growth_rate, None, None, rates.at_least), rates
     unstable = 1j * np.sqrt(found.unstable)
     grows = np.ones(len(unstable), bool)
     rates = Rates(np.where(unstable.real < 0, -unstable, unstable), grows, found.free)
@@ -71,6 +71,7 @@ class SmallMotion:
     growth_rate: float
     sticking: LinearNeighbour
     free: int
+    at_least: bool = False
     reasons: Sequence[str] = ()
     one_sided: dict[str, Any] | None = None
     creep: Creep | None = None
@@ -82,7 +83,7 @@ class SmallMotion:
         """Of linear motion with sticking contacts."""
         sticking = LinearNeighbour.of(linear.sticking)
         grows = None if doubts else bool(linear.sticking.grows.any())
-        return cls(grows, sticking.growth_rate, sticking, linear.sticking.free, doubts)
+        return cls(grows, sticking.growth_rate, sticking, linear.sticking.free, sticking.at_least, doubts)
 
 
 def follow_small_motion(system: OneSidedSystem, linear: LinearRates, time: float | None, pushes: int) -> SmallMotion:
@@ -123,7 +124,7 @@ def _as_contacts_part(linear: SmallMotion, system: OneSidedSystem, time: float |
     found = replace(linear, largest_push=most if np.isfinite(most) else None)
     if system.remembers_nothing:
         return found
-    creep = follow_creep(system, pushes, time)
+    creep = follow_creep(system, pushes, time, decay=max(-0.5 * linear.growth_rate, 0.0))
     reasons = (
         f"vibration wears contacts down, and adds more to D within t = {creep.time:.4g} than creep, which adds as the "
         "square of the time; whether this goes on was not followed",
@@ -149,6 +150,7 @@ def _after_pushes(sticks: SmallMotion, found: dict[str, Any]) -> SmallMotion:
     return replace(
         sticks,
         grows=found["grows"],
+        at_least=sticks.at_least and not found["grows"],
         growth_rate=found["growth_rate"] if found["grows"] else sticks.growth_rate,
         reasons=reasons,
         one_sided=found,

@@ -117,9 +117,9 @@ def _stability(
     touching = max(len(contacts), len(configuration) - len(configuration.rattlers)) if given else len(contacts)
     known = outcome.grows is not None and not outcome.reasons and touching > 0
     return Stability(
-        stable=not outcome.grows if known else None, growth_rate=outcome.growth_rate, undamped=linear.undamped,
-        at_bound=int(contacts.at_bound.sum()), one_sided=outcome.one_sided, creep=outcome.creep,
-        largest_push=outcome.largest_push, decay=outcome.decay, rising=rising,
+        stable=not outcome.grows if known else None, growth_rate=outcome.growth_rate, at_least=outcome.at_least,
+        undamped=linear.undamped, at_bound=int(contacts.at_bound.sum()), one_sided=outcome.one_sided,
+        creep=outcome.creep, largest_push=outcome.largest_push, decay=outcome.decay, rising=rising,
         sticking=outcome.sticking, sliding=LinearNeighbour.of(linear.sliding) if linear.one_sided else outcome.sticking,
         asymmetry={} if given else asymmetry(configuration), dissipative=configuration.damped,
         free=outcome.free, searched=outcome.sticking.searched, contacts=touching,

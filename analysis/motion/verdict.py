@@ -10,11 +10,9 @@ import numpy as np
 from ..counted import counted
 from .creep import Creep
 from .decay import Decay
+from .growth_in_words import exponential
 from .rates import Rates
 from .rising_load import vibrate_otherwise
-
-STILL_CREEPS = 0.01
-"""Share of the displacement by vibration that the second half of the time added, from which on it is said to go on."""
 
 
 @dataclass(frozen=True)
@@ -27,20 +25,23 @@ class LinearNeighbour:
         Largest 2 Re s, 1 / time; zero if none was found in a large packing.
     searched : float
         Growth rate of D, 1 / time, below which growth was not looked for; 0 if all eigenvalues are known.
+    at_least : bool
+        Whether the growth rate is only known to be no less.
     """
 
     growth_rate: float
     searched: float = 0.0
+    at_least: bool = False
 
     @classmethod
     def of(cls, rates: Rates) -> "LinearNeighbour":
         """The fastest motion."""
-        return cls(rates.growth_rate, rates.searched)
+        return cls(rates.growth_rate, rates.searched, rates.at_least)
 
     def __str__(self) -> str:
         if self.searched and self.growth_rate <= 0:
             return f"no growth of D faster than exp({self.searched:.2g} t)"
-        return f"D as exp({self.growth_rate:.4g} t)"
+        return exponential(self.growth_rate, 4, self.at_least)
 
 
 @dataclass(frozen=True)
@@ -53,11 +54,14 @@ class WithoutDissipation:
         Of D, 1 / time.
     pairs, negative : int or None
         Complex pairs, and negative eigenvalues; of large packings these are not counted.
+    at_least : bool
+        Whether the growth rate is only known to be no less.
     """
 
     growth_rate: float
     pairs: int | None
     negative: int | None
+    at_least: bool = False
 
 
 @dataclass(frozen=True)
@@ -71,6 +75,8 @@ class Stability:
     growth_rate : float
         Of D, 1 / time, with dissipation: largest 2 Re s, negative if every motion decays. Where contacts at the bound
         make the packing grow, the rate of the one-sided motion.
+    at_least : bool
+        Whether the growth rate is only known to be no less.
     undamped : WithoutDissipation
         Without dissipation.
     at_bound : int
@@ -118,6 +124,7 @@ class Stability:
 
     stable: bool | None
     growth_rate: float
+    at_least: bool
     undamped: WithoutDissipation
     at_bound: int
     one_sided: dict[str, Any] | None
@@ -161,7 +168,7 @@ class Stability:
             how = " in spite of the dissipation" if self.dissipative else ""
             if self.decay is not None and self.decay.grows:
                 return f"unstable: small motion grows{how}: {self.decay}"
-            return f"unstable: small motion grows{how}, D as exp({self.growth_rate:.6g} t)"
+            return f"unstable: small motion grows{how}, {exponential(self.growth_rate, 6, self.at_least)}"
         if self.one_sided is not None:
             pushes, size, time = (self.one_sided[name] for name in ("pushes", "amplification", "time"))
             sticks = f"; with sticking contacts {self.decay}" if self.decay else ""
@@ -184,7 +191,7 @@ class Stability:
         if self.dissipative and u.growth_rate > 0:
             counts = {"complex pair": u.pairs, "negative eigenvalue": u.negative}
             what = " and ".join(counted(count, name) for name, count in counts.items() if count)
-            yield f"without dissipation: {what or 'small motion grows'}, D as exp({u.growth_rate:.6g} t)"
+            yield f"without dissipation: {what or 'small motion grows'}, {exponential(u.growth_rate, 6, u.at_least)}"
 
     @property
     def _has_two_neighbours(self) -> bool:
@@ -213,10 +220,9 @@ class Stability:
             return
         says = f": D as ({creep.velocity:.2g} t)^2 times the mean square velocity of the push"
         if self.dissipative:
-            still = 0.5 * creep.velocity * creep.time > STILL_CREEPS * creep.amplification**0.5
             says = (
                 f", and they stay displaced, by D up to {creep.amplification:.2g} times the mean square velocity of "
-                f"the push within t = {creep.time:.4g}{', and farther later' if still else ''}"
+                f"the push within t = {creep.time:.4g}{_later(creep)}"
             )
         yield f"contacts bear less after they have closed and parted, so that vibration carries particles on{says}"
 
@@ -252,6 +258,7 @@ class Stability:
         return {
             "stable": self.stable,
             "growth_rate": self.growth_rate,
+            "at_least": self.at_least,
             "undamped": vars(self.undamped),
             "at_bound": self.at_bound,
             "one_sided": None if self.one_sided is None else _finite(self.one_sided),
@@ -288,6 +295,15 @@ def _drift_and_vibration(rising: dict[str, Any]) -> str:
         for name in ("drift", "vibration")
     )
     return ", ".join(numbers) + steady
+
+
+def _later(creep: Creep) -> str:
+    """How far vibration may carry particles after the time that was followed."""
+    if creep.settled:
+        return ""
+    if creep.limit is None:
+        return ", and farther later"
+    return f"; D may reach {creep.limit:.2g} times before the slowest motion has decayed"
 
 
 def _is(count: int) -> str:
