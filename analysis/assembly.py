@@ -30,7 +30,7 @@ law in three dimensions.)
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,19 +38,6 @@ from scipy.sparse import csr_array
 
 from .arrays import Floats, Indices, derive_frozen
 from .contacts import LinearisedContacts
-
-
-class HasParticles(Protocol):
-    """What is asked of the particles whose contacts these are: that of a Configuration."""
-
-    @property
-    def dimension(self) -> int: ...
-    @property
-    def axes(self) -> int: ...
-    @property
-    def radius(self) -> Floats: ...
-    @property
-    def free(self) -> NDArray[np.bool_]: ...
 
 
 class ContactDerivatives(NamedTuple):
@@ -114,8 +101,12 @@ class ContactBlocks:
 
     Attributes
     ----------
-    particles : HasParticles
-        Whose contacts they are of.
+    radius : ndarray, shape (N,)
+        Radii of the particles, length.
+    free : ndarray of bool, shape (N,)
+        Which particles move.
+    axes : int
+        Coordinates of each particle: 3 of a disk, 6 of a sphere.
     place : ndarray of int, shape (N + 2P,)
         Which block of the matrix has the diagonal of each particle, and (i, j) and (j, i) of the P contacts of pairs.
     order : ndarray of int, shape (axes B,)
@@ -124,16 +115,18 @@ class ContactBlocks:
         Columns and rows of the matrix, as in CSR.
     """
 
-    particles: HasParticles
+    radius: Floats
+    free: NDArray[np.bool_]
+    axes: int
     place: Indices
     order: Indices
     indices: NDArray[np.int32]
     indptr: NDArray[np.int32]
 
     @classmethod
-    def of(cls, particles: HasParticles, c: LinearisedContacts) -> "ContactBlocks":
+    def of(cls, radius: Floats, free: NDArray[np.bool_], axes: int, c: LinearisedContacts) -> "ContactBlocks":
         """Sort the pairs of particles that have a block."""
-        count, axes = len(particles.radius), particles.axes
+        count = len(radius)
         i, j, every = c.i[~c.wall], c.j[~c.wall], np.arange(count)
         # two particles that touch through two images have two contacts, which are added
         pairs, place = np.unique(
@@ -147,7 +140,7 @@ class ContactBlocks:
         indices = np.empty(order.size, np.int32)
         indices[order] = column + count * np.arange(axes)[:, None]
         indptr = np.concatenate([[0], np.cumsum(np.tile(axes * length, axes))]).astype(np.int32)
-        return cls(particles, place, order.ravel(), np.tile(indices, axes), indptr)
+        return cls(radius, free, axes, place, order.ravel(), np.tile(indices, axes), indptr)
 
     def matrix(self, contacts: LinearisedContacts, parting: ArrayLike = 0.5) -> csr_array:
         """-dF/dq of contacts of the same particles.
@@ -155,8 +148,8 @@ class ContactBlocks:
         Rows (F, T/R) and columns (translation, R theta) of both partners, from the blocks of each contact.
         """
         diagonal, off_diagonal = self._numbers(contacts, parting)
-        axes = self.particles.axes
-        count = axes * len(self.particles.radius)
+        axes = self.axes
+        count = axes * len(self.radius)
         data = np.empty((axes, len(self.order)))
         blocks = len(self.order) // axes
         for row in range(axes):
@@ -169,11 +162,11 @@ class ContactBlocks:
 
     def _numbers(self, c: LinearisedContacts, parting: ArrayLike) -> tuple[Floats, Floats]:
         """The diagonal blocks, shape (axes, axes, N), and (i, j) and (j, i) of contacts of pairs, (axes, axes, 2P)."""
-        particles, pair = self.particles, ~c.wall
+        pair = ~c.wall
         d = contact_derivatives(c, parting)
         partners = np.stack([c.i, np.where(pair, c.j, 0)])
-        radius = particles.radius[partners]
-        moves = particles.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
+        radius = self.radius[partners]
+        moves = self.free[partners] & np.stack([np.ones(len(c), dtype=np.bool_), pair])
         rolling, lever, shrinks = (each / radius for each in (c.slip_arm.T, c.lever_arm.T, c.lever_slope))
 
         def block(p: int, q: int, row: int, column: int) -> Floats:
@@ -187,9 +180,9 @@ class ContactBlocks:
                     number -= by * shrinks[p] * d.growth[row - 3, column]
             return number
 
-        count, between = len(particles.radius), int(pair.sum())
+        count, between = len(self.radius), int(pair.sum())
         shares = [None if np.all(each) else each for each in (moves[0], moves[1], (moves[0] & moves[1])[pair])]
-        axes = range(6) if particles.dimension == 3 else (0, 1, 5)
+        axes = range(6) if self.axes == 6 else (0, 1, 5)
         diagonal = np.zeros((len(axes), len(axes), count))
         off = np.empty((len(axes), len(axes), 2, between))
         for place in np.ndindex(*diagonal.shape[:2]):

@@ -342,7 +342,7 @@ class Configuration:
         if form == "paper" or coupled is not None:
             raise ValueError("The operator of a Configuration is the consistent one, of all of its contacts.")
         if self.stiffness is None:
-            return self._with_spring(ContactBlocks.of(self, self.contacts).matrix(self.contacts, parting))
+            return self._with_spring(self._blocks.matrix(self.contacts, parting))
         if np.any(np.asarray(parting) != 0.5) or np.any(sliding):
             raise ValueError(
                 "K of this configuration is a difference of forces, the mean of closing and parting, and of both "
@@ -352,14 +352,19 @@ class Configuration:
 
     def assembled_damping(self, sliding: ArrayLike = False) -> csr_array:
         """C = -dF/d(dq/dt); see :func:`~faultgouge.analysis.damping_matrix`."""
-        return self._damping(ContactBlocks.of(self, self.contacts)) if self.damping is None else self.damping.copy()
+        return self._damping(self._blocks) if self.damping is None else self.damping.copy()
 
     def assembled_operators(self) -> tuple[csr_array, csr_array]:
         """K and C, whose pattern is the same: it is found once."""
         if self.stiffness is not None:
             return self.assembled_stiffness(), self.assembled_damping()
-        blocks = ContactBlocks.of(self, self.contacts)
+        blocks = self._blocks
         return self._with_spring(blocks.matrix(self.contacts)), self._damping(blocks)
+
+    @property
+    def _blocks(self) -> ContactBlocks:
+        """Where the blocks of the contacts are in K and C."""
+        return ContactBlocks.of(self.radius, self.free, self.axes, self.contacts)
 
     def _with_spring(self, matrix: csr_array) -> csr_array:
         """K of contacts and of the spring that draws the layer, of the coordinates that lead."""

@@ -154,6 +154,11 @@ class LinearisedContacts:
         """Which contacts slide on ahead and stick on the way back, shape (C,): sliders at Coulomb's bound."""
         return self.at_bound & self.slider
 
+    @property
+    def two_derivatives(self) -> NDArray[np.bool_]:
+        """Which contacts have other derivatives while they close than while they part, shape (C,); K has the mean."""
+        return np.asarray(np.any(self.closing != self.parting, axis=1))
+
     def overlap_derivative(self, parting: ArrayLike = 0.5) -> Floats:
         """b of each contact, shape (C, 3), with the weight of opening, shape () or (C,)."""
         share = np.broadcast_to(np.asarray(parting, dtype=np.float64), (len(self),))[:, None]

@@ -4,7 +4,11 @@ With mindlin_rescale and the standard law of this package the tangential force o
 not rise as it closes. Vibration thus wears tangential forces down: in the equation of
 :mod:`~faultgouge.analysis.motion.one_sided` each contact adds :math:`B_c \int |\dot\delta_c| \mathrm dt` to the forces,
 and the packing moves on to another equilibrium. Eigenvalues of K, which has the mean of both derivatives, do not know
-this. With dissipation the vibration dies, and the particles stay displaced. Without dissipation the vibration goes on,
+this. With dissipation the vibration dies, and the particles stay displaced. They
+are followed until what may come is little: the velocity of creep is in proportion to the vibration, and no vibration
+decays more slowly than as :math:`e^{\mathrm{Re}\, s\, t}` with the slowest s. So a velocity v displaces particles by
+:math:`v / |\mathrm{Re}\, s|` more at the most. Where dashpots are weak the time is over before, and this is what is not
+known. Without dissipation the vibration goes on,
 and particles move at a constant mean velocity, so that D grows as the square of the time, in proportion to the square
 of the push. (A small vibration wears down what a contact bears in LAMMPS, too: docs/contacts_at_bound.md.)
 """
@@ -13,19 +17,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..arrays import Floats
 from ..progress import report_progress
 from .one_sided import CLOSE_STEP, OneSidedSystem
 from .one_sided_outcome import STEPS_OF_CHUNK, random_pushes
 
-CHUNKS = 4
-"""Spans of `STEPS_OF_CHUNK` stable steps that the motion is followed: forty periods of a slow mode."""
+CHUNKS_OF_SPAN = 4
+"""Chunks of `STEPS_OF_CHUNK` stable steps of a span: forty periods of a slow mode."""
 
-GROWS = 6.0
-"""Decades of D beyond the first look that are no creep: as the square of the time it gains 3.2, and the first look may
-come before the contacts have moved back and forth."""
+SPANS = 8
+"""Spans that are followed at the most."""
 
 LOOKS = 40
-"""Looks at D."""
+"""Looks at D in a span."""
+
+STILL_TO_COME = 0.1
+"""What is left to come, as a share of the displacement, from which on motion is not followed any longer."""
+
+GROWS = 100.0
+"""Growth of D in the second half of the time that is no creep: as the square of the time it is 4."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +49,11 @@ class Creep:
     time : float
         How long motion was followed.
     velocity : float
-        Root mean square over the particles of its mean velocity in the second half of this time, over the root mean
-        square velocity of the push along an axis.
+        Root mean square over the particles of its mean velocity in the last span, or the second half of the first, over
+        the root mean square velocity of the push along an axis.
+    limit : float or None
+        `amplification` that vibration may reach later, while the slowest motion decays; None if that is not known, as
+        without dissipation.
     grows : bool
         Whether D grew faster than as the square of the time.
     """
@@ -48,10 +61,16 @@ class Creep:
     amplification: float
     time: float
     velocity: float
+    limit: float | None
     grows: bool
 
+    @property
+    def settled(self) -> bool:
+        """Whether little is left to come."""
+        return self.limit is not None and self.limit <= (1 + STILL_TO_COME) ** 2 * self.amplification
 
-def follow_creep(system: OneSidedSystem, pushes: int, time: float | None = None) -> Creep:
+
+def follow_creep(system: OneSidedSystem, pushes: int, time: float | None = None, decay: float = 0.0) -> Creep:
     """Follow the motion after random pushes and their opposites, with both derivatives and with their mean.
 
     Parameters
@@ -61,20 +80,34 @@ def follow_creep(system: OneSidedSystem, pushes: int, time: float | None = None)
     pushes : int
         How many.
     time : float, optional
-        How long; `CHUNKS` by default.
+        How long; until little is left to come by default, at the most for `SPANS` spans.
+    decay : float
+        -Re s of the slowest motion, 1 / time; 0 if that is not known, or nothing decays.
     """
     stable = system.time_step / system.step_share
-    whole = CHUNKS * STEPS_OF_CHUNK * stable if time is None else time
-    count = int(np.ceil(whole / LOOKS / (CLOSE_STEP * stable)))
+    span = CHUNKS_OF_SPAN * STEPS_OF_CHUNK * stable if time is None else time
     both = system.start(random_pushes(system.motion.configuration, pushes))
     mean = replace(both, z=both.z.copy(), v=both.v.copy(), r=np.zeros((0, 2 * pushes)))
     added = [np.zeros_like(both.z)]
-    for _ in range(LOOKS):
-        for state in (both, mean):
-            system.take_steps(state, whole / LOOKS / count, count)
-        added.append(both.z - mean.z)
-    report_progress(f"creep: followed for t = {whole:.4g}")
+    for number in range(1, 1 + (SPANS if time is None and decay else 1)):
+        count = int(np.ceil(span / LOOKS / (CLOSE_STEP * stable)))
+        for _ in range(LOOKS):
+            for state in (both, mean):
+                system.take_steps(state, span / LOOKS / count, count)
+            added.append(both.z - mean.z)
+        report_progress(f"creep: followed for t = {number * span:.4g}")
+        found = _found(system, added, number * span, decay)
+        if found.settled or found.grows:
+            break
+    return found
+
+
+def _found(system: OneSidedSystem, added: list[Floats], time: float, decay: float) -> Creep:
+    """Creep, of the displacements that vibration has added at equal times."""
     sizes = np.array([system.mean_square_displacement(each).max() for each in added])
-    velocity = np.sqrt(system.mean_square_displacement(added[-1] - added[LOOKS // 2]).max()) / (whole / 2)
-    grows = not sizes[-1] < 10.0**GROWS * sizes[1]
-    return Creep(float(sizes.max()), whole, float(velocity), grows)
+    last, half = len(added) - 1, len(added) // 2
+    before = max(last - LOOKS, half)
+    moved = np.sqrt(system.mean_square_displacement(added[last] - added[before]).max())
+    velocity = float(moved) / (time * (last - before) / last)
+    limit = float(np.sqrt(sizes[-1]) + velocity / decay) ** 2 if decay > 0 else None
+    return Creep(float(sizes.max()), time, velocity, limit, bool(not sizes[-1] < GROWS * sizes[half]))

@@ -28,17 +28,17 @@ proportional to the number of coordinates.
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array
+from scipy.sparse import bsr_array
 
-from ..arrays import Complexes, Floats, Indices
-from ..configuration import Configuration
+from ..arrays import Complexes, Floats
 from ..counted import counted
 from ..factors.sparse_lu import SingularMatrixError
 from ..progress import report_progress
 from .fastest_growing import CHANCE
+from .motion import Motion
 from .slow_motions import SlowMotions, slow_motions
 from .stable_timestep import stable_timestep
 
@@ -76,26 +76,6 @@ FOLDS = 4.0
 
 FREE_FORCE = 1e-12
 """Force on a common displacement, as a share of the largest entry of A, that is no force."""
-
-
-class DecayingMotion(Protocol):
-    """What is asked of a Motion."""
-
-    @property
-    def configuration(self) -> Configuration: ...
-    @property
-    def active(self) -> Indices: ...
-    @property
-    def root_mass(self) -> Floats: ...
-    @property
-    def stiffness(self) -> csr_array: ...
-    @property
-    def damping(self) -> csr_array: ...
-    @property
-    def dissipative(self) -> bool: ...
-    @property
-    def particle(self) -> Indices: ...
-    def in_blocks(self, matrix: csr_array) -> bsr_array: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +138,7 @@ class Decay:
         return vars(self) | {"slow": len(self.slow)}
 
 
-def follow_decay(motion: DecayingMotion, time: float | None = None) -> Decay:
+def follow_decay(motion: Motion, time: float | None = None) -> Decay:
     """Find slow motions, and follow all other motion from a random state until it has decayed, or grows.
 
     Parameters
@@ -184,7 +164,7 @@ def follow_decay(motion: DecayingMotion, time: float | None = None) -> Decay:
     return replace(found, growth_rate=max(found.growth_rate, found.slowest))
 
 
-def _slow_motions(motion: DecayingMotion, reference: float, dt: float) -> SlowMotions | None:
+def _slow_motions(motion: Motion, reference: float, dt: float) -> SlowMotions | None:
     """As many as pay; None without dissipation, or without factors."""
     if not motion.dissipative or len(motion.active) > FACTORED[motion.configuration.dimension]:
         return None
@@ -234,7 +214,7 @@ class _State:
     v: Floats
 
     @classmethod
-    def of(cls, motion: DecayingMotion, reference: float, slow: SlowMotions | None) -> "_State":
+    def of(cls, motion: Motion, reference: float, slow: SlowMotions | None) -> "_State":
         """At random, without slow motions."""
         z, v = _random_state(motion)
         damping = motion.in_blocks(motion.damping) if motion.dissipative else None
@@ -277,7 +257,7 @@ class _State:
             self.z, self.v = state[: len(self.z)] / self.reference, state[len(self.z) :].copy()
 
 
-def _random_state(motion: DecayingMotion) -> tuple[Floats, Floats]:
+def _random_state(motion: Motion) -> tuple[Floats, Floats]:
     """Two vectors of normal random numbers without common motion along axes that no force opposes."""
     state = np.random.Generator(np.random.PCG64(0)).standard_normal((len(motion.active), 2))
     for common in free_translations(motion):
@@ -285,7 +265,7 @@ def _random_state(motion: DecayingMotion) -> tuple[Floats, Floats]:
     return state[:, 0].copy(), state[:, 1].copy()
 
 
-def free_translations(motion: DecayingMotion) -> list[Floats]:
+def free_translations(motion: Motion) -> list[Floats]:
     """Unit vectors of the common motions along an axis that no force opposes, mass-weighted."""
     configuration, count = motion.configuration, len(motion.configuration)
     largest = np.abs(motion.stiffness.data).max(initial=0.0)

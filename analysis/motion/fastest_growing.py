@@ -16,6 +16,10 @@ of A, or of Z, are those of its projection on their invariant subspace, and the 
 The time is tripled as long as nothing has grown enough to be seen. Time and memory are proportional to the number of
 coordinates, and the time to that of products.
 
+**Where the search ends before it has converged**, as many motions grow nearly alike, only that they grow is certain:
+eigenvalues of a mixture of motions may be wrong by a factor of two. The mixture is then followed for some times t more.
+That it grows nearly at the rate of its fastest motion, from below, is the rate which is told, as the least.
+
 **What is left out.** After j blocks a motion whose share in the random start is not below :math:`\delta / \sqrt n`
 appears with an error of 1 % where :math:`T_j(|f|)`, or :math:`|f|^j` with dissipation, is
 :math:`200 \sqrt n / \delta`. With :math:`\delta = 10^{-3}` and some twenty blocks, nothing else grows at a rate of more
@@ -66,6 +70,9 @@ GROWTH_OVER_RESIDUAL = 10.0
 """Growth over what the residual may change, from which an eigenvalue is a growing one when the search ends otherwise.
 Many motions that grow nearly alike converge slowly."""
 
+FOLLOWED = 4
+"""Times t that a motion is followed whose eigenvalue has not converged; it grows evenly after the first."""
+
 CANCELLATION = 12.0
 """Logarithm of the largest term of the exponential over the sum: five digits are lost."""
 
@@ -89,6 +96,9 @@ class FastestGrowth:
         t, the longest time that was looked at.
     limit : float
         Nothing else is likely to grow at a larger rate, 1 / time; see the module.
+    least : float
+        What the fastest motion grows at at least, 1 / time: its rate, or, where the search ends before that has
+        converged, the least rate at which the motion was seen to grow over a time t; zero if none was found.
     products : int
         Products of a matrix with a vector.
     """
@@ -99,7 +109,13 @@ class FastestGrowth:
     vectors: Complexes
     time: float
     limit: float
+    least: float
     products: int
+
+    @property
+    def converged(self) -> bool:
+        """Whether the fastest motion is known as precisely as asked; otherwise only that it grows, at `least`."""
+        return not len(self.residuals) or bool(self.residuals[0] <= CONVERGED)
 
 
 def fastest_growing(
@@ -206,6 +222,10 @@ class _Undamped:
         """Modulus of f beyond which an eigenvalue stands out, where the logarithm of its share grows so in a block."""
         return float(np.cosh(chance))
 
+    def least_growth(self, modulus: float) -> float:
+        """Least Re s, times t, of which f has this modulus."""
+        return float(np.arccosh(max(modulus, 1.0)))
+
     def visible(self, chance: float) -> float:
         """Rate times t of a motion that stands out."""
         return float(2 * np.arcsinh(np.cosh(chance)))
@@ -280,6 +300,10 @@ class _Damped:
         """As without dissipation."""
         return float(np.exp(chance))
 
+    def least_growth(self, modulus: float) -> float:
+        """As without dissipation."""
+        return float(np.log(modulus))
+
     def visible(self, chance: float) -> float:
         """As without dissipation."""
         return 2 * chance
@@ -337,6 +361,9 @@ class _Space:
         kept = slice(0, min(count, int(np.argmax([*uncertain, True]))))
         moved = self.motion.displacement(self.vectors[:, kept])
         others = rates[kept.stop :].max(initial=0.0)
+        least = 0.0
+        if kept.stop:
+            least = float(rates[0]) if self.found else self._seen_to_grow(self.vectors[:, 0])
         return FastestGrowth(
             rates[kept],
             self.values[kept],
@@ -344,8 +371,18 @@ class _Space:
             moved / np.linalg.norm(moved, axis=0),
             self.step.time,
             float(max(others, self.limit)),
+            least,
             products,
         )
+
+    def _seen_to_grow(self, vector: Complexes) -> float:
+        """Least rate at which D of a motion grows in a time t, but for the first: a mixture of motions of about one
+        rate has eigenvalues of any rate in the space, and grows at that rate, more and more nearly, from below."""
+        columns, sizes = np.column_stack([vector.real, vector.imag]), []
+        for _ in range(FOLLOWED):
+            columns = self.step.apply(columns / np.linalg.norm(columns))
+            sizes.append(np.linalg.norm(columns))
+        return 2 * self.motion.least_growth(float(min(sizes[1:]))) / self.step.time
 
 
 def _search(motion: Equation, step: Step, start: Floats, count: int) -> tuple[_Space, Krylov]:

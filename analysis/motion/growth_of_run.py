@@ -21,6 +21,7 @@ from ..packing.packing import Floats, Packing
 from .eigenvalues import Complexes
 from .growth import ABOVE, Growth, fit_growth, growing_range
 from .motion import Motion
+from .rates import rates_of
 from .spectrum import spectrum
 
 NOISE_SHARE = 0.1
@@ -229,7 +230,7 @@ def _bounds(packing: Packing, time: Floats, msd: Floats, rate: float | None, jum
 
 def unstable_rates(packing: Packing) -> Complexes:
     """The eigenvalues s with Re s > 0 beyond rounding of a packing with dissipation; 1 / time."""
-    rates = Motion.of(packing).rates
+    rates = rates_of(Motion.of(packing))
     return rates.values[rates.grows]
 
 

@@ -1,4 +1,4 @@
-r"""Small motion of a configuration about its equilibrium: the operators, and what grows.
+r"""Small motion of a configuration about its equilibrium: the operators.
 
 With the stiffness K, the damping C and the masses M, small motion obeys :math:`M \ddot q + C \dot q + K q = 0`. A
 `Motion` has :math:`A = M^{-1/2} K M^{-1/2}` and :math:`G = M^{-1/2} C M^{-1/2}` on the coordinates that feel a force.
@@ -9,105 +9,20 @@ A motion :math:`e^{st}` has :math:`s^2 + s G + A` singular; the mean square disp
 (:mod:`~faultgouge.analysis.operators.sliders`). Two linear systems are their neighbours: all stick, with K and C; or
 all slide on for ever, with :math:`K + G Y` and :math:`C + G Z`, since then the play :math:`p = Y q + Z \dot q`.
 Neither bounds what contacts do that stick and slide in turn.
-
-**What grows** beyond rounding is said by :mod:`~faultgouge.analysis.motion.eigenvalues`, of A without dissipation, and
-of the first-order matrix Z in coordinates of the energy (:mod:`~faultgouge.analysis.motion.energy_norm`) with it. A
-motion that no force opposes has s = 0 twice, in one block of Jordan's: rounding turns that into a pair of either sign.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import eig, eigvals
-from scipy.sparse import bsr_array, csc_array, csr_array, eye_array
+from scipy.sparse import bsr_array, csr_array
 
 from ..arrays import Floats, Indices
 from ..configuration import Configuration, HasConfiguration
-from ..factors.sparse_lu import SingularMatrixError, general_lu
 from ..operators.sliders import sliders_of, with_sticking_contacts
 from ..operators.stiffness import stiffness_matrix
-from .decay import FACTORED, Decay, follow_decay
-from .eigenvalues import (
-    SAFETY,
-    Complexes,
-    active_coordinates,
-    growing,
-    growing_undamped,
-    mass_weighted,
-    operator_rounding,
-    zero_uncertainty,
-)
+from .eigenvalues import active_coordinates, mass_weighted
 from .energy_norm import EnergyNorm
-from .fastest_growing import CONVERGED, fastest_growing
-from .modes import Modes
-
-SLICED = 2000
-"""Coordinates beyond which `spectrum` takes the eigenvalues of K in slices, and beyond which `Motion` has the fastest
-growing motions alone. Of 870 coordinates of disks LAPACK takes 0.4 of the time of slices, of 900 of spheres 0.3, and
-with the growth of both the times are the same at 2,000 and at 2,900."""
-
-DENSE_DAMPED = 1000
-"""Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, some seconds; of more those
-of the fastest growing motions, and of slow ones."""
-
-DECAY_UP_TO = 6000
-"""Coordinates up to which `Motion.rates` finds out whether all other motion decays; of more, who wants to know calls
-:func:`~faultgouge.analysis.motion.decay.follow_decay`, which may take minutes."""
-
-PERIODS_OF_LARGE = 2e6
-"""Periods of the fastest motion in which growth is looked for, times the number of coordinates, with spaces of one
-vector. It takes three seconds without dissipation, fourteen with it, and 35 where many motions grow alike and none
-converges."""
-
-VALUE_STEPS, VALUE_ERROR = 12, 1e-9
-"""Steps of Newton's method at the most, and the relative change of s after which it ends."""
-
-LONGEST_SEARCH = 300.0
-"""Periods of the fastest motion at the most."""
-
-FREE_SHARE = 1e-6
-"""Eigenvalues s below this share of the largest are those of motions that no force opposes: rounding leaves sqrt(u) of
-a double zero."""
-
-
-@dataclass(frozen=True, eq=False)
-class Rates:
-    """The eigenvalues s of small motion, those with Im s >= 0; each is uncertain by `uncertainty`.
-
-    Attributes
-    ----------
-    values : ndarray of complex, shape (m,)
-        s, the fastest growing first, 1 / time. Motions that no force opposes are left out.
-    grows : ndarray of bool, shape (m,)
-        Those with Re s > 0 beyond rounding.
-    free : int
-        Number of motions that no force opposes, and that drift.
-    searched : float
-        Growth rate of D, 1 / time, below which growth was not looked for; 0 where all eigenvalues are known, or nothing
-        else grows.
-    decay : Decay or None
-        What became of a random state, where not all eigenvalues are known.
-    """
-
-    values: Complexes
-    grows: NDArray[np.bool_]
-    free: int
-    searched: float = 0.0
-    decay: Decay | None = None
-
-    def decided(self, decay: Decay) -> "Rates":
-        """Where no motion was found to grow: with what has become of a random state, and of slow motions."""
-        followed = np.array([0.5 * decay.growth_rate], complex)  # where the slow motions do not say so
-        values = decay.slow if len(decay.slow) and (not decay.grows or decay.slowest > 0) else followed
-        grows = values.real > 0 if decay.grows else np.zeros(len(values), bool)
-        return Rates(values, grows, decay.free, decay.searched, decay)
-
-    @property
-    def growth_rate(self) -> float:
-        """Of D, 1 / time: the largest 2 Re s; zero where no eigenvalue is known, as none was found to grow."""
-        return 2 * float(self.values.real.max(initial=-np.inf)) if len(self.values) else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,95 +113,3 @@ class Motion:
     def first_order(self) -> Floats:
         """Z, the dense matrix of the first-order system in coordinates of the energy, shape (2E, 2E), 1 / time."""
         return self.energy_norm.first_order(self.stiffness, self.damping)
-
-    @cached_property
-    def rates(self) -> Rates:
-        """Eigenvalues s: all, by LAPACK, or of large systems those of the fastest growing motions."""
-        size = len(self.active)
-        if not size:
-            return Rates(np.zeros(0, complex), np.zeros(0, bool), 0)
-        if size <= (DENSE_DAMPED if self.dissipative else SLICED):
-            return self._damped_rates() if self.dissipative else self._undamped_rates()
-        found = self._fastest()
-        decides = self.dissipative and size <= DECAY_UP_TO and not found.grows.any()
-        return found.decided(follow_decay(self)) if decides else found
-
-    def _fastest(self) -> Rates:
-        """Of motions that surely grow; the others are not known."""
-        damping = self.in_blocks(self.damping) if self.dissipative else None
-        length = min(LONGEST_SEARCH, PERIODS_OF_LARGE / len(self.active))
-        periods = min(30.0, length), length
-        found = fastest_growing(self.in_blocks(self.stiffness), damping, count=1, periods=periods)
-        values = found.values if self.dissipative else 1j * np.sqrt(found.values.astype(complex))
-        small = len(self.active) <= FACTORED[self.configuration.dimension]
-        if self.dissipative and small and len(values) and found.residuals[0] > CONVERGED:
-            values = self._value_about(found.vectors[:, 0], values, 0.5 * found.limit)
-        values = np.where(values.real < 0, -values, values)
-        return Rates(values, np.ones(len(values), bool), 0, found.limit)
-
-    def _value_about(self, shape: Complexes, otherwise: Complexes, least: float) -> Complexes:
-        """s of a motion of about this shape, in an array of one: Newton's method for (s^2 + s G + A) x = 0.
-
-        A search that has not converged, as many motions grow nearly alike, has s with an error of its own size, but
-        knows the `least` Re s of the fastest. If Newton's method does not converge to a motion that grows, the result
-        is `otherwise`, the s of the search.
-        """
-        a, g, x = self.stiffness, self.damping, shape / np.linalg.norm(shape)
-        s = max(np.roots([1.0, np.vdot(x, g @ x), np.vdot(x, a @ x)]), key=lambda root: root.real)
-        s += max(least - s.real, 0.0)
-        for _ in range(VALUE_STEPS):
-            try:
-                factors = general_lu(csc_array(a + s * g + s * s * eye_array(len(x))))
-            except SingularMatrixError:
-                break
-            y = factors.solve(g @ x + 2 * s * x)
-            step = 1 / np.vdot(x, y)
-            s, x = s - step, y / np.linalg.norm(y)
-            if abs(step) <= VALUE_ERROR * abs(s):
-                return np.array([s]) if s.real > 0 else otherwise
-        return otherwise
-
-    def _undamped_rates(self) -> Rates:
-        modes = Modes.of_matrix(self.stiffness)
-        values, overlap = modes.values, modes.overlap
-        rounding = operator_rounding(self.configuration, self.stiffness.data)
-        zero = zero_uncertainty(self.configuration, rounding)
-        oscillates, buckles = growing_undamped(values, overlap, rounding, zero)
-        grows, kept = oscillates | buckles, values.imag >= 0
-        free = ~grows & (np.abs(values) <= zero)
-        s = 1j * np.sqrt(np.where(grows, values, np.abs(values.real)).astype(complex))
-        s = np.where(s.real < 0, -s, s)  # of a pair of roots the one that grows
-        order = np.flatnonzero(kept & ~free)
-        order = order[np.argsort(-s[order].real, kind="stable")]
-        return Rates(s[order], grows[order], int(free.sum()))
-
-    def _damped_rates(self) -> Rates:
-        z = self.first_order
-        values, rounding = eigvals(z, check_finite=False), operator_rounding(self.configuration, z)
-        largest = np.abs(values).max()
-        grows = values.real > np.sqrt(SAFETY * rounding * largest)  # no double eigenvalue is as uncertain
-        if np.any(~grows & (values.real > 0) & (np.abs(values) > FREE_SHARE * largest)):
-            # vectors take three times as long as eigenvalues
-            values, left, right = eig(z, left=True, check_finite=False)
-            grows = growing(values, np.abs(np.sum(left.conj() * right, axis=0)), rounding)
-        drifts = self._drifts(z, values, grows)
-        grows &= ~drifts
-        free = drifts | (~grows & (np.abs(values) <= FREE_SHARE * largest))
-        order = np.flatnonzero((values.imag >= 0) & ~free)
-        order = order[np.argsort(-values[order].real, kind="stable")]
-        return Rates(values[order], grows[order], int(free.sum()) // 2)
-
-    def _drifts(self, z: Floats, values: Complexes, grows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which s that seem to grow are those of motions that no force opposes, as forces are not in balance.
-
-        The imbalance leaves such a motion an eigenvalue -s (s + g) of A, with the damping g that the motion feels.
-        """
-        zero = zero_uncertainty(self.configuration, operator_rounding(self.configuration, self.stiffness.data))
-        drifts = grows & (np.abs(values) ** 2 <= zero)
-        if drifts.any():
-            vectors = eig(z, check_finite=False)
-            for k in np.flatnonzero(drifts):
-                velocity = vectors[1][len(self.active) :, np.argmin(np.abs(vectors[0] - values[k]))]
-                loss = np.vdot(velocity, self.damping @ velocity) / np.vdot(velocity, velocity)
-                drifts[k] = abs(values[k] * (values[k] + loss)) <= zero
-        return np.asarray(drifts)

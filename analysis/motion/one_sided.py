@@ -233,8 +233,7 @@ class OneSidedSystem:
     @cached_property
     def _two_derivatives(self) -> Indices:
         """Numbers of the contacts whose derivatives differ while they close and while they part."""
-        contacts = self.motion.configuration.contacts
-        return np.flatnonzero(np.any(contacts.closing != contacts.parting, axis=1))
+        return np.flatnonzero(self.motion.configuration.contacts.two_derivatives)
 
     @cached_property
     def sliders(self) -> tuple[csr_array, csr_array, csr_array, Floats, NDArray[np.bool_]]:

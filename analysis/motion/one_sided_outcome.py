@@ -60,7 +60,7 @@ LATE = 12
 packing of spheres."""
 
 
-SPANS = 8
+SLIP_SPANS = 8
 """Spans of the time, over the last four of which slips are to fall with the slowest vibration."""
 
 FALLS = 0.5
@@ -111,7 +111,7 @@ def follow_pushes(
         report_progress(f"one-sided motion: t = {state.time:.4g}, D = {seen[1][-1].max():.3g} push^2")
         grows, left = _outcome(*seen, slid, sticking_grows), 0.0
         if grows is None and sticking < 0 and not sticking_grows:
-            left = _slip_left(slid, float(np.exp(0.5 * sticking * state.time / SPANS)))
+            left = _slip_left(slid, float(np.exp(0.5 * sticking * state.time / SLIP_SPANS)))
             grows = False if left < LEFT else None
         if time is None and grows is not None:
             break
@@ -176,13 +176,13 @@ def _slip_left(slid: list[Floats], decay: float) -> float:
     slid : list of ndarray, shape (B, P)
         p at equal times.
     decay : float
-        Factor by which the slowest vibration falls in one of `SPANS` spans.
+        Factor by which the slowest vibration falls in one of `SLIP_SPANS` spans.
     """
     if len(slid) <= 2 * LOOKS_PER_CHUNK:
         return np.inf
-    places = np.linspace(0, len(slid) - 1, SPANS + 1).round().astype(int)
+    places = np.linspace(0, len(slid) - 1, SLIP_SPANS + 1).round().astype(int)
     whole = np.array([slid[place].sum(axis=0) for place in places])
-    steps = np.diff(whole, axis=0)[SPANS // 2 :]
+    steps = np.diff(whole, axis=0)[SLIP_SPANS // 2 :]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = np.nan_to_num(steps[1:] / steps[:-1], nan=0.0)
     if np.any(ratios > decay**FALLS):

@@ -14,6 +14,7 @@ from .eigenvalues import Complexes
 from .matrix_functions import WELL_CONDITIONED, BlockDiagonal, Function, second_order
 from .motion import Motion
 from .oscillator import Oscillator, released_motion
+from .rates import rates_of
 from .response import LinearMotion
 
 Norm = Literal["displacement", "energy"]
@@ -61,7 +62,7 @@ class NoGainError(FaultgougeError):
 
 def stable_motion(packing: HasConfiguration) -> LinearMotion:
     """The motion of a packing; NoGainError if the packing is unstable."""
-    if Motion.of(packing).rates.grows.any():
+    if rates_of(Motion.of(packing)).grows.any():
         raise NoGainError("the packing is unstable: some motion grows for ever, and no gain is the largest")
     return LinearMotion.of(packing)
 

@@ -44,6 +44,7 @@ from .eigenvalues import operator_rounding, zero_uncertainty
 from .next_change import next_change
 from .one_sided import OneSidedSystem, least_scale
 from .one_sided_outcome import window_and_most
+from .rates import rates_of
 
 SAMPLES_OF_WINDOW = 400
 """Velocities that a window of a load that rises has."""
@@ -189,7 +190,7 @@ def steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Flo
     else:
         return None
     if len(way):
-        found = replace(motion, stiffness=stiffness).rates
+        found = rates_of(replace(motion, stiffness=stiffness))
         if found.searched or found.grows.any():
             return None
     return velocity

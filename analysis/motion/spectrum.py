@@ -63,9 +63,11 @@ from .eigenvalues import (
     operator_rounding,
     zero_uncertainty,
 )
+from .growth_in_words import exponential
 from .modes import Mode, Modes, growth_rate
-from .motion import SLICED, Motion, Rates
+from .motion import Motion
 from .no_verdict import no_verdict
+from .rates import SLICED, Rates, rates_of
 
 DENSE_LARGEST = 900
 """Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
@@ -124,6 +126,13 @@ class Spectrum(TableDisplay):
 
     @property
     def _verdict(self) -> str:
+        """What eigenvalues say, and that contacts have two derivatives, if they do."""
+        two = not self._doubts and self.packing.configuration.contacts.two_derivatives.any()
+        more = "; contacts have two derivatives, of which K has the mean (`stability` says what that leaves out)"
+        return self._growth + (more if two else "")
+
+    @property
+    def _growth(self) -> str:
         """Growth with dissipation first, without it second; with contacts at the bound the rates of both neighbours."""
         contacts = self.packing.configuration.contacts
         pairs, negative = counted(len(self.pairs), "complex pair"), counted(len(self.negative), "negative eigenvalue")
@@ -132,18 +141,21 @@ class Spectrum(TableDisplay):
         if self._doubts:
             return f"not known whether the packing is stable: {'; '.join(self._doubts)}; {alone}"
         if contacts.one_sided.any():
-            stick, slide = (Motion.of(self.packing, sliding=on).rates.growth_rate for on in (False, True))
+            rates = (rates_of(Motion.of(self.packing, sliding=on)) for on in (False, True))
+            stick, slide = (exponential(each.growth_rate, 4, each.at_least) for each in rates)
             count = int(contacts.one_sided.sum())
             slides = "slides on ahead and sticks" if count == 1 else "slide on ahead and stick"
             return (
                 f"{counted(count, 'contact')} at Coulomb's bound {slides} on the way back: "
-                f"neither linear motion decides: D as exp({stick:.4g} t) if all stuck, exp({slide:.4g} t) if all "
+                f"neither linear motion decides: {stick} if all stuck, {slide} if all "
                 f"slid (`stability` follows them); {alone}"
             )
-        if self.damped_growth_rate is None:
+        damped = self._damped
+        if damped is None:
             return "no motion grows" if self.is_stable else f"unstable, D as exp({self.growth_rate():.6g} t): {counts}"
         grows = "every motion decays" if self.is_stable else "unstable"
-        return f"{grows} with the packing's dissipation, D as exp({self.damped_growth_rate:.6g} t); {alone}"
+        rate = exponential(damped.growth_rate, 6, damped.at_least)
+        return f"{grows} with the packing's dissipation, {rate}; {alone}"
 
     def _rows(self) -> dict[str, str]:
         rows = {
@@ -159,6 +171,10 @@ class Spectrum(TableDisplay):
     @property
     def is_stable(self) -> bool | None:
         """Whether no motion grows beyond rounding, with the packing's dissipation.
+
+        Where contacts have one derivative while they close and another while they part, K has the mean of both, and
+        vibration carries particles on in a packing in which no motion grows: :func:`~faultgouge.analysis.stability`
+        says how far.
 
         None where contacts at Coulomb's bound slide on ahead and stick on the way back: no eigenvalue decides, and
         :func:`~faultgouge.analysis.stability` follows their motion. None, too, where no verdict is possible, as of a
@@ -181,7 +197,7 @@ class Spectrum(TableDisplay):
 
     @cached_property
     def _damped(self) -> Rates | None:
-        return Motion.of(self.packing).rates if self.packing.configuration.damped else None
+        return rates_of(Motion.of(self.packing)) if self.packing.configuration.damped else None
 
     @property
     def free(self) -> int:

@@ -88,6 +88,10 @@ class TransientGain:
         No later time has a gain larger than this; inf if no bound is known.
     dimension : int
         2 for disks, 3 for spheres.
+    linear : bool
+        Whether contacts move as K has it. Otherwise the gain leaves out what contacts do that slide on ahead and stick
+        on the way back, or that have two derivatives, of which K has the mean: see
+        :func:`~faultgouge.analysis.stability`.
     """
 
     gain: float
@@ -98,6 +102,7 @@ class TransientGain:
     window: float
     bound: float
     dimension: int = 2
+    linear: bool = True
 
     @property
     def _translations(self) -> Floats:
@@ -164,14 +169,21 @@ def _gain(motion: LinearMotion, norm: Norm) -> TransientGain:
     else:
         displacement[system.active] = system.energy_norm.unweight @ start[:count] / root
         velocity[system.active] = start[count:] / root
-    return TransientGain(size**2, time, displacement, velocity, norm, length, bound, packing.dimension)
+    return TransientGain(
+        size**2, time, displacement, velocity, norm, length, bound, packing.dimension, _is_linear(packing)
+    )
 
 
 def _zero_gain(packing: HasConfiguration, norm: Norm, window: float, bound: float) -> TransientGain:
     """No start grows: K is symmetric, or what it feeds is less than the dissipation takes."""
     rest, start = np.zeros((2, packing.coordinates))
     start[0] = 1.0
-    return TransientGain(1.0, 0.0, start, rest, norm, window, bound, packing.dimension)
+    return TransientGain(1.0, 0.0, start, rest, norm, window, bound, packing.dimension, _is_linear(packing))
+
+
+def _is_linear(packing: HasConfiguration) -> bool:
+    contacts = packing.configuration.contacts
+    return not np.any(contacts.one_sided | contacts.two_derivatives)
 
 
 def _refine_maxima(propagator: Propagator, brackets: list[tuple[float, float]]) -> tuple[float, float, Floats]:

@@ -32,6 +32,7 @@ from ...analysis.configuration import HasConfiguration
 from ...analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, unit_rounding, zero_uncertainty
 from ...analysis.motion.modes import Modes, participation_ratio
 from ...analysis.motion.motion import Motion
+from ...analysis.motion.rates import rates_of
 
 LONE_PARTICIPATION = 1.5
 """Disks that take part in a motion, below which the motion is that of one disk."""
@@ -127,7 +128,7 @@ def linear_state(configuration: Configuration, sliding: bool) -> LinearState:
 def _damped_rate(motion: Motion) -> float:
     """Largest 2 Re s of the motions that more than one disk takes part in."""
     stiffness, damping = motion.stiffness.toarray(), motion.damping.toarray()
-    values = motion.rates.values
+    values = rates_of(motion).values
     for s in values[:TRIED]:
         pencil = s * s * np.eye(len(stiffness)) + s * damping + stiffness
         if _disks(motion, null_vector(pencil)[:, None])[0] >= LONE_PARTICIPATION:

@@ -62,7 +62,7 @@ from ...analysis.motion.eigenvalues import (
     mass_weighted,
     unit_rounding,
 )
-from ...analysis.motion.motion import SLICED
+from ...analysis.motion.rates import SLICED
 from ...pywrap import Equilibrium, Scene
 from ...pywrap.load_path import LoadPath
 from ...pywrap.scenes.study_sections import ModesSection

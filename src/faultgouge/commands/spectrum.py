@@ -146,6 +146,8 @@ def _print_spectrum(
             if gain["displacement"] > 1
             else "no displacement from rest grows"
         )
+        if not gain["linear"]:
+            print("this is the gain of K alone, in which each contact has one derivative; these contacts have two")
     if verbose:
         shares = ", ".join(f"{name.replace('_', ' ')} {share:.3g}" for name, share in verdict.asymmetry.items())
         print(f"what makes K asymmetric, as shares: {shares}")
@@ -206,7 +208,7 @@ def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
         reason = (str(error).splitlines() or ["no reason given"])[0]
         say(f"the transient gain was not found ({type(error).__name__}: {reason}); the eigenvalues are complete")
         return None
-    names = ("time", "window", "bound", "disk")
+    names = ("time", "window", "bound", "disk", "linear")
     gains = {"displacement": displacement.gain, "energy": energy.gain}
     return (
         gains | {name: getattr(displacement, name) for name in names} | {"direction": displacement.direction.tolist()}

@@ -77,6 +77,9 @@ def test_many_that_grow_alike_are_seen_to_grow():
     rate = 2 * abs(np.sqrt(30.0 + 5j).imag)
     assert found.rates[0] == pytest.approx(rate, rel=0.01)
     assert found.residuals[0] < 0.1 * rate / abs(np.sqrt(found.values[0]))
+    assert not found.converged
+    # followed for four times; the fastest of the eighty, which are not orthogonal, grows at 1.001 times this rate
+    assert 0.95 * rate < found.least < 1.001 * rate
 
 
 def test_what_is_slower_than_the_limit_is_not_claimed():

@@ -15,8 +15,9 @@ from scipy.sparse import csr_array
 
 from faultgouge.analysis import Contacts, MindlinLaw, Motion, Packing, one_sided_motion, stability, stiffness_matrix
 from faultgouge.analysis.arrays import derive_frozen
-from faultgouge.analysis.motion import motion as motion_module
+from faultgouge.analysis.motion import rates as rates_module
 from faultgouge.analysis.motion import rising_load
+from faultgouge.analysis.motion import small_motion as small_motion_module
 from faultgouge.analysis.motion import stability as stability_module
 from faultgouge.analysis.motion.eigenvalues import mass_weighted
 from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
@@ -200,8 +201,8 @@ def test_a_motion_that_is_that_of_no_push_has_no_verdict(monkeypatch, scales, st
     """Some contacts count as at the bound and are not, and others are as near to it."""
     at_rest = _three().configuration
     at_rest = derive_frozen(at_rest, load=-at_rest.contact_force)
-    follow = stability_module.follow_pushes
-    monkeypatch.setattr(stability_module, "follow_pushes", lambda *given: follow(*given) | {"scales": scales})
+    follow = small_motion_module.follow_pushes
+    monkeypatch.setattr(small_motion_module, "follow_pushes", lambda *given: follow(*given) | {"scales": scales})
     found = stability(at_rest)
     assert found.stable is stable
     assert any("bring the packing to rest more closely" in each for each in found.reasons) is (stable is None)
@@ -246,7 +247,7 @@ def like_a_large_one(monkeypatch):
     """No eigenvalue is computed, and the search sees fast growth alone."""
     monkeypatch.setattr(stability_module, "LARGE", 0)
     for name, value in {"SLICED": 0, "DENSE_DAMPED": 0, "DECAY_UP_TO": 0, "PERIODS_OF_LARGE": 9 * 30.0}.items():
-        monkeypatch.setattr(motion_module, name, value)
+        monkeypatch.setattr(rates_module, name, value)
 
 
 def stuck_at_rest(**law):
@@ -419,7 +420,7 @@ def test_under_a_rising_load_a_packing_that_is_unstable_is_not_followed():
 
 @pytest.mark.parametrize("time", [-1, 0, np.nan, "long"])
 def test_a_time_that_is_none_is_refused_before_work_starts(time, monkeypatch):
-    monkeypatch.setattr(stability_module, "spectrum", None)
+    monkeypatch.setattr(small_motion_module, "spectrum", None)
     with pytest.raises(ValueError, match=r"The time that motion is followed is a positive number, not "):
         stability(_three(), rise="fx", time=time)
 

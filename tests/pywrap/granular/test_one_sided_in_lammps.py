@@ -293,7 +293,7 @@ def test_motion_holds_up_to_the_push_that_is_said(growing):
 @pytest.mark.parametrize(("dashpot", "seed", "rests"), [(120.0, 4, True), (60.0, 7, False)])
 def test_the_verdict_on_a_random_state_is_that_of_lammps(tmp_path, monkeypatch, dashpot, seed, rests):
     """Spheres as if there were too many for eigenvalues: they rest, or grow so slowly that a search does not see it."""
-    from faultgouge.analysis.motion import motion as motion_module
+    from faultgouge.analysis.motion import rates as rates_module
     from faultgouge.analysis.motion import stability as stability_module
     from faultgouge.pywrap import from_lammps
     from research.lammps_laws.compute import pour, rest
@@ -307,7 +307,7 @@ def test_the_verdict_on_a_random_state_is_that_of_lammps(tmp_path, monkeypatch, 
     slowest = stability(here).growth_rate
     monkeypatch.setattr(stability_module, "LARGE", 0)
     for name, value in {"SLICED": 0, "DENSE_DAMPED": 0, "DECAY_UP_TO": 0, "PERIODS_OF_LARGE": 2e4}.items():
-        monkeypatch.setattr(motion_module, name, value)
+        monkeypatch.setattr(rates_module, name, value)
     told = stability(here)
     assert told.decay.grows is not rests
     assert told.stable is rests
@@ -414,7 +414,7 @@ def pushed_layer(packing, push, times, size=PUSH):
 
     from faultgouge.analysis import mean_square_displacement
     from faultgouge.pywrap import Engine
-    from faultgouge.pywrap.granular.lammps_arrays import owned_array, set_velocity
+    from faultgouge.pywrap.granular.lammps_arrays import set_velocity
     from faultgouge.pywrap.runs.undamped import time_step
 
     dt, found = time_step(packing), []

@@ -1,0 +1,158 @@
+r"""The eigenvalues s of small motion: all, by LAPACK, or of large systems what can be known of them.
+
+**What grows** beyond rounding is said by :mod:`~faultgouge.analysis.motion.eigenvalues`, of A without dissipation, and
+of the first-order matrix Z in coordinates of the energy (:mod:`~faultgouge.analysis.motion.energy_norm`) with it. A
+motion that no force opposes has s = 0 twice, in one block of Jordan's: rounding turns that into a pair of either sign.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eig, eigvals
+
+from ..arrays import Complexes, Floats
+from .decay import Decay, follow_decay
+from .eigenvalues import SAFETY, growing, growing_undamped, operator_rounding, zero_uncertainty
+from .fastest_growing import fastest_growing
+from .modes import Modes
+from .motion import Motion
+
+SLICED = 2000
+"""Coordinates beyond which `spectrum` takes the eigenvalues of K in slices, and beyond which `rates_of` has the fastest
+growing motions alone. Of 870 coordinates of disks LAPACK takes 0.4 of the time of slices, of 900 of spheres 0.3, and
+with the growth of both the times are the same at 2,000 and at 2,900."""
+
+DENSE_DAMPED = 1000
+"""Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, some seconds; of more those
+of the fastest growing motions, and of slow ones."""
+
+DECAY_UP_TO = 6000
+"""Coordinates up to which `rates_of` finds out whether all other motion decays; of more, who wants to know calls
+:func:`~faultgouge.analysis.motion.decay.follow_decay`, which may take minutes."""
+
+PERIODS_OF_LARGE = 2e6
+"""Periods of the fastest motion in which growth is looked for, times the number of coordinates, with spaces of one
+vector. It takes three seconds without dissipation, fourteen with it, and 35 where many motions grow alike and none
+converges."""
+
+LONGEST_SEARCH = 300.0
+"""Periods of the fastest motion at the most."""
+
+FREE_SHARE = 1e-6
+"""Eigenvalues s below this share of the largest are those of motions that no force opposes: rounding leaves sqrt(u) of
+a double zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """The eigenvalues s of small motion, those with Im s >= 0; each is uncertain by `uncertainty`.
+
+    Attributes
+    ----------
+    values : ndarray of complex, shape (m,)
+        s, the fastest growing first, 1 / time. Motions that no force opposes are left out.
+    grows : ndarray of bool, shape (m,)
+        Those with Re s > 0 beyond rounding.
+    free : int
+        Number of motions that no force opposes, and that drift.
+    searched : float
+        Growth rate of D, 1 / time, below which growth was not looked for; 0 where all eigenvalues are known, or nothing
+        else grows.
+    decay : Decay or None
+        What became of a random state, where not all eigenvalues are known.
+    at_least : bool
+        Whether Re s is only known to be no less, as the search for the fastest motion did not converge.
+    """
+
+    values: Complexes
+    grows: NDArray[np.bool_]
+    free: int
+    searched: float = 0.0
+    decay: Decay | None = None
+    at_least: bool = False
+
+    def decided(self, decay: Decay) -> "Rates":
+        """Where no motion was found to grow: with what has become of a random state, and of slow motions."""
+        followed = np.array([0.5 * decay.growth_rate], complex)  # where the slow motions do not say so
+        values = decay.slow if len(decay.slow) and (not decay.grows or decay.slowest > 0) else followed
+        grows = values.real > 0 if decay.grows else np.zeros(len(values), bool)
+        return Rates(values, grows, decay.free, decay.searched, decay)
+
+    @property
+    def growth_rate(self) -> float:
+        """Of D, 1 / time: the largest 2 Re s; zero where no eigenvalue is known, as none was found to grow."""
+        return 2 * float(self.values.real.max(initial=-np.inf)) if len(self.values) else 0.0
+
+
+def rates_of(motion: Motion) -> Rates:
+    """Eigenvalues s: all, by LAPACK, or of large systems those of the fastest growing motions."""
+    size = len(motion.active)
+    if not size:
+        return Rates(np.zeros(0, complex), np.zeros(0, bool), 0)
+    if size <= (DENSE_DAMPED if motion.dissipative else SLICED):
+        return _damped_rates(motion) if motion.dissipative else _undamped_rates(motion)
+    found = _fastest(motion)
+    decides = motion.dissipative and size <= DECAY_UP_TO and not found.grows.any()
+    return found.decided(follow_decay(motion)) if decides else found
+
+
+def _fastest(motion: Motion) -> Rates:
+    """Of motions that surely grow; the others are not known."""
+    damping = motion.in_blocks(motion.damping) if motion.dissipative else None
+    length = min(LONGEST_SEARCH, PERIODS_OF_LARGE / len(motion.active))
+    periods = min(30.0, length), length
+    found = fastest_growing(motion.in_blocks(motion.stiffness), damping, count=1, periods=periods)
+    values = found.values if motion.dissipative else 1j * np.sqrt(found.values.astype(complex))
+    values = np.where(values.real < 0, -values, values)
+    if not found.converged:
+        values = np.array(0.5 * found.least + 1j * values.imag)
+    return Rates(values, np.ones(len(values), bool), 0, found.limit, at_least=not found.converged)
+
+
+def _undamped_rates(motion: Motion) -> Rates:
+    modes = Modes.of_matrix(motion.stiffness)
+    values, overlap = modes.values, modes.overlap
+    rounding = operator_rounding(motion.configuration, motion.stiffness.data)
+    zero = zero_uncertainty(motion.configuration, rounding)
+    oscillates, buckles = growing_undamped(values, overlap, rounding, zero)
+    grows, kept = oscillates | buckles, values.imag >= 0
+    free = ~grows & (np.abs(values) <= zero)
+    s = 1j * np.sqrt(np.where(grows, values, np.abs(values.real)).astype(complex))
+    s = np.where(s.real < 0, -s, s)  # of a pair of roots the one that grows
+    order = np.flatnonzero(kept & ~free)
+    order = order[np.argsort(-s[order].real, kind="stable")]
+    return Rates(s[order], grows[order], int(free.sum()))
+
+
+def _damped_rates(motion: Motion) -> Rates:
+    z = motion.first_order
+    values, rounding = eigvals(z, check_finite=False), operator_rounding(motion.configuration, z)
+    largest = np.abs(values).max()
+    grows = values.real > np.sqrt(SAFETY * rounding * largest)  # no double eigenvalue is as uncertain
+    if np.any(~grows & (values.real > 0) & (np.abs(values) > FREE_SHARE * largest)):
+        # vectors take three times as long as eigenvalues
+        values, left, right = eig(z, left=True, check_finite=False)
+        grows = growing(values, np.abs(np.sum(left.conj() * right, axis=0)), rounding)
+    drifts = _drifts(motion, z, values, grows)
+    grows &= ~drifts
+    free = drifts | (~grows & (np.abs(values) <= FREE_SHARE * largest))
+    order = np.flatnonzero((values.imag >= 0) & ~free)
+    order = order[np.argsort(-values[order].real, kind="stable")]
+    return Rates(values[order], grows[order], int(free.sum()) // 2)
+
+
+def _drifts(motion: Motion, z: Floats, values: Complexes, grows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which s that seem to grow are those of motions that no force opposes, as forces are not in balance.
+
+    The imbalance leaves such a motion an eigenvalue -s (s + g) of A, with the damping g that the motion feels.
+    """
+    zero = zero_uncertainty(motion.configuration, operator_rounding(motion.configuration, motion.stiffness.data))
+    drifts = grows & (np.abs(values) ** 2 <= zero)
+    if drifts.any():
+        vectors = eig(z, check_finite=False)
+        for k in np.flatnonzero(drifts):
+            velocity = vectors[1][len(motion.active) :, np.argmin(np.abs(vectors[0] - values[k]))]
+            loss = np.vdot(velocity, motion.damping @ velocity) / np.vdot(velocity, velocity)
+            drifts[k] = abs(values[k] * (values[k] + loss)) <= zero
+    return np.asarray(drifts)

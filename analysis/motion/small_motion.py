@@ -1,0 +1,167 @@
+r"""What becomes of small motion under a load that is held: by eigenvalues, and by motion that is followed.
+
+Eigenvalues of the linear motion say what sticking contacts do. Contacts at Coulomb's bound, laws with two derivatives,
+and packings whose eigenvalues are not all known are followed: each makes a new outcome of the one before.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..configuration import Configuration
+from .creep import Creep, follow_creep
+from .decay import Decay, follow_decay
+from .motion import Motion
+from .one_sided import LEFT_ALONE, ContactReach, OneSidedSystem
+from .one_sided_outcome import follow_pushes, random_pushes
+from .rates import Rates, rates_of
+from .spectrum import Spectrum, spectrum
+from .verdict import LinearNeighbour, WithoutDissipation
+
+UNSETTLED = (
+    "its residual forces alone take a contact to Coulomb's bound, or open one: bring the packing to rest more closely"
+)
+"""Why there is no verdict where the residual forces alone change a contact."""
+
+
+@dataclass(frozen=True)
+class LinearRates:
+    """Eigenvalues of the linear motions.
+
+    Attributes
+    ----------
+    undamped : WithoutDissipation
+        Of sticking contacts, without dissipation.
+    sticking, sliding : Rates
+        With the dissipation, if all contacts at the bound stick, and if all slide on.
+    one_sided : bool
+        Whether contacts at the bound slide on ahead and stick on the way back.
+    """
+
+    undamped: WithoutDissipation
+    sticking: Rates
+    sliding: Rates
+    one_sided: bool
+
+    @classmethod
+    def of(cls, configuration: Configuration, known: Spectrum | None, large: bool) -> "LinearRates":
+        """Compute them; K's spectrum may be known, and that of a large packing is not computed."""
+        found = spectrum(configuration) if known is None and not large else known
+        undamped, sticking = _without_dissipation(configuration, found)
+        if configuration.damped:
+            sticking = rates_of(Motion.of(configuration))
+        one_sided = bool(configuration.contacts.one_sided.any())
+        sliding = rates_of(Motion.of(configuration, sliding=True)) if one_sided else sticking
+        return cls(undamped, sticking, sliding, one_sided)
+
+
+def _without_dissipation(configuration: Configuration, found: Spectrum | None) -> tuple[WithoutDissipation, Rates]:
+    """Of sticking contacts: what grows without dissipation, and its eigenvalues s."""
+    if found is None:
+        rates = rates_of(Motion.of(configuration, dissipation=False))
+        return WithoutDissipation(rates.growth_rate, None, None, rates.at_least), rates
+    unstable = 1j * np.sqrt(found.unstable)
+    grows = np.ones(len(unstable), bool)
+    rates = Rates(np.where(unstable.real < 0, -unstable, unstable), grows, found.free)
+    return WithoutDissipation(found.growth_rate(), len(found.pairs), len(found.negative)), rates
+
+
+@dataclass(frozen=True)
+class SmallMotion:
+    """What becomes of small motion under a load that is held: `grows` is None if that is not known."""
+
+    grows: bool | None
+    growth_rate: float
+    sticking: LinearNeighbour
+    free: int
+    at_least: bool = False
+    reasons: Sequence[str] = ()
+    one_sided: dict[str, Any] | None = None
+    creep: Creep | None = None
+    largest_push: float | None = None
+    residual_push: float = 0.0
+    decay: Decay | None = None
+
+    @classmethod
+    def of_linear(cls, linear: LinearRates, doubts: Sequence[str] = ()) -> "SmallMotion":
+        """Of linear motion with sticking contacts."""
+        sticking = LinearNeighbour.of(linear.sticking)
+        grows = None if doubts else bool(linear.sticking.grows.any())
+        return cls(grows, sticking.growth_rate, sticking, linear.sticking.free, sticking.at_least, doubts)
+
+
+def follow_small_motion(system: OneSidedSystem, linear: LinearRates, time: float | None, pushes: int) -> SmallMotion:
+    """Follow what eigenvalues do not decide."""
+    outcome = SmallMotion.of_linear(linear)
+    if linear.one_sided:
+        outcome = _after_pushes(outcome, follow_pushes(system, outcome.growth_rate, bool(outcome.grows), time, pushes))
+    elif outcome.grows is False:
+        outcome = _as_contacts_part(outcome, system, time, pushes)
+    known = linear.sticking.decay if time is None else None
+    if outcome.grows is False and known is None and linear.sticking.searched:
+        known = follow_decay(system.motion, time)
+    return outcome if known is None or outcome.grows else _after_decay(outcome, known)
+
+
+def _after_decay(outcome: SmallMotion, decay: Decay) -> SmallMotion:
+    """The outcome where a random state says whether sticking contacts grow."""
+    says = f"{'with sticking contacts ' if outcome.one_sided else ''}{decay}"
+    return replace(
+        outcome,
+        grows=decay.grows if outcome.grows is False else outcome.grows,
+        growth_rate=decay.growth_rate,
+        sticking=LinearNeighbour(decay.growth_rate, decay.searched),
+        free=decay.free,
+        reasons=[*outcome.reasons, *([says] if decay.grows is None else [])],
+        decay=decay,
+    )
+
+
+def _as_contacts_part(linear: SmallMotion, system: OneSidedSystem, time: float | None, pushes: int) -> SmallMotion:
+    """The outcome of linear motion that does not grow: how far it holds, and what laws of two derivatives add."""
+    configuration = system.motion.configuration
+    if configuration.stiffness is not None or not len(configuration.contacts):
+        return linear
+    reach = ContactReach(system)
+    reach.look_closely(system.start(random_pushes(configuration, 1)))
+    most, reasons = reach.largest_scale, [UNSETTLED] if np.isinf(reach.least_scale) else []
+    largest = most if np.isfinite(most) else None
+    found = replace(linear, largest_push=largest, residual_push=reach.residual_scale, reasons=reasons)
+    if system.remembers_nothing:
+        return found
+    creep = follow_creep(system, pushes, time, decay=max(-0.5 * linear.growth_rate, 0.0))
+    if creep.grows:
+        reasons = [
+            f"vibration wears contacts down, and adds more to D within t = {creep.time:.4g} than creep, which adds as "
+            "the square of the time; whether this goes on was not followed"
+        ]
+    return replace(found, creep=creep, reasons=reasons)
+
+
+def _after_pushes(sticks: SmallMotion, found: dict[str, Any]) -> SmallMotion:
+    """The outcome of one-sided motion; unknown, too, if it is the motion after no push of any size."""
+    reasons, (least, most) = [], found["scales"]
+    if found["grows"] is None:
+        reasons.append(
+            f"the motion of contacts at Coulomb's bound has not settled within t = {found['time']:.4g}, where D is "
+            f"{found['amplification']:.3g} times the mean square velocity of the push, and D that grows more slowly "
+            f"than exp({found['searched']:.2g} t) would not have been seen"
+        )
+    elif not found["grows"] and np.isinf(least):
+        reasons.append(UNSETTLED)
+    elif not found["grows"] and least >= most and least > LEFT_ALONE * found["residual_push"]:
+        reasons.append(
+            f"contacts that count as at Coulomb's bound reach it after pushes above {least:.1g} (velocity along an "
+            f"axis) alone, and others reach it, or open, after pushes above {most:.1g}: bring the packing to rest more "
+            "closely"
+        )
+    return replace(
+        sticks,
+        grows=found["grows"],
+        at_least=sticks.at_least and not found["grows"],
+        growth_rate=found["growth_rate"] if found["grows"] else sticks.growth_rate,
+        reasons=reasons,
+        one_sided=found,
+    )

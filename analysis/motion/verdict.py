@@ -1,0 +1,329 @@
+"""The verdict on a packing at rest: whether it moves, in numbers and in sentences."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from ..counted import counted
+from .creep import Creep
+from .decay import Decay
+from .growth_in_words import exponential
+from .one_sided import LEFT_ALONE
+from .rates import Rates
+from .rising_load import vibrate_otherwise
+
+
+@dataclass(frozen=True)
+class LinearNeighbour:
+    """The linear motion with all contacts at the bound alike.
+
+    Attributes
+    ----------
+    growth_rate : float
+        Largest 2 Re s, 1 / time; zero if none was found in a large packing.
+    searched : float
+        Growth rate of D, 1 / time, below which growth was not looked for; 0 if all eigenvalues are known.
+    at_least : bool
+        Whether the growth rate is only known to be no less.
+    """
+
+    growth_rate: float
+    searched: float = 0.0
+    at_least: bool = False
+
+    @classmethod
+    def of(cls, rates: Rates) -> "LinearNeighbour":
+        """The fastest motion."""
+        return cls(rates.growth_rate, rates.searched, rates.at_least)
+
+    def __str__(self) -> str:
+        if self.searched and self.growth_rate <= 0:
+            return f"no growth of D faster than exp({self.searched:.2g} t)"
+        return exponential(self.growth_rate, 4, self.at_least)
+
+
+@dataclass(frozen=True)
+class WithoutDissipation:
+    """The motion without dissipation, of sticking contacts: the eigenvalues of K.
+
+    Attributes
+    ----------
+    growth_rate : float
+        Of D, 1 / time.
+    pairs, negative : int or None
+        Complex pairs, and negative eigenvalues; of large packings these are not counted.
+    at_least : bool
+        Whether the growth rate is only known to be no less.
+    """
+
+    growth_rate: float
+    pairs: int | None
+    negative: int | None
+    at_least: bool = False
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Whether a packing moves.
+
+    Attributes
+    ----------
+    stable : bool or None
+        None: unknown, for the `reasons`.
+    growth_rate : float
+        Of D, 1 / time, with dissipation: largest 2 Re s, negative if every motion decays. Where contacts at the bound
+        make the packing grow, the rate of the one-sided motion.
+    at_least : bool
+        Whether the growth rate is only known to be no less.
+    undamped : WithoutDissipation
+        Without dissipation.
+    at_bound : int
+        Contacts at Coulomb's bound.
+    one_sided : dict or None
+        grows (True, False, None); growth_rate and its error; searched (growth rate of D below which growth would not
+        have been seen; 0 where grows is known); amplification (largest D over the mean square velocity of the push
+        along an axis, time^2, while contacts slid: what moves on may take D further); slip_left (how much of their slip
+        may be still to come, as a share; 0 if they have stopped); time (how long), pushes (how many); residual_push (as
+        below); scales (between which velocities of the push along an axis this holds: with smaller ones contacts that
+        count as at the bound do not reach it, or the residual forces move the packing as well, with larger ones others
+        do, or open; the first is infinite if the residual forces alone take another contact so far). None without
+        contacts that slide on one side.
+    creep : Creep or None
+        How far a push carries particles if contacts have two derivatives, and none is at the bound.
+    largest_push : float or None
+        Where motion does not grow, and no contact slides on one side: velocity of a push along an axis up to which
+        contacts neither reach the bound nor open. None where K is given.
+    residual_push : float
+        Velocity of a push along an axis that moves the particles as far as the residual forces do, where `largest_push`
+        is known.
+    decay : Decay or None
+        What became of a random state with sticking contacts; None where eigenvalues decide.
+    rising : dict or None
+        drift and vibration over the rate of loading, with drift_error and vibration_error; steady; time, None if the
+        motion was not followed but solved for; span, the last part of this time, of which drift and vibration are;
+        other_start: the first five from another start, or None; least_rise, the increase of the load from which on
+        contacts that count as at the bound reach it; next_change, at which the first other contact reaches it or opens,
+        to first order, and next_event, which of the two. None unless asked, and where it was `not_followed`.
+    sticking, sliding : LinearNeighbour
+        If all contacts at the bound stuck, and if all slid on; no bounds of what they do.
+    asymmetry : dict
+        Shares of what makes K asymmetric: tangential_force, lever_arm, overlap; empty where K is given.
+    dissipative : bool
+        Whether there are dashpots or drag.
+    free : int
+        Motions that no force opposes.
+    searched : float
+        Growth rate of D, 1 / time, below which linear growth may not have been seen; 0 if all eigenvalues are known, or
+        if a random state has decayed so far that nothing grows.
+    contacts : int
+        Number of contacts; where K is given, and walls hand out no contacts, of particles that feel something.
+    reasons : tuple of str
+        Why the verdict is unknown.
+    not_followed : str
+        Why the motion under a rising load was not followed, where it was asked for.
+    remarks : tuple of str
+        Those of the Configuration: what of its origin is left out, or other than it seems.
+    """
+
+    stable: bool | None
+    growth_rate: float
+    at_least: bool
+    undamped: WithoutDissipation
+    at_bound: int
+    one_sided: dict[str, Any] | None
+    creep: Creep | None
+    largest_push: float | None
+    residual_push: float
+    decay: Decay | None
+    rising: dict[str, Any] | None
+    sticking: LinearNeighbour
+    sliding: LinearNeighbour
+    asymmetry: dict[str, float]
+    dissipative: bool
+    free: int
+    searched: float
+    contacts: int
+    reasons: tuple[str, ...] = ()
+    not_followed: str = ""
+    remarks: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """The verdict in sentences, the verdict first."""
+        return "\n".join(self.sentences)
+
+    __repr__ = __str__
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """The verdict, what holds without dissipation, what contacts at the bound do, and remarks on the origin."""
+        parts = (
+            self._without_loss, self._at_the_bound, self._by_vibration, self._scales, self._under_the_load, self.remarks
+        )  # fmt: skip
+        return (self._verdict, *chain.from_iterable(parts))
+
+    @property
+    def _verdict(self) -> str:
+        free = f", except for {counted(self.free, 'motion')} that no force opposes" if self.free else ""
+        if not self.contacts:
+            return "no particle touches another or a wall: stability is not defined"
+        if self.stable is None:
+            return f"not known whether the packing is stable: {'; '.join(self.reasons)}"
+        if not self.stable:
+            how = " in spite of the dissipation" if self.dissipative else ""
+            if self.decay is not None and self.decay.grows:
+                return f"unstable: small motion grows{how}: {self.decay}"
+            return f"unstable: small motion grows{how}, {exponential(self.growth_rate, 6, self.at_least)}"
+        if self.one_sided is not None:
+            names = ("pushes", "amplification", "time", "slip_left")
+            pushes, size, time, left = (self.one_sided[name] for name in names)
+            until = "until the contacts have stopped sliding" if not left else "while contacts slide"
+            on = f", and they slide on by {left:.1%} at most as vibration decays" if left else ""
+            sticks = f"; with sticking contacts {self.decay}" if self.decay else ""
+            return (
+                f"stable: each of {pushes} pushes comes to rest{free}; D reaches {size:.3g} times the mean square "
+                f"velocity of the push {until} (followed for t = {time:.4g}{on}){sticks}"
+            )
+        if self.decay is not None:
+            return f"stable: {self.decay}{free}"
+        if self.dissipative and self.growth_rate < 0:
+            motion = "every vibration" if self.creep else "every motion"
+            return f"stable: {motion} decays, the slowest with D as exp({self.growth_rate:.6g} t){free}"
+        if self.creep and not self.dissipative:
+            return f"stable but for creep: no motion grows exponentially{free}"
+        return f"stable: no motion grows{free}"
+
+    @property
+    def _without_loss(self) -> Iterator[str]:
+        u = self.undamped
+        if self.dissipative and u.growth_rate > 0:
+            counts = {"complex pair": u.pairs, "negative eigenvalue": u.negative}
+            what = " and ".join(counted(count, name) for name, count in counts.items() if count)
+            yield f"without dissipation: {what or 'small motion grows'}, {exponential(u.growth_rate, 6, u.at_least)}"
+
+    @property
+    def _has_two_neighbours(self) -> bool:
+        """Whether contacts at the bound slide on ahead and stick on the way back."""
+        return self.one_sided is not None or self.sliding != self.sticking
+
+    @property
+    def _at_the_bound(self) -> Iterator[str]:
+        if self.at_bound == 0:
+            return
+        yield f"{self.at_bound} of {counted(self.contacts, 'contact')} {_is(self.at_bound)} at Coulomb's bound" + (
+            ": each slides on ahead and sticks on the way back"
+            if self._has_two_neighbours
+            else f" and {'slides' if self.at_bound == 1 else 'slide'}"
+        )
+        if self._has_two_neighbours:
+            yield (
+                f"neither of two linear motions decides: if all of them stuck, {self.sticking}; if all slid on, "
+                f"{self.sliding}"
+            )
+
+    @property
+    def _by_vibration(self) -> Iterator[str]:
+        creep = self.creep
+        if creep is None or not self.stable:
+            return
+        says = f": D as ({creep.velocity:.2g} t)^2 times the mean square velocity of the push"
+        if self.dissipative:
+            says = (
+                f", and they stay displaced, by D up to {creep.amplification:.2g} times the mean square velocity of "
+                f"the push within t = {creep.time:.4g}{_later(creep)}"
+            )
+        yield f"contacts bear less after they have closed and parted, so that vibration carries particles on{says}"
+
+    @property
+    def _scales(self) -> Iterator[str]:
+        if self.stable and self.largest_push is not None:
+            yield (
+                f"holds for pushes of {LEFT_ALONE * self.residual_push:.1g} to {self.largest_push:.1g} (velocity along "
+                "an axis): below, residual forces count; above, contacts open or slide"
+            )
+        if self.one_sided is None or self.one_sided["grows"] is not False:
+            return
+        least, most = self.one_sided["scales"]
+        if least < most:
+            yield (
+                f"this is the motion after pushes of {least:.1g} to {most:.1g} (velocity along an axis): below, "
+                "contacts that count as at the bound do not reach it, or residual forces count; above, others reach "
+                "it, or open"
+            )
+        elif self.stable:
+            yield (
+                f"no push is small enough for this motion (below {most:.1g}, where no other contact reaches the bound "
+                f"or opens) and large enough (above {least:.1g}, where residual forces do not count)"
+            )
+
+    @property
+    def _under_the_load(self) -> Iterator[str]:
+        if self.not_followed:
+            yield f"under a load that rises: not followed, since {self.not_followed}"
+        if self.rising is not None:
+            other = self.rising["other_start"]
+            starts = [self.rising, other] if other and vibrate_otherwise(self.rising, other) else [self.rising]
+            says = ", and from another start ".join(map(_drift_and_vibration, starts))
+            least, change, event = (self.rising[name] for name in ("least_rise", "next_change", "next_event"))
+            since = f"; from a rise of {least:.1g} on, where all contacts at the bound have reached it" if least else ""
+            until = "" if change is None else f"; until the load has risen by {change:.2g} (a contact {event})"
+            yield f"under a load that rises at the rate 1: {says}{since}{until}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers for JSON."""
+        return {
+            "stable": self.stable,
+            "growth_rate": self.growth_rate,
+            "at_least": self.at_least,
+            "undamped": vars(self.undamped),
+            "at_bound": self.at_bound,
+            "one_sided": None if self.one_sided is None else _finite(self.one_sided),
+            "creep": None if self.creep is None else vars(self.creep),
+            "largest_push": self.largest_push,
+            "residual_push": self.residual_push,
+            "decay": None if self.decay is None else self.decay.as_dict(),
+            "rising": self.rising,
+            "sticking": vars(self.sticking),
+            "sliding": vars(self.sliding),
+            "asymmetry": self.asymmetry,
+            "free": self.free,
+            "searched": self.searched,
+            "reasons": list(self.reasons),
+            "not_followed": self.not_followed,
+            "remarks": list(self.remarks),
+        }
+
+
+def _finite(numbers: dict[str, Any]) -> dict[str, Any]:
+    """With None in place of numbers that JSON does not have, as of a scale without a bound."""
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return [plain(each) for each in value]
+        return None if isinstance(value, float) and not np.isfinite(value) else value
+
+    return {name: plain(value) for name, value in numbers.items()}
+
+
+def _drift_and_vibration(rising: dict[str, Any]) -> str:
+    steady = "" if rising["steady"] else ", not steady yet"
+    numbers = (
+        f"{name} {rising[name]:.3g}" + (f" \u00b1 {error:.1g}" if (error := rising[f"{name}_error"]) else "")
+        for name in ("drift", "vibration")
+    )
+    return ", ".join(numbers) + steady
+
+
+def _later(creep: Creep) -> str:
+    """How far vibration may carry particles after the time that was followed."""
+    if creep.settled:
+        return ""
+    if creep.limit is None:
+        return ", and farther later"
+    return f"; D may reach {creep.limit:.2g} times before the slowest motion has decayed"
+
+
+def _is(count: int) -> str:
+    return "is" if count == 1 else "are"
