@@ -34,14 +34,19 @@ LIMIT = 1800
 """Seconds for one command on a busy machine."""
 
 
+COPIES = Path(__file__).parent / "pywrap" / "granular"
+"""Tests of what looks into LAMMPS in copies of the process."""
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What is long is slow, too. Tests of several ranks come first: xdist begins with a long run of tests for each
-    worker, so that one worker has all of these and the other does not wait for its turn."""
+    worker, so that one worker has all of these and the other does not wait for its turn. Then come those that copy the
+    process hundreds of times: a copy takes twice as long once other tests have imported what they need."""
     for item in items:
         if item.get_closest_marker("long") is not None:
             item.add_marker("slow")
-    items.sort(key=lambda item: item.get_closest_marker("ranks") is None)
+    items.sort(key=lambda item: (item.get_closest_marker("ranks") is None, COPIES not in item.path.parents))
 
 
 def pytest_collection_finish() -> None:
