@@ -12,7 +12,6 @@ from faultgouge.analysis.motion.decay import follow_decay
 from faultgouge.analysis.motion.motion import Motion
 from faultgouge.analysis.motion.slow_motions import slow_motions
 
-
 STRONG, WEAKER, WITH_DRAG = (2.0, 1.0, None), (0.2, 0.1, None), (0.02, 0.01, 30.0)
 
 
