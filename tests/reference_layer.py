@@ -6,6 +6,16 @@ from pathlib import Path
 
 BIN = Path(sys.executable).parent
 
+
+def on_ranks(ranks: int) -> list[str | Path]:
+    """What comes before a program on several ranks; nothing on one.
+
+    Each rank has a core of its own. Ranks give their core away while they wait, and of two on one core, beside another
+    process, each waits a slice of time for each message: a run of a second then takes twenty.
+    """
+    return [BIN / "mpiexec", "-bind-to", "core", "-n", str(ranks)] if ranks > 1 else []
+
+
 REFERENCE = Path(__file__).parent / "reference" / "packing7.json"
 
 

@@ -30,7 +30,8 @@ def ranks(run: UndampedRun, steps: int, folder: Path) -> Part:
     job = folder / "run.pickle"
     job.write_bytes(pickle.dumps((run, steps)))
     code = "import sys; from faultgouge.assessment.explain.processors import time_ranks; time_ranks(sys.argv[1])"
-    command = [str(program), "-n", "2", sys.executable, "-c", code, str(job)]
+    # each on its own core: ranks that share one wait for each other's turns
+    command = [str(program), "-bind-to", "core", "-n", "2", sys.executable, "-c", code, str(job)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         return Part("MPI", False, f"{reason}: two ranks did not run here", adds, None, same, None)

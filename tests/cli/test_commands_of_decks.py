@@ -153,7 +153,7 @@ ON_TWO_RANKS = [pytest.param(way, 2, marks=() if way in ("if", "error") else pyt
 
 
 @pytest.mark.ranks
-@pytest.mark.parametrize(("way", "ranks"), [*((way, None) for way in EARLY), *ON_TWO_RANKS])
+@pytest.mark.parametrize(("way", "ranks"), [*((way, 1) for way in EARLY), *ON_TWO_RANKS])
 def test_decks_that_end_early(faultgouge, tmp_path, monkeypatch, way, ranks):
     """One sentence, no file of results, no temporary file, no lock."""
     temporary = tmp_path / "temporary"
@@ -170,7 +170,7 @@ def test_decks_that_end_early(faultgouge, tmp_path, monkeypatch, way, ranks):
 
 
 @pytest.mark.ranks
-@pytest.mark.parametrize("ranks", [None, 2])
+@pytest.mark.parametrize("ranks", [1, 2])
 def test_empty_deck(faultgouge, tmp_path, ranks):
     (tmp_path / "empty.in").write_text("")
     assert "No pair_style is in the log" in faultgouge("import", "empty.in", ranks=ranks, code=2).stderr

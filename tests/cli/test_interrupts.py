@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from reference_layer import BIN, LAYER, toml
+from reference_layer import LAYER, on_ranks, toml
 
 from faultgouge.analysis import RunFile
 from fuzz.kills import CommandToKill, start_command
@@ -338,8 +338,7 @@ def settled(faultgouge_here_in, tmp_path_factory):
 
 
 def with_failing_engine(folder, ranks, script, *arguments):
-    launcher = [BIN / "mpiexec", "-n", str(ranks)] if ranks > 1 else []
-    command = [*launcher, sys.executable, "-c", FAILING + script, *map(str, arguments)]
+    command = [*on_ranks(ranks), sys.executable, "-c", FAILING + script, *map(str, arguments)]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
 
 

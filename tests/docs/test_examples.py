@@ -8,7 +8,7 @@ from math import sqrt
 from pathlib import Path
 
 import pytest
-from reference_layer import BIN
+from reference_layer import on_ranks
 
 FOLDER = Path(__file__).parents[2] / "docs" / "examples"
 PAGE = FOLDER.parent / "examples.md"
@@ -112,7 +112,7 @@ def test_slip(printed):
 @pytest.mark.ranks
 def test_two_ranks(printed):
     """The same bits on one rank and on two."""
-    one, two = printed("on_two_ranks"), printed("on_two_ranks", BIN / "mpiexec", "-n", 2)
+    one, two = printed("on_two_ranks"), printed("on_two_ranks", *on_ranks(2))
     assert (number(one, ""), number(two, "")) == (1, 2)
     assert one.split(":")[1] == two.split(":")[1]
     assert number(one, "growth rate") > 0

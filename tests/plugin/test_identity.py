@@ -13,7 +13,7 @@ if "${cn} > 0" then "include ${decks}/dashpots.in"
 fix             move all nve/disc 1.0 ${drag} ${compensated}
 """
 # a layer that is torn off: contacts slide, open and close, disks go round the periodic box, and the
-# neighbour lists are built some 180 times
+# neighbour lists are built thirty times
 RUN = """
 run             500
 write_dump      all custom {} id x y ${{low}} vx vy omegaz d_theta f_floor[3] modify sort id format float %.17g

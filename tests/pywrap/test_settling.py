@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from reference_layer import BIN
+from reference_layer import on_ranks
 from scipy.linalg import eigvalsh
 
 from faultgouge.analysis import MindlinLaw, Packing, spectrum, stiffness_matrix, touching
@@ -134,6 +134,6 @@ def test_same_packing_on_two_ranks(large, tmp_path):
         f"packing = settle(Scene.from_mapping({scene(**LARGE).resolved()!r})).packing\n"
         "if MPI.COMM_WORLD.rank == 0: np.save(sys.argv[1], packing.position)\n"
     )
-    command = [BIN / "mpiexec", "-n", "2", sys.executable, "-c", script, tmp_path / "two.npy"]
+    command = [*on_ranks(2), sys.executable, "-c", script, tmp_path / "two.npy"]
     subprocess.run(command, check=True, timeout=300)
     assert np.array_equal(np.load(tmp_path / "two.npy"), large.packing.position)

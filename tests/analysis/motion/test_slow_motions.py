@@ -14,8 +14,10 @@ from faultgouge.analysis.motion.motion import Motion
 from faultgouge.analysis.motion.rates import rates_of
 from faultgouge.analysis.motion.slow_motions import slow_motions
 
+STRONG, WEAKER, WITH_DRAG = (2.0, 1.0, None), (0.2, 0.1, None), (0.02, 0.01, 30.0)
 
-@pytest.fixture(scope="module", params=[(2.0, 1.0, None), (0.2, 0.1, None), (0.02, 0.01, 30.0)])
+
+@pytest.fixture(scope="module", params=[STRONG, WEAKER, WITH_DRAG])
 def damped(request, reference_packing):
     """100 disks with strong and with weak dashpots, and with drag."""
     cn, ct, drag = request.param
@@ -98,6 +100,7 @@ def test_the_space_of_slow_motions_is_invariant(damped):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("damped", [STRONG, pytest.param(WEAKER, marks=pytest.mark.long), WITH_DRAG], indirect=True)
 def test_rates_of_a_packing_beyond_lapack_have_its_slowest_decay(damped, monkeypatch):
     expected = rates_of(Motion.of(damped))
     assert not expected.grows.any()

@@ -80,7 +80,7 @@ def test_fixes_that_act_as_contacts_do_not_tell(bed, fix, says):
     from faultgouge.pywrap import NotTakenError
 
     with pytest.raises(NotTakenError, match=f"^LAMMPS's forces do not change as K says: .*{says}") as refusal:
-        look(*bed, f"fix trap all {fix}", 30000)
+        look(*bed, f"fix trap all {fix}", 10000)
     assert "\n" not in str(refusal.value)
 
 
@@ -91,7 +91,7 @@ def test_fixes_that_act_as_contacts_do_not_tell(bed, fix, says):
 )  # fmt: skip
 def test_forces_of_places_are_taken_by_differences(bed, fix):
     """The laws of contacts do not have them, which the proof shows; K by differences does, and has a proof."""
-    found = look(*bed, f"fix trap all {fix}", 30000)
+    found = look(*bed, f"fix trap all {fix}", 10000)
     assert found.operators == "differences"
     assert found.proof < 1e-5
     assert found.operator_error < 1e-5
@@ -101,7 +101,7 @@ def test_a_force_of_places_is_in_the_operator(bed):
     """F = -0.2 (x - 1.5) adds 0.2 to each x of K."""
     from faultgouge.analysis import stiffness_matrix
 
-    found, laws = (look(*bed, "fix trap all addforce v_trap 0 0", 30000, prove=prove) for prove in (True, False))
+    found, laws = (look(*bed, "fix trap all addforce v_trap 0 0", 10000, prove=prove) for prove in (True, False))
     assert (found.operators, laws.operators) == ("differences", "laws")
     added = (stiffness_matrix(found) - stiffness_matrix(laws)).toarray()
     expected = np.diag(np.repeat([0.2, 0.0], [len(found), 5 * len(found)]))
@@ -130,7 +130,7 @@ def test_fixes_that_act_on_what_moves(bed, fix, says):
 )
 def test_fixes_without_effect_on_small_motion(bed, fix):
     """Some of them were refused by their names before there was a proof."""
-    found = look(*bed, f"fix trap all {fix}", 30000)
+    found = look(*bed, f"fix trap all {fix}", 10000)
     assert found.operators == "laws"
     assert found.proof < 1e-5
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from granular_packings import command, instance, start, state, with_law
-from reference_layer import BIN
+from reference_layer import on_ranks
 
 
 def test_a_look_changes_nothing(tmp_path):
@@ -76,8 +76,7 @@ run 1995
 
 def run_script(folder: Path, *arguments: object, script: str = "next_run.py", ranks: int = 1) -> None:
     """Run a script, whose threads sleep while they wait, since other processes want the cores."""
-    launcher = [BIN / "mpiexec", "-n", str(ranks)] if ranks > 1 else []
-    words = [*launcher, sys.executable, Path(__file__).with_name(script), *map(str, arguments)]
+    words = [*on_ranks(ranks), sys.executable, Path(__file__).with_name(script), *map(str, arguments)]
     passive = os.environ | {"OMP_WAIT_POLICY": "passive"}
     done = subprocess.run(words, cwd=folder, env=passive, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
