@@ -224,7 +224,7 @@ def test_forces_that_depend_on_all_contacts_of_a_particle(lammps_with):
     model = "mdr 1e4 0.3 3e3 0.0 1.0 0.2 damping mdr 1 tangential linear_history 3e3 1.0 0.7"
     found = from_lammps(lammps_with(COLUMN.format(model=model)))
     assert found.operator_error < 1e-5
-    assert found.proof < 1e-3  # the volume acts one step late: 3e-4 in ten steps, 3e-5 in a hundred short ones
+    assert found.proof < 1e-3  # the volume acts one step late: 3e-4 in long steps, 3e-5 in short ones
     along = abs(stiffness_matrix(found).toarray()[8:12, 8:12])
     far = np.abs(np.subtract.outer(np.arange(4), np.arange(4)))
     assert along[far == 2].min() > 0.01 * along.max()
@@ -291,7 +291,7 @@ def test_cohesive_spheres_in_a_cone(cone, tmp_path):
     assert len(found.contacts) > 0.7 * len(found)  # of pairs; the region hands out none
     assert found.contacts.normal_force.min() < 0  # cohesion
     assert found.operator_error < 1e-5
-    assert found.proof < 1e-5  # ten steps of Verlet, so that no error of the step is in it
+    assert found.proof < 1e-5  # steps of Verlet, so that no error of the step is in it
     # in proportion to the time step, as LAMMPS takes dashpots at the half step; extrapolated to none
     runs = [compare_motion(lmp, found, 0.005, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
     assert runs[0].difference / runs[1].difference == pytest.approx(2, rel=0.1)
