@@ -150,6 +150,6 @@ def _by_differences(lmp: Any, given: Commands | None, *, balance: float, prove: 
     """A Configuration whose K and C are differences of LAMMPS's forces, on one rank."""
     still = still_particles(lmp, given)
     made = derive_frozen(configuration_by_differences(lmp, still), remarks=drag_remarks(still.fixes))
-    refuse_motion(made, balance, still.commands, still.at_walls)
-    proves = prove and made.residual <= BALANCE * force_scale(made, still.at_walls)
+    refuse_motion(made, balance, still.commands)
+    proves = prove and made.residual <= BALANCE * force_scale(made)
     return _proved(lmp, made, still.commands, still.fixes) if proves else made

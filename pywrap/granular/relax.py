@@ -85,18 +85,10 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
     given = None if commands is None else list(commands)
     lines = None if given is None else read_commands(given)
 
-    def scale(found: Configuration) -> float:
-        """A force that is at rest what the mean contact force is."""
-        return (
-            force_scale(found)
-            if found.operators == "laws"
-            else force_scale(found, still_particles(lmp, lines).at_walls)
-        )
-
     still = still_particles(lmp, lines)
     look = partial(take_configuration, lmp, given, {}, slides=False, balance=np.inf, prove=False)
     try:
-        found, _ = bring_to_rest(lmp, look, still.configuration, balance, steps, RATE, "", far=FAR, scale=scale)
+        found, _ = bring_to_rest(lmp, look, still.configuration, balance, steps, RATE, "", far=FAR)
     except NoEquilibriumError as error:
         says = restless_fix(still.commands) or " and ".join(
             f"fix {name} {still.fixes[name]} may drive the packing" for name in acting_fixes(still.fixes)
@@ -104,7 +96,7 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
         if says:
             raise NoEquilibriumError(f"{str(error).rstrip('.')}; {says}.") from error
         raise
-    return found.residual / (scale(found) or 1.0)
+    return found.residual / (force_scale(found) or 1.0)
 
 
 def bring_to_rest(
@@ -117,7 +109,6 @@ def bring_to_rest(
     where: str,
     *,
     far: float = 1.0,
-    scale: Callable[[Configuration], float] = force_scale,
 ) -> tuple[Configuration, float]:
     """Run with drag until the packing rests.
 
@@ -137,8 +128,6 @@ def bring_to_rest(
         What errors say of the load.
     far : float
         Diameters by which particles move in the mean, and then are said to flow.
-    scale : callable
-        The mean contact force of a configuration.
 
     Returns
     -------
@@ -149,7 +138,7 @@ def bring_to_rest(
     """
     dt, turning = float(lmp.extract_global("dt")), lmp.has_style("fix", "viscous/sphere")  # else dashpots alone
     drags = {"faultgouge_drag": "viscous"} | ({"faultgouge_spin": "viscous/sphere"} if turning else {})
-    way, residual, force, rounding = 0.0, np.inf, scale(start), 0.0
+    way, residual, force, rounding = 0.0, np.inf, force_scale(start), 0.0
     mass, squared_radius = float(start.mass[start.free].mean()), float(np.min(start.radius**2))
     fastest = FASTEST * float(start.mass[start.free].min()) / mass
     try:
@@ -171,7 +160,7 @@ def bring_to_rest(
             way += STEPS_BETWEEN_LOOKS * dt * float(speed.mean())
             if force == 0.0 or residual <= max(balance * force, rounding):
                 found = look()
-                force = scale(found)
+                force = force_scale(found)
                 # what touches nothing has no residual; without a load, LAMMPS's forces are those of the drag
                 falls = force == 0.0 and np.linalg.norm(forces + drag_forces) > 0.5 * np.linalg.norm(drag_forces)
                 if found.residual <= max(balance * force, rounding) and not falls:

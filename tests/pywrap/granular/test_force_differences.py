@@ -5,6 +5,7 @@ import pytest
 from granular_packings import LAWS, command, instance
 
 from faultgouge.analysis import damping_matrix, spectrum, stability, stiffness_matrix
+from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 
 
@@ -188,6 +189,27 @@ def test_spheres_in_an_edge_and_in_a_corner_of_a_region(lammps_with, kisses):
         assert found.operator_error < 1e-6
         assert found.proof < 1e-5
         assert verdict.stable
+
+
+def test_rest_is_measured_by_forces_of_walls_too(lammps_with):
+    """Two spheres rest on the floor of a region and hardly press each other: their weight is what is in balance."""
+    from faultgouge.pywrap import from_lammps
+
+    spheres = "create_atoms 1 single 0 0 -5.5\ncreate_atoms 1 single 0.999 0 -5.5"
+    found = from_lammps(lammps_with(BOX.format(spheres=spheres, down="0 0 -1")), balance=1.0)
+    weight = np.pi / 6
+    assert found.wall_force == pytest.approx(weight, rel=1e-3)
+    contacts = derive_frozen(found.contacts, normal_force=np.full(len(found.contacts), 1e-6 * weight))
+    feeble = derive_frozen(found, contacts=contacts)
+
+    def said(out_of_balance: float):
+        load = feeble.load - feeble.net_force
+        load[0, 0, 0] += out_of_balance * weight
+        return stability(derive_frozen(feeble, load=load))
+
+    assert "moves" not in " ".join(said(1e-5).reasons)
+    residual = "the packing moves: the residual force on a particle is 0.00524"
+    assert f"{residual}, the largest force of a contact or a wall 0.524" in said(1e-2).reasons
 
 
 COLUMN = """
