@@ -22,6 +22,7 @@ from .from_lammps import take_configuration
 from .granular_commands import NotTakenError, read_commands
 from .instance_queries import explain_error, require_instance
 from .lammps_arrays import owned_array, rows_of, set_velocity
+from .lammps_steps import set_up_run
 from .look_in_a_copy import can_copy
 
 REST = 1e-8
@@ -139,6 +140,7 @@ def bring_to_rest(
     dt, turning = float(lmp.extract_global("dt")), lmp.has_style("fix", "viscous/sphere")  # else dashpots alone
     drags = {"faultgouge_drag": "viscous"} | ({"faultgouge_spin": "viscous/sphere"} if turning else {})
     way, residual, force, rounding = 0.0, np.inf, force_scale(start), 0.0
+    acting = 0.0, 0.0
     mass, squared_radius = float(start.mass[start.free].mean()), float(np.min(start.radius**2))
     fastest = FASTEST * float(start.mass[start.free].min()) / mass
     try:
@@ -150,9 +152,11 @@ def bring_to_rest(
             rate = float(np.clip(rate, min(SLOWEST, fastest), fastest))
             drag = mass * rate / dt
             spin = drag * squared_radius if turning else 0.0
-            for (name, style), strength in zip(drags.items(), (drag, spin), strict=False):
-                lmp.command(f"fix {name} all {style} {strength:.17g}")
-            _run(lmp, len(start), where)
+            changes, acting = acting != (drag, spin), (drag, spin)
+            if changes:
+                for (name, style), strength in zip(drags.items(), (drag, spin), strict=False):
+                    lmp.command(f"fix {name} all {style} {strength:.17g}")
+            _run(lmp, len(start), where, set_up=changes)
             forces = _on_bodies(lmp, start, ("f", "torque"), (1.0, 1.0))
             drag_forces = _on_bodies(lmp, start, ("v", "omega"), (drag, spin))
             residual = float(np.linalg.norm(np.vstack([forces, drag_forces]), axis=0).max())
@@ -197,11 +201,13 @@ def _refuse_long_steps(found: Configuration, timestep: float, where: str) -> Non
         )
 
 
-def _run(lmp: Any, count: int, where: str) -> None:
+def _run(lmp: Any, count: int, where: str, *, set_up: bool) -> None:
     """Some steps, at the end of which there are as many particles."""
-    began = lmp.extract_global("ntimestep")
+    began = lmp.extract_global("ntimestep") + set_up
     try:
-        lmp.command(f"run {STEPS_BETWEEN_LOOKS} post no")
+        if set_up:
+            set_up_run(lmp)
+        lmp.command(f"run {STEPS_BETWEEN_LOOKS} pre no post no")
     except Exception as error:  # LAMMPS raises what its bindings choose
         raise NotTakenError(f"While the packing came to rest{where}, {explain_error(error)}") from error
     if lmp.extract_global("ntimestep") != began + STEPS_BETWEEN_LOOKS:
