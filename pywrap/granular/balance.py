@@ -84,9 +84,11 @@ def known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
         return f"{says}, and run on"
     if touch_twice(contacts.i[~contacts.wall], contacts.j[~contacts.wall]):
         return TWICE
-    if commands.write_restart and commands.style != OWN:
+    if commands.after_run.startswith("rerun"):
+        return f"{commands.after_run!r} puts the positions of a dump, which has no tangential histories: leave it out"
+    if commands.after_run and commands.style != OWN:
         return (
-            f"{commands.write_restart!r} stands after the last run, where LAMMPS forgets tangential histories if "
+            f"{commands.after_run!r} stands after the last run, where LAMMPS forgets tangential histories if "
             "its lists of neighbours have changed since: have the run itself write the restart, by `restart N FILE` "
             "before it"
         )
