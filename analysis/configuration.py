@@ -95,6 +95,8 @@ class Configuration:
     jump : array_like, shape (N,), optional
         Difference of the one-sided derivatives of the force on each particle, of which K and C have the mean, as a
         share of the largest entry; zero by default.
+    wall_force : array_like, shape (N,), optional
+        Size of the force on each particle of walls whose contacts are not known, force; zero by default.
     constraint : scipy.sparse.csr_array, shape (coordinates, coordinates), optional
         P of q = P Q; by default the identity, but for particles that are not free.
     spring : float
@@ -136,6 +138,7 @@ class Configuration:
     damping: csr_array | None
     operator_error: float
     jump: Floats
+    wall_force: Floats
     constraint: csr_array | None
     spring: float
     slips_known: bool
@@ -166,6 +169,7 @@ class Configuration:
         damping: csr_array | None = None,
         operator_error: float = 0.0,
         jump: ArrayLike | None = None,
+        wall_force: ArrayLike | None = None,
         constraint: csr_array | None = None,
         spring: float = 0.0,
         slips_known: bool = True,
@@ -199,6 +203,7 @@ class Configuration:
             drag_rate=number("drag_rate", drag_rate),
             operator_error=number("operator_error", operator_error),
             jump=floats("jump", np.zeros(n) if jump is None else jump, (n,)),
+            wall_force=floats("wall_force", np.zeros(n) if wall_force is None else wall_force, (n,)),
             **{name: None if each is None else square(name, each, size) for name, each in matrices.items()},
             spring=number("spring", spring),
             slips_known=bool(slips_known),
@@ -284,6 +289,11 @@ class Configuration:
     def normal_force(self) -> Floats:
         """f_n of each contact, force, shape (C,)."""
         return self.contacts.normal_force
+
+    @property
+    def largest_force(self) -> float:
+        """The largest normal force of a contact, or force of walls on a particle, as far as these are known."""
+        return float(max(self.normal_force.max(initial=0.0), self.wall_force.max()))
 
     @property
     def branch(self) -> Floats:

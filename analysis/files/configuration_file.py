@@ -32,8 +32,11 @@ if TYPE_CHECKING:
 SCALARS = ("dimension", "fx", "load_error", "drag_rate", "spring", "operator_error", "slips_known")
 ARRAYS = (
     "position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind", "top", "jump",
+    "wall_force",
 )  # fmt: skip
-LATER = ("slider", "viscous_slider", "top", "drag_rate", "spring", "operator_error", "jump", "slips_known")
+LATER = (
+    "slider", "viscous_slider", "top", "drag_rate", "spring", "operator_error", "jump", "wall_force", "slips_known",
+)  # fmt: skip
 """Fields that files of version 1 do not have."""
 
 MATRICES = ("stiffness", "damping", "constraint")

@@ -22,7 +22,7 @@ itself noise is uncertain by a factor of two or so.
 """
 
 IN_BALANCE = 1e-4
-"""Residual force over the largest normal force up to which a packing is in equilibrium. Dumps with few digits leave
+"""Residual force over the largest force up to which a packing is in equilibrium. Dumps with few digits leave
 1e-6; a packing before it is brought to rest, 1e-2 and more."""
 
 
@@ -53,9 +53,10 @@ def operator_rounding(packing: HasConfiguration, matrix: Floats | Complexes) -> 
 
 def in_balance(packing: HasConfiguration) -> bool:
     """Whether what is left of the forces on a particle is rounding, of a dump's digits at most."""
-    if not len(packing.normal_force) and packing.configuration.stiffness is not None:
+    force = packing.configuration.largest_force
+    if not force and packing.configuration.stiffness is not None:
         return True  # no force is known to compare with; whoever measured K has looked
-    return packing.residual <= IN_BALANCE * float(packing.normal_force.max(initial=0.0))
+    return packing.residual <= IN_BALANCE * force
 
 
 def zero_uncertainty(packing: HasConfiguration, rounding: float) -> float:

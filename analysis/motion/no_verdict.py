@@ -21,5 +21,5 @@ def no_verdict(configuration: Configuration) -> Iterator[str]:
     if not in_balance(configuration):
         yield (
             f"the packing moves: the residual force on a particle is {configuration.residual:.3g}, "
-            f"the largest contact force {configuration.normal_force.max(initial=0.0):.3g}"
+            f"the largest force of a contact or a wall {configuration.largest_force:.3g}"
         )

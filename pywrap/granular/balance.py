@@ -3,14 +3,12 @@
 import numpy as np
 
 from ...analysis import BadInputError, Configuration, LinearisedContacts
-from ...analysis.arrays import Floats, Indices
+from ...analysis.arrays import Indices
 from .granular_commands import OWN, Commands, NotTakenError, without_suffix
 
 BALANCE = 1e-4
 """Share of the mean contact force that may be out of balance: then the motion is that of a packing which comes to rest
 elsewhere, and K says nothing of it."""
-
-NONE: Floats = np.zeros(0)
 
 
 def check_balance(balance: float) -> None:
@@ -19,9 +17,10 @@ def check_balance(balance: float) -> None:
         raise BadInputError(f"balance = {balance:g} is refused: give a share of the mean contact force, from 0 on.")
 
 
-def force_scale(configuration: Configuration, at_walls: Floats = NONE) -> float:
+def force_scale(configuration: Configuration) -> float:
     """The mean normal force of contacts, and of walls whose contacts are not known, by particle; where nothing is
     known, the force of an overlap of 1e-4 of a radius."""
+    at_walls = configuration.wall_force
     forces = np.concatenate([np.abs(configuration.contacts.normal_force), at_walls[at_walls > 0]])
     if len(forces):
         return float(forces.mean())
@@ -30,9 +29,9 @@ def force_scale(configuration: Configuration, at_walls: Floats = NONE) -> float:
     return 1e-4 * float(np.abs(configuration.stiffness.data).max(initial=0.0) * configuration.radius.mean())
 
 
-def refuse_motion(configuration: Configuration, balance: float, commands: Commands, at_walls: Floats = NONE) -> None:
+def refuse_motion(configuration: Configuration, balance: float, commands: Commands) -> None:
     """Refuse a packing that moves, with the particle that is farthest from rest."""
-    force = force_scale(configuration, at_walls)
+    force = force_scale(configuration)
     if not configuration.residual > balance * force:  # an infinite balance allows no number where nothing touches
         return
     size = configuration.particle_residual
@@ -85,9 +84,11 @@ def known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
         return f"{says}, and run on"
     if touch_twice(contacts.i[~contacts.wall], contacts.j[~contacts.wall]):
         return TWICE
-    if commands.write_restart and commands.style != OWN:
+    if commands.after_run.startswith("rerun"):
+        return f"{commands.after_run!r} puts the positions of a dump, which has no tangential histories: leave it out"
+    if commands.after_run and commands.style != OWN:
         return (
-            f"{commands.write_restart!r} stands after the last run, where LAMMPS forgets tangential histories if "
+            f"{commands.after_run!r} stands after the last run, where LAMMPS forgets tangential histories if "
             "its lists of neighbours have changed since: have the run itself write the restart, by `restart N FILE` "
             "before it"
         )

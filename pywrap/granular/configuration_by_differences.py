@@ -27,15 +27,13 @@ class Still(NamedTuple):
     """Particles as they stand, without K and C: both are empty.
 
     `constraint` is P of q = P Q, which the configuration has only where P says more than which particles are free.
-    `commands` and `fixes` are those of the instance. `at_walls` has the size of the force of walls on each particle,
-    shape (N,).
+    `commands` and `fixes` are those of the instance.
     """
 
     configuration: Configuration
     constraint: csr_array
     commands: Commands
     fixes: dict[str, str]
-    at_walls: Floats
 
 
 def configuration_by_differences(lmp: Any, still: Still) -> Configuration:
@@ -48,7 +46,7 @@ def configuration_by_differences(lmp: Any, still: Still) -> Configuration:
     place[:, : made.dimension] = made.position
     bodies = tuple(still.commands.fixes[name] for name, style in still.fixes.items() if without_suffix(style) in BODIES)
     particles = Particles(made.dimension, made.ids, place, made.radius, still.constraint, bodies)
-    measured = measure_operators(lmp, particles, force_scale(made, still.at_walls) or None)
+    measured = measure_operators(lmp, particles, force_scale(made) or None)
     return derive_frozen(
         made,
         stiffness=measured.stiffness,
@@ -82,11 +80,12 @@ def still_particles(lmp: Any, given: Commands | None) -> Still:
         contacts=_forces_of_pairs(found, box_of(lmp)[0], commands.style),
         stiffness=empty,
         damping=empty,
+        wall_force=found["at walls"],
         constraint=moved.needed,
     )
     total = np.stack([found["f"], found["torque"]], axis=1)
     load = np.where(made.free[:, None, None], total, 0.0) - made.contact_force
-    return Still(derive_frozen(made, load=load), moved.constraint, commands, fixes, found["at walls"])
+    return Still(derive_frozen(made, load=load), moved.constraint, commands, fixes)
 
 
 def _forces_of_pairs(found: Arrays, box: Floats, style: str) -> LinearisedContacts:

@@ -53,7 +53,7 @@ def from_lammps(
     balance : float
         Residual that is allowed, as a share of the mean contact force; not negative.
     prove : bool
-        Whether ten steps of LAMMPS in a copy of the process are compared with those of the result, drag left out: its
+        Whether five steps of LAMMPS in a copy of the process are compared with those of the result, drag left out: its
         `proof` is their relative difference (:mod:`~faultgouge.pywrap.granular.motion_proof`). A packing of more than
         1e-3 is refused, and 1e-5 or less is usual. `proof` is None on several ranks or with threads, where no copy can
         be made, and for a packing whose residual exceeds the default balance.
@@ -150,6 +150,6 @@ def _by_differences(lmp: Any, given: Commands | None, *, balance: float, prove: 
     """A Configuration whose K and C are differences of LAMMPS's forces, on one rank."""
     still = still_particles(lmp, given)
     made = derive_frozen(configuration_by_differences(lmp, still), remarks=drag_remarks(still.fixes))
-    refuse_motion(made, balance, still.commands, still.at_walls)
-    proves = prove and made.residual <= BALANCE * force_scale(made, still.at_walls)
+    refuse_motion(made, balance, still.commands)
+    proves = prove and made.residual <= BALANCE * force_scale(made)
     return _proved(lmp, made, still.commands, still.fixes) if proves else made

@@ -60,12 +60,12 @@ def with_one_rank(reason: NotLinearisedError) -> str:
 @dataclass(frozen=True)
 class Commands:
     """What a deck says of contacts and of motion: pair_style with the pair_coeff that hold, fixes and regions by their
-    IDs; and the write_restart that comes after the last run."""
+    IDs; and the write_restart or rerun that comes after the last run."""
 
     pair: tuple[str, ...]
     fixes: dict[str, str]
     regions: dict[str, str] = field(default_factory=dict)
-    write_restart: str = ""
+    after_run: str = ""
 
     @property
     def style(self) -> str:
@@ -86,7 +86,8 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
     NotTakenError
         If no line is a pair_style, or a line that a user gives has a variable in it.
     """
-    style = restart = ""
+    style = after = ""
+    cleared = False
     coefficients: list[str] = []
     fixes: dict[str, str] = {}
     regions: dict[str, str] = {}
@@ -102,6 +103,7 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
             raise NotTakenError(f"{line.strip()!r} has a variable: write its number, as a log of LAMMPS has it.")
         if words[0] == "clear":
             style, coefficients, fixes, regions = "", [], {}, {}
+            cleared = True
         elif words[0] == "pair_style" and len(words) > 1:
             if not style or style.split()[1] != words[1]:
                 coefficients = []
@@ -114,12 +116,14 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
             fixes.pop(words[1], None)
         elif words[0] == "region" and len(words) > 2:
             regions[words[1]] = " ".join(words)
-        elif words[0] in ("run", "minimize", "write_restart"):
-            restart = text.strip() if words[0] == "write_restart" else ""
+        elif words[0] in ("run", "minimize", "write_restart", "rerun"):
+            after = text.strip() if words[0] in ("write_restart", "rerun") else ""
     if not style:
         where = "The log of this LAMMPS has" if log else "The commands have"
+        if cleared:
+            raise NotTakenError(f"{where} no pair_style after `clear`, which takes all away: leave it out.")
         raise NotTakenError(f"{where} no pair_style: {GIVE_LINES}.")
-    return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes, regions, restart)
+    return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes, regions, after)
 
 
 def logged_text(text: str, folder: Path) -> str:

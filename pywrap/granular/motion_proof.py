@@ -1,9 +1,9 @@
 r"""The proof of a Configuration: a few steps of LAMMPS beside the same steps of the linearised packing.
 
 LAMMPS starts from small random velocities, in a copy of the process. The linearised packing, its contacts at Coulomb's
-bound sliding on ahead and sticking on the way back (:mod:`~faultgouge.analysis.motion.one_sided`), starts from the same
-velocities and with the forces that are left at rest, and takes LAMMPS's own steps of velocity Verlet. So no error of
-the step is left, and the step may be as long as a stable one. Dashpots feel the velocities of half steps in LAMMPS's
+bound sliding on ahead and sticking on the way back (:mod:`~faultgouge.pywrap.granular.linear_steps`), starts from the
+same velocities and with the forces that are left at rest, and takes LAMMPS's own steps of velocity Verlet. So no error
+of the step is left, and the step may be as long as a stable one. Dashpots feel the velocities of half steps in LAMMPS's
 styles, and extrapolated ones in mindlin/smooth (fix dashpot/velocities).
 
 K by differences of forces has no contacts at the bound. A model that acts one step late differs by less in shorter
@@ -26,16 +26,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from ...analysis import Configuration
-from ...analysis.arrays import Floats, Indices
+from ...analysis.arrays import Floats
 from ...analysis.counted import counted
-from ...analysis.motion.motion import Motion
-from ...analysis.motion.one_sided import OneSidedSystem
 from .acting_fixes import acting_fixes
 from .granular_commands import GIVE_LINES, NotLinearisedError, NotTakenError
 from .lammps_steps import steps_in_a_copy
+from .linear_steps import LinearForces, linear_forces, linear_steps
 
 BOUND = 1e-3
 """Difference from which on a packing is refused. Packings at rest have 1e-9 to 1e-5, by curvatures and roundings of
@@ -47,18 +45,19 @@ CLOSE = 0.99
 """Share of Coulomb's bound from which on a contact of a packing that creeps may slide: dashpots bear the rest."""
 
 OTHER = 1e-6
-"""Stiffness that is none of contacts, as a share of K's mean diagonal, from which on a packing is refused: far below
-the smallest eigenvalues, some 1e-4 of the largest, and far above rounding, 1e-11 and less."""
+"""Stiffness that is none of contacts, as a share of the mean normal stiffness of contacts, from which on a packing is
+refused: far below the smallest eigenvalues, some 1e-4 of the largest, and far above rounding, 1e-11 and less."""
 
-STEPS_OF_PROOF = 10
+STEPS_OF_PROOF = 5
 """Steps of LAMMPS and of the linearised packing."""
 
 SHORTER_STEPS = 10
 """By how much steps are shorter where a model may act one step late, as the volume of particles does in mdr: then the
 difference falls as the step, and that of a K which is not LAMMPS's does not."""
 
-PHASE = 0.5
-"""A step times a bound of the fastest rate, twice the fastest rate or so: ten steps are half an oscillation of it."""
+PHASE = 1.5
+"""A step times a bound of the fastest rate, some three times the fastest rate: five steps are half an oscillation of
+it. Below 2 steps are stable."""
 
 COMMON = 1.0
 """Velocity that all particles share, in units of their random ones. A fix that changes the total momentum changes this
@@ -173,8 +172,8 @@ class _Comparison:
     ----------
     configuration : Configuration
         The linearised packing.
-    stiffness, damping : scipy.sparse.csr_array, shape (coordinates, coordinates)
-        Its K and C.
+    forces : LinearForces
+        Its forces to first order.
     extrapolates : bool
         Whether dashpots feel velocities of whole steps.
     start : ndarray, shape (coordinates,)
@@ -186,8 +185,7 @@ class _Comparison:
     """
 
     configuration: Configuration
-    stiffness: csr_array
-    damping: csr_array
+    forces: LinearForces
     extrapolates: bool
     start: Floats
     timestep: float
@@ -196,13 +194,13 @@ class _Comparison:
     @classmethod
     def of(cls, configuration: Configuration, *, extrapolates: bool) -> "_Comparison | None":
         """None if nothing that moves has a contact."""
-        stiffness, damping = configuration.assembled_operators()
-        if not stiffness.nnz:
+        forces = linear_forces(configuration)
+        rate = forces.fastest_rate()
+        if not rate:
             return None
-        k, c = (_largest_row(matrix, configuration) for matrix in (stiffness, damping))
-        timestep, start = PHASE / (0.5 * (c + np.sqrt(c * c + 4 * k))), _start(configuration)
+        timestep, start = PHASE / rate, _start(configuration)
         start = start / _deformation(configuration, STEPS_OF_PROOF * timestep * start)
-        return cls(configuration, stiffness, damping, extrapolates, start, timestep)
+        return cls(configuration, forces, extrapolates, start, timestep)
 
     def in_shorter_steps(self) -> "_Comparison":
         """The same motion in more steps."""
@@ -269,80 +267,34 @@ class _Comparison:
             )
             for k, size in enumerate(sizes)
         ]
+        linear = np.column_stack([self._linear_steps(size * self.start) for size in sizes])
         mix = {1: [[1.0]], 2: [[0.5], [-0.5]], 3: [[1.0, 0.0], [0.0, -1.0], [-1.0, 1.0]]}[len(signs)]
         moves = c.coordinate_free | ~np.tile(c.free, c.axes)  # particles that do not move are compared, too
         weight = np.sqrt(c.coordinate_mass) * (moves & ~np.tile(self._rattle & c.free, c.axes))
         seen, expected = (
             weight[:, None] * (each @ mix - amplitude * self.start[:, None])
-            for each in (np.column_stack([end.velocity for end in ends]), self._velocities(sizes))
+            for each in (np.column_stack([end.velocity for end in ends]), linear)
         )
         difference = float((np.linalg.norm(seen - expected, axis=0) / np.linalg.norm(expected, axis=0)).max())
         change = ends[0].force_change
         return difference, 0.0 if change is None else self._other_stiffness(change) / float(np.linalg.norm(way))
+
+    def _linear_steps(self, velocity: Floats) -> Floats:
+        """Velocities of all coordinates after the linear steps."""
+        c = self.configuration
+        return linear_steps(c, self.forces, velocity, self.timestep, self.steps, extrapolates=self.extrapolates)
 
     @property
     def _rattle(self) -> NDArray[np.bool_]:
         return np.isin(np.arange(len(self.configuration)), self.configuration.rattlers)
 
     def _other_stiffness(self, change: Floats) -> float:
-        """Largest change of a force on particles that touch no wall, over the mean of K's diagonal."""
+        """Largest change of a force on particles that touch no wall, over the mean normal stiffness."""
         c = self.configuration
         inside = c.free & ~self._rattle
         inside[c.contacts.i[c.contacts.wall]] = False
         largest = np.abs(change[np.tile(inside, c.axes)]).max(initial=0.0)
-        return float(largest / np.mean(self.stiffness.diagonal()[self._active]))
-
-    @property
-    def _active(self) -> Indices:
-        """Coordinates that feel a force."""
-        return np.flatnonzero(np.diff(self.stiffness.indptr))
-
-    def _velocities(self, sizes: Floats) -> Floats:
-        """Velocities of all coordinates after the linear steps, shape (coordinates, P), from P sizes of the start.
-
-        Forces that are left at rest act, and contacts slide that are a little below Coulomb's bound.
-        """
-        c = self.configuration.contacts
-        if not c.one_sided.any() and np.array_equal(c.closing, c.parting):
-            return self._linear_velocities(sizes)
-        system = OneSidedSystem(Motion.of_matrices(self.configuration, self.stiffness, self.damping))
-        motion, velocity = system.motion, self.start[:, None] * sizes
-        state = system.start(velocity)
-        constant = (self.configuration.coordinate_force[motion.active] / motion.root_mass)[:, None]
-        # p begins with what is missing to the bound, which the force does not lack
-        slack = (c.friction - np.linalg.norm(c.tangential_force, axis=1))[c.one_sided, None]
-        state.p += slack
-        constant = constant + system.sliders[0] @ slack
-        system.take_steps(state, self.timestep, self.steps, constant=constant, extrapolates=self.extrapolates)
-        velocity[motion.active] = state.v / motion.root_mass[:, None]
-        return velocity
-
-    def _linear_velocities(self, sizes: Floats) -> Floats:
-        """The same where no contact has two sides: a few products, where the one-sided equations take as many sparse
-        matrices as the whole look."""
-        mass, active, dt = self.configuration.coordinate_mass[:, None], self._active, self.timestep
-        constant = np.zeros((len(mass), 1))
-        constant[active, 0] = self.configuration.coordinate_force[active]
-
-        def acceleration(displacement: Floats, velocity: Floats) -> Floats:
-            """Of all coordinates."""
-            return np.asarray((constant - self.stiffness @ displacement - self.damping @ velocity) / mass)
-
-        velocity = self.start[:, None] * sizes
-        displacement = np.zeros_like(velocity)
-        change = acceleration(displacement, velocity)
-        for _ in range(self.steps):
-            half = velocity + 0.5 * dt * change
-            displacement += dt * half
-            change = acceleration(displacement, 2 * half - velocity if self.extrapolates else half)
-            velocity = half + 0.5 * dt * change
-        return velocity
-
-
-def _largest_row(matrix: csr_array, configuration: Configuration) -> float:
-    """Largest sum of a row in absolute values, the matrix divided by the roots of the masses on both sides."""
-    scale = 1 / np.sqrt(configuration.coordinate_mass)
-    return float((scale * (abs(matrix) @ scale)).max(initial=0.0))
+        return float(largest / np.mean(c.contacts.normal_stiffness))
 
 
 def _start(configuration: Configuration) -> Floats:

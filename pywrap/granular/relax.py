@@ -22,6 +22,7 @@ from .from_lammps import take_configuration
 from .granular_commands import NotTakenError, read_commands
 from .instance_queries import explain_error, require_instance
 from .lammps_arrays import owned_array, rows_of, set_velocity
+from .lammps_steps import set_up_run
 from .look_in_a_copy import can_copy
 
 REST = 1e-8
@@ -85,18 +86,10 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
     given = None if commands is None else list(commands)
     lines = None if given is None else read_commands(given)
 
-    def scale(found: Configuration) -> float:
-        """A force that is at rest what the mean contact force is."""
-        return (
-            force_scale(found)
-            if found.operators == "laws"
-            else force_scale(found, still_particles(lmp, lines).at_walls)
-        )
-
     still = still_particles(lmp, lines)
     look = partial(take_configuration, lmp, given, {}, slides=False, balance=np.inf, prove=False)
     try:
-        found, _ = bring_to_rest(lmp, look, still.configuration, balance, steps, RATE, "", far=FAR, scale=scale)
+        found, _ = bring_to_rest(lmp, look, still.configuration, balance, steps, RATE, "", far=FAR)
     except NoEquilibriumError as error:
         says = restless_fix(still.commands) or " and ".join(
             f"fix {name} {still.fixes[name]} may drive the packing" for name in acting_fixes(still.fixes)
@@ -104,7 +97,7 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
         if says:
             raise NoEquilibriumError(f"{str(error).rstrip('.')}; {says}.") from error
         raise
-    return found.residual / (scale(found) or 1.0)
+    return found.residual / (force_scale(found) or 1.0)
 
 
 def bring_to_rest(
@@ -117,7 +110,6 @@ def bring_to_rest(
     where: str,
     *,
     far: float = 1.0,
-    scale: Callable[[Configuration], float] = force_scale,
 ) -> tuple[Configuration, float]:
     """Run with drag until the packing rests.
 
@@ -137,8 +129,6 @@ def bring_to_rest(
         What errors say of the load.
     far : float
         Diameters by which particles move in the mean, and then are said to flow.
-    scale : callable
-        The mean contact force of a configuration.
 
     Returns
     -------
@@ -149,7 +139,8 @@ def bring_to_rest(
     """
     dt, turning = float(lmp.extract_global("dt")), lmp.has_style("fix", "viscous/sphere")  # else dashpots alone
     drags = {"faultgouge_drag": "viscous"} | ({"faultgouge_spin": "viscous/sphere"} if turning else {})
-    way, residual, force, rounding = 0.0, np.inf, scale(start), 0.0
+    way, residual, force, rounding = 0.0, np.inf, force_scale(start), 0.0
+    acting = 0.0, 0.0
     mass, squared_radius = float(start.mass[start.free].mean()), float(np.min(start.radius**2))
     fastest = FASTEST * float(start.mass[start.free].min()) / mass
     try:
@@ -161,9 +152,11 @@ def bring_to_rest(
             rate = float(np.clip(rate, min(SLOWEST, fastest), fastest))
             drag = mass * rate / dt
             spin = drag * squared_radius if turning else 0.0
-            for (name, style), strength in zip(drags.items(), (drag, spin), strict=False):
-                lmp.command(f"fix {name} all {style} {strength:.17g}")
-            _run(lmp, len(start), where)
+            changes, acting = acting != (drag, spin), (drag, spin)
+            if changes:
+                for (name, style), strength in zip(drags.items(), (drag, spin), strict=False):
+                    lmp.command(f"fix {name} all {style} {strength:.17g}")
+            _run(lmp, len(start), where, set_up=changes)
             forces = _on_bodies(lmp, start, ("f", "torque"), (1.0, 1.0))
             drag_forces = _on_bodies(lmp, start, ("v", "omega"), (drag, spin))
             residual = float(np.linalg.norm(np.vstack([forces, drag_forces]), axis=0).max())
@@ -171,7 +164,7 @@ def bring_to_rest(
             way += STEPS_BETWEEN_LOOKS * dt * float(speed.mean())
             if force == 0.0 or residual <= max(balance * force, rounding):
                 found = look()
-                force = scale(found)
+                force = force_scale(found)
                 # what touches nothing has no residual; without a load, LAMMPS's forces are those of the drag
                 falls = force == 0.0 and np.linalg.norm(forces + drag_forces) > 0.5 * np.linalg.norm(drag_forces)
                 if found.residual <= max(balance * force, rounding) and not falls:
@@ -208,11 +201,13 @@ def _refuse_long_steps(found: Configuration, timestep: float, where: str) -> Non
         )
 
 
-def _run(lmp: Any, count: int, where: str) -> None:
+def _run(lmp: Any, count: int, where: str, *, set_up: bool) -> None:
     """Some steps, at the end of which there are as many particles."""
-    began = lmp.extract_global("ntimestep")
+    began = lmp.extract_global("ntimestep") + set_up
     try:
-        lmp.command(f"run {STEPS_BETWEEN_LOOKS} post no")
+        if set_up:
+            set_up_run(lmp)
+        lmp.command(f"run {STEPS_BETWEEN_LOOKS} pre no post no")
     except Exception as error:  # LAMMPS raises what its bindings choose
         raise NotTakenError(f"While the packing came to rest{where}, {explain_error(error)}") from error
     if lmp.extract_global("ntimestep") != began + STEPS_BETWEEN_LOOKS:

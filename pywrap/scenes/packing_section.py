@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis import BadInputError, MindlinLaw, Packing, PackingFileError, RunFile
 from ...analysis.arrays import Floats
-from ...analysis.files.formats import Disks, format_of, is_hdf5, packing_of, upper_layer
+from ...analysis.files.formats import Disks, UpperLayerError, format_of, is_hdf5, packing_of, upper_layer
 from ..lammps.restart_file import read_disks
 from .random_start import layer_size, random_start
 from .validation import Positive, Section, refusal_sentence
@@ -175,8 +175,8 @@ class StoredPacking(Section):
         try:
             upper_layer(read_disks(self.file, self.frame), self.top)
         except BadInputError as error:
-            # the sentence is that of the command `import`
-            says = str(error).rstrip(".").replace("add --top,", "give packing.top:").replace("--top", "packing.top =")
+            says = error.sentence("packing.top", " = ") if isinstance(error, UpperLayerError) else str(error)
+            says = says.rstrip(".")
             raise refusal_sentence("file", f'= "{self.file.name}" is refused: {says}') from None
         return self
 

@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 
+import h5py
 import pytest
 from pile_decks import DECK, FLAT, ROUND
 from reference_layer import BIN
@@ -104,6 +105,19 @@ def test_deck_with_logs_of_its_own(faultgouge_here, tmp_path):
 def test_decks_that_leave_no_commands(faultgouge_here, tmp_path, before, after, says):
     (tmp_path / "mute.in").write_text(DECK.format(**FLAT, word="contacts").replace(before, after))
     assert says in faultgouge_here("import", "mute.in", code=2).stderr
+
+
+def test_deck_that_clears_all(faultgouge_here, tmp_path):
+    (tmp_path / "cleared.in").write_text(DECK.format(**FLAT, word="contacts") + "clear\n")
+    assert "no pair_style after `clear`, which takes all away" in faultgouge_here("import", "cleared.in", code=1).stderr
+
+
+def test_deck_that_moves_its_own_file(faultgouge_here, tmp_path):
+    deck = DECK.format(**FLAT, word="contacts") + "shell mv pile.in done.in\n"
+    (tmp_path / "pile.in").write_text(deck)
+    faultgouge_here("import", "pile.in", "-o", "pile.h5")
+    with h5py.File(tmp_path / "pile.h5") as file:
+        assert file.attrs["deck"] == deck
 
 
 ONCE = """

@@ -297,6 +297,15 @@ def test_restart_after_the_last_run(faultgouge_here, tmp_path):
     assert "by `restart N FILE` before it" in says
 
 
+def test_rerun_after_the_last_run(faultgouge_here, tmp_path):
+    """The positions of a dump come without histories."""
+    dumps = "dump all all custom 20000 pile.dump id x y z\ndump_modify all sort id\nrun 20000"
+    deck = two_on_three().replace("run 20000", dumps)
+    (tmp_path / "again.in").write_text(f"{deck}undump all\nrerun pile.dump dump x y\n")
+    says = faultgouge_here("import", "again.in", code=1).stderr
+    assert "'rerun pile.dump dump x y' puts the positions of a dump, which has no tangential histories" in says
+
+
 def test_deck_of_another_name(faultgouge_here, tmp_path):
     (tmp_path / "pile.lammps").write_text(DECK.format(**FLAT, word="contacts"))
     assert "LAMMPS decks (.in, in.NAME)" in faultgouge_here("import", "pile.lammps", code=2).stderr

@@ -202,8 +202,8 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ({"law": {"kt": 1.0}}, "law.kt stands without kn: give kn"),
         ({"packing": {"file": str(REFERENCE), "seed": 1}}, "packing.seed cannot stand beside packing.file"),
         # of a scene, and not of `import`
-        ({"packing": {"file": SHIPPED}}, "which disks are the upper layer: give packing.top: 12 (the highest"),
-        ({"packing": {"file": SHIPPED, "top": "y>1000"}}, "the upper layer holds no disk (packing.top = y>1000)"),
+        ({"packing": {"file": SHIPPED}}, "which disks are the upper layer: add packing.top, 12 (the highest"),
+        ({"packing": {"file": SHIPPED, "top": "y>1000"}}, "is refused: packing.top = y>1000: this layer of"),
     ],
     ids=lambda value: str(value)[:60],
 )

@@ -9,13 +9,14 @@ from .disks import Disks, Slips, packing_of
 from .export_quantities import Frame, ModeVectors
 from .frames import choose_frames, frames_of
 from .registry import format_of, is_hdf5, read_disks, write_frames, write_packing
-from .upper_layer import upper_layer
+from .upper_layer import UpperLayerError, upper_layer
 
 __all__ = [
     "Disks",
     "Frame",
     "ModeVectors",
     "Slips",
+    "UpperLayerError",
     "choose_frames",
     "format_of",
     "frames_of",

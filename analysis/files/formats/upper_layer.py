@@ -28,6 +28,31 @@ OPERATORS = {"<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": operat
 REGION = re.compile(r"\s*(x|y|radius)\s*(<=|>=|<|>)\s*([-+.\deE]+)\s*")
 
 
+class UpperLayerError(BadInputError):
+    """The upper layer is not given, or its text is not understood, or names what a file does not have.
+
+    Parameters
+    ----------
+    layer : str or None
+        The text, if one is given.
+    reason : str
+        What is wrong, without a stop.
+    """
+
+    def __init__(self, layer: str | None, reason: str) -> None:
+        super().__init__(layer, reason)
+        self.layer, self.reason = layer, reason
+
+    def __str__(self) -> str:
+        return self.sentence("--top")
+
+    def sentence(self, key: str, sign: str = " ") -> str:
+        """The sentence, with the name by which a user gives the layer, and the sign between both."""
+        if self.layer is None:
+            return f"{self.reason}: add {key}, {WAYS}."
+        return f"{key}{sign}{self.layer}: {self.reason}."
+
+
 def upper_layer(disks: Disks, says: str | int | None) -> NDArray[np.bool_]:
     """Select the disks of the upper layer.
 
@@ -46,18 +71,21 @@ def upper_layer(disks: Disks, says: str | int | None) -> NDArray[np.bool_]:
 
     Raises
     ------
-    BadInputError
+    UpperLayerError
         If no upper layer is given, the text is not understood, or it selects no disk.
+    BadInputError
+        If the upper layer of the file holds no disk.
     """
     if says is None:
         if disks.top is None:
-            raise BadInputError(f"{disks.source} does not say which disks are the upper layer: add --top, {WAYS}.")
-        chosen = disks.top
-    else:
-        chosen = _choose_disks(disks, str(says).strip())
+            raise UpperLayerError(None, f"{disks.source} does not say which disks are the upper layer")
+        if not disks.top.any():
+            raise BadInputError(f"{disks.source}: its own column top holds no disk: {_extent(disks)}.")
+        return disks.top
+    text = str(says).strip()
+    chosen = _choose_disks(disks, text)
     if not chosen.any():
-        what = "its own column top" if says is None else f"--top {says}"
-        raise BadInputError(f"{disks.source}: the upper layer holds no disk ({what}): {_extent(disks)}.")
+        raise UpperLayerError(text, f"this layer of {disks.source} holds no disk: {_extent(disks)}")
     return chosen
 
 
@@ -72,7 +100,7 @@ def _choose_disks(disks: Disks, says: str) -> NDArray[np.bool_]:
     if key == "group" and value:
         if value not in disks.groups:
             has = ", ".join(disks.groups) or "none; restarts alone have groups"
-            raise BadInputError(f"--top {says}: {disks.source} has no group {value} (its groups: {has}).")
+            raise UpperLayerError(says, f"{disks.source} has no group {value} (its groups: {has})")
         return disks.groups[value]
     return _region(disks, says)
 
@@ -85,16 +113,16 @@ def _of_type(disks: Disks, says: str, value: str) -> NDArray[np.bool_]:
         return disks.kind == int(value)
     if disks.types:
         has = ", ".join(disks.types)
-        raise BadInputError(f"--top {says}: {disks.source} has no type {value} (its types: {has}).")
+        raise UpperLayerError(says, f"{disks.source} has no type {value} (its types: {has})")
     if disks.kind is None:
-        raise BadInputError(f"--top {says}: {disks.source} has no types; take another of {WAYS}.")
-    raise BadInputError(f"--top {says}: the types of {disks.source} have no names: give a number, as in type:2.")
+        raise UpperLayerError(says, f"{disks.source} has no types; take another of {WAYS}")
+    raise UpperLayerError(says, f"the types of {disks.source} have no names: give a number, as in type:2")
 
 
 def _highest(disks: Disks, count: int) -> NDArray[np.bool_]:
     """The highest disks that touch something; the highest of all disks if too few have a contact."""
     if count > len(disks):
-        raise BadInputError(f"--top {count}: {disks.source} has {len(disks)} disks alone.")
+        raise UpperLayerError(str(count), f"{disks.source} has {len(disks)} disks alone")
     order = np.argsort(-disks.position[:, 1], kind="stable")
     held = ~touching_nothing(disks)[order]
     if held.sum() >= max(count, FEW_TOUCH * len(disks)):
@@ -139,16 +167,16 @@ def _read_list(disks: Disks, says: str, value: str) -> NDArray[np.bool_]:
         try:
             value = read_plain_text(value[1:])
         except (OSError, UnicodeDecodeError) as error:
-            raise BadInputError(f"--top {says}: the file cannot be read ({error}).") from None
+            raise UpperLayerError(says, f"the file cannot be read ({error})") from None
     wanted: set[int] = set()
     for part in re.split(r"[\s,]+", value.strip()):
         match = re.fullmatch(r"(\d+)(?:-(\d+))?", part)
         if not match:
-            raise BadInputError(f"--top {says}: {part} is no ID and no range of IDs, as in ids:1,4,7-9.")
+            raise UpperLayerError(says, f"{part} is no ID and no range of IDs, as in ids:1,4,7-9")
         wanted.update(range(int(match[1]), int(match[2] or match[1]) + 1))
     missing = wanted - set(disks.id.tolist())
     if missing:
-        raise BadInputError(f"--top {says}: {disks.source} has no disk {min(missing)}.")
+        raise UpperLayerError(says, f"{disks.source} has no disk {min(missing)}")
     return np.isin(disks.id, list(wanted))
 
 
@@ -162,7 +190,7 @@ def _region(disks: Disks, says: str) -> NDArray[np.bool_]:
         except ValueError:
             limit = None
         if match is None or limit is None:
-            raise BadInputError(f"--top {says}: it is none of {WAYS}.")
+            raise UpperLayerError(says, f"it is none of {WAYS}")
         chosen &= OPERATORS[match[2]](values[match[1]], limit)
     return chosen
 

@@ -154,11 +154,12 @@ def _import_deck(file: Path, output: Path, slides: bool, balance: float | None, 
     from faultgouge.pywrap.granular.run_deck import run_deck
 
     keeps(f"nothing has been written to {output} yet")
+    text = file.read_text(errors="replace") if file.is_file() else ""  # a deck may move its own file
     with status(f"{file}: LAMMPS runs"):
         allowed = BALANCE if balance is None else balance
         configuration = run_deck(file, slides=slides, balance=allowed, relaxes=relaxes, keep=output)
     if is_root():
-        write_configuration(output, configuration, {"deck": file.read_text(errors="replace")})
+        write_configuration(output, configuration, {"deck": text})
     keeps(f"{output} has been written; whether the packing is stable says `faultgouge spectrum {output}`", output)
     print_line(f"{repr(configuration).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
     print_line(_time_steps(configuration))

@@ -5,6 +5,7 @@ import pytest
 from granular_packings import LAWS, command, instance
 
 from faultgouge.analysis import damping_matrix, spectrum, stability, stiffness_matrix
+from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 
 
@@ -190,6 +191,27 @@ def test_spheres_in_an_edge_and_in_a_corner_of_a_region(lammps_with, kisses):
         assert verdict.stable
 
 
+def test_rest_is_measured_by_forces_of_walls_too(lammps_with):
+    """Two spheres rest on the floor of a region and hardly press each other: their weight is what is in balance."""
+    from faultgouge.pywrap import from_lammps
+
+    spheres = "create_atoms 1 single 0 0 -5.5\ncreate_atoms 1 single 0.999 0 -5.5"
+    found = from_lammps(lammps_with(BOX.format(spheres=spheres, down="0 0 -1")), balance=1.0)
+    weight = np.pi / 6
+    assert found.wall_force == pytest.approx(weight, rel=1e-3)
+    contacts = derive_frozen(found.contacts, normal_force=np.full(len(found.contacts), 1e-6 * weight))
+    feeble = derive_frozen(found, contacts=contacts)
+
+    def said(out_of_balance: float):
+        load = feeble.load - feeble.net_force
+        load[0, 0, 0] += out_of_balance * weight
+        return stability(derive_frozen(feeble, load=load))
+
+    assert "moves" not in " ".join(said(1e-5).reasons)
+    residual = "the packing moves: the residual force on a particle is 0.00524"
+    assert f"{residual}, the largest force of a contact or a wall 0.524" in said(1e-2).reasons
+
+
 COLUMN = """
 units si
 atom_style sphere
@@ -224,7 +246,7 @@ def test_forces_that_depend_on_all_contacts_of_a_particle(lammps_with):
     model = "mdr 1e4 0.3 3e3 0.0 1.0 0.2 damping mdr 1 tangential linear_history 3e3 1.0 0.7"
     found = from_lammps(lammps_with(COLUMN.format(model=model)))
     assert found.operator_error < 1e-5
-    assert found.proof < 1e-3  # the volume acts one step late: 3e-4 in ten steps, 3e-5 in a hundred short ones
+    assert found.proof < 1e-3  # the volume acts one step late: 3e-4 in long steps, 3e-5 in short ones
     along = abs(stiffness_matrix(found).toarray()[8:12, 8:12])
     far = np.abs(np.subtract.outer(np.arange(4), np.arange(4)))
     assert along[far == 2].min() > 0.01 * along.max()
@@ -291,7 +313,7 @@ def test_cohesive_spheres_in_a_cone(cone, tmp_path):
     assert len(found.contacts) > 0.7 * len(found)  # of pairs; the region hands out none
     assert found.contacts.normal_force.min() < 0  # cohesion
     assert found.operator_error < 1e-5
-    assert found.proof < 1e-5  # ten steps of Verlet, so that no error of the step is in it
+    assert found.proof < 1e-5  # steps of Verlet, so that no error of the step is in it
     # in proportion to the time step, as LAMMPS takes dashpots at the half step; extrapolated to none
     runs = [compare_motion(lmp, found, 0.005, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
     assert runs[0].difference / runs[1].difference == pytest.approx(2, rel=0.1)

@@ -60,6 +60,7 @@ LIDS = {
     "aveforce, sideways held": f"fix body lid nve\n{CONFINED}\nfix hold lid setforce NULL 0.0 NULL\n"
     "fix stiff lid aveforce 0.0 NULL 0.0",
     "rigid": f"{CONFINED}\nfix body lid rigid single torque 1 off off off",
+    "rigid, pushed by a later fix": f"fix body lid rigid single torque 1 off off off\n{CONFINED}",
     "rigid, sideways held": f"{CONFINED}\nfix body lid rigid group 1 lid torque * off off off force 1 on off on",
 }
 
