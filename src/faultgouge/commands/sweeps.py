@@ -222,8 +222,8 @@ BEFORE = {
 """Columns of the table of states before slips, with their headings."""
 
 
-def _cell(value: float) -> str:
-    return f"{value:.4g}"
+def _cell(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"
 
 
 def _show_modes(rows: list[dict[str, Any]]) -> None:
@@ -231,8 +231,7 @@ def _show_modes(rows: list[dict[str, Any]]) -> None:
     first = [row for row in rows if (row["disks"], row["seed"]) == (rows[0]["disks"], rows[0]["seed"])]
     lines = []
     for row in first:
-        least = "" if row["least_q"] is None else f"{row['least_q']:.4g}"
-        numbers = str(row["pairs"]), f"{row['share']:.3f}", f"{row['growth_rate']:.4g}", least
+        numbers = str(row["pairs"]), f"{row['share']:.3f}", _cell(row["growth_rate"]), _cell(row["least_q"])
         lines.append((f"{row['fx_over_fy']:g}", *numbers))
     if lines:
         print_line(table_of(("F_x/F_y", "complex pairs", "share", "growth rate of D", "least Q"), lines))
