@@ -48,7 +48,7 @@ PURE_ROTATION = 1e-9
 """Displacements that are smaller than this share of the rotations are rounding: a sphere spins about its contact."""
 
 
-TWO_MOMENTS = "two moments, a quarter of a period apart"
+TWO_MOMENTS = "at two moments a quarter of a period apart"
 
 
 class ModeError(BadInputError):
@@ -157,8 +157,8 @@ def unstable_pair(packing: HasConfiguration, modes: Modes, believed: Sequence[co
     """
     if len(believed):
         number = int(np.argmin(np.abs(modes.values - believed[0])))
-        mode = ModeShape.of(packing, modes, number)
-        return [mode], f"the complex pair: {TWO_MOMENTS}"
+        words = "the complex pair" if len(believed) == 1 else f"the fastest growing of {len(believed)} complex pairs"
+        return [ModeShape.of(packing, modes, number)], words
     first, second, cosine = closest_to_meeting(modes)
     if cosine < ORTHOGONAL_COSINE:
         raise ModeError(
@@ -309,7 +309,8 @@ def draw_modes(packing: HasConfiguration, modes: Sequence[ModeShape], words: str
         artist.show(phase, magnified)
         scale = "on the scale of the left picture" if magnified == 1 else f"arrows and colours times {magnified:g}"
         one.set_title(f"a quarter of a period later\n{scale}" if later else mode.words, fontsize=7)
-    finish(figure, axes, packing, words)
+    complex_ = any(mode.is_complex for mode in modes)
+    finish(figure, axes, packing, f"{words}, {TWO_MOMENTS}" if complex_ else words)
     return figure
 
 
@@ -323,7 +324,7 @@ def _draw_modes_of_spheres(packing: Configuration, modes: Sequence[ModeShape], w
         moved = np.concatenate([moved[:3], moved[3:] / turns])
         draw_turns(one, packing, moved, _arrow_scale(packing, mode))
         one.set_title(mode.words, fontsize=7)
-    figure.suptitle(words.replace(TWO_MOMENTS, "at its largest displacement"), fontsize=8)
+    figure.suptitle(f"{words}, at the largest displacement", fontsize=8)
     add_scale_of_turns(figure, axes)
     return figure
 
