@@ -33,11 +33,11 @@ from .style import EDGE, INK, styled
 
 Complexes = NDArray[np.complex128]
 
-TYPICAL, LONGEST = 1.2, 4.0
+TYPICAL_ARROW, LONGEST_ARROW = 1.2, 4.0
 """Length that three quarters of the arrows do not exceed, and length of the longest arrow at most, in units of the mean
 radius: a few disks that move far leave the arrows of all others to be seen."""
 
-MOVING = 0.5
+FILM_DISPLACEMENT = 0.5
 """Largest displacement of a disk in a film, in units of the largest radius."""
 
 ORTHOGONAL_COSINE = 1e-6
@@ -193,7 +193,7 @@ class ModeArtist:
         self, axes: Axes, packing: HasConfiguration, mode: ModeShape, points: float | None = None, moves: bool = False
     ) -> None:
         self.mode, self.moves = mode, moves
-        self.reach = MOVING * packing.radius.max() if moves else _arrow_scale(packing, mode)
+        self.reach = FILM_DISPLACEMENT * packing.radius.max() if moves else _arrow_scale(packing, mode)
         self.artist = PackingArtist(
             axes, packing, view=View.of(packing, margin=self.reach if moves else 0.0), points=points
         )
@@ -234,8 +234,9 @@ class ModeArtist:
 def _arrow_scale(packing: HasConfiguration, mode: ModeShape) -> float:
     """Length of an arrow for a displacement of one, length."""
     largest = np.sqrt(np.sum(np.abs(mode.displacement[: packing.dimension]) ** 2, axis=0))
-    typical, radius = np.quantile(np.delete(largest, packing.rattlers), 0.75), packing.radius.mean()
-    return float(radius * min(TYPICAL / max(typical, PURE_ROTATION), LONGEST / max(largest.max(), PURE_ROTATION)))
+    typical = max(np.quantile(np.delete(largest, packing.rattlers), 0.75), PURE_ROTATION)
+    longest = max(largest.max(), PURE_ROTATION)
+    return float(packing.radius.mean() * min(TYPICAL_ARROW / typical, LONGEST_ARROW / longest))
 
 
 def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list[ModeShape], str]:

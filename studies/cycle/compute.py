@@ -42,7 +42,7 @@ INVERSE_STEPS = 3
 
 @dataclass(frozen=True)
 class LinearState:
-    """What grows about a state, if all contacts at Coulomb's bound stick, or all slide.
+    """Linear motion about a state, with all contacts at Coulomb's bound sticking, or all sliding.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ def cycle_state(packing: Packing, spring: float) -> dict[str, Any]:
 
 
 def linear_state(configuration: Configuration, sliding: bool) -> LinearState:
-    """What grows about a configuration in linear motion."""
+    """The growth rates of linear motion about a configuration."""
     motion = Motion.of(configuration, sliding=sliding)
     modes = Modes.of_matrix(motion.stiffness)
     rounding = unit_rounding(motion.stiffness.data)

@@ -13,7 +13,7 @@ from ...packing.geometry import touching
 from ..plain_file import read_plain_text
 from .disks import Disks
 
-WAYS = (
+LAYER_WAYS = (
     "12 (the highest that touch something), type:2, type:NAME, ids:1,4,7-9, ids:@FILE, group:NAME (of a restart), or a "
     'region such as "y>10"'
 )
@@ -21,7 +21,7 @@ WAYS = (
 FEW_TOUCH = 0.5
 """Share of disks that touch something below which a packing is not at rest yet, and contacts tell nothing."""
 
-LISTED = 10
+MOST_NAMED = 10
 """Disks that are named; more are counted."""
 
 OPERATORS = {"<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": operator.ge}
@@ -51,7 +51,9 @@ def upper_layer(disks: Disks, says: str | int | None) -> NDArray[np.bool_]:
     """
     if says is None:
         if disks.top is None:
-            raise BadInputError(f"{disks.source} does not say which disks are the upper layer: add --top, {WAYS}.")
+            raise BadInputError(
+                f"{disks.source} does not say which disks are the upper layer: add --top, {LAYER_WAYS}."
+            )
         chosen = disks.top
     else:
         chosen = _choose_disks(disks, str(says).strip())
@@ -87,7 +89,7 @@ def _of_type(disks: Disks, says: str, value: str) -> NDArray[np.bool_]:
         has = ", ".join(disks.types)
         raise BadInputError(f"--top {says}: {disks.source} has no type {value} (its types: {has}).")
     if disks.kind is None:
-        raise BadInputError(f"--top {says}: {disks.source} has no types; take another of {WAYS}.")
+        raise BadInputError(f"--top {says}: {disks.source} has no types; take another of {LAYER_WAYS}.")
     raise BadInputError(f"--top {says}: the types of {disks.source} have no names: give a number, as in type:2.")
 
 
@@ -131,7 +133,7 @@ def layer_remark(disks: Disks, says: str | None, layer: NDArray[np.bool_]) -> st
 
 
 def _list_ids(ids: list[int]) -> str:
-    return ", ".join(map(str, ids[:LISTED])) + (", ..." if len(ids) > LISTED else "")
+    return ", ".join(map(str, ids[:MOST_NAMED])) + (", ..." if len(ids) > MOST_NAMED else "")
 
 
 def _read_list(disks: Disks, says: str, value: str) -> NDArray[np.bool_]:
@@ -162,7 +164,7 @@ def _region(disks: Disks, says: str) -> NDArray[np.bool_]:
         except ValueError:
             limit = None
         if match is None or limit is None:
-            raise BadInputError(f"--top {says}: it is none of {WAYS}.")
+            raise BadInputError(f"--top {says}: it is none of {LAYER_WAYS}.")
         chosen &= OPERATORS[match[2]](values[match[1]], limit)
     return chosen
 
