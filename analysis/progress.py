@@ -1,4 +1,4 @@
-"""What a long computation is doing, in words: who works reports, and who shows need not be passed on to who works.
+"""What a long computation is doing, in words: a function that works long reports, and a caller shows the reports.
 
 Reports go to the innermost `show_progress` of the thread; without one, as in a process of a pool, to nobody.
 """

@@ -44,7 +44,7 @@ FEWEST_ON_PAGE, MOST_ON_PAGE = 4, 40
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """What changes from one packing of a page to the next.
+    """The quantity that changes from one packing of a page to the next.
 
     Attributes
     ----------
@@ -205,7 +205,7 @@ def _frame(packing: HasConfiguration, axis: Axis, images: Images, followed: Ramp
 
 
 def sentences_of(verdict: Stability) -> list[str]:
-    """The verdict, what the eigenvalues without dissipation say, and contacts at Coulomb's bound.
+    """Sentences of a page: the verdict, the eigenvalues without dissipation, and contacts at Coulomb's bound.
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def _legend(packing: HasConfiguration) -> str:
 
 
 def _scene(packings: Sequence[HasConfiguration], images: Sequence[Images]) -> dict[str, Any]:
-    """What all packings of a page share: the particles, the colours and the frame of the picture."""
+    """The part that all packings of a page share: the particles, the colours and the frame of the picture."""
     return {
         "dimension": images[0].dimension,
         "radius": packings[0].radius,

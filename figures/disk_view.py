@@ -93,7 +93,7 @@ def _frame(
     periodic: Any,
     walls: tuple[Wall, ...],
 ) -> tuple[Floats, Floats]:
-    """Lower left and upper right corner of a picture: the box where it is periodic, else what lies in it."""
+    """Lower left and upper right corner of a picture: the box along periodic axes, else the extent of the disks."""
     reach, largest = packing.radius[:, None], packing.radius.max()
     low, high = (position - reach).min(axis=0), (position + reach).max(axis=0)
     if isinstance(packing, Packing):

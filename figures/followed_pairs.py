@@ -139,7 +139,7 @@ class _Followed:
                     known[k] = image
 
     def _members(self, known: dict[int, Space], k: int, modes: SystemModes) -> tuple[int, int] | None:
-        """The members of a pair at this load, from its last load, or from the one with the closest load."""
+        """The members of a pair at this load, followed from its last load, or from its closest load."""
         closest = min(known, key=lambda n: abs(self.packings[n].fx - self.packings[k].fx))
         for pair in (known[max(known)], known[closest]):
             members = modes.nearest(pair)

@@ -33,11 +33,11 @@ from .style import EDGE, INK, styled
 
 Complexes = NDArray[np.complex128]
 
-TYPICAL, LONGEST = 1.2, 4.0
+TYPICAL_ARROW, LONGEST_ARROW = 1.2, 4.0
 """Length that three quarters of the arrows do not exceed, and length of the longest arrow at most, in units of the mean
 radius: a few disks that move far leave the arrows of all others to be seen."""
 
-MOVING = 0.5
+FILM_DISPLACEMENT = 0.5
 """Largest displacement of a disk in a film, in units of the largest radius."""
 
 ORTHOGONAL_COSINE = 1e-6
@@ -48,7 +48,7 @@ PURE_ROTATION = 1e-9
 """Displacements that are smaller than this share of the rotations are rounding: a sphere spins about its contact."""
 
 
-TWO_MOMENTS = "two moments, a quarter of a period apart"
+TWO_MOMENTS = "at two moments a quarter of a period apart"
 
 
 class ModeError(BadInputError):
@@ -157,8 +157,8 @@ def unstable_pair(packing: HasConfiguration, modes: Modes, believed: Sequence[co
     """
     if len(believed):
         number = int(np.argmin(np.abs(modes.values - believed[0])))
-        mode = ModeShape.of(packing, modes, number)
-        return [mode], f"the complex pair: {TWO_MOMENTS}"
+        words = "the complex pair" if len(believed) == 1 else f"the fastest growing of {len(believed)} complex pairs"
+        return [ModeShape.of(packing, modes, number)], words
     first, second, cosine = closest_to_meeting(modes)
     if cosine < ORTHOGONAL_COSINE:
         raise ModeError(
@@ -193,7 +193,7 @@ class ModeArtist:
         self, axes: Axes, packing: HasConfiguration, mode: ModeShape, points: float | None = None, moves: bool = False
     ) -> None:
         self.mode, self.moves = mode, moves
-        self.reach = MOVING * packing.radius.max() if moves else _arrow_scale(packing, mode)
+        self.reach = FILM_DISPLACEMENT * packing.radius.max() if moves else _arrow_scale(packing, mode)
         self.artist = PackingArtist(
             axes, packing, view=View.of(packing, margin=self.reach if moves else 0.0), points=points
         )
@@ -234,8 +234,9 @@ class ModeArtist:
 def _arrow_scale(packing: HasConfiguration, mode: ModeShape) -> float:
     """Length of an arrow for a displacement of one, length."""
     largest = np.sqrt(np.sum(np.abs(mode.displacement[: packing.dimension]) ** 2, axis=0))
-    typical, radius = np.quantile(np.delete(largest, packing.rattlers), 0.75), packing.radius.mean()
-    return float(radius * min(TYPICAL / max(typical, PURE_ROTATION), LONGEST / max(largest.max(), PURE_ROTATION)))
+    typical = max(np.quantile(np.delete(largest, packing.rattlers), 0.75), PURE_ROTATION)
+    longest = max(largest.max(), PURE_ROTATION)
+    return float(packing.radius.mean() * min(TYPICAL_ARROW / typical, LONGEST_ARROW / longest))
 
 
 def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list[ModeShape], str]:
@@ -309,7 +310,8 @@ def draw_modes(packing: HasConfiguration, modes: Sequence[ModeShape], words: str
         artist.show(phase, magnified)
         scale = "on the scale of the left picture" if magnified == 1 else f"arrows and colours times {magnified:g}"
         one.set_title(f"a quarter of a period later\n{scale}" if later else mode.words, fontsize=7)
-    finish(figure, axes, packing, words)
+    complex_ = any(mode.is_complex for mode in modes)
+    finish(figure, axes, packing, f"{words}, {TWO_MOMENTS}" if complex_ else words)
     return figure
 
 
@@ -323,7 +325,7 @@ def _draw_modes_of_spheres(packing: Configuration, modes: Sequence[ModeShape], w
         moved = np.concatenate([moved[:3], moved[3:] / turns])
         draw_turns(one, packing, moved, _arrow_scale(packing, mode))
         one.set_title(mode.words, fontsize=7)
-    figure.suptitle(words.replace(TWO_MOMENTS, "at its largest displacement"), fontsize=8)
+    figure.suptitle(f"{words}, at the largest displacement", fontsize=8)
     add_scale_of_turns(figure, axes)
     return figure
 

@@ -22,7 +22,7 @@ from .style import INK, styled
 INSET_POINTS = 8
 """Loads beyond the onset that the inset shows."""
 
-BETWEEN = 10
+LOADS_BETWEEN = 10
 """Points of a curve between two loads: closer to each other at the ends, where a square root is steep."""
 
 DOTTED_LOADS = 100
@@ -90,7 +90,7 @@ def _with_loads_between(
     roots = np.array([root for root in square_at.roots(extrapolate=False) if np.isfinite(root)])
     knots = np.union1d(load, roots)
     # short steps at both ends, as an eigenvalue leaves a coalescence as a square root
-    share = np.sin(np.linspace(0, 0.5 * np.pi, BETWEEN + 1)[:-1]) ** 2
+    share = np.sin(np.linspace(0, 0.5 * np.pi, LOADS_BETWEEN + 1)[:-1]) ** 2
     at = np.append((knots[:-1, None] + np.diff(knots)[:, None] * share).ravel(), knots[-1])
     found = square_at(at)
     found[np.isin(at, roots)] = 0.0  # to the last bit, so that the branches meet

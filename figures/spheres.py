@@ -29,16 +29,16 @@ AZIMUTH, ELEVATION = np.radians([-62.0, 16.0])
 """Where the eye is."""
 
 LIGHT = np.array([-0.45, -0.55, 0.9]) / np.linalg.norm([-0.45, -0.55, 0.9])
-AMBIENT, DIFFUSE, PALE = 0.45, 0.6, 0.4
+AMBIENT, DIFFUSE, WHITE_SHARE = 0.45, 0.6, 0.4
 """Light from everywhere, light from the lamp, and the share of white."""
 
-STILL, TURNING = "#f4f4f4", "#1f5fa8"
+STILL_COLOUR, TURNING_COLOUR = "#f4f4f4", "#1f5fa8"
 """Colours of a sphere that does not rotate, and of the one that rotates most."""
 
 DOTS_ACROSS = 900
 """Dots across the picture of the spheres."""
 
-FADED = 0.25
+FAR_OPACITY = 0.25
 """Opacity of the bars farthest from the eye."""
 
 ROOM_AROUND = 0.25
@@ -110,7 +110,7 @@ def shade_spheres(eye: Eye, place: Floats, radius: Floats, colour: Floats, frame
         towards = np.sqrt(np.maximum(1 - u**2 - v**2, 0.0))
         seen = (u**2 + v**2 < 1) & (d - r * towards < nearest[part])
         bright = AMBIENT + DIFFUSE * np.maximum(u * light[0] + v * light[1] + towards * light[2], 0.0)
-        shade = (1 - PALE) * np.minimum(bright[..., None] * face, 1.0) + PALE
+        shade = (1 - WHITE_SHARE) * np.minimum(bright[..., None] * face, 1.0) + WHITE_SHARE
         picture[part] = np.where(seen[..., None], np.dstack([shade, np.ones_like(u)]), picture[part])
         nearest[part] = np.where(seen, d - r * towards, nearest[part])
     return picture
@@ -176,7 +176,7 @@ class SpheresArtist:
         bars = LineCollection(
             list(np.stack([eye.flat(start), eye.flat(end)], axis=1)[order]),
             linewidths=(widest * force)[order],
-            alpha=(FADED + (1 - FADED) * near)[order],
+            alpha=(FAR_OPACITY + (1 - FAR_OPACITY) * near)[order],
             capstyle="round",
             zorder=3,
             **style,
@@ -196,7 +196,7 @@ def new_figure(configuration: Configuration, count: int) -> Figure:
 def draw_turns(axes: Axes, configuration: Configuration, moved: Floats, scale: float) -> None:
     """A motion: arrows for displacements, blue for rotations; shape (6, N), the largest rotation one."""
     turn = np.linalg.norm(moved[3:], axis=0)[:, None]
-    faces = (1 - turn) * np.array(to_rgb(STILL)) + turn * np.array(to_rgb(TURNING))
+    faces = (1 - turn) * np.array(to_rgb(STILL_COLOUR)) + turn * np.array(to_rgb(TURNING_COLOUR))
     artist = SpheresArtist(axes, configuration, faces)
     place, arrow = artist.eye.flat(configuration.position), scale * artist.eye.flat(moved[:3].T)
     depth = configuration.position @ artist.eye.into
@@ -214,7 +214,7 @@ def draw_turns(axes: Axes, configuration: Configuration, moved: Floats, scale: f
 
 def add_scale_of_turns(figure: Figure, axes: Sequence[Axes]) -> None:
     """The scale of the rotations below."""
-    scale = ScalarMappable(Normalize(0, 1), LinearSegmentedColormap.from_list("turns", [STILL, TURNING]))
+    scale = ScalarMappable(Normalize(0, 1), LinearSegmentedColormap.from_list("turns", [STILL_COLOUR, TURNING_COLOUR]))
     bar = figure.colorbar(scale, ax=list(axes), location="bottom", shrink=0.5, aspect=40)
     bar.set_ticks([0, 1], labels=["no rotation", "largest rotation"])
     bar.outline.set_linewidth(0.4)

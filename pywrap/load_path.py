@@ -33,7 +33,7 @@ class EquilibriumSolver(Protocol[S]):
     """Finds the equilibrium at one load after the other."""
 
     def solve(self, load: float, below: S | None, beside: S | None, ahead: bool) -> S:
-        """The equilibrium at a load that follows from the one `below`; None for where the path begins.
+        """The equilibrium at a load, reached from the equilibrium `below`; `below` is None where the path begins.
 
         `beside` is another one near `below`, for an initial guess. `ahead` says that the path goes on from the result,
         at a load larger than all so far. A NoEquilibriumError says that the packing flows.

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -76,9 +78,9 @@ def onset_run(
 ) -> Onset:
     """Ramp a scene for one friction coefficient and find the onset.
 
-    The error of each onset is the whole one: that of rounding, and that of the path's increments
-    (:mod:`~faultgouge.pywrap.runs.path_error`). The ramp goes to its end, or to where the packing flows. Where the
-    first window alone is sought, and nobody else wants the equilibria, it ends there.
+    The error of each onset includes the rounding and the increments of the path
+    (:mod:`~faultgouge.pywrap.runs.path_error`). The ramp goes to its end, or to the load at which the packing flows. If
+    only the first window is sought, and `reached` is not given, the ramp ends with the first window.
 
     Parameters
     ----------
@@ -95,16 +97,20 @@ def onset_run(
     reached : callable, optional
         Called with each equilibrium of the ramp.
     near_onset : ndarray, optional
-        Distances from F_x^c at which equilibria are wanted besides, force.
+        Distances from F_x^c, force, at which equilibria are also computed: `between` of the result.
     known : callable, optional
         Of a search with dissipation: called as soon as there is a window, and after each increment from there on.
     bed : Packing, optional
-        As of :func:`~faultgouge.pywrap.settle`.
+        As in :func:`~faultgouge.pywrap.settle`.
     watch : callable, optional
         Told in words what is under way.
     folder : Path, optional
-        Where the search of a large packing leaves what it finds, and goes on from, see
+        Folder in which the search of a large packing stores its slices, and from which the search continues, see
         :func:`~faultgouge.analysis.find_onset`.
+
+    Returns
+    -------
+    Onset
 
     Raises
     ------
@@ -138,25 +144,13 @@ def onset_run(
         def at(fx: float) -> Packing:
             return path(fx) if damping is None else with_dashpots(path(fx))
 
-        try:
-            found = find_onset(
-                at,
-                forces,
-                dissipation=dissipation,
-                modes=modes,
-                first=first,
-                known=known,
-                ranks=search_ranks(),
-                folder=folder,
-            )
-        except TurningPointError:
-            raise
-        except (OnsetError, NoEquilibriumError) as error:
-            raise _of_scene(error, path, flows, dissipation) from error
+        search = partial(find_onset, dissipation=dissipation, modes=modes, first=first, known=known, folder=folder)
+        with _errors_of_scene(path, flows, dissipation):
+            found = search(at, forces, ranks=search_ranks())
         equilibria = tuple(path.equilibria)
         last = equilibria[-1].fx
-        extra = [] if near_onset is None else [fx for fx in found.fx_c + near_onset if 0 <= fx <= last]
-        between = {float(fx): path(float(fx)) for fx in extra}
+        near = np.zeros(0) if near_onset is None else found.fx_c + near_onset
+        between = {fx: path(fx) for fx in near[(near >= 0) & (near <= last)].tolist()}
         report_progress("the path once more, with other increments")
         found = with_path_error(found, path, with_dashpots)
     return replace(found, mu=mu, equilibria=equilibria, between=between, flows_beyond=last if flows else None)
@@ -168,6 +162,17 @@ def _climb(path: LoadPath[Equilibrium], loads: Floats, reached: Callable[[Equili
     for equilibrium in path.climb(loads[1:]):
         reached(equilibrium)
     return np.array([each.fx for each in path.equilibria])
+
+
+@contextmanager
+def _errors_of_scene(path: LoadPath[Equilibrium], flows: bool, dissipation: bool) -> Iterator[None]:
+    """Errors of a search, as the user of a scene reads them; a turning point is told as it is."""
+    try:
+        yield
+    except TurningPointError:
+        raise
+    except (OnsetError, NoEquilibriumError) as error:
+        raise _of_scene(error, path, flows, dissipation) from error
 
 
 def _of_scene(
@@ -189,7 +194,7 @@ def _of_scene(
 
 
 def search_ranks() -> Ranks:
-    """All ranks as those of one search; the cores of a machine are shared evenly. Collective."""
+    """All ranks take part in one search; the ranks of a machine share its cores evenly. Collective."""
     world = MPI.COMM_WORLD
     if world.size == 1:
         return Ranks()

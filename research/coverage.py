@@ -14,8 +14,8 @@ from typing import get_args
 
 from faultgouge.analysis import NoEquilibriumError
 from faultgouge.assessment.work_precision.coverage.stated_errors import (
-    AT_ONCE,
-    FINER,
+    INCREMENTS_AT_ONCE,
+    REFINEMENT,
     TABLE,
     CoverageCase,
     FirstOnset,
@@ -61,8 +61,8 @@ def _compare_case(onset: FirstOnset, case: CoverageCase) -> CoverageCase:
         return case
     fx_c, stated = onset.whole(*found)
     case = replace(case, changes=changes, fx_c=fx_c, stated=stated)
-    before = found[1].fx_onset - AT_ONCE * case.increment
-    coarser, finest = (onset.first_window(finer, before) for finer in (FINER // 2, FINER))
+    before = found[1].fx_onset - INCREMENTS_AT_ONCE * case.increment
+    coarser, finest = (onset.first_window(finer, before) for finer in (REFINEMENT // 2, REFINEMENT))
     if coarser is None or finest is None:
         return case
     limit = finest[1].fx_onset

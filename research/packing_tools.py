@@ -1,30 +1,14 @@
-"""Packings of research: other seeds, noise, loading paths, contacts, and the displacement of what bears load."""
-
-from collections.abc import Iterator
-from contextlib import contextmanager
+"""Packings of research: other seeds, noise, and the displacement of the disks that bear load."""
 
 import numpy as np
-from mpi4py import MPI
 
 from faultgouge.analysis import Packing, mean_square_displacement
-from faultgouge.pywrap import Engine, Equilibrium, LoadPath, Scene, scene_path
+from faultgouge.pywrap import Engine, Scene
 
 
 def with_seed(scene: Scene, seed: int) -> Scene:
     """The scene with another packing."""
     return scene.model_copy(update={"packing": scene.packing.model_copy(update={"seed": seed})})
-
-
-@contextmanager
-def path_from(rest: Equilibrium, scene: Scene) -> Iterator[LoadPath[Equilibrium]]:
-    """The loading path of a scene from the settled packing on, in this process alone."""
-    with Engine(rest.packing, MPI.COMM_SELF) as engine:
-        yield scene_path(engine, rest, scene)
-
-
-def contact_pairs(packing: Packing) -> set[tuple[int, int]]:
-    """The contacts of a packing as (i, j)."""
-    return set(zip(packing.contacts.i.tolist(), packing.contacts.j.tolist(), strict=True))
 
 
 def shake_disks(engine: Engine, packing: Packing, size: float, seed: int) -> None:

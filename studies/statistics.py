@@ -115,7 +115,7 @@ def median_interval(reach: ArrayLike, found: ArrayLike, draws: int = 2000, seed:
 
 
 def _medians(reach: Floats, found: Bools) -> Floats:
-    """Kaplan and Meier's median of each row, as `quartiles` has it; inf where it lies beyond what was reached."""
+    """Kaplan and Meier's median of each row, as in `quartiles`; inf where it lies beyond the values reached."""
     order = np.lexsort((~found, reach), axis=1)  # of equal ones, onsets before packings that are lost there
     reach, found = np.take_along_axis(reach, order, axis=1), np.take_along_axis(found, order, axis=1)
     left = np.arange(reach.shape[1], 0, -1)

@@ -76,7 +76,7 @@ class SceneStudy:
     def __call__(
         self, scene: Scene, output: Path, say: Say = print, progress: Progress = lambda results, _: results
     ) -> Result:
-        """Compute what is missing, and leave numbers, pictures and page in a folder, which is made if need be.
+        """Compute the missing rows, and write numbers, pictures and page into a folder; make the folder if need be.
 
         Under `mpiexec -n K` all K ranks call this; one hands out the work, the others take it.
 

@@ -33,7 +33,7 @@ from .sparse_lu import Factors, SingularMatrixError, minimum_degree, symmetric_l
 
 Booleans = NDArray[np.bool_]
 
-ACCURATE = 1e-2
+RESIDUAL_SHARE = 1e-2
 """Residual of the iterative solution, as a share of the force. Where contacts open or close a Newton iteration gains a
 factor of five, where none does a thousand: a tenth of it is lost at the end, and half of the work saved before."""
 
@@ -243,7 +243,7 @@ class SparseSolver:
         operator = LinearOperator(
             shape, lambda residual: self._matrix @ apply_preconditioner(residual), dtype=np.float64
         )
-        found, failed = gmres(operator, force[active], rtol=ACCURATE, restart=GMRES_ITERATIONS, maxiter=1)
+        found, failed = gmres(operator, force[active], rtol=RESIDUAL_SHARE, restart=GMRES_ITERATIONS, maxiter=1)
         if failed:
             return None
         step = np.zeros_like(force)

@@ -34,10 +34,10 @@ ARRAYS = (
     "position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind", "top", "jump",
     "wall_force",
 )  # fmt: skip
-LATER = (
+LATER_KEYS = (
     "slider", "viscous_slider", "top", "drag_rate", "spring", "operator_error", "jump", "wall_force", "slips_known",
 )  # fmt: skip
-"""Fields that files of version 1 do not have."""
+"""Keys that files of version 1 do not have."""
 
 MATRICES = ("stiffness", "damping", "constraint")
 MATRIX_PARTS = ("data", "indices", "indptr")
@@ -136,10 +136,16 @@ def read_configuration(path: Path) -> Configuration:
             group, size = file["snapshot"], path.stat().st_size
             given = group["contacts"]
             contacts = LinearisedContacts(
-                **{name: dataset(given, name, size)[()] for name in PER_CONTACT if name in given or name not in LATER}
+                **{
+                    name: dataset(given, name, size)[()]
+                    for name in PER_CONTACT
+                    if name in given or name not in LATER_KEYS
+                }
             )
-            arrays = {name: dataset(group, name, size)[()] for name in ARRAYS if name in group or name not in LATER}
-            stored = [name for name in SCALARS if name in group.attrs or name not in LATER]
+            arrays = {
+                name: dataset(group, name, size)[()] for name in ARRAYS if name in group or name not in LATER_KEYS
+            }
+            stored = [name for name in SCALARS if name in group.attrs or name not in LATER_KEYS]
             numbers = {name: group.attrs[name].item() for name in stored}
             matrices = {name: _matrix(group[name], size) for name in MATRICES if name in group}
             proof = group.attrs["proof"].item() if "proof" in group.attrs else None

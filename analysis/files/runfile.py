@@ -115,7 +115,7 @@ class RunFile(SealedFile):
         return cls(path, "a")
 
     def __len__(self) -> int:
-        """Number of complete frames, those of a trajectory left out: of equilibria."""
+        """Number of equilibria; frames of a trajectory do not count."""
         return equilibria(self._file)
 
     @property

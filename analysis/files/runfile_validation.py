@@ -30,7 +30,7 @@ LARGEST_CHUNK = 1 << 30
 
 
 class _UnsoundError(Exception):
-    """A file is damaged; the message says in what."""
+    """A file is damaged; the message says which part."""
 
 
 def _require(sound: object, says: str) -> None:

@@ -387,7 +387,7 @@ class MindlinLaw:
 
 
 def _closed_overlap(overlap: ArrayLike) -> Floats:
-    """Overlaps, those of open contacts set to zero; long doubles stay so."""
+    """Overlaps, zero for open contacts; long doubles remain long doubles."""
     return np.maximum(np.asarray(overlap, dtype=np.result_type(overlap, np.float64)), 0.0)
 
 

@@ -220,7 +220,7 @@ class Packing:
 
     @property
     def coordinate_rounding(self) -> float:
-        """Rounding error of a coordinate, length: its last place or that of its low part (see compensated.h)."""
+        """Rounding error of a coordinate, length: its last place, or the last place of its low part."""
         if not self.compensated:
             return float(np.finfo(float).eps * np.abs(self.position).max())
         exponent = int(np.frexp(2 * self.radius.max())[1])
@@ -310,7 +310,7 @@ class Packing:
 
     @property
     def _contact_forces(self) -> tuple[NDArray, NDArray, NDArray]:
-        """f_n, f_t and n of the contacts; of a compensated packing in long doubles, which keep what low parts add."""
+        """f_n, f_t and n of the contacts; of a compensated packing in long doubles, which keep the low parts."""
         if not self.compensated:
             return self.normal_force, self.tangential_force, self.geometry.normal
         _, branch, overlap = self._exact_geometry

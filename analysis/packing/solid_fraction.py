@@ -43,7 +43,7 @@ def solid_fraction(packing: HasConfiguration) -> float:
 
 
 def _solid_in_box(configuration: Configuration) -> float:
-    """The volume of all particles over that of the periodic box, of disks the areas."""
+    """Volume of all particles over the volume of the periodic box; of disks areas."""
     d = configuration.dimension
     edges = [axis for axis, closed in zip("xyz"[:d], configuration.periodic[:d], strict=True) if not closed]
     if edges:

@@ -44,7 +44,7 @@ class LostTrackError(FaultgougeError):
 
 
 class DoubtError(FaultgougeError):
-    """What happens on an increment is in doubt; `fx` is a load inside at which to look, or None."""
+    """The search cannot decide what happens on an increment; `fx` is a load inside at which to look, or None."""
 
     def __init__(self, fx: float | None = None) -> None:
         super().__init__("an increment is in doubt")

@@ -162,7 +162,7 @@ class _OnsetSearch:
         return Onset(windows, complete, doubtful, self.modes, at_start if opens else None, ends)
 
     def undamped_onset_or_none(self) -> Onset | None:
-        """The onset without dissipation beside the one with it; None if there is none."""
+        """The onset without dissipation, beside a search with dissipation; None if there is no such onset."""
         with suppress(OnsetError, NoEquilibriumError):
             return self.undamped_onset()
         return None
@@ -236,7 +236,7 @@ class _Inside:
                 self._along = windows_up_to(undamped, loads[begin:], limits=limits)
 
     def look(self, below: float, above: float) -> list[float]:
-        """Onsets between two neighbouring loads, and of windows that end there the middle of what they have there."""
+        """Loads between two loads at which to look: the onsets, and the middles of the windows that end in between."""
         if not self._windows or above <= self._windows[0].fx_onset:
             return []
         while self._reached < above:

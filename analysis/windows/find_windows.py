@@ -66,7 +66,7 @@ def windows_up_to(
     first: bool = False,
     limits: Limits = LIMITS,
 ) -> Iterator[tuple[float, tuple[Window, ...]]]:
-    """Each load but the smallest as it is reached, and all windows up to there; as of `find_windows`."""
+    """Yield each load but the smallest, with all windows up to this load; the windows are those of `find_windows`."""
     loads = check_increasing(forces)
     start = system(float(loads[0]))
     unit, last = unit_of(start), float(loads[-1])

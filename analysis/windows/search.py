@@ -90,10 +90,10 @@ class Search:
         return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
 
     def along(self, loads: Floats, look: Look = lambda below, above: ()) -> Iterator[tuple[float, tuple[Window, ...]]]:
-        """Each load but the smallest as it is reached, and all windows up to there.
+        """Yield each load but the smallest, with all windows up to this load.
 
-        The walk ends where an eigenvalue is found to be negative, as the branch of equilibria has ended before that
-        load, if there is a window.
+        If an eigenvalue is negative at a load, the branch of equilibria has ended before this load. The walk then ends
+        if there is a window, and otherwise raises the TurningPointError.
         """
         here = self.at(float(loads[0]))
         for below, above in pairwise(map(float, loads)):
@@ -118,7 +118,7 @@ class Search:
                     return
 
     def _steps(self, here: System, there: System) -> list[System]:
-        """The steps that lead to a load: where contacts change on the way, one about each change is a short one."""
+        """The steps that lead to a load; where contacts change on the way, a short step about each change."""
         shortest = self.limits.bending * (there.fx - here.fx)
 
         def divide(below: System, above: System) -> list[System]:
@@ -344,9 +344,9 @@ def windows_along(
     first: bool = False,
     limits: Limits = LIMITS,
 ) -> Iterator[tuple[float, tuple[Window, ...]]]:
-    """Each load but the smallest as it is reached, and all windows up to there, as of `Search.along`.
+    """Yield each load but the smallest, with all windows up to this load, see `Search.along`.
 
-    A screen is of finite order: should all modes contradict it, the ramp is walked again without it.
+    A screen is of finite order: if all modes contradict the screen, the ramp is walked again without a screen.
     """
     reached = float(loads[0])
     for way in [screen, None] if screen else [None]:
@@ -362,7 +362,7 @@ def windows_along(
 
 
 def look_between(look: At, below: float, middle: float, above: float) -> list[System]:
-    """The system at a load in between, or beside that load if it has no equilibrium; an empty list if none has."""
+    """The system at the middle load, or at a load beside it; empty if none of these has an equilibrium."""
     for fx in (middle, 0.5 * (below + middle), 0.5 * (middle + above)):
         try:
             return [look(fx)]

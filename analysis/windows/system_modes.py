@@ -56,7 +56,7 @@ class SystemModes(Modes):
 
     @cached_property
     def overlap(self) -> Floats:
-        """|y^H x| of the vectors; with dissipation of those of the first-order matrix, shape (E,)."""
+        """|y^H x| of the vectors, with dissipation of the vectors of the first-order matrix, shape (E,)."""
         if self.first_order_overlap is not None:
             return self.first_order_overlap
         return super().overlap

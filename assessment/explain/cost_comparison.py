@@ -1,4 +1,4 @@
-"""What one way of doing a thing costs beside another, and the line that says so.
+"""The cost of one way to do the same work beside another way, and its line in the table.
 
 The ratio is taken within a turn. Work of one thread is timed by the processor time of this process, which leaves out
 the pauses that others make it take; work of several by the clock on the wall. Of the turns, medians and quartiles are

@@ -137,7 +137,7 @@ def _units(scene: Scene) -> dict[str, float] | None:
 
 
 def _run_feature(feature: Feature, scene: InstanceContents, steps: int, folder: Path) -> Part:
-    """Run a feature switched on and off: what the feature loads, its cost, and whether both runs agree."""
+    """Run a scene with a feature and without it: what the feature loads, its cost, and whether both runs agree."""
     with ExitStack() as both:
         logs = folder / "without.log", folder / "with.log"
         without, plain = both.enter_context(feature.without.start(MPI.COMM_SELF, logs[0]))

@@ -132,7 +132,7 @@ class UndampedRun:
         return replace(self, packing=replace(self.packing, **changes))
 
     def moved_by(self, *names: str, otherwise: dict[str, Any]) -> tuple[dict[str, Any], ArrayLike]:
-        """What moves the disks, by its names in `motion`, or what else would; and the disks."""
+        """The fixes that move the disks, by their names in `motion`, or would move them otherwise; and the disks."""
         own = {key: value for key, value in self.motion.items() if key in (*names, "target")}
         what = own if names[0] in own else otherwise
         return what, what.get("target", np.flatnonzero(self.packing.top))

@@ -24,7 +24,7 @@ ZERO_ABOVE = 0.25
 
 SHADE = "#e9e9e9"
 
-AROUND = ((-29, -3), (-14, 6), (2, -11), (6, -3))
+LABEL_OFFSETS = ((-29, -3), (-14, 6), (2, -11), (6, -3))
 """Where the increments of the first arithmetic stand, points, by increasing true error: they lie close together."""
 
 
@@ -154,7 +154,7 @@ def coverage_figure(cases: Sequence[StatedError]) -> Figure:
             at = (max(case.true, smallest), case.stated)
             label = None if place else arithmetic  # once in the key
             axes.plot(*at, MARKERS[number], color=f"C{number}", label=label, clip_on=False)
-            aside = AROUND[place % len(AROUND)] if number == 0 else (5, -10)
+            aside = LABEL_OFFSETS[place % len(LABEL_OFFSETS)] if number == 0 else (5, -10)
             axes.annotate(f"{case.increment:g}", at, xytext=aside, textcoords="offset points", fontsize="small")
     axes.legend(loc="lower right")
     return figure

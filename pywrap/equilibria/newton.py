@@ -31,7 +31,7 @@ import numpy as np
 from ...analysis import Packing, nearest_image, touching
 from ...analysis.arrays import Floats, Indices
 from ..lammps.trial_state import EPSILON, Trial
-from .newton_matrix import IDLE, StiffnessFactors, factor_stiffness
+from .newton_matrix import IDLE_FORCE_SHARE, StiffnessFactors, factor_stiffness
 from .rattlers import middle_of_cage
 
 NEWTON_ITERATIONS = 40
@@ -39,10 +39,10 @@ NEWTON_ITERATIONS = 40
 their contacts open as delta^p -> 0, on which Newton's method gains a factor of 5 an iteration for p = 3/2, and 12 reach
 the floor."""
 
-FRUITLESS, FRUITFUL = 8, 0.5
+ITERATIONS_WITHOUT_GAIN, LEAST_GAIN = 8, 0.5
 """Iterations that gain nothing before an increment is halved, and the factor of the residual that counts as a gain."""
 
-PATIENT = 200, 0.95
+PATIENCE = 200, 0.95
 """Iterations, and the factor of the residual that counts as a gain, where halving leads nowhere. Beside a contact that
 carries next to nothing, or slides nearly, the residual may fall by no more than 0.7 an iteration."""
 
@@ -75,7 +75,7 @@ FIRST_GAIN = 1e-2
 FARTHEST_MOVE = 0.25
 """Displacement, in units of the smallest radius, up to which no centre of a disk comes to lie in another disk."""
 
-REACH = 0.99
+FARTHEST_TRIAL = 0.99
 """Displacement of a disk from an equilibrium, in units of its radius, up to which a trial is made."""
 
 
@@ -117,7 +117,7 @@ def iterate_newton(
     guess : Guess, optional
         By default it starts without a displacement.
     patient : bool
-        Whether a residual that falls slowly is good enough to go on, see `PATIENT`.
+        Whether a residual that falls slowly is good enough to go on, see `PATIENCE`.
 
     Returns
     -------
@@ -126,9 +126,9 @@ def iterate_newton(
     int
         Force evaluations.
     """
-    base, since, rattlers = start.packing, start.graph, _Rattlers(start, IDLE if patient else 0.0)
+    base, since, rattlers = start.packing, start.graph, _Rattlers(start, IDLE_FORCE_SHARE if patient else 0.0)
     displacement, factors, answers = guess or Guess(np.zeros(3 * len(base)))
-    iterations, gain = PATIENT if patient else (NEWTON_ITERATIONS, FRUITFUL)
+    iterations, gain = PATIENCE if patient else (NEWTON_ITERATIONS, LEAST_GAIN)
     course = _Course(start.floor, answers, force_tolerance, gain)
     evaluations = 0
     for iteration in range(iterations):
@@ -195,7 +195,7 @@ class _Course:
                     self.best = trial  # below the floor the one that moved less is as good
                 return True
             self._worse += 1
-            if self._worse > FRUITLESS:
+            if self._worse > ITERATIONS_WITHOUT_GAIN:
                 self.best = None
                 return True
         if result and (self.best is None or residual < self.best.residual):
@@ -257,8 +257,8 @@ def _out_of_the_way(trial: Packing, disks: Indices, displacement: Floats) -> Flo
     changed = displacement.copy()
     changed.reshape(3, -1)[:2, disks] += (middle_of_cage(trial, disks) - trial.position[disks]).T
     moved = np.hypot(*changed.reshape(3, -1)[:2])
-    far = disks[moved[disks] > REACH * trial.radius[disks]]
-    changed.reshape(3, -1)[:2, far] *= REACH * trial.radius[far] / moved[far]  # a part of the way
+    far = disks[moved[disks] > FARTHEST_TRIAL * trial.radius[disks]]
+    changed.reshape(3, -1)[:2, far] *= FARTHEST_TRIAL * trial.radius[far] / moved[far]  # a part of the way
     return changed
 
 
@@ -271,7 +271,7 @@ def _lammps_refuses(displacement: Floats, packing: Packing) -> bool:
     far = np.hypot(*moved)
     if far.max(initial=0.0) <= FARTHEST_MOVE * packing.radius.min():
         return False
-    if np.any(far > REACH * packing.radius):
+    if np.any(far > FARTHEST_TRIAL * packing.radius):
         return True
     there = packing.position + moved.T
     contacts = touching(there, packing.radius, packing.box_length)

@@ -16,19 +16,19 @@ from ...analysis.packing.disk_operators import assemble_stiffness, contact_terms
 from ..lammps.contact_graph import ContactGraph
 from ..lammps.trial_state import Trial
 
-IDLE = 1e-7
+IDLE_FORCE_SHARE = 1e-7
 """Share of the largest contact force up to which a contact carries nothing that matters."""
 
-CREEP = 0.1
+HOLDING_SHARE = 0.1
 """Share of its largest stiffness that is added to a disk with none but such contacts, in all directions. Such a
 disk has next to no stiffness along its contacts, and none across a contact that slides: Newton's step would throw the
 disk through its cage. With this share the force on the disk, small already, falls tenfold in an iteration."""
 
-AFLOAT = 1e-13
+FLOATING_SHARE = 1e-13
 """Share that is added to all others. A share of the size of its rounding keeps the solve finite where something floats,
 such as the whole packing along a floor without friction; on stiff directions it changes nothing."""
 
-SLIPLESS = 1e-2
+SLIPLESS_SHARE = 1e-2
 """Share of its tangential stiffness that a contact keeps which has no slip, so that a disk with no other contact is
 held. It reduces the error of an iteration to a hundredth at best."""
 
@@ -75,7 +75,7 @@ def factor_stiffness(
     graph, law = trial.graph, trial.derivatives
     loaded, old = law.normal_force > floor, None if since is None else graph.old(since)
     if old is not None:
-        slip_derivative = np.where(old, law.slip_derivative, SLIPLESS * law.slip_derivative)
+        slip_derivative = np.where(old, law.slip_derivative, SLIPLESS_SHARE * law.slip_derivative)
         law = law._replace(slip_derivative=slip_derivative)
     normal, distance, _ = trial.branches
     terms = contact_terms(law, normal, distance, graph.pairs)
@@ -85,7 +85,7 @@ def factor_stiffness(
     unknowns = np.count_nonzero(active)
     if unknowns == 0:
         return None
-    matters = loaded & (law.normal_force > IDLE * law.normal_force.max(initial=0.0))
+    matters = loaded & (law.normal_force > IDLE_FORCE_SHARE * law.normal_force.max(initial=0.0))
     idle = graph.count(matters) == 0  # disks with none but contacts that carry nothing that matters
     expelled = _find_expelled(graph, loaded, old) & ~trial.still.top
     if unknowns <= BAND_SIZE:
@@ -110,13 +110,13 @@ def _band_matrix(band: Band, terms: Floats, idle: Booleans) -> BandSolver:
 
 
 def _stiffen_idle(diagonal: Floats, disk: Indices, idle: Booleans) -> Floats:
-    """The diagonal of K with `CREEP` more stiffness for idle disks, and `AFLOAT` more for all others."""
-    held = (1 + AFLOAT) * diagonal
+    """The diagonal of K, larger by `HOLDING_SHARE` for idle disks and by `FLOATING_SHARE` for all others."""
+    held = (1 + FLOATING_SHARE) * diagonal
     creeping = idle[disk]
     if creeping.any():
         stiffest = np.zeros(len(idle))
         np.maximum.at(stiffest, disk, diagonal)
-        held[creeping] = diagonal[creeping] + CREEP * stiffest[disk[creeping]]
+        held[creeping] = diagonal[creeping] + HOLDING_SHARE * stiffest[disk[creeping]]
     return held
 
 

@@ -25,7 +25,9 @@ from ..lammps.trial_state import rounding
 from .newton import Guess, iterate_newton, too_long
 from .newton_matrix import factor_stiffness
 
-SMOOTH = "; without friction (mu = 0) nothing holds a layer back on a smooth floor, so give law.mu a value above 0"
+SMOOTH_FLOOR_ADVICE = (
+    "; without friction (mu = 0) nothing holds a layer back on a smooth floor, so give law.mu a value above 0"
+)
 
 SMALLEST_SHARE = 2.0**-10
 """The share of an increment below which halving ends."""
@@ -33,7 +35,7 @@ SMALLEST_SHARE = 2.0**-10
 INCREMENT_PARTS = 3, 7
 """Parts of an increment that are tried where halving has led nowhere: no load is one that halving has met."""
 
-RESTS = 1e-9
+FORCE_AT_REST = 1e-9
 """Force on a disk, in units of F_y, at which dynamics end."""
 
 FEWEST_STEPS, MOST_DYNAMICS_STEPS, DISK_STEPS = 20_000, 800_000, 80_000_000
@@ -153,7 +155,7 @@ def equilibrate(
         tried = f"; tried were {ATTEMPTS}" if onward else ""
         raise NoEquilibriumError(
             f"no equilibrium was found beyond F_x = {here.fx:.10g}: the packing flows or slides freely there{tried}"
-            f"{'' if here.packing.law.frictional else SMOOTH}",
+            f"{'' if here.packing.law.frictional else SMOOTH_FLOOR_ADVICE}",
             here.fx,
         )
     return here
@@ -204,7 +206,7 @@ def _at_rest(engine: Engine, start: Equilibrium, fx: float) -> Equilibrium | Non
     here, flown, steps = start.packing, 0.0, 0
     most = min(MOST_DYNAMICS_STEPS, max(FEWEST_STEPS, DISK_STEPS // len(here)))
     while abs(flown) < 2 * here.radius.mean() and steps < most:
-        rest = engine.relax(RESTS * here.fy, steps=max(FEWEST_STEPS, most // LOOKS_AT_LAYER))
+        rest = engine.relax(FORCE_AT_REST * here.fy, steps=max(FEWEST_STEPS, most // LOOKS_AT_LAYER))
         before, here, steps = here, engine.packing, steps + rest.steps
         if rest.status != "no":
             return Equilibrium(here, rest.residual, rounding_floor(here), steps)

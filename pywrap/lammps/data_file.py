@@ -25,7 +25,7 @@ def data_file(packing: Packing) -> str:
 
 
 def sort_contacts(path: Path) -> None:
-    """Bring the rows of a dump of contacts into the order of their disks: LAMMPS's is that of its neighbour lists.
+    """Sort the rows of a dump of contacts by their disks: LAMMPS writes them in the order of its neighbour lists.
 
     Force and slip of a contact are the same for either disk as the first one.
     """

@@ -30,7 +30,7 @@ class Decks:
         self.lammps = lammps
 
     def command(self, command: str) -> None:
-        """One line of an input script; what LAMMPS says against it is raised as an `EngineError`."""
+        """Run one line of an input script; an error of LAMMPS is raised as an `EngineError`."""
         try:
             self.lammps.command(command)
         except Exception as error:  # the LAMMPS module raises plain Exception, or MPIAbortException on one rank alone

@@ -95,7 +95,7 @@ class Dynamics:
 
     @contextmanager
     def integrate(self, time_step: float | None, drag_time: float | None, rattlers: bool = False) -> Iterator[None]:
-        """Velocity Verlet, and what damping there is (deck part undamped.in); with rattlers, or all others alone.
+        """Velocity Verlet with the damping of the packing (deck part undamped.in), of all disks or of all but rattlers.
 
         By default the time step is that of the deck part.
         """
@@ -223,7 +223,7 @@ class Dynamics:
         return self._state.checkpoint() | periods
 
     def resume(self, step: int, state: Mapping[str, Floats]) -> None:
-        """Go on from the state that a run had at a step, this one or that of another engine.
+        """Continue from the state of a run at a step; the run may be that of another engine.
 
         Forces are computed anew. A run that is continued elsewhere is the same to the bit as one that resumes its own
         state at the same steps.

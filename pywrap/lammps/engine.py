@@ -30,7 +30,7 @@ from .lammps_state import LammpsState
 from .plain_file_names import decks_folder, move_files, shared_folder
 from .trial_state import Trial
 
-LOOK = 1000
+STEPS_A_LOOK = 1000
 """Time steps between two looks at the forces."""
 
 
@@ -129,7 +129,7 @@ class Engine:
             Largest number of time steps in each stage.
         """
         self._state.end_displacements()
-        self._decks.variables(force_tolerance=force_tolerance, chunk=LOOK, chunks=steps // LOOK)
+        self._decks.variables(force_tolerance=force_tolerance, chunk=STEPS_A_LOOK, chunks=steps // STEPS_A_LOOK)
         if viscosity is not None:
             self._decks.variables(viscosity=viscosity)
         if gather < 1:
@@ -144,7 +144,9 @@ class Engine:
         self.restore(packing)
         if viscosity is not None:
             self._decks.variables(viscosity=viscosity)
-        self._decks.include("damp.in", force_tolerance=force_tolerance, chunk=LOOK, chunks=steps // LOOK)
+        self._decks.include(
+            "damp.in", force_tolerance=force_tolerance, chunk=STEPS_A_LOOK, chunks=steps // STEPS_A_LOOK
+        )
 
     def relax(
         self,

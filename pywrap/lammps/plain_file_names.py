@@ -26,7 +26,7 @@ DECKS = Path(str(files("faultgouge.lammps_inputs")))
 PLAIN = re.compile(r"[A-Za-z0-9_./+:@=~-]*")
 """Characters that mean themselves in every command of LAMMPS."""
 
-ELSEWHERE = "/tmp", "/var/tmp", "/dev/shm"
+OTHER_FOLDERS = "/tmp", "/var/tmp", "/dev/shm"
 """Where temporary files lie if the name of Python's own place is not plain."""
 
 
@@ -43,7 +43,7 @@ def temporary_folder() -> tempfile.TemporaryDirectory[str]:
     FaultgougeError
         If there is no place for one.
     """
-    for place in (tempfile.gettempdir(), *ELSEWHERE):
+    for place in (tempfile.gettempdir(), *OTHER_FOLDERS):
         if is_plain(place) and os.access(place, os.W_OK | os.X_OK):
             return tempfile.TemporaryDirectory(prefix="faultgouge-", dir=place)
     raise FaultgougeError(
@@ -66,7 +66,7 @@ def shared_folder(communicator: MPI.Comm) -> Iterator[Path]:
 
 @contextmanager
 def plain_name(path: Path) -> Iterator[Path]:
-    """A plain name of a file that is there: its own, or that of a link to it."""
+    """A plain name of an existing file: its own name, or the name of a link to the file."""
     whole = Path(os.path.realpath(path))
     if is_plain(str(whole)):
         yield whole

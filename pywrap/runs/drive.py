@@ -49,7 +49,7 @@ from ..settling.settle import law_of, settle, settle_bed
 from .run_iterator import run_of_scene
 from .undamped import Checkpoint
 
-LOADED, MOVED = 0.016, 0.01
+LOADED_SHARE, MOVED_DIAMETERS = 0.016, 0.01
 """Where a scene does not say when states are stored: share of mu F_y by which the spring loads a layer that sticks from
 one to the next, and way of a rigid drive in smallest diameters. The length of the run has no part in it, so that a run
 is the same up to the end of a shorter one."""
@@ -57,14 +57,14 @@ is the same up to the end of a shorter one."""
 SAMPLES_A_PERIOD, SAMPLES_A_PART = 20, 10
 """Rows of the series: so many in a period of the layer on the spring, and at least so many in a part of the run."""
 
-SLOW_ENOUGH, TOO_FAST = 100.0, 10.0
+LEAST_LOADING_PERIODS, REFUSED_LOADING_PERIODS = 100.0, 10.0
 """Periods of the slowest vibration in which the spring loads the layer to mu F_y: below the first a run is warned, and
 below the second refused."""
 
 STEPS_A_PULSE = 10
 """Time steps in a period of a pulse: velocity Verlet then samples it to some per cent."""
 
-DILATED = 1.5
+DILATION_LIMIT = 1.5
 """Height of the layer, in units of that at the beginning, above which it has left the bed."""
 
 
@@ -175,8 +175,8 @@ def strength(packing: Packing) -> float:
 def _between_states(settings: Drive, start: Packing) -> float:
     """Time between two stored states of a scene that does not say it."""
     if settings.spring == "rigid":
-        return float(MOVED * 2 * start.radius.min() / settings.fastest)
-    return LOADED * strength(start) / (settings.spring * settings.fastest)
+        return float(MOVED_DIAMETERS * 2 * start.radius.min() / settings.fastest)
+    return LOADED_SHARE * strength(start) / (settings.spring * settings.fastest)
 
 
 def layer_period(settings: Drive, packing: Packing) -> float | None:
@@ -239,13 +239,13 @@ def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = No
         f"drive.velocity = {settings.fastest:g} loads the layer to mu F_y in {loading:.3g}, which is "
         f"{loading / period:.2g} periods of its slowest vibration"
     )
-    if loading < TOO_FAST * period:
+    if loading < REFUSED_LOADING_PERIODS * period:
         raise SceneError(
-            f"{says}, and slow driving takes {SLOW_ENOUGH:g} or more: lower it to "
-            f"{settings.fastest * loading / (SLOW_ENOUGH * period):.1g}, or take a softer spring"
+            f"{says}, and slow driving takes {LEAST_LOADING_PERIODS:g} or more: lower it to "
+            f"{settings.fastest * loading / (LEAST_LOADING_PERIODS * period):.1g}, or take a softer spring"
         )
-    if loading < SLOW_ENOUGH * period:
-        warnings.append(f"{says}: slow driving takes {SLOW_ENOUGH:g} or more")
+    if loading < LEAST_LOADING_PERIODS * period:
+        warnings.append(f"{says}: slow driving takes {LEAST_LOADING_PERIODS:g} or more")
     unit = (layer_force(start, 1.0) / start.coordinate_mass)[active]
     moved = np.zeros(start.coordinates)
     moved[active] = general_lu(matrix.tocsc()).solve(unit)
@@ -301,33 +301,17 @@ def drive(
         plan = Plan.of(settings, start, dynamics.time_step)
         detector = slip_detector(settings, start)
         slips = sum(detector.add(*_of_detector(row)) is not None for row in known) if detector else 0
-        last, past = 0, deque[DriveState]()
-        stored = known[-1].time if known else 0.0  # at the end of a part
+        last, recent = 0, _RecentStates(detector, known[-1].time if known else 0.0)  # at the end of a part
         if resume is not None:
             last = resume.step
             dynamics.resume(last, resume.state)
         for step in plan.steps(last):
             sample, state = _advance(engine, dynamics, step - last, step * plan.dt, start)
             last = step
-            past.append(state)
             slip = detector.add(*_of_detector(sample)) if detector else None
+            slips += slip is not None
             ends_part = step % plan.part == 0 or step == plan.total
-            wanted = set[float]()
-            if slip is not None:
-                slips += 1
-                wanted |= {slip.begins, sample.time}
-            if ends_part:
-                # the state with which a slip begins that is not yet known to be one
-                wanted |= {detector.largest if detector else sample.time, sample.time}
-            states = tuple(each for each in past if each.time in wanted and each.time > stored)
-            stored = max([stored, *(each.time for each in states)])
-            if detector is not None:
-                oldest = min(detector.largest, sample.time - detector.look_back)
-                while past[0].time < oldest:
-                    past.popleft()
-            else:
-                past.clear()
-            yield DriveStep(sample, slip, states)
+            yield DriveStep(sample, slip, recent.take(state, slip, ends_part))
             if settings.slips is not None and slips == settings.slips:
                 return
             if ends_part and step < plan.total:
@@ -336,6 +320,37 @@ def drive(
                 dynamics.resume(step, reached)  # as a run does that is continued from here
                 if keep is not None:
                     keep(Checkpoint(step, reached))
+
+
+class _RecentStates:
+    """States of a run from which a slip may have begun, and the choice of those that are stored.
+
+    Parameters
+    ----------
+    detector : SlipDetector, optional
+        The detector of the run; None of a rigid drive, whose layer has no slips.
+    stored : float
+        Time of the last state that is stored already.
+    """
+
+    def __init__(self, detector: SlipDetector | None, stored: float) -> None:
+        self._detector, self._stored = detector, stored
+        self._states = deque[DriveState]()
+
+    def take(self, state: DriveState, slip: Slip | None, ends_part: bool) -> tuple[DriveState, ...]:
+        """Take the next state, and the slip that ends with it; give the states that are to be stored, by time."""
+        detector, now = self._detector, state.time
+        self._states.append(state)
+        wanted = set() if slip is None else {slip.begins, now}
+        if ends_part:
+            # the state with which a slip begins that is not yet known to be one
+            wanted |= {detector.largest if detector else now, now}
+        chosen = tuple(each for each in self._states if each.time in wanted and each.time > self._stored)
+        self._stored = max([self._stored, *(each.time for each in chosen)])
+        oldest = min(detector.largest, now - detector.look_back) if detector else np.inf
+        while self._states and self._states[0].time < oldest:
+            self._states.popleft()
+        return chosen
 
 
 @contextmanager
@@ -404,7 +419,7 @@ def _advance(
         kinetic_energy=motion.kinetic_energy(start),
         at_bound=int(np.count_nonzero(packing.sliding)),
     )
-    if sample.thickness > DILATED * _height(start):
+    if sample.thickness > DILATION_LIMIT * _height(start):
         raise DilationError(
             f"the upper layer has left the bed at t = {time:g}: its mean height is {sample.thickness:.3g}, and was "
             f"{_height(start):.3g}; take a slower drive, a softer spring or a larger load.fy"

@@ -146,7 +146,7 @@ def slips_in(file: RunFile) -> list[Slip]:
 
 
 def all_slips_in(file: RunFile) -> tuple[list[Slip], Slip | None]:
-    """The slips in the series of a drive.h5, and the one that is under way at its end."""
+    """The slips in the series of a drive.h5, with the slip that is under way at its end."""
     settings = drive_of(file)
     if settings is None:
         return [], None

@@ -13,10 +13,10 @@ SECANT_STEPS = 8
 WIDENINGS = 20
 """Factors of two between the half of an increment and the smallest step in which a jump is looked for."""
 
-NOISY = 10
+NOISE_IN_ROUNDINGS = 10
 """Rounding errors about which the last of the secant steps may still jump."""
 
-STRAIGHT = 1e-3
+SLOPE_TOLERANCE = 1e-3
 """Distance of a root, in half increments, up to which the slope of what vanishes is the same on all paths: both its
 curvature and the paths' difference change the slope by about this share."""
 
@@ -47,7 +47,7 @@ def nearby_root(
         The load, nan beyond the reach; and the slope, None at a jump.
     """
     at = cache(function)
-    if slope and abs(at(fx) / slope) < STRAIGHT * reach:
+    if slope and abs(at(fx) / slope) < SLOPE_TOLERANCE * reach:
         return fx - at(fx) / slope, slope
     found = _secant(at, fx, rounding, reach)
     if np.isnan(found):
@@ -58,7 +58,7 @@ def nearby_root(
 
 def _bracket_root(function: Callable[[float], float], fx: float, rounding: float, reach: float) -> float:
     """Steps to either side of fx grow until the sign changes; the last is halved."""
-    sign, near, far = np.sign(function(fx)), 0.0, max(NOISY * rounding, reach * 2.0**-WIDENINGS)
+    sign, near, far = np.sign(function(fx)), 0.0, max(NOISE_IN_ROUNDINGS * rounding, reach * 2.0**-WIDENINGS)
     while far <= reach:
         for side in (-1.0, 1.0):
             if np.sign(function(fx + side * far)) == sign:
@@ -90,4 +90,4 @@ def _secant(discriminant: Callable[[float], float], fx: float, rounding: float, 
         if abs(b - a) <= max(SECANT_TOLERANCE * abs(b - fx), rounding):
             return b
         at_b = discriminant(b)
-    return b if abs(b - a) <= NOISY * rounding else np.nan
+    return b if abs(b - a) <= NOISE_IN_ROUNDINGS * rounding else np.nan

@@ -13,8 +13,9 @@ remaining error is
 .. math:: F_h - F = \frac{F_{2h} - F_h}{S_{2h}/S_h - 1}, \qquad S = \sum_i h_i^3,
 
 Richardson's extrapolation for increments that need not be equal. The onset is given at F. Its uncertainty is twice the
-largest difference that rounding of both onsets allows. A ramp with fewer than `FEWEST` increments up to the onset is
-compared with the path through the middles of its increments, which has the smaller S, by the same formula.
+largest difference that rounding of both onsets allows. A ramp with fewer than `FEWEST_INCREMENTS` increments
+up to the onset is compared with the path through the middles of its increments, which has the smaller S, by the same
+formula.
 
 **Contacts change.** Nothing is extrapolated, and three effects are bounded.
 
@@ -54,16 +55,16 @@ from .nearby_root import nearby_root
 
 Vanishes = Callable[[Packing], float]
 
-FEWEST = 4
+FEWEST_INCREMENTS = 4
 """Increments up to the onset from which on every second load may be left out."""
 
-CARRIES = 1e-9
+LEAST_BEARING_FORCE = 1e-9
 """Normal force, in units of F_y, from which on a contact counts; that of a disk that carries nothing is noise."""
 
-FAILURES = NoEquilibriumError, OnsetError, ArpackError, LinAlgError
+PATH_FAILURES = NoEquilibriumError, OnsetError, ArpackError, LinAlgError
 """Errors of another path, which cost the error of the path alone and not the onset."""
 
-SHIFTS = 1 / 3, 2 / 3
+LOAD_SHIFTS = 1 / 3, 2 / 3
 """Shares of an increment by which the loads of two other paths are moved up where contacts change."""
 
 LONGEST_RUN = 2
@@ -72,7 +73,7 @@ LONGEST_RUN = 2
 DISKS_OF_ALL_MODES = 30
 """Disks up to which all eigenvalues take no longer than some."""
 
-UNKNOWN = 2.0
+UNCERTAINTY_OF_CORRECTION = 2.0
 """Uncertainty of an extrapolated onset, in units of the correction. As a rule a correction is good to a tenth.
 Where its coefficient changes sign along the path, the correction is wrong by more than itself."""
 
@@ -121,7 +122,7 @@ class PathError:
         if np.isnan([self.shift, self.finer, *self.moved]).any():
             return self.increment
         if not self.changes:
-            return UNKNOWN * (abs(self.shift) + hidden) / abs(self.weight)
+            return UNCERTAINTY_OF_CORRECTION * (abs(self.shift) + hidden) / abs(self.weight)
         part = 1.0 if self.weight > 0 else 2.0  # the ramp is the coarser path of the two
         return max(part * abs(self.shift), 2 * abs(self.finer), 2 * float(np.ptp([0.0, *self.moved]))) + hidden
 
@@ -157,7 +158,7 @@ def with_path_error(
         )
         try:
             part = errors.error(window.fx_onset, vanishes, window.rounding_error)
-        except FAILURES:
+        except PATH_FAILURES:
             return window
         edge = replace(window.onset, fx=window.fx_onset + part.correction)
         return replace(window, onset=edge, path_error=part.error)
@@ -183,7 +184,7 @@ class PathErrors:
         self._coarser, self._finer, self._moved = (
             [path.equilibria[0]],
             [path.equilibria[0]],
-            [[path.equilibria[0]] for _ in SHIFTS],
+            [[path.equilibria[0]] for _ in LOAD_SHIFTS],
         )
 
     def error(self, fx: float, vanishes: Vanishes, rounding: float) -> PathError:
@@ -205,7 +206,7 @@ class PathErrors:
         """
         changed = self.changes(fx)
         ramp = np.array([*(each.fx for each in self.path.equilibria if each.fx < fx), fx])
-        few = len(changed) < FEWEST
+        few = len(changed) < FEWEST_INCREMENTS
         other = _halve_loads(ramp) if few else _thin_loads(ramp, changed)
         increment = float(np.diff(ramp).max())
 
@@ -216,7 +217,7 @@ class PathErrors:
             try:
                 there = self._along(through, known)
                 root, slope = nearby_root(lambda load: vanishes(there(load)), fx, rounding, 0.5 * increment, slope)
-            except FAILURES:
+            except PATH_FAILURES:
                 return np.nan
             return root - fx
 
@@ -225,7 +226,9 @@ class PathErrors:
         if not changed.any():
             return PathError(shift, 0.0, (), weight, False, rounding, increment)
         finer = 0.0 if few else shift_path(_halve_loads(ramp), self._finer)
-        moved = (shift_path(_shift_loads(ramp, share), known) for share, known in zip(SHIFTS, self._moved, strict=True))
+        moved = (
+            shift_path(_shift_loads(ramp, share), known) for share, known in zip(LOAD_SHIFTS, self._moved, strict=True)
+        )
         return PathError(shift, finer, tuple(moved), weight, True, rounding, increment)
 
     def changes(self, fx: float) -> NDArray[np.bool_]:
@@ -241,7 +244,7 @@ class PathErrors:
         return np.array([a != b for a, b in pairwise(states)])
 
     def _along(self, through: Floats, known: list[Equilibrium]) -> LoadPath[Equilibrium]:
-        """The path through the inner ones of some loads, beginning with what is known of it; what is new is kept."""
+        """The path through the inner loads of `through`, from the equilibria `known`; new ones are added to them."""
         inner = through[1:-1]
         common = 0
         while common < min(len(inner), len(known) - 1) and known[common + 1].fx == inner[common]:
@@ -257,7 +260,7 @@ class PathErrors:
 
 def bearing_contacts(packing: Packing) -> frozenset[tuple[int, int, bool]]:
     """The contacts (i, j, whether it slides) that carry a force; j = -1 for the floor."""
-    carrying = packing.loaded(CARRIES * packing.fy)
+    carrying = packing.loaded(LEAST_BEARING_FORCE * packing.fy)
     contacts = carrying.contacts
     return frozenset(zip(contacts.i.tolist(), contacts.j.tolist(), carrying.sliding.tolist(), strict=True))
 

@@ -1,4 +1,4 @@
-"""Functions that run a scene, step by step: what they take, and how what they return prints."""
+"""Functions that run a scene step by step: their arguments, and the printed form of their results."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Step = TypeVar("Step")
 
 
 class RunIterator(Generic[Step]):
-    """The steps of a run, which says in an interactive session what to do with it."""
+    """The steps of a run; its printed form says in an interactive session how to use the run."""
 
     def __init__(self, name: str, steps: Iterator[Step]) -> None:
         self._name, self._steps = name, steps

@@ -203,7 +203,7 @@ class Record:
     def _keep(
         self, name: str, samples: list[Any], motions: list[tuple[float, MotionState]], reached: Checkpoint | None
     ) -> None:
-        """Write what has come since the last checkpoint, together with this one."""
+        """Write the samples and motions since the last checkpoint, together with this checkpoint."""
         if self._file is not None and (samples or reached):
             with self._file.change():
                 self._file.complete = False
@@ -226,7 +226,7 @@ class Record:
         self._file.append_trajectory(times, positions, low or None)
 
     def _say_saved(self, more: str = "") -> None:
-        """Say what the stored file holds, if it holds all."""
+        """Say what the stored file contains, if nothing is still to be written."""
         file = self._file
         if file is None or not file.saved or len(file) == 0:
             return
@@ -258,7 +258,7 @@ class Record:
 
 
 def _stored_steps(scene: Scene, disks: int, steps: Indices) -> Indices:
-    """The steps, among those of the samples, at which an undamped run stores positions."""
+    """The steps at which an undamped run stores positions: some of the steps of its samples."""
     wanted = None if scene.output is None else scene.output.trajectory
     if wanted is not None:
         return steps if wanted else steps[:0]

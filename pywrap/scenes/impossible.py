@@ -1,4 +1,4 @@
-r"""Refuse what no computation can do, before any work starts.
+r"""Refuse scenes that no computation can complete, before any work starts.
 
 `refuse_impossible` finds impossible numbers in a scene: overlaps beyond the contact law, forces below the rounding of
 the coordinates, a settling that never ends. `refuse_endless` finds a command that would take years, more memory than

@@ -1,4 +1,4 @@
-"""Quantities with units anywhere in a scene, such as ``width = "1.19 mm"``, and what the grains decide by themselves.
+"""Quantities with units anywhere in a scene, such as ``width = "1.19 mm"``, and the values that the grains determine.
 
 A scene with a section [units] may give each of its numbers as a text with a unit. The text is converted to the scene's
 own units (:mod:`~faultgouge.pywrap.scenes.units`) before the scene is checked, and rounded to `DIGITS`, so that two
@@ -88,7 +88,7 @@ Scene: TypeAlias = Mapping[str, Any]
 
 
 def as_numbers(scene: Scene, folder: Path, name: str) -> Scene:
-    """A scene as TOML holds it, with numbers in place of quantities, and with what its grains decide.
+    """A scene as TOML contains it, with numbers in place of quantities, and with the values that its grains determine.
 
     Parameters
     ----------

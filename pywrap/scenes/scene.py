@@ -211,7 +211,7 @@ ALL_SECTIONS = Command(tuple(SceneKeys.model_fields))
 
 
 def scene_of(scene: object, command: str) -> Scene:
-    """The scene that a function is given, or that of a file.
+    """The scene that a function is given, or the scene of a file.
 
     Parameters
     ----------

@@ -64,5 +64,5 @@ class SceneKeys(Section):
 
     @property
     def inertia_factor(self) -> float:
-        """I_0 in I = I_0 m R^2 of dynamics, spectrum and onset alike: that of [perturb], or the paper's 1."""
+        """I_0 in I = I_0 m R^2, for dynamics, spectrum and onset alike: the key of [perturb], or the paper's 1."""
         return (self.perturb or self._inertia).inertia_factor

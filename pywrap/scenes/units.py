@@ -112,7 +112,7 @@ class RealUnits:
         return self.stress(amplitude) / (self.density * self.shear_wave)
 
     def onset(self, fx: float, omega: float) -> dict[str, float]:
-        """For JSON: the shear stress of F_x, its share of the overburden, and the frequency of what grows."""
+        """For JSON: the shear stress of F_x, its share of the overburden, and the frequency of the growing motion."""
         return {
             "shear_stress_Pa": self.stress(fx),
             "stress_ratio": fx / self.fy,

@@ -97,7 +97,7 @@ def refusal_sentence(key: str, says: str) -> PydanticCustomError:
 
 
 def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[Section], ...]]) -> str:
-    """One error of pydantic as: where, what is wrong, what to do; `sections` has the models of each section."""
+    """An error of pydantic as: where, what is wrong, what to do; `sections` has the model of each section."""
     kind, context = error["type"], error.get("ctx", {})
     path = [str(part) for part in error["loc"] if part not in ("generated", "stored")]
     if kind == "extra_forbidden":

@@ -29,11 +29,11 @@ from ..equilibria.quasistatic import Equilibrium, equilibrate
 from ..lammps.engine import Engine
 from .minimize_energy import finest_tolerance, is_minimum, minimize_energy, settle_loose
 
-FACTOR = 1.05
+LOAD_FACTOR = 1.05
 """Factor of F_y from one equilibrium to the next. Up to 25 times the load of the paper's packing, factors
 of 1.005 to 1.3 lead to the same packing within 1e-14."""
 
-UNBALANCED = 1e-6
+FORCE_OF_MOTION = 1e-6
 """Force on a disk, in units of F_y, above which a packing is not at rest: all ways to rest end far below."""
 
 
@@ -63,7 +63,7 @@ def change_load(packing: Packing, fy: float, communicator: MPI.Comm | None = Non
     for load in loads_between(packing.fy, fy):
         report_progress(f"settled at F_y = {packing.fy:.6g}, carried to {load:.6g}")
         here = _rest(replace(here, fy=load), communicator)
-        if here.residual > UNBALANCED * load:
+        if here.residual > FORCE_OF_MOTION * load:
             raise NoEquilibriumError(
                 f"the packing that settled at F_y = {packing.fy:.6g} does not come to rest on the way to {fy:.6g}, at "
                 f"{load:.6g}: choose packing.settle_at nearer to the load, or another seed"
@@ -79,7 +79,7 @@ def loads_between(first: float, last: float) -> list[float]:
     """
     if last == first:
         return []
-    factor = FACTOR if last > first else 1 / FACTOR
+    factor = LOAD_FACTOR if last > first else 1 / LOAD_FACTOR
     whole = int(np.ceil(np.log(last / first) / np.log(factor) - 1e-9))
     return [*(first * factor**k for k in range(1, whole)), last]
 

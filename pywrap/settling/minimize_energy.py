@@ -56,13 +56,13 @@ the upper layer of `loose.layer_size` a stage takes 10,000 to 50,000, whatever t
 MINIMIZER_ITERATIONS = 60
 """Iterations before dynamics takes over again; where no rearrangement is under way, 15 to 40 do."""
 
-FLOATING = 1e-8
+FLOATING_STIFFNESS = 1e-8
 """Stiffness, in units of that of a contact that carries F_y, that is added to what has none: to what nothing holds."""
 
 LONGEST_DISPLACEMENT = 0.1
 """Longest displacement in one iteration, in smallest radii: no disk jumps over another."""
 
-UPHILL = 0.5
+UPHILL_SLOPE_SHARE = 0.5
 """A step is shortened if the slope at its end is uphill and steeper than this share of the slope at its begin."""
 
 LIGHT_VISCOSITY = 0.02
@@ -168,7 +168,7 @@ def minimize_energy(packing: Packing, iterations: int = MINIMIZER_ITERATIONS) ->
 
 def is_minimum(packing: Packing) -> bool:
     """Whether an equilibrium without friction is a minimum of the energy, but for parts that float."""
-    return _positive(packing, FLOATING * _stiffest(packing)) is not None
+    return _positive(packing, FLOATING_STIFFNESS * _stiffest(packing)) is not None
 
 
 def _downhill(packing: Packing, step: Floats) -> tuple[Packing, float]:
@@ -179,7 +179,7 @@ def _downhill(packing: Packing, step: Floats) -> tuple[Packing, float]:
     while True:
         there = place_disks(packing, packing.position + share * move)
         after = there.net_force[: len(step)] @ step
-        if after >= -UPHILL * slope or share < 1e-6:
+        if after >= -UPHILL_SLOPE_SHARE * slope or share < 1e-6:
             return there, share
         # where the slope would vanish if it fell evenly; a contact that closed on the way makes it fall late
         share *= max(0.1, slope / (slope - after))

@@ -27,7 +27,7 @@ from ..scenes.validation import SceneError
 from .change_load import change_load
 from .minimize_energy import settle_loose
 
-OUT_OF_BALANCE = 1e-3
+LARGEST_IMBALANCE = 1e-3
 """Residual of a stored packing, in units of F_y, above which it counts as not settled: the packing would
 rearrange rather than relax."""
 
@@ -35,7 +35,7 @@ STIFFNESS = {1.5: 2e5, 1.0: 7e3}
 """k_n while a packing settles, by the exponent of the law (of others that of 3/2): the paper's, and of harmonic disks
 the stiffness 3/2 k_n delta^(1/2) that a contact of the paper's law has under the paper's load."""
 
-SLIPPERY = 1e-3
+LEAST_BEARING_FRICTION = 1e-3
 """Friction coefficient below which friction bears no packing: contacts are at their bound at slips of a thousandth of
 an overlap, and K has no tangential stiffness there."""
 
@@ -103,7 +103,7 @@ def settle(
 
 def _cure(scene: Scene, packing: Packing) -> str:
     """Advice for a packing that has no equilibrium nearby."""
-    if 0 < packing.law.mu < SLIPPERY:
+    if 0 < packing.law.mu < LEAST_BEARING_FRICTION:
         return f"friction of mu = {packing.law.mu:g} holds next to nothing; take a larger law.mu, or 0 for no friction"
     if isinstance(scene.packing, GeneratedPacking):
         return (
@@ -266,7 +266,7 @@ def _in_arithmetic(packing: Packing, precision: str) -> Packing:
 def _take_stored(scene: Scene, law: MindlinLaw) -> Packing:
     assert not isinstance(scene.packing, GeneratedPacking)
     packing = _in_arithmetic(scene.packing.packing(law, **load_of(scene)), scene.precision)
-    if packing.residual > OUT_OF_BALANCE * scene.load.fy:
+    if packing.residual > LARGEST_IMBALANCE * scene.load.fy:
         raise SceneError(
             f"{scene.packing.file}: the packing is not in balance, a disk feels {packing.residual:.3g} under "
             f"fy = {scene.load.fy:g}: check law and load against those it was settled with, or bring it to rest by "

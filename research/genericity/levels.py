@@ -46,7 +46,7 @@ from scipy.sparse import csr_array
 from faultgouge.analysis import Floats, Indices, spectrum
 from faultgouge.analysis.windows import force_bearing, full_operator
 from faultgouge.pywrap import Equilibrium, Scene, ramp_loads
-from research.packing_tools import path_from
+from faultgouge.studies.packing_tools import path_from
 
 AVERAGED_OVER = 21
 """Levels over which local densities and couplings are averaged: some 5 % of the level's statistics in error, and few

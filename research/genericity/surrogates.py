@@ -30,8 +30,8 @@ from scipy.sparse import coo_array, csr_array
 from faultgouge.analysis import Floats, NoEquilibriumError, Packing, mass_weighted, stiffness_matrix
 from faultgouge.analysis.windows import complex_windows, force_bearing
 from faultgouge.pywrap import Equilibrium, Scene, ramp_loads
+from faultgouge.studies.packing_tools import path_from
 from research.genericity.levels import Pencil, pencil_of
-from research.packing_tools import path_from
 
 BLOCK = 20
 """Levels among which spacings and couplings are permuted: their means change little over so many."""

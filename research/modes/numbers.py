@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from faultgouge.analysis import Floats
-from faultgouge.studies.modes.table import QUANTITIES, Table, medians_over_load
+from faultgouge.studies.modes import QUANTITIES, Table, medians_over_load
 from faultgouge.studies.statistics import median, share
 from research.modes.loss import GROWS, RESTITUTIONS
 from research.statistics import exponent

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from faultgouge.studies.modes.table import Table
+from faultgouge.studies.modes import Table
 from faultgouge.studies.sweep import read_results
 from research.tables import SWEEP_ROWS, read_rows
 

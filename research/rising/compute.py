@@ -33,7 +33,7 @@ from research.lammps_laws.compute import GAMMA, KN, MU, pour, rest
 from research.laws.both_laws import as_slider, at_loads
 from research.modes.loss import impact_velocity, with_dashpots
 from research.modes.sets import sets
-from research.rising.windows import Windows, drift_and_vibration, rise_in_plugin
+from research.rising.windows import FADE, Windows, drift_and_vibration, follow_one_sided, rise_in_plugin
 from research.tables import known_rows
 
 SEEDS = 20
@@ -55,6 +55,9 @@ RATES = (3e-4, 3e-5, 3e-6)
 
 STARTS = (True, False)
 """Whether the drag that fades out acts on rotations."""
+
+FOLLOWED = 60
+"""Windows for which the layers of `APART` are followed: more than twice as many as those of the other rows."""
 
 POURED_LAWS = (
     "granular hertz, mindlin/force",
@@ -163,6 +166,24 @@ def beside(packing: Packing, rising: dict[str, Any], rates: Sequence[float], con
     if control:
         found["control"] = lammps(replace(packing, law=replace(packing.law, mu=100.0)), min(rates), True)
     return found
+
+
+def follow_longer(seed: int) -> Iterator[dict[str, Any]]:
+    """The row of a layer at `COMPARED` that is followed for a longer time: vibration in each window, of both starts."""
+    begin, (load, restitution) = time.process_time(), COMPARED
+    scene, at, _ = at_rest(seed, "coulomb", [load])
+    packing = with_restitution(at[load], scene, restitution)
+    length, windows = follow_one_sided(packing, FOLLOWED)
+    followed_there = Windows(length, FOLLOWED, FOLLOWED - FADE)
+    motions = [rise_in_plugin(packing, min(RATES), followed_there, spins) for spins in STARTS]
+    lammps = [[drift_and_vibration([part], length, min(RATES)) for part in motion] for motion in motions]
+    yield {
+        "seed": seed,
+        "chunk": length,
+        "one_sided": {"drift": windows[:, 0].T.tolist(), "vibration": windows[:, 1].T.tolist()},
+        "lammps": {name: [[part[name] for part in motion] for motion in lammps] for name in ("drift", "vibration")},
+        "cpu_seconds": time.process_time() - begin,
+    }
 
 
 def poured(law: str, kn: float, slope: float, seed: int) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 python -m research.rising.make layers    what the table of layers lacks, on one core, resumable; an hour
 python -m research.rising.make poured    what the table of poured spheres lacks; ten minutes
-python -m research.rising.make starts SEEDS   what the table of two starts lacks; a minute a seed
+python -m research.rising.make starts    what the table of two layers for a longer time lacks; a minute
 python -m research.rising.make onsets SEEDS   what the table of onsets lacks; ten seconds a seed
 python -m research.rising.make page      README.md from the tables
 python -m research.rising.make check     the first seed of the layers and a tenth of the spheres once more, compared
@@ -39,10 +39,10 @@ from research.rising.compute import (
     STIFFNESSES,
     compute_layers,
     compute_poured,
+    follow_longer,
     layers,
     poured,
 )
-from research.rising.starts import order, rows_of
 from research.statistics import count_of
 from research.tables import add_seeds, differing, known_rows
 
@@ -414,8 +414,8 @@ if __name__ == "__main__":
             compute_layers(LAYERS)
         case ["poured"]:
             compute_poured(POURED)
-        case ["starts", seeds]:
-            add_seeds(STARTS, order(int(seeds)), rows_of)
+        case ["starts"]:
+            add_seeds(STARTS, APART, follow_longer)
         case ["onsets", seeds]:
             add_seeds(ONSETS, range(1, int(seeds) + 1), onsets.rows_of)
         case ["page"]:

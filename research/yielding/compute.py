@@ -27,9 +27,10 @@ import numpy as np
 
 from faultgouge.analysis import Packing, Signal, nearest_image
 from faultgouge.pywrap import Dynamics, Engine, EngineError, Equilibrium, Scene, dashpot, time_step
-from faultgouge.studies.eruptions.compute import growth_rate
+from faultgouge.studies.eruptions import growth_rate
+from faultgouge.studies.packing_tools import contact_pairs
 from research.modes.loss import impact_velocity, with_dashpots
-from research.packing_tools import contact_pairs, distance_of_bearing_disks, shake_disks
+from research.packing_tools import distance_of_bearing_disks, shake_disks
 from research.yielding.static import Branch, FailedError, branch, layer_slip, rest
 
 SHARES = (0.25, 0.5, 0.75, 0.9, 0.97)

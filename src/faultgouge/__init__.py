@@ -1,4 +1,4 @@
-"""Stability of stressed layers of frictional grains: what they do, and why.
+"""Stability of packings of frictional grains: whether they move, and what happens when they do.
 
 What most users need is here, and is imported when it is used. ``faultgouge.analysis`` has the stability operator,
 spectrum, onset and growth of a configuration; ``faultgouge.pywrap`` drives LAMMPS from a scene to stored

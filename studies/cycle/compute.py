@@ -37,17 +37,13 @@ from ...analysis.motion.rates import rates_of
 LONE_PARTICIPATION = 1.5
 """Disks that take part in a motion, below which the motion is that of one disk."""
 
-TRIED = 20
-"""Growing motions whose vectors are looked at for one that more than a disk takes part in."""
-
-
 INVERSE_STEPS = 3
 """Steps of inverse iteration with an eigenvalue that is known to nine digits: two leave 1e-12 of the others."""
 
 
 @dataclass(frozen=True)
 class LinearState:
-    """What grows about a state, if all contacts at Coulomb's bound stick, or all slide.
+    """Linear motion about a state, with all contacts at Coulomb's bound sticking, or all sliding.
 
     Attributes
     ----------
@@ -55,17 +51,17 @@ class LinearState:
         Complex pairs of K without dissipation.
     undamped : float
         Growth rate of D without dissipation, 1 / time: of complex pairs and of negative eigenvalues.
-    damped : float
-        Largest 2 Re s with dissipation, 1 / time.
+    damped : float, optional
+        Largest 2 Re s with dissipation, 1 / time; None if no motion of several disks is known.
     lowest : float
         Least real part of the eigenvalues of K, 1 / time^2.
     alone : int
-        Motions of one disk that grow without dissipation.
+        Motions of one disk that grow without dissipation. The other numbers leave out the motions of one disk.
     """
 
     pairs: int
     undamped: float
-    damped: float
+    damped: float | None
     lowest: float
     alone: int
 
@@ -106,7 +102,7 @@ def cycle_state(packing: Packing, spring: float) -> dict[str, Any]:
 
 
 def linear_state(configuration: Configuration, sliding: bool) -> LinearState:
-    """What grows about a configuration in linear motion."""
+    """The growth rates of linear motion about a configuration."""
     motion = Motion.of(configuration, sliding=sliding)
     modes = Modes.of_matrix(motion.stiffness)
     rounding = unit_rounding(motion.stiffness.data)
@@ -125,15 +121,14 @@ def linear_state(configuration: Configuration, sliding: bool) -> LinearState:
     )
 
 
-def _damped_rate(motion: Motion) -> float:
-    """Largest 2 Re s of the motions that more than one disk takes part in."""
+def _damped_rate(motion: Motion) -> float | None:
+    """Largest 2 Re s of the motions that more than one disk takes part in; None if no such motion is known."""
     stiffness, damping = motion.stiffness.toarray(), motion.damping.toarray()
-    values = rates_of(motion).values
-    for s in values[:TRIED]:
+    for s in rates_of(motion).values:  # the fastest growing first
         pencil = s * s * np.eye(len(stiffness)) + s * damping + stiffness
         if _disks(motion, null_vector(pencil)[:, None])[0] >= LONE_PARTICIPATION:
             return float(2 * s.real)
-    return float(2 * values[min(TRIED, len(values)) - 1].real)
+    return None
 
 
 def null_vector(singular: Complexes) -> Complexes:

@@ -27,7 +27,7 @@ CYCLE_COLUMNS = (
 
 
 def holds_drive(path: Path) -> bool:
-    """Whether a file that is named like a run.h5 is one of `drive`; the reader of scenes says what others lack."""
+    """Whether a file with the suffix of a run.h5 is a file of `drive`."""
     if path.suffix != ".h5":
         return False
     with RunFile(path) as file:

@@ -48,7 +48,7 @@ QUIET_TIME = 50.0
 SAMPLES_OF_RUN = 400
 """Samples of disks and contacts in a run of the full time, and at least so many in a shorter one."""
 
-OVER = 1.5
+LATE_GROWTH_OF_D = 1.5
 """Largest growth of D, from the second quarter to the second half, of a run that is over: D of disks that wander about
 at random would double."""
 
@@ -65,7 +65,7 @@ RISE_OF_D = 1e4
 """Factor from the D of the first time unit from which D of a linearly stable packing has risen: rounding alone drifts
 by a few hundred times in `QUIET_TIME`."""
 
-WALK = 10.0
+WALK_FACTOR = 10.0
 """Factor from the D of a random walk, one rounding of a coordinate a time step, below which D has not risen: strong
 drag leaves D at 1e-30 in the first time unit, and the walk is at 3e-25 after fifty."""
 
@@ -163,7 +163,7 @@ def _over(samples: list[Sample], rate: float, unit: float) -> bool:
         return False
     quarter = max((each["msd"] for each in samples if t / 4 < each["time"] <= t / 2), default=0.0)
     half = max(each["msd"] for each in samples if each["time"] > t / 2)
-    return half <= OVER * quarter
+    return half <= LATE_GROWTH_OF_D * quarter
 
 
 def _flows(samples: list[Sample], packing: Packing) -> bool:
@@ -227,9 +227,9 @@ def _noise(columns: dict[str, Floats], unit: float) -> float:
 def _end_of_growth(
     start: Start, samples: list[Sample], columns: dict[str, Floats], rate: float, unit: float
 ) -> dict[str, Any]:
-    """When and by what the growth ended, see the module."""
+    """Time and cause of the end of the growth, see the module."""
     ended: float | None = None
-    drift = WALK * start.packing.coordinate_rounding**2 * columns["time"][-1] / time_step(start.packing)
+    drift = WALK_FACTOR * start.packing.coordinate_rounding**2 * columns["time"][-1] / time_step(start.packing)
     ends: Ends = "stable" if columns["msd"].max() <= max(RISE_OF_D * _noise(columns, unit), drift) else "rises"
     if rate > 0:
         place = int(np.argmax(columns["msd"] >= END_OF_GROWTH * columns["msd"].max()))

@@ -20,7 +20,7 @@ from ...pywrap.settling.settle import settle
 from ..packing_tools import path_from
 from ..result_rows import Rows
 from ..study import Figures, Result, SceneStudy, Work
-from .compute import DECADES_OF_D, OVER, QUIET_TIME, Start, erupt
+from .compute import DECADES_OF_D, LATE_GROWTH_OF_D, QUIET_TIME, Start, erupt
 from .draw import WORDS_OF, course_figure, size_figure
 
 
@@ -81,12 +81,12 @@ def _page(result: Result) -> Result:
         "small": len(small),
         "noise": (min(run["noise"] for run in runs), max(run["noise"] for run in runs)),
         "balance": max(run["balance"] for run in free),
-        "criterion": (OVER, DECADES_OF_D, QUIET_TIME),
+        "criterion": (LATE_GROWTH_OF_D, DECADES_OF_D, QUIET_TIME),
     }
 
 
 def eruptions_of(scene: Scene, _: object) -> Result:
-    """The task "eruptions" of a sweep: sizes at each load of [eruptions], and what ended them, without time series.
+    """The task "eruptions" of a sweep: size and end of the eruption at each load of [eruptions], without time series.
 
     Raises
     ------

@@ -1,5 +1,14 @@
 """Complex modes over the load: their number, their growth rates, and the loss of a contact that stops them."""
 
 from .count_pairs import PairCounts, along_ramp, antisymmetric_norm, count_pairs
+from .table import QUANTITIES, Table, medians_over_load
 
-__all__ = ["PairCounts", "along_ramp", "antisymmetric_norm", "count_pairs"]
+__all__ = [
+    "QUANTITIES",
+    "PairCounts",
+    "Table",
+    "along_ramp",
+    "antisymmetric_norm",
+    "count_pairs",
+    "medians_over_load",
+]

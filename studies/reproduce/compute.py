@@ -148,7 +148,7 @@ def growth_run(scene: Scene, run: Onset, path: Path) -> GrowthRun:
 
 
 def _dominance(modes: Spectrum) -> float:
-    """Growth rate of the fastest pair, less that of the second: how fast it gets ahead; 0 of a packing that buckles."""
+    """Growth rate of the fastest pair less the rate of the second pair; 0 of a packing that buckles."""
     if len(modes.negative):
         return 0.0
     rates = sorted((pair.growth_rate for pair in modes.pairs), reverse=True)

@@ -27,7 +27,7 @@ SEED = "packing.seed"
 STYLE_COLOURS = 6
 """Colours of the style: more scenes cannot be told apart."""
 
-ASIDE, EDGE_MARGIN = 0.035, 0.08
+SAMPLE_DISTANCE, EDGE_MARGIN = 0.035, 0.08
 """Distance of samples at one value, and of the outermost from the edge, in units of the range of values."""
 
 FEWEST_SCENES = 6
@@ -132,7 +132,7 @@ def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
 
 
 def _labels(samples: Sequence[SeedSample]) -> list[str]:
-    """What the colour of each sample stands for: the sample, or, of more than can be told apart, one key's value."""
+    """The meaning of the colours: the sample, or, of too many samples for colours, the value of one key."""
     if len(samples) <= STYLE_COLOURS:
         return [sample.label for sample in samples]
     counts = {key: len({str(sample.values[key]) for sample in samples}) for key in samples[0].values}
@@ -154,13 +154,13 @@ def _draw_onsets(axes: Axes, key: str, samples: Sequence[SeedSample], colours: S
 
 
 def _side_by_side(axes: Axes, places: Floats) -> Floats:
-    """Places on the axis of a key, those of equal values next to each other; the axis becomes wide enough for all."""
+    """Places on the axis of a key, samples of one value next to each other; the axis becomes wide enough for all."""
     logarithmic = axes.get_xscale() == "log"
     along = np.log(places) if logarithmic else places
     span = float(np.ptp(along)) or 1.0
     same = along[:, None] == along
     rank = np.tril(same, -1).sum(axis=1) - 0.5 * (same.sum(axis=1) - 1)
-    aside = along + ASIDE * span * rank
+    aside = along + SAMPLE_DISTANCE * span * rank
     ends = aside.min() - EDGE_MARGIN * span, aside.max() + EDGE_MARGIN * span
     axes.set_xlim(*np.exp(ends) if logarithmic else ends)
     return np.exp(aside) if logarithmic else aside

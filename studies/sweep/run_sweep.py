@@ -35,7 +35,7 @@ from .table import Row, write_tables
 from .tasks import TASKS
 from .workers import compute_points
 
-LINES, ASKED = "results.jsonl", "sweep.json"
+RESULTS_FILE, REQUEST_FILE = "results.jsonl", "sweep.json"
 
 
 class FailedSweepError(FaultgougeError):
@@ -123,15 +123,15 @@ def run_sweep(
             return []
         make_folder(output)
         with lock_output(output):
-            known = read_results(output / LINES)
+            known = read_results(output / RESULTS_FILE)
             missing = missing_points(points, known)
             _write_request(sweep, output, part)
             if len(missing) < len(points):
-                say(f"{len(points) - len(missing)} of {len(points)} points are in {output / LINES} already")
+                say(f"{len(points) - len(missing)} of {len(points)} points are in {output / RESULTS_FILE} already")
             if others := known.keys() - {point.key for point in sweep.points}:
                 say(f"{len(others)} rows there are of other scenes, code or versions, and are not in the table")
             with closing(compute_points(pool, sweep.located_task, missing)) as ended:
-                for row in progress(result_rows.keep_rows(output / LINES, ended), len(missing)):
+                for row in progress(result_rows.keep_rows(output / RESULTS_FILE, ended), len(missing)):
                     known[row["key"]] = row
             table = [known[point.key] for point in points]
             write_tables(table, sweep.names, output)
@@ -142,7 +142,7 @@ def _write_request(sweep: Sweep, output: Path, part: tuple[int, int]) -> None:
     """Write sweep.json; its keys recognise the rows wherever the files of the scenes and of the task are."""
     keys = [point.key for point in sweep.points]
     request = sweep.as_dict() | {"version": version("faultgouge"), "keys": keys, "shard": list(part)}
-    write_json(output / ASKED, request)
+    write_json(output / REQUEST_FILE, request)
 
 
 def missing_points(points: Iterable[SweepPoint], known: dict[str, Row]) -> list[SweepPoint]:
@@ -156,7 +156,7 @@ def missing_points(points: Iterable[SweepPoint], known: dict[str, Row]) -> list[
 
 
 def require_result(rows: Sequence[Row]) -> None:
-    """Raise FailedSweepError if there are rows, and each of them is that of a failure."""
+    """Raise FailedSweepError if there are rows, and each row is a failure."""
     if rows and all(row["says"] is not None for row in rows):
         raise FailedSweepError(f"none of the {len(rows)} scenes has a result; the first says: {rows[0]['says']}")
 
@@ -219,15 +219,15 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
     request = _common_request(parts)
     make_folder(output)
     with lock_output(output):
-        if (output / ASKED).exists() or (output / LINES).exists():
+        if (output / REQUEST_FILE).exists() or (output / RESULTS_FILE).exists():
             _common_request([*parts, output])
-        kept = read_results(output / LINES)
-        known = read_results(output / LINES, *(part / LINES for part in parts))
+        kept = read_results(output / RESULTS_FILE)
+        known = read_results(output / RESULTS_FILE, *(part / RESULTS_FILE for part in parts))
         table = [known[key] for key in request["keys"] if key in known]
-        write_json(output / ASKED, request | {"shard": [1, 1]})
+        write_json(output / REQUEST_FILE, request | {"shard": [1, 1]})
         for row in table:
             if _as_text(kept.get(row["key"])) != _as_text(row):
-                result_rows.append_row(output / LINES, row)
+                result_rows.append_row(output / RESULTS_FILE, row)
         sweep = Sweep(request["task"], request["sweep"], request["scene"])
         write_tables(table, sweep.names, output)
     count = len(request["keys"])
@@ -256,11 +256,11 @@ def _common_request(folders: Sequence[Path]) -> dict[str, Any]:
 
 def _read_request(folder: Path) -> dict[str, Any]:
     """The contents of sweep.json; SceneError if the folder is none of a sweep."""
-    if not (folder / ASKED).is_file():
+    if not (folder / REQUEST_FILE).is_file():
         raise SceneError(
-            f"{folder} is no folder of a sweep (it has no {ASKED}): give folders that `faultgouge sweep` has left"
+            f"{folder} is no folder of a sweep (it has no {REQUEST_FILE}): give folders of `faultgouge sweep`"
         )
-    request = _read(folder / ASKED)
+    request = _read(folder / REQUEST_FILE)
     if not {"task", "sweep", "scene", "version", "keys"} <= request.keys():
         raise SceneError(
             f"{folder} is of version 1.0.0 or before, whose rows this version does not know: merge it with the version "

@@ -226,7 +226,7 @@ def _split_keys(key: str) -> list[str]:
 
 
 def _values(key: str, values: Any, name: str) -> list[Any]:
-    """The values of a swept key: those of a list, or the whole numbers of "FIRST:LAST"."""
+    """The values of a swept key: the elements of a list, or the whole numbers of "FIRST:LAST"."""
     names = _split_keys(key)
     if isinstance(values, str):
         match = re.fullmatch(r"\s*(\d{1,12})\s*:\s*(\d{1,12})\s*", values)

@@ -33,7 +33,7 @@ from .user_function import UserFunctionError
 TRIES = 3
 """Number of successive worker deaths after which the point is considered the cause."""
 
-FINAL = (NoEquilibriumError, SceneError)
+FINAL_ERRORS = (NoEquilibriumError, SceneError)
 """Errors that the same scene has again, to the bit: it has no equilibrium, or it is refused. Others may have passed, as
 a lack of memory or a full disk does, and a sweep that goes on tries such scenes again."""
 
@@ -142,7 +142,7 @@ def compute_point(task: str, point: SweepPoint, bed: Packing | None, keep: bool)
             except FAILURES as error:
                 says = str(error) or type(error).__name__
                 row["says"] = f"scene {point.number}: {says}" if isinstance(error, UserFunctionError) else says
-                row["final"] = isinstance(error, FINAL)
+                row["final"] = isinstance(error, FINAL_ERRORS)
     row["seconds"] = round(time.perf_counter() - begin[0], 3)
     row["cpu_seconds"] = round(time.process_time() - begin[1], 3)
     return row, (beds[0] if keep and beds else bed if keep else None)

@@ -47,7 +47,7 @@ DEFAULT_FREQUENCIES = 24
 FIRST_BRACKET = 0.05
 """Relative distance from the prediction at which the bisection begins."""
 
-WIDEN = 1.5
+BRACKET_FACTOR = 1.5
 """Factor by which a bracket that does not hold is widened on the wrong side."""
 
 BISECTION_RUNS = 24
@@ -199,7 +199,7 @@ def _bracket(wave: Wave) -> tuple[float, float, int, float]:
     below, above = predicted * (1 - FIRST_BRACKET), predicted * (1 + FIRST_BRACKET)
     runs = 1
     while (reached := _triggers(wave, above)) is None and runs < BISECTION_RUNS:
-        below, above, runs = above, above * WIDEN, runs + 1
+        below, above, runs = above, above * BRACKET_FACTOR, runs + 1
     if reached is None:
         raise SceneError(f"no wave up to {above:.3g} triggers at omega = {wave.expected['omega']:g}: lower friction.v0")
     if below < predicted:
@@ -210,7 +210,7 @@ def _bracket(wave: Wave) -> tuple[float, float, int, float]:
                     f"at F_x = {wave.packing.fx:.6g} the layer exceeds v_0 = {threshold(wave.scene):g} without a wave, "
                     "by rounding noise, so that no amplitude is critical: raise friction.v0"
                 )
-            below, above, reached, runs = below / WIDEN, below, time, runs + 1
+            below, above, reached, runs = below / BRACKET_FACTOR, below, time, runs + 1
     return below, above, runs, reached
 
 

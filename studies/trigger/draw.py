@@ -18,7 +18,7 @@ WAVE = {"layer": "amplitude of the force $a$", "floor": "acceleration of the flo
 
 @styled
 def map_figure(result: dict[str, Any]) -> Figure:
-    """The critical amplitude over frequency and distance from the onset, of what trigger.json holds.
+    """The critical amplitude over frequency and distance from the onset, from the contents of trigger.json.
 
     Colours are from K; there are circles where LAMMPS was asked, in the colour of its own answer.
     """
@@ -38,7 +38,7 @@ def map_figure(result: dict[str, Any]) -> Figure:
 
 @styled
 def threshold_figure(result: dict[str, Any]) -> Figure:
-    """The critical amplitude over the frequency, a curve for each distance from the onset, of what trigger.json holds.
+    """The critical amplitude over the frequency, a curve for each distance from the onset, from trigger.json.
 
     Lines are from K with the transient, dotted ones of the stationary motion alone at the smallest distance; triangles
     are runs of LAMMPS that did (upwards) and did not (downwards) trigger.

@@ -45,15 +45,15 @@ from ...pywrap.scenes.validation import require_section
 from ..packing_tools import unit_of_time
 from .forecast import JUMP_SHARE, Forecast, forecast
 
-EARLY = 2000
+EARLY_SAMPLES = 2000
 """Samples of each run at times that grow geometrically: the layer passes the velocities over which the friction falls
 early in a run, within a small share of its length."""
 
-FALL = 20_000
+SAMPLES_OF_FALL = 20_000
 """Such samples of the run whose friction falls. The friction falls within some twenty time steps after a thousand; so
 many samples include each step up to there."""
 
-SENSITIVE = 1e-2
+LARGEST_DISTANCE = 1e-2
 """Largest distance 1 - F_x/F_x^c at which the response is compared with its power law: further off, the pair is no
 longer the whole of it."""
 
@@ -282,7 +282,7 @@ def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: O
         weakening: Weakening | None = None,
         time: float = settings.time,
         start: Equilibrium = start,
-        early: int = EARLY,
+        early: int = EARLY_SAMPLES,
     ) -> None:
         one = settings.model_copy(update={"amplitude": amplitude, "time": time})
         series = series_of(perturb(scene.model_copy(update={"perturb": one}), start, early=early, weakening=weakening))
@@ -293,7 +293,7 @@ def trigger(scene: Scene, start: Equilibrium, below: Equilibrium | None, ramp: O
     run("unperturbed", 0.0, early=200)  # as `perturb` calibrates v_0
     weakening = calibrate_weakening(friction, runs["unperturbed"])
     run("perturbed", settings.amplitude)
-    run("erupting", settings.amplitude, weakening, early=FALL)
+    run("erupting", settings.amplitude, weakening, early=SAMPLES_OF_FALL)
     if below is not None:
         run("control", settings.amplitude, weakening, start=below)
     packing, amplitude = start.packing, ABOVE_NOISE * settings.amplitude
@@ -333,7 +333,7 @@ def sensitivity(run: Onset) -> Sensitivity:
     first = run.windows[0]
     below = sorted((fx for fx in run.between if fx < first.fx_onset), reverse=True)
     # nearer than a hundred times the onset's own error, the distance is not known
-    nearest, furthest = 100 * first.error, SENSITIVE * first.fx_onset
+    nearest, furthest = 100 * first.error, LARGEST_DISTANCE * first.fx_onset
     below = [fx for fx in below if nearest < first.fx_onset - fx < furthest]
     pairs = tuple(normal_forms([run.between[fx] for fx in below], first.eigenvalue))
     distance = 1 - np.array(below) / first.fx_onset

@@ -10,7 +10,7 @@ from reference_layer import SMALL
 
 from faultgouge.analysis import nearest_image
 from faultgouge.pywrap import Scene, SceneError, settle
-from faultgouge.pywrap.settling.change_load import FACTOR, change_load, loads_between
+from faultgouge.pywrap.settling.change_load import LOAD_FACTOR, change_load, loads_between
 from faultgouge.pywrap.settling.settle import settle_bed
 
 
@@ -40,7 +40,7 @@ def test_loads_lie_on_one_grid(first, here, there):
     assert farther[-1] == far
     assert farther[: len(nearer) - 1] == nearer[:-1]
     steps = np.abs(np.diff(np.log([first, *farther])))
-    assert steps.max() <= np.log(FACTOR) * (1 + 1e-6)
+    assert steps.max() <= np.log(LOAD_FACTOR) * (1 + 1e-6)
 
 
 def test_a_packing_at_the_load_of_settling_is_the_settled_one():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from faultgouge.analysis import RunFile, stability, stiffness_matrix
+from faultgouge.analysis import FLOOR, Contacts, MindlinLaw, Packing, RunFile, stability, stiffness_matrix
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 from faultgouge.analysis.motion.motion import Motion
 from faultgouge.pywrap import Equilibrium, Scene, SceneError
@@ -134,6 +134,26 @@ def test_a_state_at_rest_has_the_rates_of_stability(slow):
     assert found["lowest_sticking"] > cycle_state(packing, 0.0)["lowest_sticking"]
     # the pairs that the force brings grow in spite of the dashpots
     assert cycle_state(moving, SPRING)["pairs_sticking"] > found["pairs_sticking"]
+
+
+def test_motions_of_many_lone_disks_do_not_hide_a_motion_of_two():
+    """Beside two disks that touch, heavy lone disks lie on the floor, whose motions decay more slowly."""
+
+    def two_and(lone):
+        x = np.r_[0.0, 0.999, 3.0 * np.arange(1, lone + 1)]
+        floor = np.arange(lone + 2)
+        return Packing(
+            position=np.column_stack([x, np.full(lone + 2, 0.499)]),
+            radius=np.full(lone + 2, 0.5),
+            mass=np.r_[1.0, 1.0, np.geomspace(1e4, 2e4, lone)],  # equal motions would mix
+            top=floor == 1,
+            contacts=Contacts(np.r_[0, floor], np.r_[1, np.full(lone + 2, FLOOR)], np.zeros(lone + 3)),
+            law=MindlinLaw(2e5, 6e4, 1.0, cn=60.0, ct=17.0),
+        )
+
+    alone, beside = (cycle_state(two_and(lone), SPRING) for lone in (0, 25))
+    assert alone["damped_sticking"] < 0
+    assert beside["damped_sticking"] == pytest.approx(alone["damped_sticking"], rel=1e-6)
 
 
 def test_a_drive_without_a_spring_and_other_files_are_refused(tmp_path, faultgouge_here):

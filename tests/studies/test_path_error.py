@@ -11,7 +11,7 @@ import pytest
 from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
-from faultgouge.assessment.work_precision.coverage.stated_errors import FINER, draw_scene, read, restate_case
+from faultgouge.assessment.work_precision.coverage.stated_errors import REFINEMENT, draw_scene, read, restate_case
 from faultgouge.pywrap import Engine, LoadPath, Scene, scene_path, settle
 from faultgouge.pywrap.onset import onset_run
 from faultgouge.pywrap.runs.path_error import PathError, PathErrors, squared_gap, with_path_error
@@ -175,7 +175,7 @@ def test_all_but_a_few_are_covered(kind, fresh):
 
 def test_the_limits_are_known_better_than_the_errors_that_they_judge():
     """In doubles rounding moves the limit as it moves the onset, by as much as is stated of it."""
-    assert FINER >= 20
+    assert REFINEMENT >= 20
     assert all(case.uncertain < 0.1 * case.stated for case in CASES if case.precision == "compensated")
     assert all(case.uncertain < 1.5 * case.stated for case in CASES)
     # of an independent code

@@ -426,7 +426,7 @@ load = { fy = 3.0 }
 ramp = { step = 5e-3, until = 0.025 }
 """
 
-PATIENT = {
+PATIENCE = {
     "distributed.comm.timeouts.connect": "5 minutes",
     "distributed.comm.timeouts.tcp": "5 minutes",
     "distributed.deploy.lost-worker-timeout": "5 minutes",
@@ -453,7 +453,7 @@ def test_a_distributed_engine_whose_worker_is_killed_loses_nothing(tmp_path):
     stored = tmp_path / "cluster" / "results.jsonl"
     # one thread a worker: LAMMPS does not stand several in a process
     with (
-        dask.config.set(PATIENT),
+        dask.config.set(PATIENCE),
         distributed.LocalCluster(n_workers=4, threads_per_worker=1, dashboard_address=None) as cluster,
         distributed.Client(cluster) as client,
     ):

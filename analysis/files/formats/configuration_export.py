@@ -44,7 +44,7 @@ def export_configuration(path: Path, configuration: Configuration, modes: Sequen
     return ", ".join(counted(number, noun) for noun, number in what.items())
 
 
-FARTHEST = 0.5
+LARGEST_EXPORTED = 0.5
 """Longest displacement in a film of a mode, in units of the smallest radius: particles stay beside their neighbours."""
 
 
@@ -67,7 +67,7 @@ def write_mode_frames(
     OutputError
         If a file cannot be written.
     """
-    reach = FARTHEST * configuration.radius.min() / max(1.0, np.abs(mode.displacement).max())
+    reach = LARGEST_EXPORTED * configuration.radius.min() / max(1.0, np.abs(mode.displacement).max())
     frames = []
     for k in range(count):
         moved = np.real(reach * mode.displacement * np.exp(2j * np.pi * periods * k / count))

@@ -21,7 +21,7 @@ from ...packing.geometry import nearest_image, neighbour_tree, touching
 from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
 
-FLAT = 1e-6
+FLATNESS = 1e-6
 """Spread of z up to which disks lie in a plane, in smallest radii: text with seven digits, or float32, leaves less."""
 
 NAMES = {
@@ -311,7 +311,7 @@ def _check_numbers(source: str, columns: Mapping[str, Floats], ids: Indices) -> 
 
 def _check_plane(source: str, columns: Mapping[str, Floats], radius: Floats) -> None:
     z = columns.get("z", columns.get("zu"))
-    if z is not None and len(z) and np.ptp(z) > FLAT * radius.min():
+    if z is not None and len(z) and np.ptp(z) > FLATNESS * radius.min():
         raise PackingFileError(
             f"{source} is of three dimensions (z goes from {z.min():g} to {z.max():g}), and what such a file has is "
             "read as disks in a plane: give a run of dimension 2, or, for spheres, a LAMMPS deck with their contact "

@@ -52,9 +52,9 @@ class ModeVectors:
         return {f"{self.name}_eigenvalue": self.eigenvalue.real, f"{self.name}_eigenvalue_imag": self.eigenvalue.imag}
 
     def fields(self, vectors: Callable[[Floats], tuple[Floats, Floats]] | None = None) -> dict[str, Floats]:
-        """Translations, shape (N, 3), and rotations by their names in a file; `vectors` is that of a Configuration.
+        """Translations, shape (N, 3), and rotations by their names in a file; `vectors` is a method of Configuration.
 
-        Without it the rotations are those of disks, shape (N,).
+        Without `vectors` the rotations are those of disks, shape (N,).
         """
         found: dict[str, Floats] = {}
         for part, moved in (("", self.displacement.real), ("_imag", self.displacement.imag)):

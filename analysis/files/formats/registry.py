@@ -1,4 +1,4 @@
-"""The formats of other codes: the module that reads and writes each format, and what a format cannot store.
+"""The formats of other codes: for each the module that reads and writes it, and the quantities that it cannot store.
 
 A module is imported only when a file of its format is used.
 """

@@ -1,4 +1,4 @@
-"""Units in the heads of a table, as in ``x [mm]`` or ``radius (µm)``: all lengths in one unit, that of x.
+"""Units in the heads of a table, as in ``x [mm]`` or ``radius (µm)``: all lengths in the unit of x.
 
 A packing has no units of its own: law and load are given in the unit of its lengths. Masses, and densities, are brought
 to one unit of mass. Angles in degrees become radians. Units of columns that nobody reads are left alone. Conversions

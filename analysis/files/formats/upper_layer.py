@@ -13,7 +13,7 @@ from ...packing.geometry import touching
 from ..plain_file import read_plain_text
 from .disks import Disks
 
-WAYS = (
+LAYER_WAYS = (
     "12 (the highest that touch something), type:2, type:NAME, ids:1,4,7-9, ids:@FILE, group:NAME (of a restart), or a "
     'region such as "y>10"'
 )
@@ -21,7 +21,7 @@ WAYS = (
 FEW_TOUCH = 0.5
 """Share of disks that touch something below which a packing is not at rest yet, and contacts tell nothing."""
 
-LISTED = 10
+MOST_NAMED = 10
 """Disks that are named; more are counted."""
 
 OPERATORS = {"<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": operator.ge}
@@ -49,7 +49,7 @@ class UpperLayerError(BadInputError):
     def sentence(self, key: str, sign: str = " ") -> str:
         """The sentence, with the name by which a user gives the layer, and the sign between both."""
         if self.layer is None:
-            return f"{self.reason}: add {key}, {WAYS}."
+            return f"{self.reason}: add {key}, {LAYER_WAYS}."
         return f"{key}{sign}{self.layer}: {self.reason}."
 
 
@@ -115,7 +115,7 @@ def _of_type(disks: Disks, says: str, value: str) -> NDArray[np.bool_]:
         has = ", ".join(disks.types)
         raise UpperLayerError(says, f"{disks.source} has no type {value} (its types: {has})")
     if disks.kind is None:
-        raise UpperLayerError(says, f"{disks.source} has no types; take another of {WAYS}")
+        raise UpperLayerError(says, f"{disks.source} has no types; take another of {LAYER_WAYS}")
     raise UpperLayerError(says, f"the types of {disks.source} have no names: give a number, as in type:2")
 
 
@@ -159,7 +159,7 @@ def layer_remark(disks: Disks, says: str | None, layer: NDArray[np.bool_]) -> st
 
 
 def _list_ids(ids: list[int]) -> str:
-    return ", ".join(map(str, ids[:LISTED])) + (", ..." if len(ids) > LISTED else "")
+    return ", ".join(map(str, ids[:MOST_NAMED])) + (", ..." if len(ids) > MOST_NAMED else "")
 
 
 def _read_list(disks: Disks, says: str, value: str) -> NDArray[np.bool_]:
@@ -190,7 +190,7 @@ def _region(disks: Disks, says: str) -> NDArray[np.bool_]:
         except ValueError:
             limit = None
         if match is None or limit is None:
-            raise UpperLayerError(says, f"it is none of {WAYS}")
+            raise UpperLayerError(says, f"it is none of {LAYER_WAYS}")
         chosen &= OPERATORS[match[2]](values[match[1]], limit)
     return chosen
 

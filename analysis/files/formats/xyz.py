@@ -54,7 +54,7 @@ def read_xyz(path: Path, frame: int | None = None) -> Disks:
 
 
 def _columns(properties: str) -> list[str | None]:
-    """Names of the columns, None for text; those of a vector have a number behind them, but for positions."""
+    """Names of the columns, None for text; components of a vector other than the position are numbered."""
     words = properties.lower().split(":")
     names: list[str | None] = []
     for name, kind, count in zip(words[::3], words[1::3], words[2::3], strict=False):
@@ -75,7 +75,7 @@ def _species_column(properties: str) -> int | None:
 
 
 def _write_columns(frame: Frame, modes: list[ModeVectors]) -> list[tuple[str, str, np.ndarray]]:
-    """Names, kinds and numbers of what stands in a row for each disk."""
+    """Name, kind and numbers of each column; a row is a disk."""
     packing = frame.packing
     n, force = len(packing), export_quantities.disk_force(packing)
     columns: list[tuple[str, str, np.ndarray]] = [

@@ -142,7 +142,7 @@ class _Scaled:
 
     @property
     def largest_frequency(self) -> float:
-        """A bound of the frequency of motions that grow: the largest undamped one, and what the feed adds to it."""
+        """A bound of the frequency of motions that grow: the largest undamped frequency, raised by the feed."""
         return float(np.sqrt(1 + 0.25 * np.abs(self.feed).sum(axis=1).max() ** 2))
 
     def fastest_growth(self, low: float, high: float) -> float:
@@ -155,7 +155,7 @@ class _Scaled:
         return min(fastest, 0.5 * (_largest_eigenvalue(form) - most_taken))
 
     def look(self, middle: complex) -> tuple[float, list[Space]]:
-        """The radius about a point in which all that grows is found, and what is found."""
+        """The radius about a point within which all growing motions are found, and these motions."""
         disc, system = Disc.about(middle, *self.single_precision), self.system
         if disc.radius < LIMITS.smallest_disc:
             raise UncoveredAxisError(f"motions at F_x = {system.fx:.10g} lie too close to be told from each other")
@@ -202,7 +202,7 @@ def growing_modes(system: System) -> list[Space]:
 
 
 def _cover_axis(scaled: _Scaled) -> tuple[list[Space], list[Rectangle]]:
-    """Modes in discs along the axis, and what of the right half-plane these discs leave uncovered."""
+    """Modes in discs along the axis, and the rectangles of the right half-plane that these discs leave uncovered."""
     found: list[Space] = []
     beside: list[Rectangle] = []
     covered, radius, end = 0.0, 0.05, scaled.largest_frequency
@@ -221,7 +221,7 @@ def _cover_axis(scaled: _Scaled) -> tuple[list[Space], list[Rectangle]]:
 
 
 def _solve(system: System, x: Complexes, s: complex, distance: float) -> list[Space]:
-    """The mode of an eigenvalue that is nearly known; or those next to it that grow, where it is lost on the way."""
+    """The mode of a nearly known eigenvalue; if the iteration strays, the growing modes next to the eigenvalue."""
     mode = Space.of(system, x, x.conj(), s).refine(s)
     if mode is not None and abs(mode.mean - s) < LIMITS.strayed * distance:
         return [mode]
@@ -232,7 +232,7 @@ def _solve(system: System, x: Complexes, s: complex, distance: float) -> list[Sp
 
 
 def _largest_eigenvalue(matrix: csr_array) -> float:
-    """The largest eigenvalue of a Hermitian matrix, which is positive: much less than the largest sum of a row."""
+    """The largest eigenvalue of a Hermitian matrix, positive: much less than the largest sum of a row."""
     if matrix.shape[0] < 3:
         return float(np.linalg.eigvalsh(matrix.toarray())[-1])
     start = np.random.default_rng(0).standard_normal(matrix.shape[0]).astype(matrix.dtype)
@@ -241,7 +241,7 @@ def _largest_eigenvalue(matrix: csr_array) -> float:
 
 
 def _factors(matrix: csc_array) -> Factors:
-    """In single precision; where a pivot is zero, those of a matrix that differs by a rounding."""
+    """Factors in single precision; if a pivot is zero, the factors of a matrix that differs by a rounding."""
     single = csc_array(matrix.astype(np.complex64))
     try:
         return symmetric_lu(single, pivoting=LIMITS.pivot)

@@ -95,7 +95,7 @@ class Basis(Slice):
 
     @classmethod
     def of(cls, matrix: csr_array, limits: Limits = LIMITS) -> "Basis":
-        """All modes, by LAPACK: the one expensive step, some 10 E^3 operations."""
+        """The basis of all modes, by LAPACK: the only expensive step, some 10 E^3 operations."""
         active = active_coordinates(matrix)
         dense = matrix[active][:, active].toarray()
         dense += dense.T.copy()
@@ -161,7 +161,7 @@ def width_and_mixing(block: Floats, levels: Floats) -> tuple[float, float]:
 
 
 class Bases:
-    """This rank's bases along the ramp, kept from increment to increment where there is memory, as long as they serve.
+    """The bases of this rank along the ramp; with enough memory they are kept as long as they serve.
 
     `modes` are the numbers of the first mode that is looked at and of the first that is not, None for all. The ranks
     share the slices; all of them must come to the end of their bases.
@@ -196,9 +196,9 @@ class Bases:
         return (stop - first + margins) * matrix.shape[0] <= limits.largest_basis
 
     def at(self, matrix: csr_array, known: SlicePass = NEW_PASS) -> Iterable[tuple[Basis, Levels]]:
-        """The bases, those of an earlier load as long as all ranks' serve, and the operator in them.
+        """The bases and the operator in them; bases of an earlier load as long as the bases of all ranks serve.
 
-        Where they are not kept, those of the slices that are known are left out.
+        If bases are not kept in memory, the slices that are known already are left out.
         """
         serving = self._usable_bases(matrix)
         if serving is not None:
@@ -210,7 +210,7 @@ class Bases:
         return ((basis, basis.levels(matrix)) for basis in bases)
 
     def _usable_bases(self, matrix: csr_array) -> list[tuple[Basis, Levels]] | None:
-        """The bases that are kept and the operator in them; None if those of all ranks do not serve."""
+        """The bases that are kept and the operator in them; None if the bases of all ranks do not serve."""
         covering = all(basis.covers(matrix) for basis in self._kept)
         known = [(basis, basis.levels(matrix)) for basis in self._kept if covering]
         mine = [each for basis, levels in known for each in basis.mixing(levels)] if covering else [np.inf]

@@ -269,7 +269,7 @@ class SlicedGrowth(SliceSearch):
 
 
 def antisymmetric(place: System) -> float:
-    """|A - A^T|, 1 / time^2: what feeds motion."""
+    """|A - A^T|, 1 / time^2: the part of A that feeds motion."""
     return float(np.linalg.norm((place.stiffness - place.stiffness.T).data))
 
 

@@ -145,7 +145,7 @@ class _Spectrum:
         return [each for one in self.ranks.together(lambda: list(pool.map(self.below, mine))) for each in one]
 
     def shifts(self, pool: ThreadPoolExecutor, first: int, stop: int) -> list[Shift]:
-        """The shifts of all slices from the eigenvalue of number `first` on, and before that of number `stop`."""
+        """The shifts of all slices from eigenvalue number `first` on, and before eigenvalue number `stop`."""
         places, numbers = count_places(self.matrix, partial(self.count_below, pool), (first, stop), self.limits.coarse)
         pieces = max(1, round((stop - first) / self.limits.own))
         ends = first + np.arange(pieces + 1) * (stop - first) // pieces
@@ -190,7 +190,7 @@ class _Spectrum:
         return part
 
     def compare(self, part: Slice) -> None:
-        """Raise an error if a slice's own eigenvalues are not those of the matrix, but of inaccurate factors.
+        """Raise an error if inaccurate factors gave the slice other eigenvalues than the matrix has.
 
         The Krylov space knows the factors alone; the Rayleigh quotients are of the matrix itself.
         """
@@ -210,12 +210,12 @@ class _Spectrum:
 class _Krylov:
     """An orthonormal basis Q of the block Krylov space of an operator, and the operator in it, H = Q^T A Q.
 
-    A new block is made orthogonal to the last ones at once, and to all others together with the next block: so the
-    basis is read from memory half as often. What a block has by then along the others, its part that strayed, is known
-    when the part is taken away. Where a shift is next to an eigenvalue, and blocks stray too far, they are made anew,
-    from there on fewer at a time (semiorthogonality: Simon, Linear Algebra Appl. 61, 101 (1984)).
+    A new block is made orthogonal to the last blocks at once, and to all others later, together with the next block:
+    the basis is then read from memory half as often. The part of a block along the others by then, the part that has
+    strayed, is known when it is taken away. If a shift is next to an eigenvalue, blocks may stray too far. Such blocks
+    are made anew, and from then on fewer at a time (semiorthogonality: Simon, Linear Algebra Appl. 61, 101 (1984)).
 
-    The vectors are rows: so the products of many with a few take a third of the time.
+    The vectors are rows: products of many vectors with a few then take a third of the time.
     """
 
     def __init__(self, operator: Solve, basis: Floats, limits: Limits) -> None:
@@ -252,7 +252,7 @@ class _Krylov:
         self.used += block
 
     def _settle(self) -> None:
-        """Take from the last blocks what they have along those before them, or give these blocks up."""
+        """Make the last blocks orthogonal to the blocks before them, or give the last blocks up."""
         firm, fresh = self.firm, self.basis[self.firm : self.used]
         products = fresh @ self.basis[: self.used].T
         strayed, among = products[:, :firm], products[:, firm:] - np.eye(len(fresh))

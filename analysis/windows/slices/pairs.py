@@ -96,6 +96,6 @@ class SlicedPairs(SliceSearch):
 
 
 def _with_larger_feed(block: Floats, excess: float) -> Floats:
-    """The operator in a cluster with its antisymmetric couplings enlarged by what they may be in error."""
+    """The operator in a cluster with its antisymmetric couplings enlarged by their error."""
     width, mixing = width_and_mixing(block, np.diag(block))
     return block + excess * mixing**2 * width / len(block) * np.sign(block - block.T)

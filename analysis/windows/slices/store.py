@@ -37,7 +37,7 @@ Shift = tuple[float, tuple[int, int]]
 Take = Callable[[tuple[int, int]], bool]
 """Takes the slice of some modes, and says whether no other search has it."""
 
-SHIFTS = "shifts.npz"
+SHIFTS_FILE = "shifts.npz"
 """The file of all shifts: to find these, eigenvalues are counted, which takes minutes for 100,000 disks."""
 
 LOCK_FILE = "taken"
@@ -171,7 +171,7 @@ class SlicePass:
     def read(cls, folder: Path) -> "SlicePass":
         """Read the results in a folder, if it exists; DamagedSliceError if a file has another format."""
         found = sorted((_read_candidates(path) for path in folder.glob("*-*.npz")), key=lambda each: each.border.modes)
-        shifts = folder / SHIFTS
+        shifts = folder / SHIFTS_FILE
         return cls(folder, found, _shifts(shifts) if shifts.exists() else ())
 
     @property
@@ -203,7 +203,7 @@ class SlicePass:
             yield take
 
     def keep(self, found: SliceResult) -> None:
-        """Write what has been found in a slice, if there is a folder; an OutputError if that cannot be."""
+        """Write the results of a slice, if there is a folder; OutputError if the file cannot be written."""
         flat = [(k, each) for k, candidates in enumerate(found.candidates) for each in candidates]
         self._write(
             _name(found.border.modes),
@@ -219,7 +219,7 @@ class SlicePass:
 
     def keep_shifts(self, shifts: Sequence[Shift]) -> None:
         """Write the shifts of all slices, if there is a folder; an OutputError if that cannot be."""
-        self._write(SHIFTS, shift=[shift for shift, _ in shifts], modes=[modes for _, modes in shifts])
+        self._write(SHIFTS_FILE, shift=[shift for shift, _ in shifts], modes=[modes for _, modes in shifts])
 
     def _write(self, name: str, **arrays: Any) -> None:
         if self.folder is not None:

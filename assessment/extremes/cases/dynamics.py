@@ -36,7 +36,7 @@ MODE_AMPLITUDE = 1e-4
 """Amplitude of a mode in units of the smallest overlap: it moves as that of a frozen K up to this relative change of
 K."""
 
-SHAKEN = 0.1
+SHAKE_AMPLITUDE = 0.1
 """Amplitude of the motion whose energy is followed, in units of the smallest overlap: contacts stay closed."""
 
 
@@ -103,7 +103,7 @@ def _limit_is_sharp() -> Outcome:
 
 
 def _energy(packing: Packing, position: np.ndarray, velocity: np.ndarray, dt: float) -> float:
-    """The conserved energy of an instant, from that of the packing at rest."""
+    """The conserved energy at an instant, less the energy of the packing at rest."""
     moved = _displace_disks(packing, (position - packing.position).T.ravel())
     v = np.concatenate([velocity.T.ravel(), np.zeros(len(packing))])
     force = moved.net_force
@@ -119,7 +119,7 @@ def _drift(steps: int) -> Outcome:
     """Energies, and momenta along x in units of the disks' own, of an undamped run without friction."""
     packing = _smooth()
     _, limit = _fastest()
-    push = np.random.default_rng(1).uniform(-1, 1, 2 * len(packing)) * SHAKEN * packing.geometry.overlap.min()
+    push = np.random.default_rng(1).uniform(-1, 1, 2 * len(packing)) * SHAKE_AMPLITUDE * packing.geometry.overlap.min()
     samples = 400
     energy, momentum = np.empty(samples), np.empty(samples)
     dt = 0.1 * limit

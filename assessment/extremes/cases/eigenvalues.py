@@ -105,7 +105,7 @@ def _near_an_onset(distance: float) -> Outcome:
 
 
 def _rattlers() -> Outcome:
-    """30 % of the disks touch nothing: the others' eigenvalues are what they were."""
+    """30 % of the disks touch nothing: the eigenvalues of the others do not change."""
     settled = shear_packing(bed()).packing
     extra = round(len(settled) * 3 / 7)
     height = settled.position[:, 1].max() + 2.0 + 1.5 * np.arange(extra)

@@ -16,7 +16,7 @@ from .packings import KN, at_rest, bed, crystal, law, shear_packing, with_rattle
 
 GROUP = "geometry"
 
-NONE = Contacts(np.zeros(0, int), np.zeros(0, int), np.zeros(0))
+NO_CONTACTS = Contacts(np.zeros(0, int), np.zeros(0, int), np.zeros(0))
 
 
 def _contact(slip: float) -> Contacts:
@@ -124,7 +124,7 @@ def _opens_and_closes() -> Outcome:
 
 def _grazing() -> Outcome:
     """A disk passes another at an overlap of 1e-12 for one step."""
-    aside = _disks([(2.999, 4.0), (3.0, 3.0)], NONE, position_low=np.array([[0.0, -1e-12], [0.0, 0.0]]))
+    aside = _disks([(2.999, 4.0), (3.0, 3.0)], NO_CONTACTS, position_low=np.array([[0.0, -1e-12], [0.0, 0.0]]))
     step = np.array([3.0 - aside.position[0, 0], 0.0, 0.0, 0.0, 0.0, 0.0])
     with Engine(aside) as engine:
         closest = engine.displace(aside, step)
@@ -145,12 +145,12 @@ def _wide(columns: int) -> Outcome:
     return balance(shear_packing(crystal(columns)))
 
 
-NARROW = {"packing": {"disks": 10, "top": 1, "width": 2.7}, "law": {"kn": KN}, "load": {"fy": 3.0}}
+NARROW_SCENE = {"packing": {"disks": 10, "top": 1, "width": 2.7}, "law": {"kn": KN}, "load": {"fy": 3.0}}
 
 INVALID_GEOMETRY: dict[str, Callable[[], Outcome]] = {
     "box 2 wide": lambda: refused_outcome(lambda: crystal(2), "under two largest diameters"),
     "box under two diameters, a scene": lambda: refused_outcome(
-        lambda: Scene.from_mapping(NARROW), "widen the box", SceneError
+        lambda: Scene.from_mapping(NARROW_SCENE), "widen the box", SceneError
     ),
     "one centre": lambda: refused_outcome(
         lambda: stiffness_matrix(_disks([(3.0, 3.0), (3.0, 3.0)], _contact(0.0))), "same centre"
@@ -160,7 +160,7 @@ INVALID_GEOMETRY: dict[str, Callable[[], Outcome]] = {
         [(3.0, 3.0), (3.4, 3.0)], "run 0\n", "contact law does not hold"
     ),
     "a coordinate that is no number": lambda: refused_outcome(
-        lambda: _disks([(3.0, float("nan"))], NONE), "not finite"
+        lambda: _disks([(3.0, float("nan"))], NO_CONTACTS), "not finite"
     ),
     "k_n infinite": lambda: refused_outcome(lambda: MindlinLaw(float("inf"), 1.0, 1.0), "must be finite"),
 }

@@ -16,7 +16,7 @@ GROUP = "stiffness and load"
 
 Make = Callable[[], Packing]
 
-LOOSE = """
+LOOSE_SCENE = """
 packing = { disks = 24, top = 5, width = 5.95, seed = 2 }
 law = { kn = 2e5 }
 load = { fy = 2e4 }
@@ -50,7 +50,7 @@ def _tolerance_below_the_floor() -> Outcome:
     return balance(found)
 
 
-MADE: dict[str, tuple[Make, bool]] = {
+LOADED_PACKINGS: dict[str, tuple[Make, bool]] = {
     **{f"k_n = 1e{n}": (partial(bed, law(10.0**n)), n in (2, 12)) for n in (2, 4, 6, 8, 10, 12)},
     **{
         f"load {load:g} k_n, a crystal": (partial(crystal, 3, 2, law(), load, True), load in (1e-12, 0.1))
@@ -66,7 +66,7 @@ MADE: dict[str, tuple[Make, bool]] = {
 CASES = [
     *(
         Case(GROUP, f"{name}: {what}", partial(criterion, make), quick)
-        for name, (make, quick) in MADE.items()
+        for name, (make, quick) in LOADED_PACKINGS.items()
         for what, criterion in (("equilibrium", _balance), ("K", _derivative))
     ),
     Case(GROUP, "f_min = 1e-15 in doubles", _tolerance_below_the_floor, True),
@@ -74,7 +74,7 @@ CASES = [
     Case(
         GROUP,
         "load 0.1 k_n from a loose start",
-        partial(expect_refusal, "faultgouge settle FILE -o run.h5", LOOSE, "contact law does not hold"),
+        partial(expect_refusal, "faultgouge settle FILE -o run.h5", LOOSE_SCENE, "contact law does not hold"),
         True,
     ),
 ]

@@ -25,13 +25,14 @@ GROUP = "restart in the middle"
 
 STEPS_BETWEEN = 2000
 
-HARDEST = 1e-3
+LARGEST_FORCE = 1e-3
 """Largest force along x, in units of k_n: a layer that nothing holds would soon cross its radius in one step."""
 
 
 def _same_after_restart(make: Make, compensated: bool) -> Outcome:
     packing = make()
-    packing = replace(with_low_parts(packing) if compensated else packing, fx=min(packing.fy, HARDEST * packing.law.kn))
+    fx = min(packing.fy, LARGEST_FORCE * packing.law.kn)
+    packing = replace(with_low_parts(packing) if compensated else packing, fx=fx)
     start = [
         "velocity all set 0.0 0.0 0.0",
         f"timestep {0.1 * stable_timestep(spectrum(packing).omega_max)!r}",
@@ -71,7 +72,7 @@ def _state(engine: Engine) -> list[np.ndarray]:
     return [packing.position, packing.angle, c.i, c.j, c.slip, *low, *slip_low, *velocities]
 
 
-MADE: dict[str, tuple[Make, bool]] = {
+RESTARTED_PACKINGS: dict[str, tuple[Make, bool]] = {
     "k_n = 1e2": (partial(bed, law(1e2)), False),
     "k_n = 1e12": (partial(bed, law(1e12)), True),
     "load 1e-12 k_n": (partial(crystal, 3, 2, law(), 1e-12), False),
@@ -88,6 +89,6 @@ MADE: dict[str, tuple[Make, bool]] = {
 
 CASES = [
     Case(GROUP, f"{name}, {arithmetic}", partial(_same_after_restart, make, arithmetic == "compensated"), quick)
-    for name, (make, quick) in MADE.items()
+    for name, (make, quick) in RESTARTED_PACKINGS.items()
     for arithmetic in ("doubles", "compensated")
 ]

@@ -1,11 +1,11 @@
 """Stated and true errors of onsets before which contacts slide, stick, close or open, undamped and damped.
 
 Scenes are drawn at random: seeds, numbers of disks, friction, stiffness and exponent of the law, dashpots, increments,
-both arithmetics. A scene counts if its ramp has an onset and contacts change before the onset. The true onset is that
-of a ramp whose increments are `FINER` times smaller. A ramp with twice these increments shows how accurate the true
-onset is. The search looks for windows in each of these small increments, because between loads farther apart it may
-miss a window that a change of contacts ends. The rule for the stated errors was chosen with the first draws of the
-table; draws marked `fresh` came later. `research/coverage.py` computes the table.
+both arithmetics. A scene counts if its ramp has an onset and contacts change before the onset. The true onset is the
+onset of a ramp whose increments are `REFINEMENT` times smaller. A ramp with twice these increments shows how accurate
+the true onset is. The search looks for windows in each of these small increments, because between loads farther apart
+the search may miss a window that a change of contacts ends. The rule for the stated errors was chosen with the first
+draws of the table; draws marked `fresh` came later. `research/coverage.py` computes the table.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from ....pywrap.runs.scene_path import scene_path
 
 Kind = Literal["undamped", "damped"]
 
-FINER = 20
+REFINEMENT = 20
 """How many times smaller the increments of the ramp are on which the true onset is found."""
 
 TABLE = Path(__file__).with_name("table.jsonl")
 
-AT_ONCE = 3
+INCREMENTS_AT_ONCE = 3
 """Increments that are searched at once: an onset far below the ramp's end costs no more than it has to."""
 
 FIRST_SCENES = {
@@ -161,8 +161,8 @@ class FirstOnset:
         None if there is no window beyond a given load and before the end of the ramp, or of the equilibria.
         """
         path = scene_path(self._engine, self._start, self._scene, onward=True)
-        for first in range(0, len(self._wanted) - 1, AT_ONCE):
-            part = self._wanted[first : first + AT_ONCE + 1]
+        for first in range(0, len(self._wanted) - 1, INCREMENTS_AT_ONCE):
+            part = self._wanted[first : first + INCREMENTS_AT_ONCE + 1]
             fine = np.concatenate([part[:1], *(np.linspace(a, b, finer + 1)[1:] for a, b in pairwise(part))])
             try:
                 for fx in fine[1:]:
@@ -211,7 +211,7 @@ def restate_case(case: CoverageCase) -> CoverageCase:
     start = settle(scene.model_copy(update={"damping": None}))
     with Engine(start.packing) as engine:
         onset = FirstOnset(scene, engine, start)
-        found = onset.first_window(beyond=case.fx_c - AT_ONCE * case.increment)
+        found = onset.first_window(beyond=case.fx_c - INCREMENTS_AT_ONCE * case.increment)
         assert found is not None  # it was there when the limit was computed
         fx_c, stated = onset.whole(*found)
         return replace(case, changes=onset.changes(found[0], found[1].fx_onset), fx_c=fx_c, stated=stated)

@@ -1,4 +1,4 @@
-r"""What the eigenvalues lose on the way through a file.
+r"""Digits that the eigenvalues lose on the way through a file.
 
 An overlap is a small difference of coordinates: an error :math:`\Delta x` of these changes the stiffness
 :math:`\tfrac32 k_n \delta^{1/2}` of a contact by the share :math:`\Delta x/(2\delta)`, and the overlaps of a packing

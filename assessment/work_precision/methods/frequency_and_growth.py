@@ -27,14 +27,22 @@ from ....analysis.motion.eigenvalues import Complexes, unit_rounding
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine, Equilibrium
 from .extended import refine_eigenvalue
-from .work_precision_study import Point, Settings, Study, Theory, compensate, fit_order, study_of, time_jobs
+from .work_precision_study import (
+    COMPENSATED_SUFFIX,
+    Point,
+    Settings,
+    Study,
+    Theory,
+    compensate,
+    fit_order,
+    study_of,
+    time_jobs,
+)
 
 STEP_SHARES = (0.8, 0.4, 0.2, 0.1, 0.05, 0.025)
 """Time steps in units of the limit 2/omega_max."""
 
-RUN, CORRECTED, SPECTRUM = "run", "run, dispersion taken out", "eigenvalue of K, no run"
-CAREFUL = ", compensated"
-"""Suffix of the name of a method in compensated arithmetic."""
+RUN, RUN_CORRECTED, SPECTRUM = "run", "run, dispersion taken out", "eigenvalue of K, no run"
 
 CAREFUL_AMPLITUDE, DISPLACED_BY = 1e-12, 1e-8
 """Length by which the disk that moves most is displaced: far above what a coordinate is known to, 1e-23 or 2e-15, and
@@ -155,7 +163,7 @@ def _study(
     points = _points(settings, mode, fine_mode, steps, time)
     noise, careful_noise = (
         float(np.median([point.error for point in points if point.method == method]))
-        for method in (CORRECTED, CORRECTED + CAREFUL)
+        for method in (RUN_CORRECTED, RUN_CORRECTED + COMPENSATED_SUFFIX)
     )
     default, fifth = points[STEP_SHARES.index(0.05)], points[STEP_SHARES.index(0.2)]
     numbers = {
@@ -179,7 +187,7 @@ def _study(
         points=points,
         numbers=numbers,
         reference_error=mode.resolution,
-        orders=(fit_order(points, RUN + CAREFUL, 2, least=10 * careful_noise, most=0.01),),
+        orders=(fit_order(points, RUN + COMPENSATED_SUFFIX, 2, least=10 * careful_noise, most=0.01),),
         theory=(_dispersion(mode, steps), Theory("rounding of K", (mode.resolution,))),
     )
 
@@ -190,7 +198,7 @@ def _points(
     """The runs in both arithmetics, as they are and with the dispersion taken out, and K's eigenvalue."""
     with Engine(mode.packing) as engine, Engine(fine_mode.packing) as fine_engine:
         runs = [(RUN, mode, engine, dt) for dt in steps.tolist()]
-        runs += [(RUN + CAREFUL, fine_mode, fine_engine, dt) for dt in steps.tolist()]
+        runs += [(RUN + COMPENSATED_SUFFIX, fine_mode, fine_engine, dt) for dt in steps.tolist()]
         jobs: list[Callable[[], complex]] = [partial(one.measure_frequency, on, dt, time) for _, one, on, dt in runs]
         (*found, alone), seconds = time_jobs([*jobs, mode.from_spectrum], settings)
     plain, out = [], []
@@ -199,7 +207,7 @@ def _points(
         plain.append(Point(method, dt, _relative_error(one, one.quantity(value)), *work))
         out.append(
             Point(
-                CORRECTED + method.removeprefix(RUN),
+                RUN_CORRECTED + method.removeprefix(RUN),
                 dt,
                 _relative_error(one, one.quantity(correct_dispersion(value, dt))),
                 *work,

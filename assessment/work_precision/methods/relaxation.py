@@ -22,16 +22,13 @@ from ....analysis import Packing, dynamical_matrix
 from ....analysis.packing.packing import Floats
 from ....pywrap import Engine, Equilibrium, equilibrate
 from ....pywrap.equilibria.quasistatic import rounding_floor
-from .work_precision_study import Run, Settings, Study, Theory, compensate, study_of, timed_points
+from .work_precision_study import COMPENSATED_SUFFIX, Run, Settings, Study, Theory, compensate, study_of, timed_points
 
 FROM, TO = 0.010, 0.011
 """F_x before and after: an increment far from the onset."""
 
 DECKS, OVERDAMPED, FIRE = "overdamped, step of the decks", "overdamped", "FIRE"
 VERLET, NEWTON = "Verlet with drag", "Newton"
-COMPENSATED_SUFFIX = ", compensated"
-"""Ends the name of a method in compensated arithmetic."""
-
 STEPS_PER_LOOK = 200
 """Steps between two looks at the forces, so that the cost is known to so many steps."""
 

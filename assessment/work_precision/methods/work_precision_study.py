@@ -27,6 +27,9 @@ else:
 WORDS = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
 """The texts of each study."""
 
+COMPENSATED_SUFFIX = ", compensated"
+"""Ends the name of a method in compensated arithmetic."""
+
 T = TypeVar("T")
 
 Run = tuple[str, float | None, Callable[[], tuple[T, int | None]]]

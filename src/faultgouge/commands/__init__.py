@@ -26,7 +26,7 @@ def program() -> Callable[..., object]:
         invoke_without_command=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # Rich would double the time of --help
-        help="Remote triggering in a stressed layer of frictional disks: simulate with LAMMPS, analyse, reproduce.",
+        help="Does a packing of frictional grains move, and what happens when it does? Stability, and runs in LAMMPS.",
         epilog="Example: faultgouge reproduce -o results",
     )
     app.callback()(_options)

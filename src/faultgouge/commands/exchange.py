@@ -316,7 +316,7 @@ def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[st
 def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict[str, Any]) -> None:
     """Say in one sentence all that neither file nor options say, with the command that would do."""
     from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.files.formats.upper_layer import WAYS
+    from faultgouge.analysis.files.formats.upper_layer import LAYER_WAYS
 
     gaps = {"--top 10": "which disks are the upper layer"} if top is None and disks.top is None else {}
     if scene is None and "kn" not in values:
@@ -327,7 +327,7 @@ def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict
         return
     *others, last = gaps.values()
     missing = f"{', '.join(others)} and {last}" if others else last
-    ways = f"; --top takes {WAYS}" if "--top 10" in gaps else ""
+    ways = f"; --top takes {LAYER_WAYS}" if "--top 10" in gaps else ""
     example = f"faultgouge import ... {' '.join(gaps)}"
     options = " ".join(each.split()[0] for each in gaps)
     raise BadInputError(f"{disks.source} does not say {missing}: add {options}, as in `{example}`{ways}")
@@ -351,9 +351,9 @@ def _in_balance(file: Path, packing: Packing, relax: bool) -> Packing:
     """The packing if it is in balance, else brought to rest if that is wanted."""
     from faultgouge.analysis import PackingFileError
     from faultgouge.pywrap.settling.relax import bring_to_rest
-    from faultgouge.pywrap.settling.settle import OUT_OF_BALANCE
+    from faultgouge.pywrap.settling.settle import LARGEST_IMBALANCE
 
-    if len(packing.contacts) and packing.residual <= OUT_OF_BALANCE * packing.fy:
+    if len(packing.contacts) and packing.residual <= LARGEST_IMBALANCE * packing.fy:
         return packing
     if not relax:
         feels = f"a disk feels {packing.residual:.3g}" if len(packing.contacts) else "no disk touches another"

@@ -45,7 +45,7 @@ def sweep(
     cores busy.
     """
     from faultgouge.studies.sweep.draw import draw_sweep
-    from faultgouge.studies.sweep.run_sweep import LINES, missing_points, read_results, require_result, run_sweep
+    from faultgouge.studies.sweep.run_sweep import RESULTS_FILE, missing_points, read_results, require_result, run_sweep
     from faultgouge.studies.sweep.sweep_plan import Sweep
     from faultgouge.studies.sweep.sweep_plan import shard as part_of
     from faultgouge.studies.sweep.tasks import TASKS, remaining_work
@@ -54,12 +54,12 @@ def sweep(
     _warn_of_seeds(wanted)
     if dry_run:
         if is_root():
-            known = read_results(output / LINES)
+            known = read_results(output / RESULTS_FILE)
             missing = missing_points(part_of(wanted.points, part), known)
             for line in remaining_work(missing, known.values()):
                 print_line(line)
         return
-    keeps(f"{output}/{LINES} has the scenes that have ended; the same command continues from there", output)
+    keeps(f"{output}/{RESULTS_FILE} has the scenes that have ended; the same command continues from there", output)
     rows = run_sweep(wanted, output, part, say, lambda ended, count: progress(ended, "scenes", count), workers)
     if is_root():
         failed = sum(row["says"] is not None for row in rows)
@@ -151,7 +151,7 @@ def modes(
     from faultgouge.studies.cycle.study import holds_drive
     from faultgouge.studies.modes.study import modes as count_modes
     from faultgouge.studies.modes.study import read_modes_sweep
-    from faultgouge.studies.sweep.run_sweep import LINES, missing_points, read_results, require_result
+    from faultgouge.studies.sweep.run_sweep import RESULTS_FILE, missing_points, read_results, require_result
     from faultgouge.studies.sweep.sweep_plan import shard as part_of
     from faultgouge.studies.sweep.tasks import remaining_work
 
@@ -162,11 +162,11 @@ def modes(
     _warn_of_seeds(wanted)
     if dry_run:
         if is_root():
-            known = read_results(output / LINES)
+            known = read_results(output / RESULTS_FILE)
             for line in remaining_work(missing_points(part_of(wanted.points, part), known), known.values()):
                 print_line(line)
         return
-    keeps(f"{output}/{LINES} has the scenes that have ended; the same command continues from there", output)
+    keeps(f"{output}/{RESULTS_FILE} has the scenes that have ended; the same command continues from there", output)
     result = count_modes(wanted, output, part, say, lambda rows, count: progress(rows, "scenes", count), workers)
     if is_root() and not result:
         print_line("this part of the sweep has no scenes")
@@ -198,9 +198,9 @@ def _along_cycles(file: Path, output: Path) -> None:
     states, rows = result["states"], []
     for number, slip in enumerate(result["slips"], 1):
         before = [state for state in states if state["time"] <= slip["begins"]][-1]
-        rows.append([str(number), *(_cell(before[name]) for name in BEFORE)])
+        rows.append([str(number), *(_cell(before[name]) for name in COLUMNS_BEFORE_SLIPS)])
     if rows:
-        print_line(table_of(("slip", *BEFORE.values()), rows))
+        print_line(table_of(("slip", *COLUMNS_BEFORE_SLIPS.values()), rows))
     moving = sum(not state["rests"] for state in states)
     print_line(
         f"{counted(len(states), 'state')}, {moving} of them not in equilibrium (the flag rests), "
@@ -208,7 +208,7 @@ def _along_cycles(file: Path, output: Path) -> None:
     )
 
 
-BEFORE = {
+COLUMNS_BEFORE_SLIPS = {
     "time": "begins",
     "force": "F",
     "at_bound": "at the bound",
@@ -222,8 +222,8 @@ BEFORE = {
 """Columns of the table of states before slips, with their headings."""
 
 
-def _cell(value: float) -> str:
-    return f"{value:.4g}"
+def _cell(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"
 
 
 def _show_modes(rows: list[dict[str, Any]]) -> None:
@@ -231,8 +231,7 @@ def _show_modes(rows: list[dict[str, Any]]) -> None:
     first = [row for row in rows if (row["disks"], row["seed"]) == (rows[0]["disks"], rows[0]["seed"])]
     lines = []
     for row in first:
-        least = "" if row["least_q"] is None else f"{row['least_q']:.4g}"
-        numbers = str(row["pairs"]), f"{row['share']:.3f}", f"{row['growth_rate']:.4g}", least
+        numbers = str(row["pairs"]), f"{row['share']:.3f}", _cell(row["growth_rate"]), _cell(row["least_q"])
         lines.append((f"{row['fx_over_fy']:g}", *numbers))
     if lines:
         print_line(table_of(("F_x/F_y", "complex pairs", "share", "growth rate of D", "least Q"), lines))
