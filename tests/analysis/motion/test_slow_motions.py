@@ -1,18 +1,24 @@
 """Slow motions and the decay of all others, against LAPACK's eigenvalues of the first-order matrix."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from known_spectra import complex_block, turned
 from linearised import dissipative, motion_matrix
+from scipy.sparse import csr_array
 
 from faultgouge.analysis import Configuration, LinearisedContacts
+from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.contacts import PER_CONTACT
 from faultgouge.analysis.motion import decay as decay_module
 from faultgouge.analysis.motion import rates as module
 from faultgouge.analysis.motion.decay import follow_decay
+from faultgouge.analysis.motion.decay_steps import ExplicitSteps, ImplicitSteps, slope
 from faultgouge.analysis.motion.growth_in_words import exponential
 from faultgouge.analysis.motion.motion import Motion
 from faultgouge.analysis.motion.rates import rates_of
-from faultgouge.analysis.motion.slow_motions import slow_motions
+from faultgouge.analysis.motion.slow_motions import motions_of_one, slow_motions
 
 STRONG, WEAKER, WITH_DRAG = (2.0, 1.0, None), (0.2, 0.1, None), (0.02, 0.01, 30.0)
 
@@ -133,6 +139,78 @@ def test_motions_that_no_force_opposes_are_counted_however_many_are_alike(monkey
     assert found.free == expected.free == 40
     assert found.searched == 0
     assert found.growth_rate == pytest.approx(expected.growth_rate, rel=1e-5)
+
+
+def turned_row(row):
+    """The row, and its load, in another direction, so that no number that should be zero is zero to the bit."""
+    q, _ = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))
+    contacts = derive_frozen(row.contacts, normal=row.contacts.normal @ q)
+    return derive_frozen(row, contacts=contacts, load=row.load @ q)
+
+
+@pytest.mark.slow
+def test_motions_of_one_sphere_that_nothing_drives_are_found_with_rounding(monkeypatch):
+    """A sphere rolls on a plane in any direction."""
+    row = turned_row(row_of_spheres(12, 0.0))
+    expected = rates_of(Motion.of(row)).free
+    motion = Motion.of(row)
+    alone = motions_of_one(motion.stiffness, motion.damping, motion.particle)
+    np.testing.assert_allclose((alone.T @ alone).toarray(), np.eye(alone.shape[1]), atol=1e-14)
+    for matrix in (motion.stiffness, motion.damping):
+        # rounding of a sum of a few entries
+        assert abs(alone.T @ matrix).max() < 1e-13 * abs(matrix).max()
+    monkeypatch.setattr(module, "DENSE_DAMPED", 10)
+    found = rates_of(Motion.of(row))
+    assert found.free == expected == alone.shape[1] == 36
+    assert found.searched == 0
+
+
+@pytest.fixture(scope="module")
+def made_up():
+    """The motion of a known matrix, with a loss in proportion to it, and slow motions, none of them known."""
+
+    def make(growing):
+        rng = np.random.default_rng(4)
+        matrix = turned(
+            [*(np.array([[value]]) for value in rng.uniform(0.5, 100, 150)), complex_block(40.0, growing)], rng
+        )
+        size = matrix.shape[0]
+        row = row_of_spheres(40)
+        damping = csr_array(2e-3 * (matrix + matrix.T))
+        motion = Motion(row, np.arange(size), np.ones(size), csr_array(matrix), damping)
+        slow = slow_motions(motion.stiffness, motion.damping, np.arange(size), 1.0, lambda found: 0.0)
+        z = np.block([[np.zeros((size, size)), np.eye(size)], [-matrix.toarray(), -damping.toarray()]])
+        values = np.linalg.eigvals(z)
+        return motion, replace(slow, values=slow.values[:0], basis=np.zeros((2 * size, 0)), radius=2.0), values
+
+    return make
+
+
+@pytest.mark.parametrize("kind", [ExplicitSteps, ImplicitSteps])
+def test_steps_of_both_kinds_fall_as_the_slowest_motion(made_up, kind):
+    motion, slow, values = made_up(0.1)
+    slowest = values[np.argmax(values.real)]
+    assert slowest.real < 0
+    steps = kind.of(motion, 1.0, slow, 0.2)
+    logs = [steps.look() for _ in range(4 * int(2 / abs(slowest.real) / steps.time_of_look) + 40)]
+    late = 2 * slope(logs[len(logs) // 2 :], steps.time_of_look)
+    in_a_step = slowest.real if kind is ExplicitSteps else slowest.real / (1 + abs(slowest / steps.sigma) ** 2)
+    # of the mean over a look of one motion, whose |u|^2 oscillates
+    assert late / 2 == pytest.approx(2 * in_a_step, rel=0.05)
+
+
+@pytest.mark.parametrize("kind", [ExplicitSteps, ImplicitSteps])
+def test_steps_of_both_kinds_have_the_rate_of_what_grows(made_up, kind):
+    motion, slow, values = made_up(4.0)
+    fastest = 2 * values.real.max()
+    assert fastest > 0.1
+    steps = kind.of(motion, 1.0, slow, 0.1)
+    logs = [steps.look()]
+    while logs[-1] < min(logs) + 12:
+        logs.append(steps.look())
+    rate, error = steps.growth(logs)
+    assert rate == pytest.approx(fastest, abs=max(2 * error, 1e-3 * fastest))
+    assert error < 0.1 * fastest
 
 
 @pytest.mark.slow
