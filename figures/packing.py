@@ -269,7 +269,7 @@ def in_words(packing: HasConfiguration) -> str:
         return (
             f"F_x = {packing.fx:g}, F_y = {packing.fy:g}: {counted(len(packing), 'disk')}, "
             f"{counted(len(packing.contacts), 'contact')} "
-            f"({sliding} slide), {counted(len(packing.rattlers), 'rattler')}"
+            f"({sliding} {'slides' if sliding == 1 else 'slide'}), {counted(len(packing.rattlers), 'rattler')}"
         )
     c = packing.configuration.contacts
     slide = ", which slide" if c.sliding.any() else ", which stick" if c.at_bound.any() else ""

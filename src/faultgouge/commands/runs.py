@@ -56,7 +56,7 @@ def init(
     lock_output(context, output)
     if is_root():
         write_text(output, (files("faultgouge") / "scenes" / "commented.toml").read_text())
-        say(f"written to {output}; next: faultgouge onset {output}")
+        print_line(f"written to {output}; next: faultgouge onset {output}")
 
 
 @app.command(epilog="Example: faultgouge settle paper.toml -o run.h5")
