@@ -66,10 +66,10 @@ HOLDS = ("freeze", "setforce", "aveforce", "lineforce", "planeforce", "momentum"
 
 def hold_still(lmp: Any, bodies: tuple[str, ...]) -> None:
     """Leave what exerts forces in a copy alone: no output, no drag, and nothing that moves or holds particles by
-    itself; what has a velocity moves by it."""
+    itself; what has a velocity moves by it. Dashpots feel the masses of bodies, and of frozen particles, which stay."""
     quieten(lmp, drag=True)
     for name, style in styles_of(lmp).fixes.items():
-        if style.startswith((*MOVES, *HOLDS)) and without_suffix(style) not in BODIES:
+        if style.startswith((*MOVES, *HOLDS)) and without_suffix(style) not in (*BODIES, "freeze"):
             lmp.command(f"unfix {name}")
     for line in bodies:
         lmp.command(f"{line} {HELD}")

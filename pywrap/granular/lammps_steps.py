@@ -12,6 +12,7 @@ import numpy as np
 from ...analysis import Configuration
 from ...analysis.arrays import Floats
 from .acting_fixes import acting_fixes
+from .granular_commands import BODIES
 from .instance_queries import styles_of
 from .lammps_arrays import owned_array, rows_of, set_velocity
 from .look_in_a_copy import in_a_copy, quieten
@@ -68,10 +69,14 @@ def steps_in_a_copy(
 
 
 def set_up_run(lmp: Any) -> None:
-    """A step in which nothing moves, after which LAMMPS runs on without a set-up.
+    """Set up a run, which goes on without a set-up of its own.
 
-    At a set-up fix rigid does not know what later fixes add to the forces, and pushes its bodies in the first step.
+    At a set-up fix rigid does not know what later fixes add to the forces, and pushes its bodies in the first step: in
+    this step nothing moves.
     """
+    if not any(style.startswith(BODIES) for style in styles_of(lmp).fixes.values()):
+        lmp.command("run 0 post no")
+        return
     timestep = float(lmp.extract_global("dt"))
     lmp.command(f"timestep {SHORT * timestep:.17g}")
     try:

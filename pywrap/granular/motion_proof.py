@@ -20,6 +20,7 @@ beside the lowest eigenvalues of K. Therefore all particles are displaced alike,
 changes, and only particles at walls may feel other forces. K by differences has such forces, to its own error.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -125,40 +126,52 @@ def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extr
     others, moves = acting_fixes(fixes), partial(comparison.least_difference, lmp)
     difference, other_stiffness = moves()
     if other_stiffness > OTHER:
-        causes = [says for name, says in others.items() if moves((name,))[1] < OTHER]
-        if not causes and moves(tuple(others))[1] < OTHER:
-            causes = list(others.values())
-        causes = causes or ["something acts on particles by their positions"]
-        raise OtherStiffnessError(
-            "LAMMPS's forces do not change as K says: where all particles are displaced alike, forces change that no "
-            f"contact has; {' and '.join(causes)}."
-        )
+        raise _other_stiffness(others, moves)
     if len(configuration.one_sided_particles):
         return difference  # no linear motion is LAMMPS's, and no verdict is given
     if difference > BOUND and configuration.operators == "differences":
         difference = min(difference, comparison.in_shorter_steps().least_difference(lmp)[0])
-    found = difference > GOOD
-    causes = [says for name, says in others.items() if found and moves((name,))[0] < CURES * difference]
+    tells = difference > GOOD
+    causes = [says for name, says in others.items() if tells and moves((name,))[0] < CURES * difference]
     if difference <= BOUND and not causes:
         return difference
     if not causes and others and not UNCHANGED < moves(tuple(others))[0] / difference < 1 / UNCHANGED:
         causes = list(others.values())  # which of them is not known, but without them the motion is another one
+    raise _not_proved(configuration, difference, causes)
+
+
+Moves = Callable[..., tuple[float, float]]
+"""Difference and other stiffness without some fixes."""
+
+
+def _other_stiffness(others: dict[str, str], moves: Moves) -> OtherStiffnessError:
+    """The error of forces that change where all particles are displaced alike, with the fixes that exert them."""
+    causes = [says for name, says in others.items() if moves((name,))[1] < OTHER]
+    if not causes and moves(tuple(others))[1] < OTHER:
+        causes = list(others.values())
+    return OtherStiffnessError(
+        "LAMMPS's forces do not change as K says: where all particles are displaced alike, forces change that no "
+        f"contact has; {' and '.join(causes or ['something acts on particles by their positions'])}."
+    )
+
+
+def _not_proved(configuration: Configuration, difference: float, causes: list[str]) -> NotTakenError:
+    """The error of a motion that is another one, with its causes, or the likeliest ones."""
     says = (
         f"LAMMPS's forces do not change as K says: in {STEPS_OF_PROOF} steps from small velocities the change differs "
         f"by {difference:.2g} of itself"
     )
     if causes:
-        raise NotProvedError(f"{says}; {' and '.join(causes)}.")
+        return NotProvedError(f"{says}; {' and '.join(causes)}.")
     if configuration.operators == "differences":
-        raise NotTakenError(f"{says}, though K and C are differences of these forces: do they depend on the time?")
-    contacts = configuration.contacts
-    close = np.count_nonzero((configuration.mobilised > CLOSE) & ~contacts.at_bound)
+        return NotTakenError(f"{says}, though K and C are differences of these forces: do they depend on the time?")
+    close = np.count_nonzero((configuration.mobilised > CLOSE) & ~configuration.contacts.at_bound)
     if close:
-        raise NotTakenError(
+        return NotTakenError(
             f"{says}; {counted(int(close), 'contact')} just below Coulomb's bound may slide while the packing creeps: "
             f"run on with drag until it rests; or the commands are not those of the instance: {GIVE_LINES}."
         )
-    raise NotTakenError(
+    return NotTakenError(
         f"{says}; the commands are those of another run or instance, or some are not in the log (echo none, a full "
         f"disk), or a restart has lost histories of contacts: {GIVE_LINES}, as they hold now."
     )

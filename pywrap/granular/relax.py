@@ -7,6 +7,7 @@ since the forces of a vibration vanish together at times, and those on a sphere 
 """
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -137,28 +138,19 @@ def bring_to_rest(
     rate : float
         Of the drag at the end.
     """
-    dt, turning = float(lmp.extract_global("dt")), lmp.has_style("fix", "viscous/sphere")  # else dashpots alone
-    drags = {"faultgouge_drag": "viscous"} | ({"faultgouge_spin": "viscous/sphere"} if turning else {})
+    drag, changes = _Drag.of(lmp, start, rate), True
+    dt = float(lmp.extract_global("dt"))
     way, residual, force, rounding = 0.0, np.inf, force_scale(start), 0.0
-    acting = 0.0, 0.0
-    mass, squared_radius = float(start.mass[start.free].mean()), float(np.min(start.radius**2))
-    fastest = FASTEST * float(start.mass[start.free].min()) / mass
     try:
         for done in range(0, steps, STEPS_BETWEEN_LOOKS):
             if done == PATIENCE:
                 found = look()
                 _refuse_long_steps(found, dt, where)
                 rounding = _rounding(found)
-            rate = float(np.clip(rate, min(SLOWEST, fastest), fastest))
-            drag = mass * rate / dt
-            spin = drag * squared_radius if turning else 0.0
-            changes, acting = acting != (drag, spin), (drag, spin)
             if changes:
-                for (name, style), strength in zip(drags.items(), (drag, spin), strict=False):
-                    lmp.command(f"fix {name} all {style} {strength:.17g}")
+                drag.exert()
             _run(lmp, len(start), where, set_up=changes)
-            forces = _on_bodies(lmp, start, ("f", "torque"), (1.0, 1.0))
-            drag_forces = _on_bodies(lmp, start, ("v", "omega"), (drag, spin))
+            forces, drag_forces = _on_bodies(lmp, start, ("f", "torque"), (1.0, 1.0)), drag.forces()
             residual = float(np.linalg.norm(np.vstack([forces, drag_forces]), axis=0).max())
             speed = np.linalg.norm(owned_array(lmp, "v")[rows_of(lmp, start)][start.free], axis=1)
             way += STEPS_BETWEEN_LOOKS * dt * float(speed.mean())
@@ -169,20 +161,65 @@ def bring_to_rest(
                 falls = force == 0.0 and np.linalg.norm(forces + drag_forces) > 0.5 * np.linalg.norm(drag_forces)
                 if found.residual <= max(balance * force, rounding) and not falls:
                     set_velocity(lmp, found, np.zeros(found.coordinates))
-                    return found, rate
+                    return found, drag.rate
             if way > far * 2 * start.radius.mean():
                 moved = f"{far:g} diameters" if far > 1 else "a diameter"
                 raise NoEquilibriumError(f"The packing flows{where}: its particles have moved by {moved}.")
-            ratio = np.linalg.norm(forces) / max(np.linalg.norm(drag_forces), np.finfo(float).tiny)
-            rate *= 2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0
+            changes = drag.follow(np.linalg.norm(forces) / max(np.linalg.norm(drag_forces), np.finfo(float).tiny))
     finally:
-        for name in drags:
-            if name in lmp.available_ids("fix"):
-                lmp.command(f"unfix {name}")
+        drag.remove()
     raise NoEquilibriumError(
         f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of balance; give more "
         "steps, or the packing creeps."
     )
+
+
+@dataclass
+class _Drag:
+    """The drag on all particles of an instance; its rate, per time step on the mean mass, follows the motion."""
+
+    lmp: Any
+    start: Configuration
+    styles: dict[str, str]
+    rates: tuple[float, float]
+    rate: float
+
+    @classmethod
+    def of(cls, lmp: Any, start: Configuration, rate: float) -> "_Drag":
+        """By fix viscous, and by fix viscous/sphere where this LAMMPS has one; else dashpots alone stop rotations."""
+        styles = {"faultgouge_drag": "viscous"}
+        if lmp.has_style("fix", "viscous/sphere"):
+            styles["faultgouge_spin"] = "viscous/sphere"
+        fastest = FASTEST * float(start.mass[start.free].min() / start.mass[start.free].mean())
+        rates = min(SLOWEST, fastest), fastest
+        return cls(lmp, start, styles, rates, float(np.clip(rate, *rates)))
+
+    @property
+    def strengths(self) -> tuple[float, float]:
+        """Of both fixes: force time / length, and torque time."""
+        drag = self.rate * float(self.start.mass[self.start.free].mean()) / float(self.lmp.extract_global("dt"))
+        return drag, drag * float(np.min(self.start.radius**2)) if len(self.styles) > 1 else 0.0
+
+    def exert(self) -> None:
+        """Give LAMMPS the fixes, in the place of those that it has."""
+        for (name, style), strength in zip(self.styles.items(), self.strengths, strict=False):
+            self.lmp.command(f"fix {name} all {style} {strength:.17g}")
+
+    def forces(self) -> Floats:
+        """Sizes of its forces (F, T/R) on what moves, shape (axes, N)."""
+        return _on_bodies(self.lmp, self.start, ("v", "omega"), self.strengths)
+
+    def follow(self, ratio: float) -> bool:
+        """Change the rate by the ratio of the forces to those of the drag; whether it has changed."""
+        before, factor = self.rate, 2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0
+        self.rate = float(np.clip(factor * before, *self.rates))
+        return self.rate != before
+
+    def remove(self) -> None:
+        """Take the fixes away."""
+        for name in self.styles:
+            if name in self.lmp.available_ids("fix"):
+                self.lmp.command(f"unfix {name}")
 
 
 def _rounding(found: Configuration) -> float:
@@ -203,10 +240,10 @@ def _refuse_long_steps(found: Configuration, timestep: float, where: str) -> Non
 
 def _run(lmp: Any, count: int, where: str, *, set_up: bool) -> None:
     """Some steps, at the end of which there are as many particles."""
-    began = lmp.extract_global("ntimestep") + set_up
     try:
         if set_up:
             set_up_run(lmp)
+        began = lmp.extract_global("ntimestep")
         lmp.command(f"run {STEPS_BETWEEN_LOOKS} pre no post no")
     except Exception as error:  # LAMMPS raises what its bindings choose
         raise NotTakenError(f"While the packing came to rest{where}, {explain_error(error)}") from error

@@ -102,6 +102,17 @@ run 0
 """
 
 
+def test_dashpots_of_frozen_particles(lammps_with):
+    """They weigh infinitely much in LAMMPS's dashpots, whichever way C is found."""
+    from faultgouge.pywrap import from_lammps
+
+    frozen = ROW.format(x="1.0").replace("-1.5 0 0.4999", "-0.99 0.1 0.4999").replace("1.0 0 0.4999", "0.99 0.1 0.4999")
+    lmp = lammps_with(frozen.replace("run 0", "group base id 1\nfix base base freeze\nrun 0"))
+    laws, found = (from_lammps(lmp, differences=each, balance=np.inf, prove=False) for each in (False, True))
+    assert apart(damping_matrix(found), damping_matrix(laws)) < 1e-6
+    assert apart(stiffness_matrix(found), stiffness_matrix(laws)) < 1e-5
+
+
 @pytest.mark.parametrize("gap", [1e-13, 1e-5])
 def test_particles_that_nearly_touch(lammps_with, gap):
     """LAMMPS's compute pair/local says nothing of them, and one that is displaced may feel the other one.
