@@ -57,10 +57,11 @@ def _towards_first(branch: Floats, between: Floats, box: Floats) -> Floats:
 
 def by_types(pairs: OneLaw, kind: Indices) -> dict[Any, OneLaw]:
     """Contacts between particles by their two types, the smaller first."""
-    types = np.sort(np.column_stack([kind[pairs.geometry["i"]], kind[pairs.geometry["j"]]]), axis=1)
-    found = {}
-    for first, second in np.unique(types, axis=0).tolist():
-        which = np.all(types == (first, second), axis=1)
+    low, high = np.sort([kind[pairs.geometry["i"]], kind[pairs.geometry["j"]]], axis=0)
+    count = 1 + int(kind.max(initial=0))
+    codes, found = low * count + high, {}
+    for code in np.unique(codes).tolist():
+        (first, second), which = divmod(code, count), codes == code
         geometry = {name: values[which] for name, values in pairs.geometry.items()}
         found[first, second] = OneLaw(f"contacts of types {first} and {second}", geometry, pairs.forces[which])
     return found

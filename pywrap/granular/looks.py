@@ -45,9 +45,7 @@ def look_at_contacts(
     world, copied = communicator(lmp), can_copy(lmp)
     if given is None:
         lines = log_of(lmp, files) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
-        if lines is None:
-            raise NotTakenError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
-        given = read_commands(lines, log=True)
+        given = _logged_commands(lines)
     elif copied:
         lmp.command("log none")
     styles = styles_of(lmp)
@@ -76,6 +74,13 @@ def look_at_contacts(
     return given, styles.fixes, {name: rows if name in BY_CONTACT else rows[order] for name, rows in found.items()}
 
 
+def _logged_commands(lines: list[str] | None) -> Commands:
+    """The commands of a log, which an instance may not have."""
+    if lines is None:
+        raise NotTakenError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
+    return read_commands(lines, log=True)
+
+
 def _join_ranks(parts: list[Floats]) -> Floats:
     """Rows of all ranks; those of a rank that has none may have another number of columns."""
     return np.concatenate([part for part in parts if len(part)] or parts[:1])
@@ -87,10 +92,7 @@ def look_at_forces(
     """The commands, the styles of fixes, the particles, and who is in the groups of the fixes that move or hold them;
     in a copy."""
     if given is None:
-        lines = log_of(lmp, files)
-        if lines is None:
-            raise NotTakenError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
-        given = read_commands(lines, log=True)
+        given = _logged_commands(log_of(lmp, files))
     lmp.command("log none")
     styles = styles_of(lmp)
     with suppress(NotLinearisedError):
