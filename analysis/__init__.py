@@ -1,11 +1,15 @@
-"""The stability operator, spectrum, onset and growth of a packing of frictional disks.
+"""The analysis of packings of frictional grains: stability operator, spectrum, stability, onset, growth.
 
-All functions take a :class:`Packing`; operators, spectra and functions based on these also take a
-:class:`Configuration`.
-The physics is in the docstrings of the modules: `law` (the contact law), `contacts`, `geometry`, `packing` (forces),
-`stiffness` and `assembly` (the stability operator), `spectrum` (its eigenvalues), `damping` (the damping
-matrix), `onset` (where eigenvalues become complex), `growth` (growth in a run). `runfile`, `dumps` and `files` read and
-write packings.
+Functions take a :class:`Packing`, the disks of this package's law, or a :class:`Configuration`, the particles of any
+code with their contacts to first order. The physics is in the docstrings of the modules:
+
+- `contacts`, `assembly` and `configuration`: contacts to first order, and the stability operator of these;
+- `packing`: the contact law, geometry and forces of disks;
+- `operators`: stiffness and damping matrix, sliders at Coulomb's bound;
+- `factors`: factors of sparse and banded matrices;
+- `motion`: eigenvalues, the verdict on stability, responses, growth in a run, time step;
+- `windows`: the loads between which a motion grows;
+- `files`: run.h5, dumps, and the formats of other codes.
 """
 
 from .arrays import Complexes, Floats, Indices

@@ -11,6 +11,7 @@ From the folder of the repository.
 """
 
 import sys
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -59,19 +60,19 @@ QUALITIES = (50, 100, 200, 300)
 
 FY = float(STANDARD["load"]["fy"])
 
-LATEST = 8
+LAST_WINDOWS = 8
 """Windows over which the vibration of a start is a mean, and which are compared with as many before."""
 
-VIBRATES = 0.05
+VIBRATION_SHARE = 0.05
 """Vibration over drift of a layer that is said to vibrate; what a start leaves is a hundredth at the most."""
 
-NEAR = 1.25
+SAME_VIBRATION = 1.25
 """Ratio of two vibrations that are said to be the same: both are measured over two windows of an uneven motion."""
 
-GROWS = 1e-4
+GROWTH_FROM = 1e-4
 """Growth rate of D, 1 / time, from which linear motion is said to grow: fifty times the rounding of eigenvalues."""
 
-AGREES = 1e-3
+SAME_RATE = 1e-3
 """Relative difference of rates that are computed again: those of motions repeat to the last digits on one machine."""
 
 Row = dict[str, Any]
@@ -82,8 +83,8 @@ def outcomes(rows: list[Row]) -> dict[str, Any]:
     found: dict[str, Any] = {
         "packings": len(rows),
         "bound": sum(row["at_bound"] > 0 for row in rows),
-        "sticking": share(sum(row["sticking"] > GROWS for row in rows), len(rows)),
-        "sliding": share(sum(row["sliding"] > GROWS for row in rows), len(rows)),
+        "sticking": share(sum(row["sticking"] > GROWTH_FROM for row in rows), len(rows)),
+        "sliding": share(sum(row["sliding"] > GROWTH_FROM for row in rows), len(rows)),
     }
     for name, stable in (("rests", True), ("grows", False), ("unknown", None)):
         found[name] = share(sum(row["stable"] is stable for row in rows), len(rows))
@@ -97,7 +98,7 @@ def starts_of(rising: Row) -> list[Row]:
     return [rising, *([rising["other_start"]] if rising.get("other_start") else [])]
 
 
-def does(rising: Row) -> str:
+def outcome_of(rising: Row) -> str:
     """Whether a layer vibrates, from one of its starts at least, follows the load from all, or is not known to."""
     steady = [_vibrates(each) for each in starts_of(rising) if each["steady"]]
     if any(steady):
@@ -108,7 +109,7 @@ def does(rising: Row) -> str:
 def under_the_load(rows: list[Row]) -> dict[str, Any]:
     """How many layers vibrate under a load that rises, and how much: the most of both starts."""
     known = [row["rising"] for row in rows if row["rising"]]
-    done = [does(each) for each in known]
+    done = [outcome_of(each) for each in known]
     steady = [
         max(each["vibration"] / each["drift"] for each in starts_of(rising) if each["steady"])
         for rising, what in zip(known, done, strict=True)
@@ -124,13 +125,17 @@ def under_the_load(rows: list[Row]) -> dict[str, Any]:
     }
 
 
-def beside_lammps(rows: list[Row]) -> dict[str, Any]:
+def one_start_beside_lammps(rows: list[Row]) -> dict[str, Any]:
     """Each layer that LAMMPS integrates, from one start and over windows."""
     slow = str(min(RATES))
     shown = [row | {"ratio": row["rising"]["vibration"] / row["rising"]["drift"]} for row in rows if "lammps" in row]
-    both = [row for row in shown if row["rising"]["steady"] and row["ratio"] > VIBRATES]
+    both = [row for row in shown if row["rising"]["steady"] and row["ratio"] > VIBRATION_SHARE]
     near = [row["lammps"][slow]["vibration"] / row["rising"]["vibration"] for row in both]
-    apart = [(row["seed"], ratio) for row, ratio in zip(both, near, strict=True) if not 1 / NEAR < ratio < NEAR]
+    apart = [
+        (row["seed"], ratio)
+        for row, ratio in zip(both, near, strict=True)
+        if not 1 / SAME_VIBRATION < ratio < SAME_VIBRATION
+    ]
     return {
         "rows": shown,
         "near": [float(np.median(near)), min(near), max(near)] if near else None,
@@ -139,7 +144,7 @@ def beside_lammps(rows: list[Row]) -> dict[str, Any]:
     }
 
 
-def in_lammps(rows: list[Row]) -> Row:
+def vibration_in_lammps(rows: list[Row]) -> Row:
     """How many layers vibrate in LAMMPS at the smallest rate, from a start at least, and with a large friction."""
     slow = [row["lammps"][str(min(RATES))] for row in rows]
     motions = [each if isinstance(each, list) else [each] for each in slow]
@@ -151,10 +156,10 @@ def in_lammps(rows: list[Row]) -> Row:
 
 
 def _vibrates(motion: Row) -> bool:
-    return bool(motion["vibration"] > VIBRATES * motion["drift"])
+    return bool(motion["vibration"] > VIBRATION_SHARE * motion["drift"])
 
 
-def from_two_starts(rows: list[Row]) -> list[Row]:
+def starts_beside_lammps(rows: list[Row]) -> list[Row]:
     """Motion from each start beside LAMMPS's from the same start and over the same span, at all rates.
 
     `risen` is by how much the load rises in the run at each rate, as a share of what changes the first contact.
@@ -243,7 +248,7 @@ def onsets_over_undamped(rows: list[Row]) -> list[Row]:
     return found
 
 
-def of_two_starts(rows: list[Row]) -> list[Row]:
+def longer_runs(rows: list[Row]) -> list[Row]:
     """Vibration of each start at the end, one-sided and in LAMMPS, and whether it is steady."""
     found = []
     for row in rows:
@@ -251,7 +256,8 @@ def of_two_starts(rows: list[Row]) -> list[Row]:
         for name in ("one_sided", "lammps"):
             windows = np.array(row[name]["vibration"])
             last, before = (
-                windows[:, part].mean(axis=1) for part in (slice(-LATEST, None), slice(-2 * LATEST, -LATEST))
+                windows[:, part].mean(axis=1)
+                for part in (slice(-LAST_WINDOWS, None), slice(-2 * LAST_WINDOWS, -LAST_WINDOWS))
             )
             ends[name] = [
                 {"vibration": float(now), "steady": bool(abs(now - then) <= WINDOWS * now)}
@@ -293,32 +299,37 @@ def rows_of_layers() -> tuple[list[Row], list[Row]]:
     return new, [row for row in known_rows(ONE_START) if key_of(row) not in done]
 
 
+def cells_of_layers(rows: list[Row]) -> list[Row]:
+    """The outcomes of the layers of each load, law and restitution."""
+    found = []
+    for key in product(LOADS, HISTORIES, RESTITUTIONS):
+        own = [row for row in rows if (row["fx_over_fy"], row["law"], row["restitution"]) == key]
+        cell = dict(zip(("load", "law", "restitution"), key, strict=True)) | outcomes(own)
+        found.append(cell | ({"rising": under_the_load(own)} if cell["law"] == "coulomb" else {}))
+    return found
+
+
+def piles_of_spheres(rows: list[Row]) -> list[Row]:
+    """The outcomes of the poured spheres of each law, stiffness and slope."""
+    found = []
+    for law, kn, slope in product(POURED_LAWS, STIFFNESSES, SLOPES):
+        tried = [row for row in rows if (row["law"], row["kn"], row["slope"]) == (law, kn, slope)]
+        good = [row for row in tried if row["rests"]]
+        cell: Row = {"law": law, "kn": kn, "slope": slope, "tried": len(tried)} | outcomes(good)
+        cell["overlap"] = float(np.median([row["overlap"] for row in good])) if good else None
+        cell["pairs"] = sum(row["pairs"] > 0 for row in good)
+        found.append(cell)
+    return found
+
+
 def numbers() -> dict[str, Any]:
     """All numbers of the page."""
     spheres, starts, laws, firsts = (known_rows(table) for table in (POURED, STARTS, LAWS, ONSETS))
     new, old = rows_of_layers()
     every = new + old
     rows = [row for row in every if "stable" in row]
-    from_both = from_two_starts([row for row in new if "lammps" in row])
-    cells = []
-    for load in LOADS:
-        for law in HISTORIES:
-            for restitution in RESTITUTIONS:
-                key = (law, load, restitution)
-                own = [row for row in rows if (row["law"], row["fx_over_fy"], row["restitution"]) == key]
-                cells.append(dict(zip(("law", "load", "restitution"), key, strict=True)) | outcomes(own))
-                if law == "coulomb":
-                    cells[-1]["rising"] = under_the_load(own)
-    piles = []
-    for law in POURED_LAWS:
-        for kn in STIFFNESSES:
-            for slope in SLOPES:
-                tried = [row for row in spheres if (row["law"], row["kn"], row["slope"]) == (law, kn, slope)]
-                good = [row for row in tried if row["rests"]]
-                cell: Row = {"law": law, "kn": kn, "slope": slope, "tried": len(tried)} | outcomes(good)
-                cell["overlap"] = float(np.median([row["overlap"] for row in good])) if good else None
-                cell["pairs"] = sum(row["pairs"] > 0 for row in good)
-                piles.append(cell)
+    from_both = starts_beside_lammps([row for row in new if "lammps" in row])
+    cells = cells_of_layers(rows)
     return {
         "cells": cells,
         "usual": {cell["load"]: cell for cell in cells if (cell["law"], cell["restitution"]) == ("coulomb", 0.9)},
@@ -330,18 +341,18 @@ def numbers() -> dict[str, Any]:
         "both_starts": [row for row in from_both if (row["fx_over_fy"], row["restitution"]) == COMPARED],
         "elsewhere": [row for row in from_both if (row["fx_over_fy"], row["restitution"]) != COMPARED],
         "vibrating": vibrating(from_both),
-        "lammps": beside_lammps([row for row in old if "stable" in row]),
-        "in_lammps": in_lammps([row for row in rows if "control" in row]),
+        "lammps": one_start_beside_lammps([row for row in old if "stable" in row]),
+        "in_lammps": vibration_in_lammps([row for row in rows if "control" in row]),
         "first": FIRST,
         "rates": RATES,
-        "starts": of_two_starts(starts),
+        "starts": longer_runs(starts),
         "over_loss": over_loss(laws, cells),
         "over_quality": over_quality(laws),
         "qualities": QUALITIES,
         "onsets": onsets_over_undamped(firsts),
         "onset_seeds": [row["seed"] for row in firsts],
         "without_onset": sum(row["undamped"] is None for row in firsts),
-        "poured": piles,
+        "poured": piles_of_spheres(spheres),
         "poured_seeds": max((row["seed"] for row in spheres), default=0),
         "poured_rows": len(spheres),
         "poured_asked": POURED_SEEDS * len(POURED_LAWS) * len(STIFFNESSES) * len(SLOPES),
@@ -404,7 +415,7 @@ def check() -> list[str]:
     return [
         f"{key_of(old)}: {each}"
         for old, new in pairs
-        for each in differing(old, new, ("rests", "stable", "sticking"), AGREES)
+        for each in differing(old, new, ("rests", "stable", "sticking"), SAME_RATE)
     ]
 
 

@@ -41,6 +41,17 @@ def page(request):
     return request.param
 
 
+def test_extras_of_the_pages_exist():
+    """An extra that a page names is one of the package, and the page about the installation has them all."""
+    extras = read_toml(ROOT / "pyproject.toml", "project")["project"]["optional-dependencies"].keys()
+    install = (ROOT / "docs" / "install.md").read_text()
+    assert set(re.findall(r"^\| `(\w+)` \|", install, re.MULTILINE)) == extras
+    named = [found for page in PAGES if page.name != "CHANGELOG.md"
+             for found in re.findall(r"(?:'\.|faultgouge|\.whl)\[([\w,]+)\]'", page.read_text())]  # fmt: skip
+    assert len(named) >= 3
+    assert {each for found in named for each in found.split(",")} <= extras
+
+
 def test_links_lead_somewhere(page):
     lost = []
     for link, anchor in re.findall(r"\]\((?!https?:)([^)#\s]*)(?:#([^)\s]*))?\)", page.read_text()):

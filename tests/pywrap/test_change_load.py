@@ -66,7 +66,7 @@ def test_other_increments_lead_to_the_same_packing(monkeypatch):
     bed = settle_bed(scene())
     bed = replace(bed, law=replace(bed.law, mu=0.0))
     found = change_load(bed, 6.0)
-    monkeypatch.setattr("faultgouge.pywrap.settling.change_load.FACTOR", 1.02)
+    monkeypatch.setattr("faultgouge.pywrap.settling.change_load.LOAD_FACTOR", 1.02)
     assert farthest(change_load(bed, 6.0), found) < 1e-11  # rounding of coordinates, over soft modes
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from research.rising.compute import APART, RATES, RESTITUTIONS
-from research.rising.make import HERE, ONSETS, STARTS, VIBRATES, check, numbers, write_page
+from research.rising.make import HERE, ONSETS, STARTS, VIBRATION_SHARE, check, numbers, write_page
 from research.tables import read_rows
 
 FOUND = numbers()
@@ -29,8 +29,8 @@ def test_lammps_vibrates_where_one_sided_motion_does_and_as_much():
     lammps, renewed = FOUND["lammps"], {row["seed"] for row in FOUND["both_starts"]}
     slow = str(min(RATES))
     for row in (each for each in lammps["rows"] if each["rising"]["steady"]):
-        vibrates = row["lammps"][slow]["vibration"] > VIBRATES * row["lammps"][slow]["drift"]
-        assert vibrates == (row["ratio"] > VIBRATES)
+        vibrates = row["lammps"][slow]["vibration"] > VIBRATION_SHARE * row["lammps"][slow]["drift"]
+        assert vibrates == (row["ratio"] > VIBRATION_SHARE)
     assert lammps["near"][0] == pytest.approx(1, abs=0.02)
     # the two layers that vibrate otherwise are those that were followed for a longer time
     assert [seed for seed, _ in lammps["apart"]] == [seed for seed in APART if seed not in renewed]
@@ -43,7 +43,7 @@ def test_from_each_start_and_over_the_same_span_lammps_vibrates_as_one_sided_mot
     for row in (each for each in rows if each["one_sided"]["steady"]):
         moving = row["lammps"][slow]
         assert moving["drift"] == pytest.approx(row["one_sided"]["drift"], abs=2 * row["one_sided"]["drift_error"])
-        assert row["vibrates"] == (moving["vibration"] > VIBRATES * moving["drift"])
+        assert row["vibrates"] == (moving["vibration"] > VIBRATION_SHARE * moving["drift"])
         assert row["within"] or not row["vibrates"]
 
 
