@@ -17,7 +17,9 @@ the bound the motions of both signs are no opposites; each is compared by itself
 
 A force that no contact has, and that depends on the position, may be weak beside those of the contacts, and strong
 beside the lowest eigenvalues of K. Therefore all particles are displaced alike, too. Then no contact between particles
-changes, and only particles at walls may feel other forces. K by differences has such forces, to its own error.
+changes, and only particles at walls may feel other forces. K by differences has such forces, to its own error. A spring
+between particles changes by no common displacement, and bears a part of the weight, so that without the spring the
+motion is another one, too: where there is a spring, laws that do not agree as well as usual are not enough.
 """
 
 from collections.abc import Callable
@@ -31,7 +33,7 @@ from numpy.typing import NDArray
 from ...analysis import Configuration
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
-from .acting_fixes import acting_fixes
+from .acting_fixes import HOLDING, acting_fixes
 from .granular_commands import GIVE_LINES, NotLinearisedError, NotTakenError
 from .lammps_steps import steps_in_a_copy
 from .linear_steps import LinearForces, linear_forces, linear_steps
@@ -132,6 +134,9 @@ def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extr
     if difference > BOUND and configuration.operators == "differences":
         difference = min(difference, comparison.in_shorter_steps().least_difference(lmp)[0])
     tells = difference > GOOD
+    pulls = [says for name, says in others.items() if fixes[name].startswith(tuple(HOLDING))]
+    if tells and pulls and configuration.operators == "laws":
+        raise OtherStiffnessError(f"{_differs(difference)}; {' and '.join(pulls)}.")
     causes = [says for name, says in others.items() if tells and moves((name,))[0] < CURES * difference]
     if difference <= BOUND and not causes:
         return difference
@@ -155,12 +160,17 @@ def _other_stiffness(others: dict[str, str], moves: Moves) -> OtherStiffnessErro
     )
 
 
-def _not_proved(configuration: Configuration, difference: float, causes: list[str]) -> NotTakenError:
-    """The error of a motion that is another one, with its causes, or the likeliest ones."""
-    says = (
+def _differs(difference: float) -> str:
+    """What a difference is, without a stop."""
+    return (
         f"LAMMPS's forces do not change as K says: in {STEPS_OF_PROOF} steps from small velocities the change differs "
         f"by {difference:.2g} of itself"
     )
+
+
+def _not_proved(configuration: Configuration, difference: float, causes: list[str]) -> NotTakenError:
+    """The error of a motion that is another one, with its causes, or the likeliest ones."""
+    says = _differs(difference)
     if causes:
         return NotProvedError(f"{says}; {' and '.join(causes)}.")
     if configuration.operators == "differences":

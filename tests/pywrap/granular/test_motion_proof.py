@@ -84,6 +84,16 @@ def test_fixes_that_act_as_contacts_do_not_tell(bed, fix, says):
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.long
+def test_a_weak_spring_between_particles(bed):
+    """A spring of 2, beside contacts of 300, changes K by so little that laws without the spring nearly agree."""
+    from faultgouge.pywrap import NotTakenError
+
+    spring = "group one id 1\ngroup other id 20\nfix trap one spring couple other 2.0 NULL NULL 0.0 0.0"
+    with pytest.raises(NotTakenError, match="fix trap spring pulls at particles as contacts do not tell: leave it out"):
+        look(*bed, spring, 60000)
+
+
 @pytest.mark.parametrize(
     "fix",
     ["addforce v_trap 0 0", "accelerate/cos 0.02", "drag 1.5 1.5 NULL 0.05 0.1", "spring/self 0.1",
