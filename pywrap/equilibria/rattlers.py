@@ -29,6 +29,9 @@ TRAVEL = 0.3
 LINEAR_PROGRAMS = 20
 """Linear programs for a disk at the most; two or three do."""
 
+BEYOND_A_BOUND = 1e-12
+"""By how much a point may be beyond a bound, in about a radius: rounding has it be so."""
+
 WIDENING = 0.05
 """Share by which a linear program has to widen the narrowest gap for another one to follow."""
 
@@ -87,9 +90,7 @@ def middle_of_cage(packing: Packing, disks: Indices) -> Floats:
 
 def _to_the_middle(branch: Floats, contact: Floats, height: float, radius: float) -> Floats:
     """The move of a disk with these branch vectors to its neighbours, of these lengths at contact, shape (2,)."""
-    from scipy.optimize import linprog
-
-    # the solver has absolute tolerances: lengths in a power of two near the radius, which rounds nothing
+    # rounding is known beside lengths near one: lengths in a power of two near the radius, which rounds nothing
     unit = 2.0 ** np.frexp(radius)[1]
     branch, contact, height, radius = branch / unit, contact / unit, height / unit, radius / unit
     move, room = np.zeros(2), TRAVEL * radius
@@ -98,13 +99,35 @@ def _to_the_middle(branch: Floats, contact: Floats, height: float, radius: float
         normal = np.vstack([(branch + move) / distance[:, None], [0.0, 1.0]])  # the floor is the last one
         gap = np.append(distance - contact, height + move[1] - radius)
         narrowest = min(float(gap.min()), radius)  # no gap needs to be wider
-        step = linprog(
-            [0.0, 0.0, -1.0],
-            np.column_stack([-normal, np.ones(len(gap))]),
-            gap,
-            bounds=[*zip(-room - move, room - move, strict=True), (narrowest, radius)],
-        ).x
+        sides = np.vstack([np.column_stack([-normal, np.ones(len(gap))]), np.eye(3), -np.eye(3)])
+        step = highest_corner(sides, np.concatenate([gap, room - move, [radius], room + move, [-narrowest]]))
         move += step[:2]
         if step[2] - narrowest <= WIDENING * abs(narrowest):
             break
     return unit * move
+
+
+def highest_corner(sides: Floats, bounds: Floats) -> Floats:
+    """Solve a linear program in three unknowns: the point where three bounds meet and the third unknown is largest.
+
+    A cage has up to twenty bounds. All threes of them are looked at, in a fifth of the time of a general solver, whose
+    import alone takes a tenth of the time of a whole command.
+
+    Parameters
+    ----------
+    sides, bounds : ndarray, shape (B, 3) and (B,)
+        `sides @ z <= bounds`, of which there must be a solution.
+
+    Returns
+    -------
+    ndarray, shape (3,)
+        The solution z.
+    """
+    n = np.arange(len(bounds))
+    threes = np.array(np.nonzero((n[:, None, None] < n[:, None]) & (n[:, None] < n)))
+    (a, b, c), (p, q, r) = sides[threes], bounds[threes][..., None]
+    bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of parallel bounds
+        corners = (p * bc + q * ca + r * ab) / np.sum(a * bc, axis=1)[:, None]
+        corners = corners[np.all(corners @ sides.T <= bounds + BEYOND_A_BOUND, axis=1)]
+    return np.asarray(corners[np.argmax(corners[:, 2])])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from granular_packings import command
-from test_one_sided_in_lammps import in_steps, pushed
+from pushes import in_steps, pushed
 
 from faultgouge.analysis import damping_matrix, stability, stiffness_matrix
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration

@@ -1,23 +1,19 @@
-"""One-sided motion, and the verdict on it, beside LAMMPS's own motion: of LAMMPS's laws and of the standard law here.
+"""One-sided motion, and the verdict on it, beside LAMMPS's own motion, with LAMMPS's laws of contacts.
 
 Particles are pushed by 1e-7 times normal velocities, far above what rounding moves (1e-11) and far below the overlaps
 (1e-3 to 1e-2), so that one-sided motion is that of LAMMPS to first order. D and velocities are compared over powers of
 the push or of the rate of loading.
 """
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from granular_packings import command, instance, start, with_law
+from pushes import PUSH, in_steps, pushed, velocities
 
 from faultgouge.analysis import one_sided_motion, stability
-from faultgouge.analysis.motion.one_sided import OneSidedSystem
 from faultgouge.analysis.motion.one_sided_outcome import PUSHES, random_pushes
-
-PUSH = 1e-7
-"""Length / time. Displacements stay below 1e-5."""
 
 AGREES = 0.1
 """Relative difference of D. Steps of one-sided motion are a twentieth of the stable one, and D is an amplitude squared
@@ -92,36 +88,6 @@ def poured(tmp_path_factory):
     yield make
     for lmp in made:
         lmp.close()
-
-
-def pushed(lmp, here, push, times, dt, size=PUSH):
-    """D of LAMMPS's particles over the push squared: shape (T, P) for pushes of all coordinates, shape (.., P)."""
-    from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of, set_velocity
-    from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy, quieten
-
-    def follow(velocity):
-        lmp.command("log none")
-        quieten(lmp, drag=True)
-        lmp.command(f"timestep {dt}")
-        at_rest = owned_array(lmp, "x")[rows_of(lmp, here)].copy()
-        set_velocity(lmp, here, size * velocity)
-        found, steps = [], 0
-        low, high, *_ = lmp.extract_box()
-        width = np.subtract(high, low)
-        for time in times:
-            lmp.command(f"run {round(time / dt) - steps} post no")
-            steps = round(time / dt)
-            away = owned_array(lmp, "x")[rows_of(lmp, here)] - at_rest
-            away[:, 0] -= width[0] * np.round(away[:, 0] / width[0])
-            found.append(float(np.mean(np.sum(away**2, axis=1))) / size**2)
-        return found
-
-    return np.transpose([in_a_copy(lambda v=v: follow(v)) for v in push.T])
-
-
-def velocities(here, push):
-    """Pushes of all coordinates as velocities of the particles, shape (P, N, d)."""
-    return [column.reshape(here.axes, len(here))[: here.dimension].T for column in push.T]
 
 
 def compare(lmp, here, times, dt, size=PUSH, agrees=AGREES):
@@ -234,18 +200,6 @@ def test_the_rate_without_contacts_at_the_bound_is_that_of_lammps_over_ten_decad
     found = pushed(lmp, here, random_pushes(here, 1)[:, :1], times, 1e-3, 1e-13)[:, 0]
     assert found[-1] > 1e10 * found[0]
     assert np.polyfit(times, np.log(found), 1)[0] == pytest.approx(told.growth_rate, rel=0.03)
-
-
-def in_steps(here, push, times, dt):
-    """D of the one-sided motion in LAMMPS's own steps, shape (T,): fast motions of different phase add up to D, and
-    what the step changes their phases by is not small."""
-    system = OneSidedSystem.of(here)
-    state, steps, found = system.start(push), 0, []
-    for time in times:
-        system.take_steps(state, dt, round(time / dt) - steps)
-        steps = round(time / dt)
-        found.append(np.sum(system.displacement(state.z)[..., 0] ** 2, axis=1).mean())
-    return np.array(found)
 
 
 @pytest.mark.parametrize("law", ["gran/hertz/history", "mindlin/force"])
@@ -387,141 +341,3 @@ def test_spheres_under_a_load_that_rises(tmp_path, law, seed, slope):
         assert vibration == pytest.approx(told["vibration"], rel=0.2)
         assert drift == pytest.approx(told["drift"], rel=0.15)
     lmp.close()
-
-
-@pytest.fixture(scope="module")
-def layer():
-    """The layer of README with Coulomb's slider, at 0.2 F_y of its own ramp, with dashpots of the restitution 0.9."""
-    from faultgouge.pywrap import Scene, settle
-    from research.laws.both_laws import as_slider, at_loads
-    from research.modes.loss import with_dashpots
-
-    found = []
-    scene = Scene.from_mapping(
-        {
-            "packing": {"seed": 1}, "law": {"kn": 2e5, "history": "coulomb"}, "load": {"fy": 3.0},
-            "ramp": {"step": 3e-3, "until": 0.6}, "modes": {"fx_over_fy": [0.2]},
-        }
-    )  # fmt: skip
-    start = settle(scene)
-    at_loads(scene, replace(start, packing=as_slider(start.packing)), lambda packing: found.append(packing) or {})
-    return with_dashpots(found[0], 171.0)
-
-
-def pushed_layer(packing, push, times, size=PUSH):
-    """D over the push squared of all disks as the plugin moves them, shape (T,)."""
-    from mpi4py import MPI
-
-    from faultgouge.analysis import mean_square_displacement
-    from faultgouge.pywrap import Engine
-    from faultgouge.pywrap.granular.lammps_arrays import set_velocity
-    from faultgouge.pywrap.runs.undamped import time_step
-
-    dt, found = time_step(packing), []
-    with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
-        set_velocity(engine.lammps, packing.configuration, size * push)
-        for time in times:
-            moved = dynamics.advance(round(time / dt) - dynamics.steps)
-            found.append(mean_square_displacement(moved.position, packing.position, packing.box_length) / size**2)
-    return np.array(found)
-
-
-def test_the_standard_law_after_a_push(layer):
-    """Dashpots of the plugin feel the velocity of the full step, and those of one-sided motion that of the half step:
-    1 % of D."""
-    here = layer.configuration
-    assert here.contacts.one_sided.any()
-    assert len(layer.contacts) - here.contacts.one_sided.sum() > 100
-    push = random_pushes(here, 1)
-    push.reshape(here.axes, len(here), -1)[:, layer.rattlers] = 0.0  # the runs of this package hold rattlers
-    times = np.array([0.2, 0.5, 1.0, 2.0, 4.0])
-    for column, velocity in zip(push.T, velocities(here, push), strict=True):
-        expected = one_sided_motion(layer, velocity, times=times)
-        assert np.any(expected.slid[-1] > 0)
-        np.testing.assert_allclose(pushed_layer(layer, column, times), expected.mean_square_displacement, rtol=0.02)
-
-
-@pytest.fixture(scope="module")
-def far_from_the_bound():
-    """Thirty disks with Coulomb's slider at 0.02 F_y, whose contacts all stick, and dashpots or none."""
-    from faultgouge.pywrap import Engine, Scene, equilibrate, settle
-
-    width = {"disks": 30, "seed": 4, "top": 3, "width": 3.57}
-    law = {"kn": 2e5, "mu": 2.0, "history": "coulomb"}
-
-    @cache
-    def make(cn):
-        damping = {"damping": {"cn": cn, "ct": 2 / 7 * cn}} if cn else {}
-        state = settle(Scene.from_mapping({"packing": width, "law": law, "load": {"fy": 3.0}, **damping}))
-        with Engine(state.packing) as engine:
-            for step in range(1, 16):
-                state = equilibrate(engine, state, fx=4e-3 * step)
-        assert not state.packing.configuration.contacts.at_bound.any()
-        return state.packing
-
-    return make
-
-
-def test_vibration_carries_particles_on_whose_contacts_wear_down(far_from_the_bound):
-    """Without loss D grows as the square of the time; the mean of both derivatives has D below 1e-3."""
-    packing = far_from_the_bound(0.0)
-    here, verdict = packing.configuration, stability(packing)
-    assert str(verdict).startswith("stable but for creep: no motion grows exponentially\n")
-    push, times = random_pushes(here, 1)[:, :1], np.array([4.0, 12.0])
-    found = pushed_layer(packing, push[:, 0], times)
-    expected = one_sided_motion(packing, velocities(here, push)[0], times=times).mean_square_displacement
-    np.testing.assert_allclose(found, expected, rtol=0.02)
-    assert np.sqrt(found[-1]) / 12 == pytest.approx(verdict.creep.velocity, rel=0.3)
-
-
-def test_with_loss_particles_stay_displaced(far_from_the_bound):
-    """Every linear motion decays, and D rises."""
-    packing = far_from_the_bound(20.0)
-    here, verdict = packing.configuration, stability(packing)
-    assert verdict.stable
-    assert verdict.growth_rate < 0
-    assert "they stay displaced, by D up to" in str(verdict)
-    push, times = random_pushes(here, 1)[:, :1], np.array([1.0, 10.0])
-    found = pushed_layer(packing, push[:, 0], times)
-    assert found[1] > 2 * found[0]
-    expected = one_sided_motion(packing, velocities(here, push)[0], times=times).mean_square_displacement
-    np.testing.assert_allclose(found, expected, rtol=0.03)
-    assert verdict.creep.amplification == pytest.approx(found[1], rel=0.5)
-
-
-def test_a_push_beyond_the_stated_size_moves_otherwise(far_from_the_bound):
-    """The size does not depend on when the motion is looked at, as contacts go farthest at the beginning."""
-    packing = far_from_the_bound(20.0)
-    here, push = packing.configuration, random_pushes(packing.configuration, 1)[:, 0]
-    velocity, times = velocities(here, push[:, None])[0], np.array([0.5, 1.0, 2.0])
-    expected = one_sided_motion(packing, velocity, times=times)
-    _, most = expected.scales
-    assert one_sided_motion(packing, velocity, times=np.linspace(0.0, 2.0, 4001)).scales[1] == pytest.approx(most, 0.05)
-    assert stability(packing).largest_push == pytest.approx(most, rel=0.7)
-    d = expected.mean_square_displacement
-    np.testing.assert_allclose(pushed_layer(packing, push, times, size=0.1 * most), d, rtol=0.1)
-    assert np.any(np.abs(pushed_layer(packing, push, times, size=20 * most) / d - 1) > 0.5)
-
-
-@pytest.mark.long
-def test_the_standard_law_under_a_load_that_rises(layer):
-    """The layer vibrates for ever in proportion to the rate: as one-sided motion says, and not with more friction."""
-    from research.rising.windows import Windows, drift_and_vibration, rise_in_plugin
-
-    def in_lammps(packing, rate, rising):
-        windows = Windows.of(packing.configuration, rising)
-        parts = rise_in_plugin(packing, rate, windows, spins=True)[-windows.span :]
-        return drift_and_vibration(parts, windows.length, rate)
-
-    told = stability(layer, rise="fx")
-    assert told.stable is True
-    assert told.rising["steady"]
-    assert told.rising["vibration"] > 0.05 * told.rising["drift"]
-    for rate in (1e-5, 1e-6):
-        found = in_lammps(layer, rate, told.rising)
-        assert found["vibration"] == pytest.approx(told.rising["vibration"], rel=0.2)
-        assert found["drift"] == pytest.approx(told.rising["drift"], rel=0.05)
-    sticks = replace(layer, law=replace(layer.law, mu=100.0))
-    rising = stability(sticks, rise="fx").rising
-    for each in (rising, in_lammps(sticks, 1e-5, rising)):
-        assert each["vibration"] < 0.01 * each["drift"]
