@@ -26,7 +26,7 @@ NO_BEGINNING = re.compile(r" (?=(?:[-+*>#=]|\d+[.)]) )")
 
 
 def render(package: str, name: str, **numbers: Any) -> str:
-    """A page in Markdown.
+    """Fill the template of a page.
 
     Parameters
     ----------
@@ -36,7 +36,12 @@ def render(package: str, name: str, **numbers: Any) -> str:
         File name of the template. In it, ``{{ x | number(".3g") }}`` formats a number as Python does, and
         ``{{ x | uncertain(error) }}`` gives it the digits that its error allows.
     **numbers
-        What the template names; a name that is missing is an error.
+        The values of the names in the template; a missing name is an error.
+
+    Returns
+    -------
+    str
+        The page in Markdown, its paragraphs filled.
     """
     return fill_paragraphs(_text(package, name, numbers))
 

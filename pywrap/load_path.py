@@ -35,8 +35,19 @@ class EquilibriumSolver(Protocol[S]):
     def solve(self, load: float, below: S | None, beside: S | None, ahead: bool) -> S:
         """The equilibrium at a load, reached from the equilibrium `below`; `below` is None where the path begins.
 
-        `beside` is another one near `below`, for an initial guess. `ahead` says that the path goes on from the result,
-        at a load larger than all so far. A NoEquilibriumError says that the packing flows.
+        Parameters
+        ----------
+        load : float
+            The load, in the unit of the path.
+        below, beside : equilibrium, optional
+            The equilibrium from which the new one is reached, and another one near it, for an initial guess.
+        ahead : bool
+            Whether the path goes on from the result, at a load larger than all so far.
+
+        Raises
+        ------
+        NoEquilibriumError
+            If the packing flows.
         """
 
     def close(self) -> None:
@@ -51,7 +62,7 @@ class LoadPath(Generic[E]):
     solver : EquilibriumSolver
         Finds each equilibrium.
     equilibria : sequence
-        Those of the path that are known already, by increasing load.
+        Equilibria of the path that are known already, by increasing load.
     onward : bool
         Whether the solver may go on by other ways where the branch of equilibria ends.
     """

@@ -137,7 +137,8 @@ class Spectrum(TableDisplay):
         contacts = self.packing.configuration.contacts
         pairs, negative = counted(len(self.pairs), "complex pair"), counted(len(self.negative), "negative eigenvalue")
         counts = f"{pairs} and {negative}" if len(self.negative) else pairs
-        alone = f"K alone has {counts}, D as exp({self.growth_rate():.6g} t)"
+        grows = len(self.pairs) + len(self.negative) > 0
+        alone = f"K alone has {counts}" + (f", D as exp({self.growth_rate():.6g} t)" if grows else "")
         if self._doubts:
             return f"not known whether the packing is stable: {'; '.join(self._doubts)}; {alone}"
         if contacts.one_sided.any():
@@ -153,9 +154,9 @@ class Spectrum(TableDisplay):
         damped = self._damped
         if damped is None:
             return "no motion grows" if self.is_stable else f"unstable, D as exp({self.growth_rate():.6g} t): {counts}"
-        grows = "every motion decays" if self.is_stable else "unstable"
+        verdict = "every motion decays" if self.is_stable else "unstable"
         rate = exponential(damped.growth_rate, 6, damped.at_least)
-        return f"{grows} with the packing's dissipation, {rate}; {alone}"
+        return f"{verdict} with the packing's dissipation, {rate}; {alone}"
 
     def _rows(self) -> dict[str, str]:
         rows = {

@@ -79,7 +79,20 @@ def contact_geometry(
 
 
 def nearest_image(difference: Floats, box_length: float | None) -> Floats:
-    """Coordinate differences, shape (..., 2), brought to the nearest periodic image along x; a new array."""
+    """Coordinate differences to the nearest periodic image along x.
+
+    Parameters
+    ----------
+    difference : ndarray, shape (..., 2)
+        Differences of coordinates, length.
+    box_length : float or None
+        The period along x, length; None without periodicity.
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+        A new array.
+    """
     difference = np.array(difference, dtype=np.float64)
     if box_length is not None:
         difference[..., 0] -= box_length * np.round(difference[..., 0] / box_length)

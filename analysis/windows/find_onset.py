@@ -42,61 +42,65 @@ def find_onset(
     folder: Path | None = None,
     limits: Limits = LIMITS,
 ) -> Onset:
-    """The windows of growing motion between the smallest and the largest load.
+    """Find the windows of growing motion between the smallest and the largest load.
 
-    Without dissipation these are windows of complex eigenvalues.
-
-    Of a packing of up to `Limits.all_windows` disks these are all, unless the first alone is asked for; of a larger one
-    it is the first. They end where the branch of equilibria does: where an equilibrium at one of the given loads has a
-    negative eigenvalue, so that a static instability lies before it.
+    Without dissipation these are windows of complex eigenvalues. In a packing of up to `Limits.all_windows` disks all
+    windows are found, unless only the first is asked for; in a larger packing only the first is found. The search ends
+    with the branch of equilibria: a negative eigenvalue at one of the given loads shows a static instability before
+    this load.
 
     Parameters
     ----------
     equilibrium : callable
-        fx -> Packing or Configuration in equilibrium. It is called with the given loads in increasing order, and
-        between calls for the loads a and b with loads between these, in any order. There it may raise a
-        NoEquilibriumError, and the search goes around it. All other errors reach the caller.
+        fx -> Packing or Configuration in equilibrium. The search calls it with the given loads in increasing order;
+        between the calls for two loads a and b it asks for loads between a and b, in any order. At a load in between
+        `equilibrium` may raise a NoEquilibriumError, and the search leaves this load out. All other errors reach the
+        caller.
     forces : array_like, shape (S,)
         The increasing loads of the ramp, force per top disk.
     dissipation : bool
-        Whether the packing's own dashpots and drag count. The onset without them is found as well, `Onset.undamped`.
+        Whether the packing's own dashpots and drag count. The onset without dissipation is then also found:
+        `Onset.undamped`.
     modes : tuple of (int, int), optional
-        Search these modes alone, and for their first window: numbers of the first one and of the first one beyond, by
-        frequency, the lowest being 0, of the symmetric part at the load where the search stands. Parts that are
-        searched apart, on machines of their own, have together the same first window as all.
+        Search only these modes, and only for their first window. The two numbers are those of the first mode and of the
+        first mode beyond, by frequency from 0, of the symmetric part at the load of the search. Searches of several
+        parts, on several machines, together find the first window of all modes.
     first : bool
-        Seek the first window alone. No equilibrium beyond the increment in which it begins is then asked for, and its
-        end is None where it ends beyond that increment.
+        Seek only the first window. No equilibrium beyond the increment in which it begins is then asked for. The end of
+        the window is None if it lies beyond this increment.
     known : callable, optional
-        With dissipation, given what is known, and the load up to which that is all, as soon as there is a window, and
-        after each increment from there on.
+        Of a search with dissipation: called with the onset so far, and the load up to which it is complete, as soon as
+        there is a window, and after each increment from there on.
     watch : callable, optional
-        Told in words what is being looked at in a large packing.
+        Told in words which part of a large packing is being searched.
     ranks : Ranks, optional
-        The processes that search a large packing together. Each makes the same call, and is told the same by
-        `equilibrium`.
+        The processes that search a large packing together. Each makes the same call, and gets the same equilibria.
     folder : Path, optional
-        Where a search whose bases are too large to be kept in memory leaves what it finds, slice by slice. A search of
-        the same loads, operators and modes goes on from there, to the bit. All ranks write to it.
+        Folder in which a search stores its results, slice by slice, if its bases are too large for memory. A search of
+        the same loads, operators and modes continues from there, to the bit. All ranks write to the folder.
+
+    Returns
+    -------
+    Onset
 
     Raises
     ------
     OnsetError
-        If no motion grows at any load; with dissipation a NoGrowthError, which has the onset without.
+        If no motion grows at any load; with dissipation a NoGrowthError, which has the onset without dissipation.
     TurningPointError
-        If one is negative before any is complex.
+        If an eigenvalue is negative before any is complex.
     LostPairError, SliceError
         Of a large packing, if a pair cannot be followed, or a part of the spectrum is not found.
     OutputError, DamagedSliceError
         If a file in the folder cannot be written, or read.
     ValueError
-        If the loads are not at least two increasing numbers, the packing has none of the modes, or no
-        dissipation that could count.
+        If the loads are not at least two increasing numbers, if the packing has none of the modes, or if it has no
+        dissipation although `dissipation` is set.
     """
     loads = check_increasing(forces)
     start = equilibrium(float(loads[0]))
     if dissipation and not start.damped:
-        raise ValueError("The packing has no dissipation: find_onset without it is what it needs.")
+        raise ValueError("The packing has no dissipation: call find_onset without dissipation=True.")
     search = _OnsetSearch(equilibrium, start, loads, modes, first, ranks, folder, limits)
     with show_progress(watch):
         if not dissipation:

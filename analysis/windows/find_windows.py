@@ -16,7 +16,7 @@ from .search import Look, windows_along
 from .system import Operator, System, unit_of
 
 Known = Callable[[tuple[Window, ...], float], None]
-"""Takes the windows so far, and the load up to which they are all."""
+"""Takes the windows so far, and the load up to which these are complete."""
 
 
 def find_windows(
@@ -29,7 +29,7 @@ def find_windows(
     known: Known = lambda windows, fx: None,
     limits: Limits = LIMITS,
 ) -> tuple[Window, ...]:
-    """All windows of a one-parameter family of systems, by increasing onset; may be none.
+    """Find all windows of a one-parameter family of systems.
 
     Parameters
     ----------
@@ -40,11 +40,16 @@ def find_windows(
     narrowest : float, optional
         Windows narrower than this are not looked for, force; by default as in `Limits`.
     look : callable, optional
-        Two neighbouring loads -> further loads between them that are to be looked at; they may have no equilibrium.
+        Two neighbouring loads -> further loads between them at which to look; these may have no equilibrium.
     first : bool
         Go no farther than the increment in which the first window begins.
     known : callable, optional
-        Given all windows so far, and the load up to which they are all, after each increment.
+        Called after each increment with all windows so far, and with the load up to which these are complete.
+
+    Returns
+    -------
+    tuple of Window
+        By increasing onset; may be empty.
 
     Raises
     ------
@@ -92,10 +97,28 @@ def complex_windows(
     narrowest: float | None = None,
     limits: Limits = LIMITS,
 ) -> tuple[Window, ...]:
-    """All windows of complex eigenvalues of a one-parameter family of matrices, by increasing onset.
+    """Find all windows of complex eigenvalues of a one-parameter family of matrices.
 
-    The operator is fx -> ndarray or sparse array, shape (n, n), in coordinates that do not depend on fx. Zero rows are
-    left out. All else is as in :func:`find_onset`.
+    Parameters
+    ----------
+    operator : callable
+        fx -> ndarray or sparse array, shape (n, n), in coordinates that do not depend on fx. Zero rows are left out.
+    forces : array_like, shape (S,)
+        The increasing loads.
+    narrowest : float, optional
+        Windows narrower than this are not looked for, force; by default as in `limits`.
+    limits : Limits
+        Sizes and tolerances of the search.
+
+    Returns
+    -------
+    tuple of Window
+        By increasing onset; may be empty.
+
+    Raises
+    ------
+    ValueError
+        If the loads are not at least two increasing numbers.
     """
     return find_windows(lambda fx: System(fx, csr_array(operator(fx))), forces, narrowest=narrowest, limits=limits)
 

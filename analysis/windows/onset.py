@@ -98,7 +98,8 @@ class Onset(TableDisplay):
     windows : tuple of Window
         By increasing onset; at least one.
     complete : bool
-        Whether these are all up to the largest load, or to where the branch of equilibria ends; else it is the first.
+        Whether `windows` has all windows up to the largest load, or to the end of the branch of equilibria; else
+        `windows` has the first window.
     doubtful : tuple of (float, float)
         Of a large packing, increments before the onset in which a pair was expected and not found: take smaller ones.
     modes : tuple of (int, int) or None
@@ -107,19 +108,18 @@ class Onset(TableDisplay):
         The eigenvalues of a packing that is unstable at the smallest load already; None if it is stable there, or too
         large for all of its eigenvalues to be counted.
     ends : float or None
-        Load before which the branch of equilibria ends, as an eigenvalue is negative there; None if it does not, as far
-        as the search went.
+        Load before which the branch of equilibria ends, as an eigenvalue is negative at this load; None if the search
+        met no such load.
     undamped : Onset or None
-        Of a search with dissipation, the onset without it; None if there is none on the same loads.
+        Of a search with dissipation, the onset without dissipation; None if the same loads have no such onset.
     mu : float
         Friction coefficient of a scene's onset; nan of others.
     equilibria : tuple of Equilibrium
-        Of a scene's onset, those of the ramp, by increasing F_x.
+        Of a scene's onset, the equilibria of the ramp, by increasing F_x.
     between : dict
         Of a scene's onset, further equilibria that were asked for, packing by F_x.
     flows_beyond : float or None
-        Of a scene's onset, the last F_x that had an equilibrium, where the packing was found to flow before the ramp's
-        end.
+        Of a scene's onset, the last F_x with an equilibrium, if the packing flows before the end of the ramp.
     """
 
     windows: tuple[Window, ...]

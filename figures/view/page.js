@@ -207,8 +207,10 @@ function describe() {
   const [[re, im], [other]] = members(chosen)
   const without = data.dissipative ? " without dissipation" : ""
   const grows = `D grows as ${exponential(growth(chosen))}${without}`
-  return growth(chosen) ? `λ = ${digits(re, 5)} ± ${digits(im)} i: a complex pair. ${grows}.`
-    : `λ = ${digits(re, 6)} and ${digits(other, 6)}: both real. Both modes oscillate.`
+  const lone = axis && frames.every((_, k) => k == here || !known(chosen, k))  // its plots have a dot and no line
+  const elsewhere = lone ? ` No two modes at another ${axis.name} of this page have the shapes of this pair.` : ""
+  return (growth(chosen) ? `λ = ${digits(re, 5)} ± ${digits(im)} i: a complex pair. ${grows}.`
+    : `λ = ${digits(re, 6)} and ${digits(other, 6)}: both real. Both modes oscillate.`) + elsewhere
 }
 
 function name(pair) {

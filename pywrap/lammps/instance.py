@@ -15,12 +15,26 @@ class EngineError(FaultgougeError):
 
 
 def lammps_instance(communicator: MPI.Comm, log: Path | None, *options: str) -> Any:
-    """Start LAMMPS with the plugin; see :func:`start_lammps`.
+    """Start LAMMPS with the plugin.
+
+    Parameters
+    ----------
+    communicator : mpi4py.MPI.Comm
+        The ranks.
+    log : Path, optional
+        File for LAMMPS's log; None for no log.
+    options : str
+        Further words of LAMMPS's command line.
+
+    Returns
+    -------
+    lammps.lammps
+        The instance; the caller closes it.
 
     Raises
     ------
     EngineError
-        If LAMMPS does not take the plugin.
+        If LAMMPS does not see these ranks, or does not take the plugin.
     """
     instance = start_lammps(communicator, log, *options)
     load_plugin(instance)
@@ -35,9 +49,14 @@ def start_lammps(communicator: MPI.Comm, log: Path | None, *options: str) -> Any
     communicator : mpi4py.MPI.Comm
         The ranks.
     log : Path, optional
-        File for LAMMPS's log; none by default.
+        File for LAMMPS's log; None for no log.
     options : str
         Further words of LAMMPS's command line.
+
+    Returns
+    -------
+    lammps.lammps
+        The instance; the caller closes it.
 
     Raises
     ------

@@ -195,10 +195,28 @@ def slip_detector(settings: Drive, packing: Packing) -> SlipDetector | None:
 def settle_for_drive(scene: Scene, communicator: MPI.Comm | None = None, watch: Watch | None = None) -> Packing:
     """Settle the packing of a scene at F_x = 0, where its slips begin at zero.
 
-    Friction bears nothing in a packing that has settled without friction: slips and low parts of coordinates are those
-    that rounding leaves, and are left out, so that a data file describes the packing for the deck drive.in. A stored
-    packing is taken as it is, to the bit, with its slips, as the deck takes that of a data file: to balance it more
-    closely would move it, by any way along x where nothing but friction holds it.
+    Friction bears nothing in a packing that has settled without friction: its slips and the low parts of its
+    coordinates are rounding. They are left out, so that a data file describes the packing for the deck drive.in. A
+    stored packing is taken as it is, to the bit, with its slips, as the deck takes the packing of a data file: to
+    balance a packing more closely would move it, any distance along x if only friction holds it.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its sections [packing], [law] and [load] count.
+    communicator : mpi4py.MPI.Comm, optional
+        The ranks that share the packing; all by default.
+    watch : callable, optional
+        Told in words what is under way.
+
+    Returns
+    -------
+    Packing
+
+    Raises
+    ------
+    NoEquilibriumError
+        If the packing does not settle.
     """
     section = scene.packing
     if isinstance(section, GeneratedPacking) and section.settle_friction:

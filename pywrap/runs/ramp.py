@@ -78,7 +78,23 @@ def ramp(
 def reach(scene: Scene, fx: float, communicator: MPI.Comm | None = None) -> Iterator[Equilibrium]:
     """Compute the equilibria up to and including fx, in steps of the scene's ramp or, without a ramp, of F_y/3000.
 
-    The ranks of the communicator share the packing; all by default.
+    Parameters
+    ----------
+    scene : Scene
+        Its section [ramp] is optional.
+    fx : float
+        The last F_x, force on each disk of the upper layer.
+    communicator : mpi4py.MPI.Comm, optional
+        The ranks that share the packing; all by default.
+
+    Yields
+    ------
+    Equilibrium
+
+    Raises
+    ------
+    NoEquilibriumError
+        If the packing flows.
     """
     step = step_of(scene)
     step = min(step, fx) or step  # one increment, where the first one of the ramp were too large

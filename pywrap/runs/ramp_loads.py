@@ -13,7 +13,12 @@ from ..scenes.validation import SceneError, require_section
 
 
 def ramp_loads(scene: Scene) -> Floats:
-    """F_x of the equilibria up to the first turning point of the scene's ramp, force, from 0: where onsets are sought.
+    """The loads of a scene's ramp at which onsets are sought: from 0 up to the first turning point.
+
+    Returns
+    -------
+    ndarray, shape (S,)
+        F_x, force on each disk of the upper layer.
 
     Raises
     ------

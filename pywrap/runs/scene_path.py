@@ -23,7 +23,7 @@ def next_equilibrium(
     beside: Equilibrium | None = None,
     onward: bool = True,
 ) -> Equilibrium:
-    """The equilibrium at fx that follows from the last one, by the scene's method; the others as in `equilibrate`."""
+    """The equilibrium at fx, from the last one by the scene's method; `beside` and `onward` as in `equilibrate`."""
     settings = require_section(scene.ramp, "ramp")
     if settings.method == "newton":
         return equilibrate(engine, last, fx, settings.force_tolerance, beside, onward)
@@ -74,5 +74,22 @@ class EngineSolver:
 
 
 def scene_path(engine: Engine, start: Equilibrium, scene: Scene, *, onward: bool = False) -> LoadPath[Equilibrium]:
-    """The path of a scene from a settled packing on; fields as of `EngineSolver`."""
+    """The path of a scene from a settled packing on.
+
+    Parameters
+    ----------
+    engine : Engine
+        LAMMPS with the packing of `start`; the caller closes it.
+    start : Equilibrium
+        Where the path begins.
+    scene : Scene
+        With a section [ramp], for its method and force tolerance.
+    onward : bool
+        Whether the path goes on by other ways where Newton's branch of equilibria ends, as in `ramp`.
+
+    Returns
+    -------
+    LoadPath
+        F_x -> the packing in equilibrium.
+    """
     return LoadPath(EngineSolver(engine, scene, start, onward), [start])

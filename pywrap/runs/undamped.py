@@ -85,6 +85,11 @@ def time_step(packing: Packing, wanted: float | None = None) -> float:
         A step of the user's; by default `ACCURATE_SHARE` of the limit
         (:func:`~faultgouge.analysis.stable_timestep`), which is 2/omega_max without dashpots.
 
+    Returns
+    -------
+    float
+        The step, time.
+
     Raises
     ------
     SceneError

@@ -150,13 +150,13 @@ class Layer(NamedTuple):
 
 
 def real_units(scene: SceneKeys) -> RealUnits | None:
-    """The units of a scene; None if it does not say them.
+    """The units of a scene; None without a section [units].
 
     Raises
     ------
     PydanticCustomError
-        While the scene is checked: if its layer has no width or its law is not Hertz's, or the overburden that
-        is given is not that of the scene's F_y.
+        While the scene is checked: if its layer has no width, if its law is not Hertz's, or if the given overburden
+        differs from the overburden of the scene's F_y.
     """
     units = scene.units
     if units is None:
@@ -233,14 +233,14 @@ def restitution(kn: float, cn: float, mass: float, velocity: float) -> float:
     cn : float
         Dashpot C_N, force / (velocity length^(1/2)).
     mass : float
-        Of each grain.
+        Mass of each grain.
     velocity : float
-        At which they meet, velocity.
+        Relative velocity with which the grains meet.
 
     Returns
     -------
     float
-        Velocity at which they part over that at which they met.
+        Relative velocity after the collision over the velocity before it.
     """
     from scipy.integrate import solve_ivp
 
@@ -253,7 +253,7 @@ def restitution(kn: float, cn: float, mass: float, velocity: float) -> float:
         return [state[1], -2 * (overlap**1.5 + damping * np.sqrt(overlap) * state[1])]
 
     def disks_part(_: float, state: np.ndarray) -> float:
-        # they part where the force would pull, which is before the overlap is gone
+        # the disks part where the force would pull, before the overlap is gone
         return state[0] + damping * state[1] if state[1] < 0 else 1.0
 
     disks_part.terminal = True  # type: ignore[attr-defined]  # what solve_ivp looks for
@@ -262,7 +262,24 @@ def restitution(kn: float, cn: float, mass: float, velocity: float) -> float:
 
 
 def dashpot(kn: float, wanted: float, mass: float, velocity: float) -> float:
-    """C_N of grains with a restitution at a velocity; other parameters as of `restitution`."""
+    """The dashpot with which two grains that meet head on have a restitution.
+
+    Parameters
+    ----------
+    kn : float
+        Normal stiffness, force / length^(3/2).
+    wanted : float
+        The restitution, above 0 and up to 1.
+    mass : float
+        Mass of each grain.
+    velocity : float
+        Relative velocity with which the grains meet.
+
+    Returns
+    -------
+    float
+        C_N, force / (velocity length^(1/2)); 0 for the restitution 1.
+    """
     from scipy.optimize import brentq
 
     if wanted == 1:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...analysis.arrays import Floats
@@ -41,31 +42,17 @@ def draw_cycle_spectrum(
         for slip in slips:
             axes.axvspan(slip.begins, slip.ends, color="0.85", linewidth=0)
         axes.margins(x=0)
-    force.plot(series["time"], series["force"], color="C1", linewidth=0.8)
-    force.set_ylabel("force $F$")
-    force.margins(y=0.12)
-    for number, slip in enumerate(slips, 1):
-        force.annotate(
-            str(number), (slip.begins, slip.force_before), (0, 3), textcoords="offset points", ha="center", fontsize=7
-        )
+    _draw_force(force, series, slips)
     two = any(state["damped_sticking"] != state["damped_sliding"] for state in states)
     alone, other = ("all sticking", "all sliding") if two else (None, None)
-
-    def draw(axes: Any, name: str, colour: str, label: str | None) -> None:
-        time, value = (np.array([state[key] for state in states], dtype=float) for key in ("time", name))
-        slipping = np.array([bool(state["slips"]) for state in states])
-        axes.plot(time, value, color=colour, linewidth=0.6, alpha=0.6)
-        axes.plot(time[~slipping], value[~slipping], ".", color=colour, markersize=3, label=label)
-        axes.plot(time[slipping], value[slipping], ".", color=colour, markersize=3, alpha=0.3)
-
-    draw(pairs, "pairs_sticking", "C0", None)
-    draw(growth, "undamped_sticking", "C0", f"without dissipation{f', {alone}' if two else ''}")
-    draw(growth, "damped_sticking", "C2", f"with dissipation{f', {alone}' if two else ''}")
-    draw(lowest, "lowest_sticking", "C0", alone)
+    _draw_states(pairs, states, "pairs_sticking", "C0")
+    _draw_states(growth, states, "undamped_sticking", "C0", f"without dissipation{f', {alone}' if two else ''}")
+    _draw_states(growth, states, "damped_sticking", "C2", f"with dissipation{f', {alone}' if two else ''}")
+    _draw_states(lowest, states, "lowest_sticking", "C0", alone)
     if two:
-        draw(pairs, "pairs_sliding", "C3", None)
-        draw(growth, "damped_sliding", "C3", f"with dissipation, {other}")
-        draw(lowest, "lowest_sliding", "C3", other)
+        _draw_states(pairs, states, "pairs_sliding", "C3")
+        _draw_states(growth, states, "damped_sliding", "C3", f"with dissipation, {other}")
+        _draw_states(lowest, states, "lowest_sliding", "C3", other)
     pairs.set_ylabel("complex pairs")
     growth.set_ylabel("growth rate of $D$")
     lowest.set_ylabel("lowest eigenvalue")
@@ -77,3 +64,25 @@ def draw_cycle_spectrum(
     lowest.set_xlabel("$t$")
     figure.align_ylabels()
     return figure
+
+
+def _draw_force(axes: Axes, series: Mapping[str, Floats], slips: Sequence[Slip]) -> None:
+    """The force over time, with the numbers of the slips."""
+    axes.plot(series["time"], series["force"], color="C1", linewidth=0.8)
+    axes.set_ylabel("force $F$")
+    axes.margins(y=0.12)
+    for number, slip in enumerate(slips, 1):
+        axes.annotate(
+            str(number), (slip.begins, slip.force_before), (0, 3), textcoords="offset points", ha="center", fontsize=7
+        )
+
+
+def _draw_states(
+    axes: Axes, states: Sequence[Mapping[str, Any]], name: str, colour: str, label: str | None = None
+) -> None:
+    """A number of the states over time; dots of states within slips are pale."""
+    time, value = (np.array([state[key] for state in states], dtype=float) for key in ("time", name))
+    slipping = np.array([bool(state["slips"]) for state in states])
+    axes.plot(time, value, color=colour, linewidth=0.6, alpha=0.6)
+    axes.plot(time[~slipping], value[~slipping], ".", color=colour, markersize=3, label=label)
+    axes.plot(time[slipping], value[slipping], ".", color=colour, markersize=3, alpha=0.3)

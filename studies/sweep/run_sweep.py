@@ -162,7 +162,17 @@ def require_result(rows: Sequence[Row]) -> None:
 
 
 def read_results(*paths: Path) -> dict[str, Row]:
-    """The rows of one results.jsonl, or of several, by key: of several rows a good one, else the last.
+    """Read the rows of one or several results.jsonl.
+
+    Parameters
+    ----------
+    *paths : Path
+        The files.
+
+    Returns
+    -------
+    dict
+        Key of a scene -> its row; of several rows with one key a row without an error, else the last row.
 
     Raises
     ------

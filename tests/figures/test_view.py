@@ -155,6 +155,7 @@ def test_a_press_on_an_eigenvalue_chooses_its_pair(there_and_back, opened):
     assert page.input_value("#pair") != before
     assert page.inner_text("#members") != says
     assert "a complex pair" in page.inner_text("#members")
+    assert "at another" not in page.inner_text("#members")
 
 
 def test_nothing_is_drawn_of_a_pair_that_is_unknown(there_and_back, opened):
@@ -179,6 +180,9 @@ def test_nothing_is_drawn_of_a_pair_that_is_unknown(there_and_back, opened):
     page.focus("#load")
     page.keyboard.press("End")
     assert page.inner_text("#members") == "No two modes at Fₓ = 0.16 have the shapes of the chosen pair."
+    page.keyboard.press("Home")
+    assert page.inner_text("#members").endswith("at another Fₓ of this page have the shapes of this pair.")
+    page.keyboard.press("End")
     assert page.query_selector_all("#imaginary circle") == []
     assert page.input_value("#motion") == "still"
 

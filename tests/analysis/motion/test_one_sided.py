@@ -13,7 +13,16 @@ from quasistatic import moved
 from scipy.linalg import expm
 from scipy.sparse import csr_array
 
-from faultgouge.analysis import Contacts, MindlinLaw, Motion, Packing, one_sided_motion, stability, stiffness_matrix
+from faultgouge.analysis import (
+    Contacts,
+    MindlinLaw,
+    Motion,
+    Packing,
+    one_sided_motion,
+    spectrum,
+    stability,
+    stiffness_matrix,
+)
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.motion import rates as rates_module
 from faultgouge.analysis.motion import rising_load
@@ -222,6 +231,12 @@ def test_a_configuration_says_what_its_stiffness_takes_contacts_at_the_bound_for
     assert "at Coulomb's bound, sticking in K, 0 rattlers" in repr(configuration)
     contacts = derive_frozen(configuration.contacts, sliding=configuration.contacts.at_bound)
     assert "at Coulomb's bound, sliding in K, 0 rattlers" in repr(derive_frozen(configuration, contacts=contacts))
+
+
+def test_a_spectrum_without_growth_has_no_rate_of_growth():
+    found = spectrum(derive_frozen(_three().configuration, load=-_three().configuration.contact_force))
+    assert len(found.pairs) == len(found.negative) == 0
+    assert "K alone has 0 complex pairs;" in repr(found)
 
 
 def test_large_packings_have_the_verdict_of_small_ones(monkeypatch):
