@@ -139,7 +139,7 @@ def bring_to_rest(
         Of the drag at the end.
     """
     drag, changes = _Drag.of(lmp, start, rate), True
-    dt = float(lmp.extract_global("dt"))
+    dt, diameter = float(lmp.extract_global("dt")), 2 * float(start.radius.mean())
     way, residual, force, rounding = 0.0, np.inf, force_scale(start), 0.0
     try:
         for done in range(0, steps, STEPS_BETWEEN_LOOKS):
@@ -162,15 +162,15 @@ def bring_to_rest(
                 if found.residual <= max(balance * force, rounding) and not falls:
                     set_velocity(lmp, found, np.zeros(found.coordinates))
                     return found, drag.rate
-            if way > far * 2 * start.radius.mean():
+            if way > far * diameter:
                 moved = f"{far:g} diameters" if far > 1 else "a diameter"
                 raise NoEquilibriumError(f"The packing flows{where}: its particles have moved by {moved}.")
             changes = drag.follow(np.linalg.norm(forces) / max(np.linalg.norm(drag_forces), np.finfo(float).tiny))
     finally:
         drag.remove()
     raise NoEquilibriumError(
-        f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of balance; give more "
-        "steps, or the packing creeps."
+        f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of balance, and its "
+        f"particles have moved by {way / diameter:.2g} diameters; give more steps, or the packing creeps or flows."
     )
 
 
