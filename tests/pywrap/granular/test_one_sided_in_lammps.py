@@ -322,6 +322,45 @@ def test_the_verdict_on_a_random_state_is_that_of_lammps(tmp_path, monkeypatch, 
     assert rate == pytest.approx(told.growth_rate, abs=5e-3)
 
 
+@pytest.mark.long
+def test_the_slowest_motion_of_a_thousand_spheres_decays_as_in_lammps(tmp_path):
+    """Kinetic energy after a push, without what rolls on for ever; a push of 1e-7 opens no contact."""
+    from faultgouge.analysis.motion.motion import Motion
+    from faultgouge.analysis.motion.rates import rates_of
+    from faultgouge.analysis.motion.slow_motions import motions_of_one
+    from faultgouge.pywrap import from_lammps
+    from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of, set_velocity
+    from research.lammps_laws.compute import pour, rest
+
+    lmp = pour("granular hertz, mindlin/force", 3, 1000, 0.5, 1, tmp_path / "log.lammps", 400.0)
+    assert rest(lmp) is not None
+    command(lmp, "unfix drag\nunfix spin\nrun 0 post no")
+    here = from_lammps(lmp)
+    motion = Motion.of(here)
+    told = rates_of(motion).decay
+    assert told.grows is False
+    assert f"the slowest decays with D as exp({told.slowest:.6g} t)" in str(told)
+    alone, rows = motions_of_one(motion.stiffness, motion.damping, motion.particle), rows_of(lmp, here)
+
+    def energy():
+        velocity = owned_array(lmp, "v")[rows], owned_array(lmp, "omega")[rows] * here.radius[:, None]
+        z = here.join_vectors(*velocity)[motion.active] * motion.root_mass
+        return np.sum((z - alone @ (alone.T @ z)) ** 2)
+
+    set_velocity(lmp, here, PUSH * random_pushes(here, 1)[:, 0])
+    # a wave of one sign takes some units of time through the bed, and the slowest motion is left after some e-folds
+    means, late = [], 6 / abs(told.slowest)
+    for _ in range(24):
+        squares = []
+        for _ in range(20):
+            lmp.command(f"run {round(late / 12 / 20 / 1e-3)} post no")
+            squares.append(energy())
+        means.append(np.mean(squares))
+    lmp.close()
+    times = late / 12 * np.arange(24)
+    assert np.polyfit(times[12:], np.log(means[12:]), 1)[0] == pytest.approx(told.slowest, rel=0.1)
+
+
 def spheres_under_a_rising_load(lmp, here, slope, rate, chunk, count):
     """Drift and vibration over the rate of the slope, of the last half of `count` chunks after a drag fades in four."""
     from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of
