@@ -56,7 +56,7 @@ def test_what_is_not_known_to_decay_has_no_limit(wearing):
 
 def test_forces_that_fall_far_more_than_they_rise_make_vibration_grow(wearing):
     """The steps of closing and parting push the packing, at more than the mean of both loses."""
-    told = stability(wearing(6.0, 20.0))
+    told = stability(wearing(2.0, 20.0))
     assert told.creep.grows
     assert told.stable is None
     assert told.growth_rate < 0
