@@ -418,7 +418,7 @@ def _by_column(matrix: bsr_array, columns: Floats) -> Floats:
 def one_sided_motion(
     packing: HasConfiguration,
     velocity: ArrayLike | None = None,
-    rise: ArrayLike | None = None,
+    rise: str | ArrayLike | None = None,
     times: ArrayLike = (0.0,),
 ) -> OneSidedMotion:
     """Small motion of a configuration after a push, or under a load that rises, contacts at the bound as they are.
@@ -429,8 +429,9 @@ def one_sided_motion(
         The equilibrium, with its dashpots and drag.
     velocity : array_like, shape (N, d), optional
         Velocities at t = 0, length / time; none by default. The motion is homogeneous, so that numbers of order one do.
-    rise : array_like, shape (N, d), optional
-        Forces per unit of time that are added to the load; none by default.
+    rise : "fx" or array_like, shape (N, d), optional
+        Forces per unit of time that are added to the load, or a unit force on each particle of the upper layer along x;
+        none by default.
     times : array_like, shape (T,)
         When to look, increasing, not negative.
 
@@ -442,7 +443,7 @@ def one_sided_motion(
     Raises
     ------
     ValueError
-        If a shape does not fit, or times are not finite and increasing.
+        If a shape does not fit, times are not finite and increasing, or rise is "fx" without an upper layer.
     """
     configuration = packing.configuration
     time = np.atleast_1d(np.asarray(times, dtype=np.float64))
@@ -467,15 +468,21 @@ def one_sided_motion(
     return OneSidedMotion(time, displacement, speed, slid, (reach.least_scale, reach.largest_scale))
 
 
-def forces_on_coordinates(configuration: Configuration, forces: ArrayLike) -> Floats:
+def forces_on_coordinates(configuration: Configuration, rise: str | ArrayLike) -> Floats:
     """Forces on particles, shape (N, d), on all coordinates, shape (coordinates, 1): a sum where several move as one.
+
+    "fx" is a unit force on each particle of the upper layer along x.
 
     Raises
     ------
     ValueError
-        If the shape does not fit.
+        If the shape does not fit, or there is no upper layer.
     """
-    whole = _of_all_coordinates(configuration, "rise", forces)
+    if isinstance(rise, str):
+        if rise != "fx" or not configuration.top.any():
+            raise ValueError('rise is "fx" of a packing with an upper layer, or an array of forces, shape (N, d).')
+        rise = np.outer(configuration.top, np.eye(configuration.dimension)[0])
+    whole = _of_all_coordinates(configuration, "rise", rise)
     return whole if configuration.constraint is None else np.asarray((configuration.constraint != 0).T @ whole)
 
 

@@ -6,6 +6,10 @@ and the packing with sticking contacts does not grow, since then the motion is l
 slowest vibration decays slowly, contacts slip on with it: the motion rests, too, if the slips of four spans of time
 each fall about as fast as this vibration, and what is left is little. Otherwise the motion has not settled. The time is
 `STEPS_OF_CHUNK` stable time steps as often as needed, up to `WORK` multiplications.
+
+Sliders that have come to rest may slide again under a law of two derivatives: vibration wears tangential forces down
+(:mod:`~faultgouge.analysis.motion.creep`), at a rate that falls with the vibration. A motion that is followed on after
+its sliders have rested is at rest unless it grows.
 """
 
 from collections.abc import Callable
@@ -55,6 +59,9 @@ time it is 0.71."""
 SETTLED = 1e-3
 """Change of p in a quarter of the time, as a share of the largest p, below which sliders may be at rest."""
 
+WINDOWS_OF_TIME = 16
+"""Parts of a time that is given, at the least."""
+
 LATE = 12
 """Chunks after which the slip of all contacts together decides. A motion that grows as exp(t) gains 15 decades in a
 packing of spheres."""
@@ -74,7 +81,7 @@ def window_and_most(system: OneSidedSystem, columns: int, time: float | None) ->
     """Time of a window, and how many there are at most."""
     chunk = STEPS_OF_CHUNK * system.time_step / system.step_share
     if time is not None:
-        return time / 16, 16
+        return time / WINDOWS_OF_TIME, WINDOWS_OF_TIME
     entries = (system.motion.stiffness.nnz + system.motion.damping.nnz) * columns
     return chunk, int(np.clip(WORK / (entries * chunk / system.time_step), 4, 40))
 
@@ -96,10 +103,14 @@ def follow_pushes(
         How many; the opposite of each is followed, too.
     """
     state = system.start(random_pushes(system.motion.configuration, pushes))
-    chunk, most = window_and_most(system, 2 * pushes, time)
+    chunk, most = window_and_most(system, 2 * pushes, None)
+    if time is not None:  # whoever gives more time sees what a shorter run sees, too
+        most = max(WINDOWS_OF_TIME, int(np.ceil(time / chunk)))
+        chunk = time / most
     times, sizes, slid, reach = [], [], [state.p.copy()], ContactReach(system)
     reach.look_closely(state)
     grows: bool | None = None
+    rested = False
     for number in range(most):
         for look in range(LOOKS_PER_CHUNK):
             system.advance(state, chunk * (number + (look + 1) / LOOKS_PER_CHUNK))
@@ -112,7 +123,8 @@ def follow_pushes(
         grows, left = _outcome(*seen, slid, sticking_grows), 0.0
         if grows is None and sticking < 0 and not sticking_grows:
             left = _slip_left(slid, float(np.exp(0.5 * sticking * state.time / SLIP_SPANS)))
-            grows = False if left < LEFT else None
+            grows = False if left < LEFT or rested else None
+        rested = grows is False
         if time is None and grows is not None:
             break
         if not np.all(np.isfinite(seen[1][-1])):
@@ -125,7 +137,8 @@ def follow_pushes(
         "error": error if grows else None,
         "searched": float(DECADES * np.log(10) / t[-1]) if grows is None else 0.0,
         "amplification": float(d.max()),
-        "slip_left": left if grows is False else None,
+        "slip_left": left if grows is False and np.isfinite(left) else None,
+        "wears": bool(len(state.r)),
         "time": float(t[-1]),
         "pushes": 2 * pushes,
         "scales": (reach.least_scale, reach.largest_scale),

@@ -19,7 +19,6 @@ decayed so far that a motion that grows, however slowly, would be seen. Otherwis
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, number
@@ -138,13 +137,7 @@ def _positive_time(time: float) -> float:
 
 def _direction(configuration: Configuration, rise: str | ArrayLike) -> Floats:
     """Forces per unit of time on all coordinates, shape (coordinates, 1)."""
-    if not isinstance(rise, str):
-        forces = forces_on_coordinates(configuration, rise)
-        if not forces.any():
-            raise ValueError("rise is a force on no particle: give the forces by which the load rises, not all zero.")
-        return forces
-    if rise != "fx" or not configuration.top.any():
-        raise ValueError('rise is "fx" of a packing with an upper layer, or an array of forces, shape (N, d).')
-    forces = np.zeros((len(configuration), configuration.dimension))
-    forces[:, 0] = configuration.top
-    return forces_on_coordinates(configuration, forces)
+    forces = forces_on_coordinates(configuration, rise)
+    if not forces.any():
+        raise ValueError("rise is a force on no particle: give the forces by which the load rises, not all zero.")
+    return forces

@@ -15,6 +15,9 @@ from .one_sided import LEFT_ALONE
 from .rates import Rates
 from .rising_load import vibrate_otherwise
 
+WORN = "contacts bear less after they have closed and parted, so that vibration carries particles on"
+"""What contacts with two derivatives do."""
+
 
 @dataclass(frozen=True)
 class LinearNeighbour:
@@ -86,7 +89,8 @@ class Stability:
         grows (True, False, None); growth_rate and its error; searched (growth rate of D below which growth would not
         have been seen; 0 where grows is known); amplification (largest D over the mean square velocity of the push
         along an axis, time^2, while contacts slid: what moves on may take D further); slip_left (how much of their slip
-        may be still to come, as a share; 0 if they have stopped); time (how long), pushes (how many); residual_push (as
+        may be still to come, as a share; 0 if they have stopped, None if that is not known); wears (whether vibration
+        wears contacts down, so that they may slide again); time (how long), pushes (how many); residual_push (as
         below); scales (between which velocities of the push along an axis this holds: with smaller ones contacts that
         count as at the bound do not reach it, or the residual forces move the packing as well, with larger ones others
         do, or open; the first is infinite if the residual forces alone take another contact so far). None without
@@ -179,7 +183,7 @@ class Stability:
         if self.one_sided is not None:
             names = ("pushes", "amplification", "time", "slip_left")
             pushes, size, time, left = (self.one_sided[name] for name in names)
-            until = "until the contacts have stopped sliding" if not left else "while contacts slide"
+            until = "until the contacts have stopped sliding" if left == 0 else "while contacts slide"
             on = f", and they slide on by {left:.1%} at most as vibration decays" if left else ""
             sticks = f"; with sticking contacts {self.decay}" if self.decay else ""
             return (
@@ -226,6 +230,8 @@ class Stability:
     @property
     def _by_vibration(self) -> Iterator[str]:
         creep = self.creep
+        if self.stable and self.one_sided is not None and self.one_sided["wears"]:
+            yield WORN + ": as long as vibration lasts, contacts may slide again, and D may rise further"
         if creep is None or not self.stable:
             return
         says = f": D as ({creep.velocity:.2g} t)^2 times the mean square velocity of the push"
@@ -234,14 +240,16 @@ class Stability:
                 f", and they stay displaced, by D up to {creep.amplification:.2g} times the mean square velocity of "
                 f"the push within t = {creep.time:.4g}{_later(creep)}"
             )
-        yield f"contacts bear less after they have closed and parted, so that vibration carries particles on{says}"
+        yield f"{WORN}{says}"
 
     @property
     def _scales(self) -> Iterator[str]:
         if self.stable and self.largest_push is not None:
+            least, most = LEFT_ALONE * self.residual_push, self.largest_push
             yield (
-                f"holds for pushes of {LEFT_ALONE * self.residual_push:.1g} to {self.largest_push:.1g} (velocity along "
-                "an axis): below, residual forces count; above, contacts open or slide"
+                f"holds for {f'pushes of {least:.1g} to {most:.1g}' if least < most else 'no push'} (velocity along an "
+                f"axis): below{'' if least < most else f' {least:.1g}'}, residual forces count; "
+                f"above{'' if least < most else f' {most:.1g}'}, contacts open or slide"
             )
         if self.one_sided is None or self.one_sided["grows"] is not False:
             return

@@ -529,3 +529,11 @@ def test_a_disk_that_touches_nothing_flies_on(bound, drag_time):
     if drag_time is None:
         drawn = one_sided_motion(with_rattler, velocity, rise, times=times)
         np.testing.assert_allclose(drawn.displacement[:, n, 1], times + 3 * times**3 / 6 / 4.0, rtol=1e-12)
+
+
+def test_fx_is_a_force_on_the_upper_layer(bound):
+    forces = np.outer(bound.top, [1.0, 0.0])
+    found, expected = (one_sided_motion(bound, rise=rise, times=[0.0, 1.0]) for rise in ("fx", forces))
+    assert np.array_equal(found.displacement, expected.displacement)
+    with pytest.raises(ValueError, match='rise is "fx" of a packing with an upper layer, or an array of forces'):
+        one_sided_motion(bound, rise="fy", times=[1.0])

@@ -125,6 +125,28 @@ def test_a_push_beyond_the_stated_size_moves_otherwise(far_from_the_bound):
     assert np.any(np.abs(pushed_layer(packing, push, times, size=20 * most) / d - 1) > 0.5)
 
 
+def test_a_longer_run_knows_no_less():
+    """Sliders that have come to rest slide again where vibration wears contacts down; the packing rests all the same."""
+    from faultgouge.pywrap import Scene, ramp
+
+    scene = Scene.from_mapping(
+        {
+            "packing": {"seed": 2, "disks": 40, "width": 7.7},
+            "law": {"kn": 2e5, "mu": 0.5, "history": "coulomb"},
+            "load": {"fy": 3.0},
+            "ramp": {"step": 0.05, "until": 0.6},
+            "damping": {"cn": 60.0, "ct": 17.0},
+        }
+    )
+    *_, last = ramp(scene)
+    short, longer = stability(last.packing), stability(last.packing, time=20.0)
+    assert short.one_sided["slip_left"] == 0
+    assert short.one_sided["time"] < 10
+    assert short.stable is longer.stable is True
+    assert longer.one_sided["amplification"] > 1.5 * short.one_sided["amplification"]
+    assert "contacts may slide again, and D may rise further" in str(short)
+
+
 @pytest.mark.long
 def test_the_standard_law_under_a_load_that_rises(layer):
     """The layer vibrates for ever in proportion to the rate: as one-sided motion says, and not with more friction."""
