@@ -5,6 +5,7 @@ import importlib
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import faultgouge
@@ -111,6 +112,22 @@ def test_load_takes_files_of_all_kinds(tmp_path, cluster_file):
     faultgouge.draw(packing)
     page = faultgouge.view(cluster_file, tmp_path / "page.html")
     assert page.read_text().startswith("<!doctype html>")
+
+
+@pytest.mark.parametrize("name", ["packing.xyz", "packing.gsd"])
+def test_load_takes_what_export_has_written(tmp_path, cluster_file, name):
+    """Law, load and slips are in the file."""
+    if name.endswith(".gsd"):
+        pytest.importorskip("gsd", reason="the format of HOOMD needs its package")
+    from faultgouge.analysis.files.formats import write_packing
+
+    stored = faultgouge.load(cluster_file)
+    write_packing(tmp_path / name, stored)
+    found = faultgouge.load(tmp_path / name)
+    assert found.law == stored.law
+    assert (found.fx, found.fy) == (stored.fx, stored.fy)
+    np.testing.assert_allclose(found.contacts.slip, stored.contacts.slip, rtol=1e-6)
+    assert faultgouge.load(tmp_path / name, fx=0.25).fx == 0.25
 
 
 def test_load_takes_disks_of_other_codes_with_their_law_and_load(tmp_path):

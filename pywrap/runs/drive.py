@@ -20,6 +20,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from warnings import warn
 
 import numpy as np
 from mpi4py import MPI
@@ -306,15 +307,24 @@ def drive(
     ------
     DriveStep
 
+    Warns
+    -----
+    UserWarning
+        If the drive of a packing that settles here may not stick and slip.
+
     Raises
     ------
     SceneError
-        If the time step of the deck is not stable for the packing.
+        If the time step of the deck is not stable for the packing, or the drive of a packing that settles here is not
+        slow.
     DilationError
         If the layer leaves the bed.
     """
     settings = require_section(scene.drive, "drive")
-    start = settle_for_drive(scene, communicator) if start is None else start
+    if start is None:
+        start = settle_for_drive(scene, communicator)
+        for warning in check_drive(scene, start, communicator):
+            warn(warning, stacklevel=2)
     with _driven(settings, start, communicator) as (engine, dynamics):
         plan = Plan.of(settings, start, dynamics.time_step)
         detector = slip_detector(settings, start)

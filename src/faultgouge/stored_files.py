@@ -14,6 +14,7 @@ from .analysis import stability as stability_of_packing
 from .analysis.configuration import HasConfiguration
 from .analysis.files.configuration_file import holds_configuration, read_configuration
 from .analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
+from .analysis.files.runfile_header import law_of_parameters
 
 
 def load(
@@ -22,7 +23,7 @@ def load(
     *,
     law: MindlinLaw | None = None,
     fy: float | None = None,
-    fx: float = 0.0,
+    fx: float | None = None,
     top: str | int | None = None,
     width: float | None = None,
 ) -> Packing | Configuration:
@@ -36,9 +37,9 @@ def load(
     frame : int
         Number of the equilibrium, or of the dump; negative numbers count from the last.
     law : MindlinLaw, optional
-        The contact law of disks of another code.
-    fy, fx : float
-        Their load on each disk of the upper layer, force.
+        The contact law of disks of another code; that of the file by default, where `faultgouge export` wrote it.
+    fy, fx : float, optional
+        Their load on each disk of the upper layer, force; that of the file by default, and fx = 0.
     top : str or int, optional
         Their upper layer, where the file does not say which it is: the number of its disks, or as `faultgouge import
         --top` has it.
@@ -72,13 +73,19 @@ def load(
     disks = _read_disks(path, frame)
     if width is not None:
         disks = replace(disks, box_length=width)
+    given = disks.given
+    law = law_of_parameters(given) if law is None and {"kn", "kt", "mu"} <= given.keys() else law
+    fy = given.get("fy") if fy is None else fy
     missing = [name for name, value in (("law", law), ("fy", fy)) if value is None]
     if law is None or fy is None:
         raise BadInputError(
             f"{path} does not say {' and '.join(missing)}: load({path.name!r}, law=MindlinLaw(kn, kt, mu), fy=3.0, "
             "top=10) takes the disks as they stand, and `faultgouge import` brings them to rest."
         )
-    return packing_of(disks, law, upper_layer(disks, top), fx=fx, fy=fy)
+    inertia_factor, drag_time = given.get("inertia_factor", 1.0), given.get("tau")
+    load = {"fx": given.get("fx", 0.0) if fx is None else fx, "fy": fy, "inertia_factor": inertia_factor}
+    layer = disks.top if top is None and disks.top is not None else upper_layer(disks, top)
+    return packing_of(disks, law, layer, drag_time=drag_time, **load)
 
 
 def path_of(file: object, caller: str) -> Path:

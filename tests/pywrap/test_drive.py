@@ -12,7 +12,7 @@ from faultgouge.analysis import RunFile, read_dump
 from faultgouge.pywrap import Equilibrium, Scene, SceneError
 from faultgouge.pywrap.lammps.data_file import data_file
 from faultgouge.pywrap.lammps.decks import DECKS
-from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
+from faultgouge.pywrap.runs.drive import check_drive, drive, settle_for_drive
 from faultgouge.pywrap.runs.drive_recorder import (
     CONFIDENCE,
     NOISES,
@@ -249,6 +249,13 @@ def test_drive_that_is_fast_or_stiff_is_warned_or_refused(scene):
     assert "slow driving takes 100 or more" in fast
     (stiff,) = check_drive(scene(spring=1e4, velocity=1e-6, until=1.0), start)
     assert "is stiffer than the layer" in stiff
+
+
+def test_drive_in_python_warns_and_refuses_as_the_command_does(scene):
+    with pytest.raises(SceneError, match=r"slow driving takes 100 or more"):
+        next(drive(scene(spring=10.0, velocity=0.1, until=1.0)))
+    with pytest.warns(UserWarning, match="is stiffer than the layer"):
+        next(drive(scene(spring=1e4, velocity=1e-6, until=1.0)))
 
 
 @pytest.mark.parametrize(

@@ -126,7 +126,7 @@ def test_a_push_beyond_the_stated_size_moves_otherwise(far_from_the_bound):
 
 
 def test_a_longer_run_knows_no_less():
-    """Sliders that have come to rest slide again where vibration wears contacts down; the packing rests all the same."""
+    """Sliders at rest slide again where vibration wears contacts down; the packing rests all the same."""
     from faultgouge.pywrap import Scene, ramp
 
     scene = Scene.from_mapping(
