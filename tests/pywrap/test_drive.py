@@ -314,8 +314,8 @@ def test_signal_changes_nothing_until_it_comes(scene, tmp_path):
     wanted = scene(**THROWN, **SIGNAL)
     drives = {"with": wanted.drive, "without": wanted.drive.without_signal(), "noise": wanted.drive.with_noise()}
     series = {}
-    for name, drive in drives.items():
-        run_to_end(wanted.model_copy(update={"drive": drive}), tmp_path / f"{name}.h5")
+    for name, section in drives.items():
+        run_to_end(wanted.model_copy(update={"drive": section}), tmp_path / f"{name}.h5")
         with RunFile(tmp_path / f"{name}.h5") as file:
             series[name] = file.series("drive")
     time = series["with"]["time"]
