@@ -33,7 +33,7 @@ from ..arrays import Complexes
 from ..counted import counted
 from ..factors.sparse_lu import SingularMatrixError
 from ..progress import report_progress
-from .decay_steps import DECAY_STEP, STEP, ExplicitSteps, ImplicitSteps, slope
+from .decay_steps import DECAY_STEP, STEP_OVERHEAD, ExplicitSteps, ImplicitSteps, slope
 from .fastest_growing import CHANCE
 from .motion import Motion
 from .slow_motions import SlowMotions, slow_motions
@@ -158,9 +158,11 @@ def _work(motion: Motion, slow: SlowMotions, limit: float) -> tuple[float, float
     folds = float(np.log(np.sqrt(2 * len(motion.active)) / CHANCE))
     if not -np.inf < slow.rate_beyond < 0:
         return np.inf, np.inf
-    explicit = folds / -slow.rate_beyond / (DECAY_STEP * limit) * (STEP + motion.stiffness.nnz + motion.damping.nnz)
+    explicit = (
+        folds / -slow.rate_beyond / (DECAY_STEP * limit) * (STEP_OVERHEAD + motion.stiffness.nnz + motion.damping.nnz)
+    )
     s = slow.rate_beyond + 1j * slow.radius
-    implicit = folds / -np.log(abs((slow.radius + s) / (slow.radius - s))) * (STEP + slow.entries)
+    implicit = folds / -np.log(abs((slow.radius + s) / (slow.radius - s))) * (STEP_OVERHEAD + slow.entries)
     return explicit, float(implicit)
 
 

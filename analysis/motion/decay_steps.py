@@ -36,7 +36,7 @@ STEPS_BETWEEN_SQUARES = 7
 """Explicit steps between two values of |u|^2 of which a look has the mean; the number divides no period of a motion for
 long."""
 
-STEP = 2e4
+STEP_OVERHEAD = 2e4
 """Multiplications that could be done in the time that a step takes besides its own."""
 
 FINER_STEP = 4
@@ -84,7 +84,7 @@ class ExplicitSteps:
     @property
     def work_of_look(self) -> float:
         """Multiplications, and what takes as long."""
-        return STEPS_OF_LOOK * (STEP + self.stiffness.nnz + (0 if self.damping is None else self.damping.nnz))
+        return STEPS_OF_LOOK * (STEP_OVERHEAD + self.stiffness.nnz + (0 if self.damping is None else self.damping.nnz))
 
     @property
     def hides(self) -> float:
@@ -173,7 +173,7 @@ class ImplicitSteps:
     @property
     def work_of_look(self) -> float:
         """Multiplications, and what takes as long."""
-        return SOLVES_OF_LOOK * (STEP + self.slow.entries + self.motion.damping.nnz)
+        return SOLVES_OF_LOOK * (STEP_OVERHEAD + self.slow.entries + self.motion.damping.nnz)
 
     @property
     def hides(self) -> float:

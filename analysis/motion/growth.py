@@ -30,7 +30,7 @@ from .power_law import fit_line
 STRETCHES = 24
 """Stretches over which D is averaged: enough for an error, few enough to hold many periods each."""
 
-ABOVE = 1e3
+NOISE_FACTOR = 1e3
 """Factor from the noise to the D from which on the fastest motion is followed: it has left the others behind there."""
 
 
@@ -168,10 +168,10 @@ def growing_range(time: ArrayLike, msd: ArrayLike, upper: float) -> tuple[float,
     Returns
     -------
     tuple of float
-        `ABOVE` times the noise, which is the median of D over the first quarter of its way to `upper`, and `upper`.
+        `NOISE_FACTOR` times the noise, the median of D over the first quarter of its way to `upper`; and `upper`.
     """
     t, d = np.asarray(time, dtype=np.float64), np.asarray(msd, dtype=np.float64)
     reached = np.flatnonzero(d >= upper)
     end = t[reached[0]] if len(reached) else t[-1]
     noise = d[t <= t[0] + 0.25 * (end - t[0])]
-    return ABOVE * float(np.median(noise)), upper
+    return NOISE_FACTOR * float(np.median(noise)), upper

@@ -2,8 +2,8 @@ r"""Whether D of an undamped run grew, beside the growth rate that the spectrum 
 
 **Noise.** All modes start with similar amplitudes, excited by the rounding of the coordinates or by the perturbation. D
 stays at this level, the noise, until the fastest growing motion exceeds the noise. With n modes, this motion starts
-with a share of about `NOISE_SHARE`/n. To reach `ABOVE` times the noise, and to be followed over a decade from there,
-takes a time of about
+with a share of about `NOISE_SHARE`/n. To reach `NOISE_FACTOR` times the noise, and to be followed over a decade from
+there, takes a time of about
 :math:`\ln(10 \cdot 10^3\, n / 0.1) / (2 |\mathrm{Im}\,\omega|)`, some 17 e-foldings for 100 disks.
 
 **Weakening.** When friction falls with the velocity, the equilibrium of the packing changes. D jumps to the
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from ..counted import counted
 from ..packing.packing import Floats, Packing
 from .eigenvalues import Complexes
-from .growth import ABOVE, Growth, fit_growth, growing_range
+from .growth import NOISE_FACTOR, Growth, fit_growth, growing_range
 from .motion import Motion
 from .rates import rates_of
 from .spectrum import spectrum
@@ -167,7 +167,9 @@ class _Prediction:
     @property
     def needed(self) -> float | None:
         """About how long a run has to be for D to leave the noise and be followed; None where nothing grows."""
-        return float(np.log(10 * ABOVE * max(1, 3 * self.disks) / NOISE_SHARE) / self.rate) if self.rate else None
+        return (
+            float(np.log(10 * NOISE_FACTOR * max(1, 3 * self.disks) / NOISE_SHARE) / self.rate) if self.rate else None
+        )
 
 
 def _predict(packing: Packing, dt: float | None) -> _Prediction:

@@ -49,20 +49,20 @@ at Coulomb's bound went up to 6e5."""
 MOST_DECADES = 25.0
 """Growth of D at which a motion has grown enough."""
 
-STEADY = 0.3
+GAIN_SHARE = 0.3
 """A motion still grows if D gains this share of its mean rate, in each quarter of the second half of the time."""
 
-EXPONENTIAL = 0.85
+EXPONENTIAL_RATIO = 0.85
 """Ratio of the growth in the last two quarters of the time from which growth is exponential: of any power of the
 time it is 0.71."""
 
-SETTLED = 1e-3
+SLIP_CHANGE = 1e-3
 """Change of p in a quarter of the time, as a share of the largest p, below which sliders may be at rest."""
 
 WINDOWS_OF_TIME = 16
 """Parts of a time that is given, at the least."""
 
-LATE = 12
+CHUNKS_BEFORE_SUM = 12
 """Chunks after which the slip of all contacts together decides. A motion that grows as exp(t) gains 15 decades in a
 packing of spheres."""
 
@@ -70,10 +70,10 @@ packing of spheres."""
 SLIP_SPANS = 8
 """Spans of the time, over the last four of which slips are to fall with the slowest vibration."""
 
-FALLS = 0.5
+DECAY_SHARE = 0.5
 """Least rate at which slips fall, as a share of that of the slowest vibration: their sums of spans are uneven."""
 
-LEFT = 0.05
+SLIP_LEFT_SHARE = 0.05
 """Slip that may be left, as a share of all slip; D then changes by less than a tenth."""
 
 
@@ -123,7 +123,7 @@ def follow_pushes(
         grows, left = _outcome(*seen, slid, sticking_grows), 0.0
         if grows is None and sticking < 0 and not sticking_grows:
             left = _slip_left(slid, float(np.exp(0.5 * sticking * state.time / SLIP_SPANS)))
-            grows = False if left < LEFT or rested else None
+            grows = False if left < SLIP_LEFT_SHARE or rested else None
         rested = grows is False
         if time is None and grows is not None:
             break
@@ -170,7 +170,7 @@ def _outcome(time: Floats, size: Floats, slid: list[Floats], sticking_grows: boo
         return None
     half, three = len(slid) // 2, 3 * len(slid) // 4
     of_any = _slip_dies(slid[half], slid[three], slid[-1], np.max)
-    of_all = _slip_dies(slid[half], slid[three], slid[-1], np.sum) & (len(slid) > LATE * LOOKS_PER_CHUNK)
+    of_all = _slip_dies(slid[half], slid[three], slid[-1], np.sum) & (len(slid) > CHUNKS_BEFORE_SUM * LOOKS_PER_CHUNK)
     return False if np.all(of_any | of_all) else None
 
 
@@ -178,7 +178,7 @@ def _slip_dies(half: Floats, three: Floats, end: Floats, over: Callable[..., Flo
     """Whether the largest slip of a contact, or that of all contacts, dies away, of each push; p at three times."""
     whole, before, after = (over(np.abs(slip), axis=0) for slip in (end, three - half, end - three))
     falls = (after <= 0.5 * before) | (after <= np.finfo(float).eps * whole)
-    return np.asarray(falls & (before <= SETTLED * whole))
+    return np.asarray(falls & (before <= SLIP_CHANGE * whole))
 
 
 def _slip_left(slid: list[Floats], decay: float) -> float:
@@ -198,7 +198,7 @@ def _slip_left(slid: list[Floats], decay: float) -> float:
     steps = np.diff(whole, axis=0)[SLIP_SPANS // 2 :]
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = np.nan_to_num(steps[1:] / steps[:-1], nan=0.0)
-    if np.any(ratios > decay**FALLS):
+    if np.any(ratios > decay**DECAY_SHARE):
         return np.inf
     slowest = np.maximum(ratios.max(axis=0), decay)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -216,7 +216,7 @@ def _still_grows(time: Floats, gained: Floats) -> bool:
     steps = np.array(
         [(gained[part[-1]] - gained[part[0] - 1]) / (time[part[-1]] - time[part[0] - 1]) for part in parts]
     )
-    return bool(steps.min() > STEADY * mean and steps[2:].sum() > EXPONENTIAL * steps[:2].sum())
+    return bool(steps.min() > GAIN_SHARE * mean and steps[2:].sum() > EXPONENTIAL_RATIO * steps[:2].sum())
 
 
 def _rate(time: Floats, size: Floats) -> tuple[float, float]:

@@ -59,25 +59,25 @@ TREND = 0.1
 """The same of the whole time after the drag, so that all of it counts, and not the last half alone: in a packing whose
 vibration grew slowly for a third of the time it is 0.18."""
 
-PRECISE = 0.1
+VIBRATION_ERROR = 0.1
 """Relative error of the vibration from which on a motion is not followed any longer."""
 
-FADE = 4
+FADE_WINDOWS = 4
 """Windows in which the drag fades out."""
 
 DRAG = 20.0
-"""That drag at first, 1/tau in units of 1/window: it takes exp(-DRAG FADE/6) = 2e-6 of the amplitude of a mode."""
+"""That drag at first, 1/tau in units of 1/window: it takes exp(-DRAG FADE_WINDOWS/6) = 2e-6 of the amplitude of a mode."""
 
 ONE_START = 6000
 """Coordinates beyond which one start stands for two: each takes a minute or more."""
 
-VANISHES = 1e-2
+VIBRATION_SHARE = 1e-2
 """Vibration over drift of a packing that follows the load."""
 
 LEAST_WINDOWS = 8
 """Windows of a span whose halves and quarters can be compared."""
 
-ENDLESS = 1e12
+LARGEST_GROWTH = 1e12
 """Growth of the vibration of a motion that has no drift."""
 
 DIAGONAL_SHIFT = 1e-11
@@ -86,7 +86,7 @@ DIAGONAL_SHIFT = 1e-11
 REFINEMENTS = 3
 """Steps of iterative refinement, each of which takes this shift out once more."""
 
-BORNE = 1e-6
+UNBORNE_SHARE = 1e-6
 """Share of the load that may be left over where K bears the load."""
 
 WAY_CHANGES = 60
@@ -207,7 +207,7 @@ def _solution(motion: Any, load: Floats, free: int) -> Floats:
     velocity = np.zeros_like(load)
     for _ in range(1 + REFINEMENTS):
         velocity += factors.solve(load - matrix @ velocity)
-    if np.linalg.norm(load - matrix @ velocity) > BORNE * np.linalg.norm(load):
+    if np.linalg.norm(load - matrix @ velocity) > UNBORNE_SHARE * np.linalg.norm(load):
         moves = f"{counted(free, 'motion')} that no force opposes" if free else "a motion that next to no force opposes"
         raise NotFollowedError(f"the load accelerates {moves}")
     return velocity
@@ -221,9 +221,9 @@ def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = 
         windows.append(window)
         seen = window.drift_and_vibration(system)[1].max()
         report_progress(f"under the rising load: t = {length * len(windows):.4g}, vibration {seen:.3g}")
-        if not seen < ENDLESS * windows[0].drift_and_vibration(system).max():
+        if not seen < LARGEST_GROWTH * windows[0].drift_and_vibration(system).max():
             raise NotFollowedError(
-                f"the motion grows without end: within t = {length * len(windows):.4g} by {ENDLESS:g}"
+                f"the motion grows without end: within t = {length * len(windows):.4g} by {LARGEST_GROWTH:g}"
             )
         if time is None and 2 * len(windows) >= most and _is_known(system, windows):
             break
@@ -263,7 +263,7 @@ def windows_under_load(system: OneSidedSystem, direction: Floats, length: float)
     direction : ndarray, shape (coordinates, 1)
         Forces per unit of time.
     length : float
-        Time of a window; the drag fades out in `FADE` of them.
+        Time of a window; the drag fades out in `FADE_WINDOWS` of them.
     """
     drag = _drag_of_starts(system)
     direction = np.repeat(direction, drag.shape[1], axis=1)
@@ -274,7 +274,7 @@ def windows_under_load(system: OneSidedSystem, direction: Floats, length: float)
         for sample in range(SAMPLES_OF_WINDOW):
             now = number + (sample + 1) / SAMPLES_OF_WINDOW
             system.advance(state, length * now, direction)
-            state.v *= np.exp(-DRAG / SAMPLES_OF_WINDOW * max(0.0, 1 - now / FADE) ** 2 * drag)
+            state.v *= np.exp(-DRAG / SAMPLES_OF_WINDOW * max(0.0, 1 - now / FADE_WINDOWS) ** 2 * drag)
             squares += system.displacement(state.v) ** 2
         squares *= length / SAMPLES_OF_WINDOW
         yield Span(length, state.z - place, state.r - way, squares, state.p - slid)
@@ -297,15 +297,15 @@ def _is_known(system: OneSidedSystem, windows: list[Span]) -> bool:
     """Whether every start vibrates steadily, with a vibration that is known precisely enough."""
     return all(
         each["steady"]
-        and each["vibration"] > VANISHES * each["drift"]
-        and each["vibration_error"] <= PRECISE * each["vibration"]
+        and each["vibration"] > VIBRATION_SHARE * each["drift"]
+        and each["vibration_error"] <= VIBRATION_ERROR * each["vibration"]
         for each in _of_starts(system, windows)[1]
     )
 
 
 def _of_starts(system: OneSidedSystem, windows: list[Span]) -> tuple[Span, list[dict[str, Any]]]:
     """The longest span that is steady from every start, or the last half; and what each start does in this span."""
-    after = windows[FADE:] or windows[-1:]
+    after = windows[FADE_WINDOWS:] or windows[-1:]
     for span, differs in ((after, TREND), (after[len(after) // 2 :], WINDOWS)):
         found = [_outcome(each, differs) for each in _parts(system, span)]
         if all(each["steady"] for each in found):
@@ -327,8 +327,12 @@ def _parts(system: OneSidedSystem, span: list[Span]) -> Floats:
 def _outcome(parts: Floats, differs: float) -> dict[str, Any]:
     """What the drift and the vibration of a span and of its parts say, shape (7, 2), whose halves may differ so far."""
     (drift, vibration), before, after = parts[:3]
-    alike = abs(after[1] - before[1]) <= differs * after[1] and after[1] > VANISHES * after[0]
-    vanishes = after[1] <= VANISHES * after[0] and after[1] <= 2 * before[1] and vibration <= 2 * VANISHES * drift
+    alike = abs(after[1] - before[1]) <= differs * after[1] and after[1] > VIBRATION_SHARE * after[0]
+    vanishes = (
+        after[1] <= VIBRATION_SHARE * after[0]
+        and after[1] <= 2 * before[1]
+        and vibration <= 2 * VIBRATION_SHARE * drift
+    )
     errors: list[float | None] = [None, None]
     if np.all(np.isfinite(parts)):
         # of the mean of four, doubled, since quarters of a slow cycle are not independent
@@ -346,5 +350,5 @@ def _outcome(parts: Floats, differs: float) -> dict[str, Any]:
 def vibrate_otherwise(first: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     """Whether the motions under a rising load from two starts differ: one is not steady, or vibrates more."""
     least, most = sorted((first["vibration"], other["vibration"]))
-    alike = most - least <= WINDOWS * most or most <= VANISHES * first["drift"]
+    alike = most - least <= WINDOWS * most or most <= VIBRATION_SHARE * first["drift"]
     return first["steady"] is not other["steady"] or not alike

@@ -269,7 +269,7 @@ def _jump_width(here: float, there: float, limits: Limits) -> float:
     return max(limits.jump * abs(there - here), 4 * rounding)
 
 
-At = Callable[[float], System]
+SystemOfLoad = Callable[[float], System]
 """Load -> the system there."""
 
 Increments = tuple[tuple[float, float], ...]
@@ -284,7 +284,7 @@ def follow_to(space: Space, system: System, limits: Limits = LIMITS) -> Space:
     return found
 
 
-def track(at: At, known: dict[float, Space], limits: Limits = LIMITS) -> Callable[[float], Space]:
+def track(at: SystemOfLoad, known: dict[float, Space], limits: Limits = LIMITS) -> Callable[[float], Space]:
     """A function of the load that follows a motion there from the nearest load in `known`, and adds it to `known`."""
 
     def look_at(fx: float) -> Space:
@@ -303,7 +303,7 @@ def _follow_from(near: Sequence[Space], system: System, limits: Limits) -> Space
     return image if image is not None and image.like(near[0]) else follow_to(near[0], system, limits)
 
 
-def locate_edge(at: At, below: Space, above: Space, limits: Limits = LIMITS) -> tuple[Edge, Space, Space]:
+def locate_edge(at: SystemOfLoad, below: Space, above: Space, limits: Limits = LIMITS) -> tuple[Edge, Space, Space]:
     """The edge of a motion that grows at one of two loads, and the motion on either side of the edge.
 
     A LostPairError is raised if the motions at both ends are not the same.
@@ -321,7 +321,7 @@ def locate_edge(at: At, below: Space, above: Space, limits: Limits = LIMITS) -> 
     return Edge.between(left.fx, right.fx, left, right), left, right
 
 
-def edge_from_inside(at: At, outside: Space, inside: Space, limits: Limits = LIMITS) -> Edge:
+def edge_from_inside(at: SystemOfLoad, outside: Space, inside: Space, limits: Limits = LIMITS) -> Edge:
     """Where a motion begins or ends to grow between a load where it does not and one where it does.
 
     The motion is followed from inside, with the increment halved until the motion outside leads back to the one inside.

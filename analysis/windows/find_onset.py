@@ -15,7 +15,7 @@ from ..motion.buckling import negative_eigenvalues
 from ..motion.spectrum import Spectrum, spectrum
 from ..packing.packing import Floats, Packing
 from ..progress import Watch, report_progress, show_progress
-from .edges import At, Edge, Window
+from .edges import Edge, SystemOfLoad, Window
 from .find_windows import Known, check_increasing, find_windows, windows_up_to
 from .limits import LIMITS, Limits
 from .onset import RAISE_LOAD, Increments, NoGrowthError, Onset, OnsetError
@@ -136,7 +136,7 @@ class _OnsetSearch:
         return System.of(packing, True, self.limits)
 
     def windows_of(
-        self, system: At, look: Look = lambda below, above: (), known: Known = lambda windows, fx: None
+        self, system: SystemOfLoad, look: Look = lambda below, above: (), known: Known = lambda windows, fx: None
     ) -> tuple[tuple[Window, ...], Increments]:
         """The windows of a family of systems, and increments in doubt."""
         if self.takes_all:
@@ -229,7 +229,7 @@ class _Inside:
     Where the first window alone is known, the others are sought as far as the ramp is walked.
     """
 
-    def __init__(self, undamped: At, loads: Floats, known: Onset | None, limits: Limits) -> None:
+    def __init__(self, undamped: SystemOfLoad, loads: Floats, known: Onset | None, limits: Limits) -> None:
         self._windows: tuple[Window, ...] = () if known is None else known.windows
         self._reached = np.inf
         self._along: Iterator[tuple[float, tuple[Window, ...]]] = iter(())

@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 
 from ..counted import counted
 from ..progress import report_progress
-from .edges import At, Window
+from .edges import SystemOfLoad, Window
 from .limits import LIMITS, Limits
 from .screens.growth import GrowthScreen
 from .screens.pairs import PairScreen
@@ -20,7 +20,7 @@ Known = Callable[[tuple[Window, ...], float], None]
 
 
 def find_windows(
-    system: At,
+    system: SystemOfLoad,
     forces: ArrayLike,
     *,
     narrowest: float | None = None,
@@ -63,7 +63,7 @@ def find_windows(
 
 
 def windows_up_to(
-    system: At,
+    system: SystemOfLoad,
     forces: ArrayLike,
     *,
     narrowest: float | None = None,

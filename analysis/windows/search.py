@@ -23,7 +23,7 @@ from typing import Protocol
 from ..errors import NoEquilibriumError, TurningPointError
 from ..packing.packing import Floats
 from .between import Course, Ends, Few, LoadStep, stretch
-from .edges import At, DoubtError, Edge, LostPairError, LostTrackError, Window, locate_edge
+from .edges import DoubtError, Edge, LostPairError, LostTrackError, SystemOfLoad, Window, locate_edge
 from .limits import LIMITS, Limits
 from .space import Space
 from .system import System
@@ -69,7 +69,12 @@ class Search:
     """
 
     def __init__(
-        self, system: At, narrowest: float, screen: Screen | None = None, first: bool = False, limits: Limits = LIMITS
+        self,
+        system: SystemOfLoad,
+        narrowest: float,
+        screen: Screen | None = None,
+        first: bool = False,
+        limits: Limits = LIMITS,
     ) -> None:
         self.at, self.narrowest, self.screen, self.limits = system, narrowest, screen, limits
         self._first = first
@@ -303,7 +308,7 @@ def _growing_of(modes: Sequence[Space]) -> list[bool]:
 
 
 def other_growth(
-    at: At, known: Sequence[list[Space]], narrowest: float, *, dipping: bool = False, limits: Limits = LIMITS
+    at: SystemOfLoad, known: Sequence[list[Space]], narrowest: float, *, dipping: bool = False, limits: Limits = LIMITS
 ) -> list[Space] | None:
     """Modes that nearly meet, at a load at which another number of them grows than at each load where they are known.
 
@@ -335,7 +340,7 @@ def other_growth(
 
 
 def windows_along(
-    system: At,
+    system: SystemOfLoad,
     loads: Floats,
     narrowest: float,
     screen: Screen | None = None,
@@ -361,7 +366,7 @@ def windows_along(
                 raise
 
 
-def look_between(look: At, below: float, middle: float, above: float) -> list[System]:
+def look_between(look: SystemOfLoad, below: float, middle: float, above: float) -> list[System]:
     """The system at the middle load, or at a load beside it; empty if none of these has an equilibrium."""
     for fx in (middle, 0.5 * (below + middle), 0.5 * (middle + above)):
         try:

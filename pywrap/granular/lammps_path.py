@@ -44,7 +44,7 @@ from .granular_commands import INTEGRATORS, NotTakenError, read_commands, withou
 from .instance_queries import OpenFile, explain_error, log_file, log_of, open_files, require_instance
 from .lammps_arrays import owned_array, rows_of, set_velocity
 from .look_in_a_copy import can_copy, in_a_copy, interrupts_wait, quieten, silent_copy
-from .relax import RATE, REST, bring_to_rest
+from .relax import DRAG_RATE, REST_SHARE, bring_to_rest
 
 ITERATIONS = 10
 """Iterations of Newton's method, each of which must halve the residual until rounding stops it: six are the rule."""
@@ -59,7 +59,7 @@ def lammps_path(
     *,
     commands: Iterable[str] | None = None,
     slides: bool = False,
-    balance: float = REST,
+    balance: float = REST_SHARE,
     steps: int = 1_000_000,
 ) -> "LoadPath[RelaxedCopy]":
     """The loading path of LAMMPS's own packing, for :func:`~faultgouge.analysis.find_onset`.
@@ -231,7 +231,7 @@ class _Relaxation:
     steps: int
     laws: KnownLaws = field(default_factory=dict)
     found: Configuration | None = None  # the equilibrium where LAMMPS stands
-    rate: float = RATE
+    rate: float = DRAG_RATE
 
     def result(self, value: float, relaxes: bool) -> Configuration | FaultgougeError | None:
         """The equilibrium at a value, or why there is none; None if Newton's method, when asked for, cannot serve."""

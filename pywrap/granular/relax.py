@@ -26,30 +26,32 @@ from .lammps_arrays import owned_array, rows_of, set_velocity
 from .lammps_steps import set_up_run
 from .look_in_a_copy import can_copy
 
-REST = 1e-8
+REST_SHARE = 1e-8
 """Residual over the mean contact force at rest: far below the couplings of 1e-3 that make complex pairs, and far above
 rounding, 1e-12 of a force whose overlap is 1e-4 of a radius."""
 
 STEPS_BETWEEN_LOOKS = 2000
 """Steps between two looks: many beside the set-up of a run, few beside a relaxation."""
 
-ROUNDING = 1e-15
+FORCE_ROUNDING = 1e-15
 """Rounding of a coordinate, as a share of the largest one: nothing comes closer to rest."""
 
-RATE = 0.01
+DRAG_RATE = 0.01
 """Rate of the drag at the beginning, per time step: critical for a mode of 1000 steps."""
 
-PATIENCE = 50 * STEPS_BETWEEN_LOOKS
+STEPS_WITHOUT_GAIN = 50 * STEPS_BETWEEN_LOOKS
 """Steps after which the time step is looked at: a packing that rests has come near to it by then."""
 
-FAR = 10.0
+FARTHEST_DRIFT = 10.0
 """Diameters that particles move in the mean before a packing is said to flow: what has been poured first falls."""
 
 SLOWEST, FASTEST = 1e-4, 0.2
 """Rates of the drag, per time step, on the mean mass, and on the smallest one; explicit drag alternates from 1 on."""
 
 
-def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = REST, steps: int = 1_000_000) -> float:
+def relax(
+    lmp: Any, commands: Iterable[str] | None = None, *, balance: float = REST_SHARE, steps: int = 1_000_000
+) -> float:
     """Bring a LAMMPS instance to rest by its own dynamics with drag; the instance runs, and ends without velocities.
 
     Parameters
@@ -90,7 +92,7 @@ def relax(lmp: Any, commands: Iterable[str] | None = None, *, balance: float = R
     still = still_particles(lmp, lines)
     look = partial(take_configuration, lmp, given, {}, slides=False, balance=np.inf, prove=False)
     try:
-        found, _ = bring_to_rest(lmp, look, still.configuration, balance, steps, RATE, "", far=FAR)
+        found, _ = bring_to_rest(lmp, look, still.configuration, balance, steps, DRAG_RATE, "", far=FARTHEST_DRIFT)
     except NoEquilibriumError as error:
         says = restless_fix(still.commands) or " and ".join(
             f"fix {name} {still.fixes[name]} may drive the packing" for name in acting_fixes(still.fixes)
@@ -143,7 +145,7 @@ def bring_to_rest(
     way, residual, force, rounding = 0.0, np.inf, force_scale(start), 0.0
     try:
         for done in range(0, steps, STEPS_BETWEEN_LOOKS):
-            if done == PATIENCE:
+            if done == STEPS_WITHOUT_GAIN:
                 found = look()
                 _refuse_long_steps(found, dt, where)
                 rounding = _rounding(found)
@@ -225,7 +227,7 @@ class _Drag:
 def _rounding(found: Configuration) -> float:
     """What a rounding of a coordinate makes of the force of the stiffest contact."""
     stiffness = found.contacts.normal_stiffness if found.stiffness is None else found.stiffness.data
-    return ROUNDING * float(np.abs(found.position).max() * np.abs(stiffness).max(initial=0.0))
+    return FORCE_ROUNDING * float(np.abs(found.position).max() * np.abs(stiffness).max(initial=0.0))
 
 
 def _refuse_long_steps(found: Configuration, timestep: float, where: str) -> None:

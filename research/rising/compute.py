@@ -33,7 +33,7 @@ from research.lammps_laws.compute import GAMMA, KN, MU, pour, rest
 from research.laws.both_laws import as_slider, at_loads
 from research.modes.loss import impact_velocity, with_dashpots
 from research.modes.sets import sets
-from research.rising.windows import FADE, Windows, drift_and_vibration, follow_one_sided, rise_in_plugin
+from research.rising.windows import FADE_WINDOWS, Windows, drift_and_vibration, follow_one_sided, rise_in_plugin
 from research.tables import known_rows
 
 SEEDS = 20
@@ -174,7 +174,7 @@ def follow_longer(seed: int) -> Iterator[dict[str, Any]]:
     scene, at, _ = at_rest(seed, "coulomb", [load])
     packing = with_restitution(at[load], scene, restitution)
     length, windows = follow_one_sided(packing, FOLLOWED)
-    followed_there = Windows(length, FOLLOWED, FOLLOWED - FADE)
+    followed_there = Windows(length, FOLLOWED, FOLLOWED - FADE_WINDOWS)
     motions = [rise_in_plugin(packing, min(RATES), followed_there, spins) for spins in STARTS]
     lammps = [[drift_and_vibration([part], length, min(RATES)) for part in motion] for motion in motions]
     yield {

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from faultgouge.analysis.motion.rising_load import FADE, WINDOWS
+from faultgouge.analysis.motion.rising_load import FADE_WINDOWS, WINDOWS
 from faultgouge.figures import render, save, styled
 from faultgouge.studies.statistics import share
 from research.laws.both_laws import RESTITUTIONS as WEAKEST_FIRST
@@ -263,7 +263,7 @@ def longer_runs(rows: list[Row]) -> list[Row]:
                 {"vibration": float(now), "steady": bool(abs(now - then) <= WINDOWS * now)}
                 for now, then in zip(last, before, strict=True)
             ]
-        found.append({"seed": row["seed"], "time": row["chunk"] * (windows.shape[1] + FADE)} | ends)
+        found.append({"seed": row["seed"], "time": row["chunk"] * (windows.shape[1] + FADE_WINDOWS)} | ends)
     return found
 
 
@@ -276,7 +276,7 @@ def figure_of_starts(rows: list[Row]) -> Figure:
     for axes, row in zip(panels, shown, strict=True):
         for start, (colour, words) in enumerate((("C0", "drag on all"), ("C3", "drag on translations"))):
             one, lammps = (np.array(row[name]["vibration"][start]) for name in ("one_sided", "lammps"))
-            times = row["chunk"] * (FADE + 0.5 + np.arange(len(one)))
+            times = row["chunk"] * (FADE_WINDOWS + 0.5 + np.arange(len(one)))
             axes.plot(times, one, color=colour, linewidth=1.0, label=words)
             axes.plot(times[::2], lammps[::2], ".", color=colour, markersize=4)
         axes.set_yscale("log")

@@ -1,6 +1,6 @@
 """Windows of the motion under a load that rises: one-sided, and as LAMMPS integrates it from the same two starts.
 
-A drag fades out in the first `FADE` windows, on all coordinates or not on rotations, as in
+A drag fades out in the first `FADE_WINDOWS` windows, on all coordinates or not on rotations, as in
 :mod:`faultgouge.analysis.motion.rising_load`: between parts of LAMMPS's run velocities are multiplied by what the drag
 leaves of them. Drift and vibration are then those of the same span of windows.
 """
@@ -18,7 +18,7 @@ from mpi4py import MPI
 from faultgouge.analysis import Configuration, Floats, Packing, Signal
 from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
 from faultgouge.analysis.motion.one_sided_outcome import STEPS_OF_CHUNK, VERDICT_STEP
-from faultgouge.analysis.motion.rising_load import DRAG, FADE, windows_under_load
+from faultgouge.analysis.motion.rising_load import DRAG, FADE_WINDOWS, windows_under_load
 from faultgouge.pywrap import Engine
 
 STEPS_OF_LOOK, LOOKS = 15, 400
@@ -68,7 +68,7 @@ def follow_one_sided(packing: Packing, count: int) -> tuple[float, Floats]:
     force = np.zeros((len(packing), 2))
     force[:, 0] = packing.top
     direction = forces_on_coordinates(packing.configuration, force)
-    followed = list(islice(windows_under_load(system, direction, _length(system)), count))[FADE:]
+    followed = list(islice(windows_under_load(system, direction, _length(system)), count))[FADE_WINDOWS:]
     return _length(system), np.array([window.drift_and_vibration(system) for window in followed])
 
 
@@ -115,13 +115,13 @@ def windows_in(lmp: Any, count: int, windows: Windows, spins: bool) -> Iterator[
         return np.asarray(lmp.numpy.extract_atom(name)[order, :dimension], dtype=float)
 
     lmp.command("run 0 post no")
-    for look in range(FADE * LOOKS):
+    for look in range(FADE_WINDOWS * LOOKS):
         lmp.command(f"run {STEPS_OF_LOOK} pre no post no")
-        left = np.exp(-DRAG / LOOKS * (1 - (look + 1) / LOOKS / FADE) ** 2)
+        left = np.exp(-DRAG / LOOKS * (1 - (look + 1) / LOOKS / FADE_WINDOWS) ** 2)
         for name in ("v", "omega") if spins else ("v",):
             lmp.numpy.extract_atom(name)[:count] *= left
     place = by_id("x")
-    for _ in range(windows.count - FADE):
+    for _ in range(windows.count - FADE_WINDOWS):
         moved, squares = np.zeros_like(place), np.zeros_like(place)
         for _ in range(LOOKS):
             lmp.command(f"run {STEPS_OF_LOOK} pre no post no")

@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from ...analysis import NoEquilibriumError
 from ...analysis.counted import counted
-from ...analysis.motion.growth import ABOVE
+from ...analysis.motion.growth import NOISE_FACTOR
 from ...pywrap import Scene, SceneError
 from ...pywrap.runs.ramp_loads import ramp_loads
 from ...pywrap.scenes.study_sections import Eruptions
@@ -69,8 +69,8 @@ def _page(result: Result) -> Result:
     free = [run for run in runs if not run["damped"]]
     damped = {run["fx"]: run for run in runs if run["damped"]}
     damping = result["scene"].get("damping") or {}
-    grown = [run["msd"] for run in free if run["ends"] != "stable" and run["msd"] > ABOVE * run["noise"]]
-    small = [run for run in runs if run["ends"] != "stable" and run["msd"] <= ABOVE * run["noise"]]
+    grown = [run["msd"] for run in free if run["ends"] != "stable" and run["msd"] > NOISE_FACTOR * run["noise"]]
+    small = [run for run in runs if run["ends"] != "stable" and run["msd"] <= NOISE_FACTOR * run["noise"]]
     return {
         "runs": runs,
         "fy": result["scene"]["load"]["fy"],

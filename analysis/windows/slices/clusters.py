@@ -25,7 +25,17 @@ import numpy as np
 from ...errors import FaultgougeError, NoEquilibriumError
 from ...packing.packing import Floats
 from ...progress import report_progress
-from ..edges import At, DoubtError, Edge, Increments, LostPairError, Window, edge_from_inside, follow_to, leads_back
+from ..edges import (
+    DoubtError,
+    Edge,
+    Increments,
+    LostPairError,
+    SystemOfLoad,
+    Window,
+    edge_from_inside,
+    follow_to,
+    leads_back,
+)
 from ..limits import LIMITS, Limits
 from ..space import Space
 from ..system import System
@@ -50,7 +60,7 @@ class SliceSearch(ABC):
 
     def __init__(
         self,
-        at: At,
+        at: SystemOfLoad,
         modes: tuple[int, int] | None = None,
         ranks: Ranks = ALONE,
         folder: Path | None = None,

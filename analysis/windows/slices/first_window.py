@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ...packing.packing import Floats
-from ..edges import At, Increments, Window
+from ..edges import Increments, SystemOfLoad, Window
 from ..limits import LIMITS, Limits
 from ..system import System, unit_of
 from .clusters import SliceSearch
@@ -13,7 +13,7 @@ from .ranks import ALONE, Ranks
 
 
 def first_window(
-    system: At,
+    system: SystemOfLoad,
     loads: Floats,
     modes: tuple[int, int] | None = None,
     ranks: Ranks = ALONE,
