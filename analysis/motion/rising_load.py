@@ -66,7 +66,7 @@ FADE_WINDOWS = 4
 """Windows in which the drag fades out."""
 
 DRAG = 20.0
-"""That drag at first, 1/tau in units of 1/window: it takes exp(-DRAG FADE_WINDOWS/6) = 2e-6 of the amplitude of a mode."""
+"""That drag at first, 1/tau in units of 1/window: it leaves exp(-DRAG FADE_WINDOWS/6) = 2e-6 of a mode's amplitude."""
 
 ONE_START = 6000
 """Coordinates beyond which one start stands for two: each takes a minute or more."""
