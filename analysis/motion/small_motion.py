@@ -122,12 +122,12 @@ def _after_decay(outcome: SmallMotion, decay: Decay) -> SmallMotion:
 def _as_contacts_part(linear: SmallMotion, system: OneSidedSystem, time: float | None, pushes: int) -> SmallMotion:
     """The outcome of linear motion that does not grow: how far it holds, and what laws of two derivatives add."""
     configuration = system.motion.configuration
-    if configuration.stiffness is not None or not len(configuration.contacts):
+    if not len(configuration.contacts):
         return linear
     reach = ContactReach(system)
     reach.look_closely(system.start(random_pushes(configuration, 1)))
     most, reasons = reach.largest_scale, [UNSETTLED] if np.isinf(reach.least_scale) else []
-    largest = most if np.isfinite(most) else None
+    largest = most if np.isfinite(most) and configuration.stiffness is None else None  # of bounds a given K knows none
     found = replace(linear, largest_push=largest, residual_push=reach.residual_scale, reasons=reasons)
     if system.remembers_nothing:
         return found

@@ -101,8 +101,8 @@ class Stability:
         Where motion does not grow, and no contact slides on one side: velocity of a push along an axis up to which
         contacts neither reach the bound nor open. None where K is given.
     residual_push : float
-        Velocity of a push along an axis that moves the particles as far as the residual forces do, where `largest_push`
-        is known.
+        Velocity of a push along an axis that moves the particles as far as the residual forces do; 0 where contacts
+        slide on one side, which has its own.
     decay : Decay or None
         What became of a random state with sticking contacts; None where eigenvalues decide.
     rising : dict or None
@@ -244,13 +244,15 @@ class Stability:
 
     @property
     def _scales(self) -> Iterator[str]:
-        if self.stable and self.largest_push is not None:
-            least, most = LEFT_ALONE * self.residual_push, self.largest_push
+        least, most = LEFT_ALONE * self.residual_push, self.largest_push
+        if self.stable and most is not None:
             yield (
                 f"holds for {f'pushes of {least:.1g} to {most:.1g}' if least < most else 'no push'} (velocity along an "
                 f"axis): below{'' if least < most else f' {least:.1g}'}, residual forces count; "
                 f"above{'' if least < most else f' {most:.1g}'}, contacts open or slide"
             )
+        elif self.stable and least:
+            yield f"holds for pushes above {least:.1g} (velocity along an axis), if small: below, residual forces count"
         if self.one_sided is None or self.one_sided["grows"] is not False:
             return
         least, most = self.one_sided["scales"]
