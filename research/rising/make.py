@@ -66,9 +66,6 @@ LAST_WINDOWS = 8
 VIBRATION_SHARE = 0.05
 """Vibration over drift of a layer that is said to vibrate; what a start leaves is a hundredth at the most."""
 
-SAME_VIBRATION = 1.25
-"""Ratio of two vibrations that are said to be the same: both are measured over two windows of an uneven motion."""
-
 GROWTH_FROM = 1e-4
 """Growth rate of D, 1 / time, from which linear motion is said to grow: fifty times the rounding of eigenvalues."""
 
@@ -122,25 +119,6 @@ def under_the_load(rows: list[Row]) -> dict[str, Any]:
         "follow": share(done.count("follow"), len(known)),
         "open": done.count("open"),
         "ratio": [float(np.median(steady)), min(steady), max(steady)] if steady else None,
-    }
-
-
-def one_start_beside_lammps(rows: list[Row]) -> dict[str, Any]:
-    """Each layer that LAMMPS integrates, from one start and over windows."""
-    slow = str(min(RATES))
-    shown = [row | {"ratio": row["rising"]["vibration"] / row["rising"]["drift"]} for row in rows if "lammps" in row]
-    both = [row for row in shown if row["rising"]["steady"] and row["ratio"] > VIBRATION_SHARE]
-    near = [row["lammps"][slow]["vibration"] / row["rising"]["vibration"] for row in both]
-    apart = [
-        (row["seed"], ratio)
-        for row, ratio in zip(both, near, strict=True)
-        if not 1 / SAME_VIBRATION < ratio < SAME_VIBRATION
-    ]
-    return {
-        "rows": shown,
-        "near": [float(np.median(near)), min(near), max(near)] if near else None,
-        "both": len(both),
-        "apart": apart,
     }
 
 
@@ -341,7 +319,6 @@ def numbers() -> dict[str, Any]:
         "both_starts": [row for row in from_both if (row["fx_over_fy"], row["restitution"]) == COMPARED],
         "elsewhere": [row for row in from_both if (row["fx_over_fy"], row["restitution"]) != COMPARED],
         "vibrating": vibrating(from_both),
-        "lammps": one_start_beside_lammps([row for row in old if "stable" in row]),
         "in_lammps": vibration_in_lammps([row for row in rows if "control" in row]),
         "first": FIRST,
         "rates": RATES,

@@ -39,8 +39,9 @@ def test_each_slip_has_its_state_before_and_its_control(row):
         assert [state["slip"] for state in row["states"] if state["kind"] == kind] == list(range(len(row["slips"])))
     for state in row["states"]:
         if state["kind"] == "before":
-            assert state["time"] == pytest.approx(row["slips"][state["slip"]]["begins"], abs=3.0)
-            assert state["until"] == pytest.approx(0.0, abs=3.0)
+            # the slip may begin between two states, one of which is stored in every 4.8
+            assert 0 <= row["slips"][state["slip"]]["begins"] - state["time"] < 4.8
+            assert 0 <= state["until"] < 4.8
         elif state["kind"] == "even":
             assert not any(slip["begins"] <= state["time"] <= slip["ends"] for slip in row["slips"])
 
