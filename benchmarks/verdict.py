@@ -2,11 +2,12 @@
 
 Fifty spheres are poured on a slope in LAMMPS, come to rest, and are copied side by side: a bed whose motion is known
 from that of the fifty, which are followed in smaller steps from more pushes. One of the two beds rests, and the other
-one grows. Beds of as many spheres as one likes are poured, too. The columns are: contacts at the bound; the verdict;
+one grows. Beds of as many spheres as one likes are poured, too, and a bed of a thousand spheres, ten deep, with a
+restitution of 0.8, comes to rest and is copied. The columns are: contacts at the bound; the verdict;
 the growth rate of D, or the largest D over the square of the push; how long the motion was followed; the rate below
 which linear growth may not have been seen; seconds of the processor; and memory.
 
-    python benchmarks/verdict.py [--copies 15 16] [--poured 2000]
+    python benchmarks/verdict.py [--copies 15 16] [--poured 2000] [--deep 10]
 """
 
 import os
@@ -22,9 +23,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+from mpi4py import MPI
 
 from faultgouge.analysis import Configuration, LinearisedContacts, Stability, stability
 from faultgouge.analysis.contacts import PER_CONTACT
+from faultgouge.pywrap import from_lammps, lammps_instance, relax
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 from research.lammps_laws.compute import pour, rest
@@ -39,6 +42,34 @@ POURED = ("gran/hertz/history", 0.0, 4.0)
 """Those of a bed that is poured as a whole: on a slope one or the other of thousands of spheres rolls on for ever."""
 
 
+DEEP = """
+units lj
+atom_style sphere
+boundary p p f
+newton off
+comm_modify vel yes
+region box block 0 {width} 0 {width} 0 60
+create_box 2 box
+{places}
+set type 1 diameter 0.8
+set type 2 diameter 1.0
+set group all density 1.0
+pair_style granular
+pair_coeff * * hertz/material 1e5 0.8 0.3 tangential mindlin NULL 1.0 0.5 damping tsuji
+fix floor all wall/gran granular hertz/material 1e5 0.8 0.3 tangential mindlin NULL 1.0 0.5 damping tsuji &
+  zplane 0 NULL contacts
+fix load all gravity 1.0 vector 0 0 -1
+fix move all nve/sphere
+timestep 1e-3
+fix drag all viscous 0.5
+run 15000 post no
+fix drag all viscous 4.0
+fix spin all viscous/sphere 0.4
+run 10000 post no
+"""
+"""Deck of the bed that is ten deep."""
+
+
 def bed(law: str, count: int, slope: float, dashpot: float) -> Configuration:
     """Spheres at rest on a slope."""
     with TemporaryDirectory() as folder:
@@ -48,6 +79,23 @@ def bed(law: str, count: int, slope: float, dashpot: float) -> Configuration:
         lmp.close()
     if found is None:
         raise SystemExit(f"{count} spheres on a slope of {slope} do not come to rest: take a smaller slope.")
+    return found
+
+
+def deep_bed(across: int = 10, deep: int = 10) -> Configuration:
+    """Spheres of two sizes that fall into a periodic box with a floor, in as many layers, and come to rest."""
+    random, width = np.random.default_rng(1), 1.05 * across
+    places = []
+    for k in range(across**2 * deep):
+        x, y = (np.array(divmod(k % across**2, across)) + 0.5) * 1.05 + random.uniform(-0.1, 0.1, 2)
+        z = 0.6 + 1.05 * (k // across**2) + random.uniform(0, 0.02)
+        places.append(f"create_atoms {random.integers(1, 3)} single {x} {y} {z}")
+    with TemporaryDirectory() as folder:
+        lmp = lammps_instance(MPI.COMM_SELF, str(Path(folder) / "log"))
+        lmp.commands_string(DEEP.format(width=width, places="\n".join(places)))
+        relax(lmp, balance=1e-9)
+        found = from_lammps(lmp)
+        lmp.close()
     return found
 
 
@@ -106,6 +154,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--copies", type=int, nargs=2, default=[15, 16], help="along x and along y")
     parser.add_argument("--poured", type=int, nargs="*", default=[], help="spheres of beds that are poured")
+    parser.add_argument("--deep", type=int, default=0, help="copies of a bed of a thousand spheres, ten deep")
     options = parser.parse_args()
     print(
         f"{'':24s}{'spheres':>8s}{'at bound':>9s}{'':>11s}{'D':>14s}{'t':>8s}{'sought':>9s}{'s':>8s}{'GB':>6s}",
@@ -118,6 +167,10 @@ def main() -> None:
     for count in options.poured:
         law, slope, dashpot = POURED
         show("poured", bed(law, count, slope, dashpot))
+    if options.deep:
+        cell = deep_bed()
+        show("a thousand, ten deep", cell)
+        show("copies of these", tiled(cell, options.deep, 1))
 
 
 if __name__ == "__main__":

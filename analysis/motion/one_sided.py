@@ -147,7 +147,7 @@ class ContactReach:
         do not count; infinite if these alone take another contact to the bound, or open one."""
         if self.alone is not None and self.alone.largest_scale < 1:
             return np.inf
-        missing = 0.0 if self.slid is None else least_scale(self.system, self.slid)
+        missing = 0.0 if self.slid is None else reaching_scale(self.system, self.slid)
         return max(missing, LEFT_ALONE * self.residual_scale)
 
     @property
@@ -160,7 +160,7 @@ class ContactReach:
         return float(limit[self.farthest > 0].min(initial=np.inf))
 
 
-def least_scale(system: "OneSidedSystem", slid: Floats) -> float:
+def reaching_scale(system: "OneSidedSystem", slid: Floats) -> float:
     """The multiple of a motion from which on contacts that count as at Coulomb's bound reach it.
 
     Parameters

@@ -8,8 +8,8 @@ each fall about as fast as this vibration, and what is left is little. Otherwise
 `STEPS_OF_CHUNK` stable time steps as often as needed, up to `WORK` multiplications.
 
 Sliders that have come to rest may slide again under a law of two derivatives: vibration wears tangential forces down
-(:mod:`~faultgouge.analysis.motion.creep`), at a rate that falls with the vibration. A motion that is followed on after
-its sliders have rested is at rest unless it grows.
+(:mod:`~faultgouge.analysis.motion.creep`), at a rate that falls with the vibration. Such a motion, followed on after
+its sliders have rested, rests as long as D does not gain at a steady rate.
 """
 
 from collections.abc import Callable
@@ -66,7 +66,6 @@ CHUNKS_BEFORE_SUM = 12
 """Chunks after which the slip of all contacts together decides. A motion that grows as exp(t) gains 15 decades in a
 packing of spheres."""
 
-
 SLIP_SPANS = 8
 """Spans of the time, over the last four of which slips are to fall with the slowest vibration."""
 
@@ -88,8 +87,8 @@ def window_and_most(system: OneSidedSystem, columns: int, time: float | None) ->
 
 def follow_pushes(
     system: OneSidedSystem, sticking: float, sticking_grows: bool, time: float | None = None, pushes: int = PUSHES
-) -> dict[str, Any]:
-    """Whether one-sided motion grows from some pushes: `Stability.one_sided`.
+) -> tuple[dict[str, Any], float]:
+    """Whether one-sided motion grows from some pushes: `Stability.one_sided` and `Stability.residual_push`.
 
     Parameters
     ----------
@@ -123,7 +122,8 @@ def follow_pushes(
         grows, left = _outcome(*seen, slid, sticking_grows), 0.0
         if grows is None and sticking < 0 and not sticking_grows:
             left = _slip_left(slid, float(np.exp(0.5 * sticking * state.time / SLIP_SPANS)))
-            grows = False if left < SLIP_LEFT_SHARE or rested else None
+            creeps = rested and bool(len(state.r)) and not _still_grows(seen[0], _gained(seen[1]))
+            grows = False if left < SLIP_LEFT_SHARE or creeps else None
         rested = grows is False
         if time is None and grows is not None:
             break
@@ -131,7 +131,7 @@ def follow_pushes(
             break
     t, d = seen
     rate, error = _rate(t, d)
-    return {
+    found = {
         "grows": grows,
         "growth_rate": rate if grows else sticking if grows is False else None,
         "error": error if grows else None,
@@ -142,8 +142,8 @@ def follow_pushes(
         "time": float(t[-1]),
         "pushes": 2 * pushes,
         "scales": (reach.least_scale, reach.largest_scale),
-        "residual_push": reach.residual_scale,
     }
+    return found, reach.residual_scale
 
 
 def random_pushes(configuration: Configuration, pushes: int) -> Floats:
@@ -161,9 +161,7 @@ def _outcome(time: Floats, size: Floats, slid: list[Floats], sticking_grows: boo
     Sliders rest if they moved little in the third quarter of the time, and less by half, or not at all, in the fourth:
     each of them, or late all of them together, as of thousands one or the other slips a last time.
     """
-    largest = size.max(axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        gained = np.log10(largest / largest[0])
+    gained = _gained(size)
     if gained[-1] > MOST_DECADES or (gained[-1] > DECADES and _still_grows(time, gained)):
         return True
     if sticking_grows or len(slid) <= 2 * LOOKS_PER_CHUNK:
@@ -172,6 +170,13 @@ def _outcome(time: Floats, size: Floats, slid: list[Floats], sticking_grows: boo
     of_any = _slip_dies(slid[half], slid[three], slid[-1], np.max)
     of_all = _slip_dies(slid[half], slid[three], slid[-1], np.sum) & (len(slid) > CHUNKS_BEFORE_SUM * LOOKS_PER_CHUNK)
     return False if np.all(of_any | of_all) else None
+
+
+def _gained(size: Floats) -> Floats:
+    """Decades that the largest D has gained, shape (T,)."""
+    largest = size.max(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.log10(largest / largest[0]))
 
 
 def _slip_dies(half: Floats, three: Floats, end: Floats, over: Callable[..., Floats]) -> NDArray[np.bool_]:

@@ -42,7 +42,7 @@ from ..factors.sparse_lu import general_lu
 from ..progress import report_progress
 from .eigenvalues import operator_rounding, zero_uncertainty
 from .next_change import next_change
-from .one_sided import OneSidedSystem, least_scale
+from .one_sided import OneSidedSystem, reaching_scale
 from .one_sided_outcome import window_and_most
 from .rates import rates_of
 
@@ -243,7 +243,7 @@ def _range(system: OneSidedSystem, span: Span) -> dict[str, Any]:
         If there is none.
     """
     velocity, paths, slid = (each[:, :1] / span.time for each in (span.displacement, span.paths, span.slid))
-    least, change = least_scale(system, slid), next_change(system, velocity, paths)
+    least, change = reaching_scale(system, slid), next_change(system, velocity, paths)
     most = change["next_change"]
     if most is not None and least >= most:
         raise NotFollowedError(

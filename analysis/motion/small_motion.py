@@ -96,7 +96,8 @@ def follow_small_motion(system: OneSidedSystem, linear: LinearRates, time: float
     """Follow what eigenvalues do not decide."""
     outcome = SmallMotion.of_linear(linear)
     if linear.one_sided:
-        outcome = _after_pushes(outcome, follow_pushes(system, outcome.growth_rate, bool(outcome.grows), time, pushes))
+        found, residual = follow_pushes(system, outcome.growth_rate, bool(outcome.grows), time, pushes)
+        outcome = _after_pushes(outcome, found, residual)
     elif outcome.grows is False:
         outcome = _as_contacts_part(outcome, system, time, pushes)
     known = linear.sticking.decay if time is None else None
@@ -127,7 +128,8 @@ def _as_contacts_part(linear: SmallMotion, system: OneSidedSystem, time: float |
     reach = ContactReach(system)
     reach.look_closely(system.start(random_pushes(configuration, 1)))
     most, reasons = reach.largest_scale, [UNSETTLED] if np.isinf(reach.least_scale) else []
-    largest = most if np.isfinite(most) and configuration.stiffness is None else None  # of bounds a given K knows none
+    # with a K that is given the bounds of contacts are not known
+    largest = most if np.isfinite(most) and configuration.stiffness is None else None
     found = replace(linear, largest_push=largest, residual_push=reach.residual_scale, reasons=reasons)
     if system.remembers_nothing:
         return found
@@ -140,7 +142,7 @@ def _as_contacts_part(linear: SmallMotion, system: OneSidedSystem, time: float |
     return replace(found, creep=creep, reasons=reasons)
 
 
-def _after_pushes(sticks: SmallMotion, found: dict[str, Any]) -> SmallMotion:
+def _after_pushes(sticks: SmallMotion, found: dict[str, Any], residual: float) -> SmallMotion:
     """The outcome of one-sided motion; unknown, too, if it is the motion after no push of any size."""
     reasons, (least, most) = [], found["scales"]
     if found["grows"] is None:
@@ -151,7 +153,7 @@ def _after_pushes(sticks: SmallMotion, found: dict[str, Any]) -> SmallMotion:
         )
     elif not found["grows"] and np.isinf(least):
         reasons.append(UNSETTLED)
-    elif not found["grows"] and least >= most and least > LEFT_ALONE * found["residual_push"]:
+    elif not found["grows"] and least >= most and least > LEFT_ALONE * residual:
         reasons.append(
             f"contacts that count as at Coulomb's bound reach it after pushes above {least:.1g} (velocity along an "
             f"axis) alone, and others reach it, or open, after pushes above {most:.1g}: bring the packing to rest more "
@@ -164,4 +166,5 @@ def _after_pushes(sticks: SmallMotion, found: dict[str, Any]) -> SmallMotion:
         growth_rate=found["growth_rate"] if found["grows"] else sticks.growth_rate,
         reasons=reasons,
         one_sided=found,
+        residual_push=residual,
     )

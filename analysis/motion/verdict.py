@@ -90,19 +90,19 @@ class Stability:
         have been seen; 0 where grows is known); amplification (largest D over the mean square velocity of the push
         along an axis, time^2, while contacts slid: what moves on may take D further); slip_left (how much of their slip
         may be still to come, as a share; 0 if they have stopped, None if that is not known); wears (whether vibration
-        wears contacts down, so that they may slide again); time (how long), pushes (how many); residual_push (as
-        below); scales (between which velocities of the push along an axis this holds: with smaller ones contacts that
-        count as at the bound do not reach it, or the residual forces move the packing as well, with larger ones others
-        do, or open; the first is infinite if the residual forces alone take another contact so far). None without
-        contacts that slide on one side.
+        wears contacts down, so that they may slide again); time (how long), pushes (how many); scales (between which
+        velocities of the push along an axis this holds: with smaller ones contacts that count as at the bound do not
+        reach it, or the residual forces move the packing as well, with larger ones others do, or open; the first is
+        infinite if the residual forces alone take another contact so far). None without contacts that slide on one
+        side.
     creep : Creep or None
         How far a push carries particles if contacts have two derivatives, and none is at the bound.
     largest_push : float or None
         Where motion does not grow, and no contact slides on one side: velocity of a push along an axis up to which
         contacts neither reach the bound nor open. None where K is given.
     residual_push : float
-        Velocity of a push along an axis that moves the particles as far as the residual forces do; 0 where contacts
-        slide on one side, which has its own.
+        Velocity of a push along an axis that moves the particles as far as the residual forces do; 0 where no motion
+        was followed.
     decay : Decay or None
         What became of a random state with sticking contacts; None where eigenvalues decide.
     rising : dict or None
@@ -244,15 +244,8 @@ class Stability:
 
     @property
     def _scales(self) -> Iterator[str]:
-        least, most = LEFT_ALONE * self.residual_push, self.largest_push
-        if self.stable and most is not None:
-            yield (
-                f"holds for {f'pushes of {least:.1g} to {most:.1g}' if least < most else 'no push'} (velocity along an "
-                f"axis): below{'' if least < most else f' {least:.1g}'}, residual forces count; "
-                f"above{'' if least < most else f' {most:.1g}'}, contacts open or slide"
-            )
-        elif self.stable and least:
-            yield f"holds for pushes above {least:.1g} (velocity along an axis), if small: below, residual forces count"
+        if self.stable and self.one_sided is None:
+            yield from self._scales_of_linear_motion
         if self.one_sided is None or self.one_sided["grows"] is not False:
             return
         least, most = self.one_sided["scales"]
@@ -266,6 +259,26 @@ class Stability:
             yield (
                 f"no push is small enough for this motion (below {most:.1g}, where no other contact reaches the bound "
                 f"or opens) and large enough (above {least:.1g}, where residual forces do not count)"
+            )
+
+    @property
+    def _scales_of_linear_motion(self) -> Iterator[str]:
+        least, most = LEFT_ALONE * self.residual_push, self.largest_push
+        if most is None:
+            if least:
+                yield (
+                    f"holds for pushes above {least:.1g} (velocity along an axis), if small: below, residual forces "
+                    "count"
+                )
+        elif least < most:
+            yield (
+                f"holds for pushes of {least:.1g} to {most:.1g} (velocity along an axis): below, residual forces "
+                "count; above, contacts open or slide"
+            )
+        else:
+            yield (
+                f"holds for no push (velocity along an axis): below {least:.1g}, residual forces count; above "
+                f"{most:.1g}, contacts open or slide"
             )
 
     @property

@@ -1,8 +1,8 @@
 r"""Steps of the linearised packing, as LAMMPS takes them: contact by contact, without the matrices K and C.
 
-The few steps of a proof cost a quarter of the assembly of both. Symbols are those of
-:mod:`~faultgouge.analysis.assembly`: a displacement and a velocity of the coordinates change the forces of each contact
-by
+The few steps of a proof cost a quarter of the assembly of both, and a test holds them to the matrices. Symbols are
+those of :mod:`~faultgouge.analysis.assembly`: a displacement and a velocity of the coordinates change the forces of
+each contact by
 
 .. math::
 

@@ -212,7 +212,12 @@ def test_a_motion_that_is_that_of_no_push_has_no_verdict(monkeypatch, scales, st
     at_rest = _three().configuration
     at_rest = derive_frozen(at_rest, load=-at_rest.contact_force)
     follow = small_motion_module.follow_pushes
-    monkeypatch.setattr(small_motion_module, "follow_pushes", lambda *given: follow(*given) | {"scales": scales})
+
+    def with_scales(*given):
+        found, residual = follow(*given)
+        return found | {"scales": scales}, residual
+
+    monkeypatch.setattr(small_motion_module, "follow_pushes", with_scales)
     found = stability(at_rest)
     assert found.stable is stable
     assert any("bring the packing to rest more closely" in each for each in found.reasons) is (stable is None)

@@ -111,10 +111,10 @@ def test_a_lid_moves_as_one(cell, tmp_path, lid):
 
 @pytest.mark.long
 def test_a_lid_with_contacts_at_the_bound_grows_as_lammps_does(cell):
-    """After a push of 1e-7 D is that of LAMMPS over six decades; sticking contacts alone decay or grow.
+    """D is that of LAMMPS over six decades; sticking contacts alone decay or grow.
 
-    A weak contact opens after a push of 3e-10: D differs by 1 % at first, and by 4 % in the end. After a push of 1e-8
-    contacts that lack a little of the bound count, and D differs by 7 %.
+    At first after a push of 1e-7, to 1 %: after smaller ones what contacts lack of the bound counts. Later after one
+    of 1e-8, to 3 %: what has grown from a larger push takes other contacts to the bound.
     """
     from faultgouge import relax
     from faultgouge.pywrap import from_lammps
@@ -128,9 +128,13 @@ def test_a_lid_with_contacts_at_the_bound_grows_as_lammps_does(cell):
     assert told.stable is False
     assert told.one_sided["grows"] is True
     push, times = random_pushes(found, 1)[:, :1], np.array([0.5, 2.0, 8.0, 32.0, 80.0, 100.0, 120.0, 140.0])
-    in_lammps = pushed(lmp, found, push, times, 2e-3, 1e-7)[:, 0]
-    np.testing.assert_allclose(in_lammps, in_steps(found, push, times, 2e-3), rtol=0.06)
-    rate = np.polyfit(times[-4:], np.log(in_lammps[-4:]), 1)[0]
+    expected = in_steps(found, push, times, 2e-3)
+    early, late = slice(0, 5), slice(4, None)
+    found_early = pushed(lmp, found, push, times[early], 2e-3, 1e-7)[:, 0]
+    np.testing.assert_allclose(found_early, expected[early], rtol=0.01)
+    found_late = pushed(lmp, found, push, times[late], 2e-3, 1e-8)[:, 0]
+    np.testing.assert_allclose(found_late, expected[late], rtol=0.03)
+    rate = np.polyfit(times[late], np.log(found_late), 1)[0]
     assert rate == pytest.approx(told.growth_rate, rel=0.05)
 
 

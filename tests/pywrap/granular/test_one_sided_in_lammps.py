@@ -215,7 +215,7 @@ def test_motion_holds_from_the_push_that_is_said(small, law):
     push, times = random_pushes(here, 1)[:, :1], np.linspace(0.2, 4.0, 20)
     motion = one_sided_motion(here, velocities(here, push)[0], times=times)
     expected, (least, most) = motion.mean_square_displacement, motion.scales
-    assert stability(here).one_sided["residual_push"] == pytest.approx(0.1 * least, rel=0.8)
+    assert stability(here).residual_push == pytest.approx(0.1 * least, rel=0.8)
     assert 3 * least < most
     command(lmp, "fix nudge one addforce 1e-8 0 0")
     weak, strong = (pushed(lmp, here, push, times, 1e-3, size)[:, 0] for size in (0.1 * least, 3 * least))
