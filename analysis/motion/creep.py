@@ -19,7 +19,8 @@ import numpy as np
 
 from ..arrays import Floats
 from ..progress import report_progress
-from .one_sided import CLOSE_STEP, OneSidedSystem
+from .contact_reach import LOOK_STEP
+from .one_sided import OneSidedSystem
 from .one_sided_outcome import STEPS_OF_CHUNK, random_pushes
 
 CHUNKS_OF_SPAN = 4
@@ -90,7 +91,7 @@ def follow_creep(system: OneSidedSystem, pushes: int, time: float | None = None,
     mean = replace(both, z=both.z.copy(), v=both.v.copy(), r=np.zeros((0, 2 * pushes)))
     added = [np.zeros_like(both.z)]
     for number in range(1, 1 + (SPANS if time is None and decay else 1)):
-        count = int(np.ceil(span / LOOKS / (CLOSE_STEP * stable)))
+        count = int(np.ceil(span / LOOKS / (LOOK_STEP * stable)))
         for _ in range(LOOKS):
             for state in (both, mean):
                 system.take_steps(state, span / LOOKS / count, count)

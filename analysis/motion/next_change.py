@@ -10,8 +10,6 @@ and opens where the overlap is zero. Particles that do not touch yet are not kno
 besides.
 """
 
-from typing import Any
-
 import numpy as np
 
 from ..arrays import Floats
@@ -21,8 +19,10 @@ from .one_sided import OneSidedSystem
 REACHES, OPENS = "reaches Coulomb's bound", "opens"
 
 
-def next_change(system: OneSidedSystem, velocity: Floats, paths: Floats) -> dict[str, Any]:
-    """The first change of a contact under a load that rises: its `Stability.rising` `next_change` and `next_event`.
+def next_change(system: OneSidedSystem, velocity: Floats, paths: Floats) -> tuple[float | None, str | None]:
+    """At which increase of the load a contact changes first, and whether it reaches the bound or opens.
+
+    None twice if no contact is known that changes.
 
     Parameters
     ----------
@@ -35,10 +35,10 @@ def next_change(system: OneSidedSystem, velocity: Floats, paths: Floats) -> dict
     """
     configuration = system.motion.configuration
     if configuration.stiffness is not None or not len(configuration.contacts):
-        return {"next_change": None, "next_event": None}
+        return None, None
     slides, opens = _increases(configuration, system.of_particles(velocity), system.of_contacts(paths))
     first, event = min((float(slides.min()), REACHES), (float(opens.min()), OPENS))
-    return {"next_change": first, "next_event": event} if first < np.inf else {"next_change": None, "next_event": None}
+    return (first, event) if first < np.inf else (None, None)
 
 
 def _increases(configuration: Configuration, velocity: Floats, paths: Floats) -> tuple[Floats, Floats]:

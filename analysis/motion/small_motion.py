@@ -6,16 +6,16 @@ and packings whose eigenvalues are not all known are followed: each makes a new 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ..configuration import Configuration
+from .contact_reach import PUSH_OVER_RESIDUAL, ContactReach
 from .creep import Creep, follow_creep
 from .decay import Decay, follow_decay
 from .motion import Motion
-from .one_sided import LEFT_ALONE, ContactReach, OneSidedSystem
-from .one_sided_outcome import follow_pushes, random_pushes
+from .one_sided import OneSidedSystem
+from .one_sided_outcome import OneSidedOutcome, follow_pushes, random_pushes
 from .rates import Rates, rates_of
 from .spectrum import Spectrum, spectrum
 from .verdict import LinearNeighbour, WithoutDissipation
@@ -78,7 +78,7 @@ class SmallMotion:
     free: int
     at_least: bool = False
     reasons: Sequence[str] = ()
-    one_sided: dict[str, Any] | None = None
+    one_sided: OneSidedOutcome | None = None
     creep: Creep | None = None
     largest_push: float | None = None
     residual_push: float = 0.0
@@ -142,18 +142,18 @@ def _as_contacts_part(linear: SmallMotion, system: OneSidedSystem, time: float |
     return replace(found, creep=creep, reasons=reasons)
 
 
-def _after_pushes(sticks: SmallMotion, found: dict[str, Any], residual: float) -> SmallMotion:
+def _after_pushes(sticks: SmallMotion, found: OneSidedOutcome, residual: float) -> SmallMotion:
     """The outcome of one-sided motion; unknown, too, if it is the motion after no push of any size."""
-    reasons, (least, most) = [], found["scales"]
-    if found["grows"] is None:
+    reasons, (least, most) = [], found.scales
+    if found.grows is None:
         reasons.append(
-            f"the motion of contacts at Coulomb's bound has not settled within t = {found['time']:.4g}, where D is "
-            f"{found['amplification']:.3g} times the mean square velocity of the push, and D that grows more slowly "
-            f"than exp({found['searched']:.2g} t) would not have been seen"
+            f"the motion of contacts at Coulomb's bound has not settled within t = {found.time:.4g}, where D is "
+            f"{found.amplification:.3g} times the mean square velocity of the push, and D that grows more slowly "
+            f"than exp({found.searched:.2g} t) would not have been seen"
         )
-    elif not found["grows"] and np.isinf(least):
+    elif not found.grows and np.isinf(least):
         reasons.append(UNSETTLED)
-    elif not found["grows"] and least >= most and least > LEFT_ALONE * residual:
+    elif not found.grows and least >= most and least > PUSH_OVER_RESIDUAL * residual:
         reasons.append(
             f"contacts that count as at Coulomb's bound reach it after pushes above {least:.1g} (velocity along an "
             f"axis) alone, and others reach it, or open, after pushes above {most:.1g}: bring the packing to rest more "
@@ -161,9 +161,9 @@ def _after_pushes(sticks: SmallMotion, found: dict[str, Any], residual: float) -
         )
     return replace(
         sticks,
-        grows=found["grows"],
-        at_least=sticks.at_least and not found["grows"],
-        growth_rate=found["growth_rate"] if found["grows"] else sticks.growth_rate,
+        grows=found.grows,
+        at_least=sticks.at_least and not found.grows,
+        growth_rate=sticks.growth_rate if found.growth_rate is None else found.growth_rate,
         reasons=reasons,
         one_sided=found,
         residual_push=residual,

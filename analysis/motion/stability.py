@@ -17,7 +17,6 @@ state is followed (:mod:`~faultgouge.analysis.motion.decay`). Sticking contacts 
 decayed so far that a motion that grows, however slowly, would be seen. Otherwise there is no verdict."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -28,9 +27,10 @@ from ..operators.sliders import with_sticking_contacts
 from .no_verdict import no_verdict
 from .one_sided import OneSidedSystem, forces_on_coordinates
 from .one_sided_outcome import PUSHES, STEP_OF_LARGE, VERDICT_STEP
-from .rising_load import NotFollowedError, motion_under_load
+from .rising_load import RisingMotion, motion_under_load
 from .small_motion import LinearRates, SmallMotion, follow_small_motion
 from .spectrum import Spectrum
+from .steady_drift import NotFollowedError
 from .verdict import LinearNeighbour, Stability
 
 LARGE = 6000
@@ -92,7 +92,7 @@ def stability(
 
 def _rising(
     system: OneSidedSystem, outcome: SmallMotion, direction: Floats, limit: float | None
-) -> tuple[dict[str, Any] | None, str]:
+) -> tuple[RisingMotion | None, str]:
     """The motion under a rising load, or why it was not followed."""
     if outcome.grows:
         return None, "small motion grows"
@@ -107,7 +107,7 @@ def _stability(
     configuration: Configuration,
     linear: LinearRates,
     outcome: SmallMotion,
-    rising: dict[str, Any] | None,
+    rising: RisingMotion | None,
     not_followed: str,
 ) -> Stability:
     """The verdict on the outcome."""
