@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from faultgouge.analysis import Packing
 from faultgouge.analysis.arrays import Floats, Indices
-from faultgouge.analysis.configuration import HasConfiguration
+from faultgouge.analysis.has_configuration import HasConfiguration
 
 from .style import figure_of
 from .surroundings import Wall, cell_of, walls_of, within_cell

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from faultgouge.analysis import Packing, PackingFileError, RunFile, nearest_image
 from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.configuration import HasConfiguration
+from faultgouge.analysis.has_configuration import HasConfiguration
 from faultgouge.analysis.motion.hysteresis import layer_displacement
 
 from .cycle import in_powers_of_ten

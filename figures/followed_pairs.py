@@ -19,8 +19,8 @@ from faultgouge.analysis import (
     closest_to_meeting,
     stability,
 )
-from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.counted import counted
+from faultgouge.analysis.has_configuration import HasConfiguration
 from faultgouge.analysis.motion.eigenvalues import is_negative, zero_uncertainty
 from faultgouge.analysis.windows import Space, System, SystemModes, force_bearing
 

@@ -24,7 +24,7 @@ from faultgouge.analysis import (
     spectrum,
 )
 from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.configuration import HasConfiguration
+from faultgouge.analysis.has_configuration import HasConfiguration
 
 from .disk_view import View
 from .packing import PACKING_WIDTH, PackingArtist

@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 
 from faultgouge.analysis import BadInputError, Configuration, Packing
 from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.counted import counted
+from faultgouge.analysis.has_configuration import HasConfiguration
 
 from .disk_view import View
 from .spheres import SpheresArtist, new_figure

@@ -15,8 +15,8 @@ eigenvalues lie within c/2 of -c/2, where Arnoldi's iteration with that shift fi
 import numpy as np
 from scipy.sparse import csc_array, eye_array
 
-from ..configuration import HasConfiguration
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
+from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats
 from .eigenvalues import SAFETY, is_negative, operator_rounding, zero_uncertainty
 from .nearest_modes import nearest_modes

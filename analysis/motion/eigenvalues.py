@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ..arrays import Complexes, Floats, Indices
-from ..configuration import HasConfiguration
+from ..has_configuration import HasConfiguration
 
 SAFETY = 50.0
 """Imaginary parts count from this many times their rounding uncertainty.

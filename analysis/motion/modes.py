@@ -17,7 +17,7 @@ from scipy.linalg import eig
 from scipy.sparse import csr_array
 
 from ..arrays import Complexes, Floats, Indices
-from ..configuration import HasConfiguration
+from ..has_configuration import HasConfiguration
 from ..operators.stiffness import stiffness_matrix
 from .eigenvalues import SAFETY, active_coordinates, mass_weighted, unit_rounding
 

@@ -35,7 +35,8 @@ from scipy.sparse import block_array, bsr_array, csr_array, eye_array
 from scipy.sparse.linalg import expm_multiply
 
 from ..arrays import Floats, Indices, floats
-from ..configuration import Configuration, HasConfiguration
+from ..configuration import Configuration
+from ..has_configuration import HasConfiguration
 from ..operators.linearised_contacts import rescaling_operators
 from ..operators.sliders import margins, sliders_of
 from .motion import Motion

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
-from ..configuration import HasConfiguration
+from ..has_configuration import HasConfiguration
 from .contact_reach import ContactReach
 from .one_sided import OneSidedSystem, forces_on_coordinates, on_all_coordinates
 

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse.linalg import svds
 
-from ..configuration import HasConfiguration
 from ..errors import FaultgougeError
+from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats, Indices
 from .eigenvalues import Complexes
 from .matrix_functions import WELL_CONDITIONED, BlockDiagonal, Function, second_order

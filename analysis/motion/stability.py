@@ -21,7 +21,8 @@ from collections.abc import Sequence
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, number
-from ..configuration import Configuration, HasConfiguration
+from ..configuration import Configuration
+from ..has_configuration import HasConfiguration
 from ..operators.asymmetry import asymmetry
 from ..operators.sliders import with_sticking_contacts
 from .no_verdict import no_verdict

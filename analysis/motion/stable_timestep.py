@@ -53,7 +53,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from ..arrays import derive_frozen
-from ..configuration import Configuration, HasConfiguration
+from ..configuration import Configuration
+from ..has_configuration import HasConfiguration
 from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats

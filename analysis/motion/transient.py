@@ -38,7 +38,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..configuration import HasConfiguration
+from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats
 from .propagator import NORM_ACCURACY, NoGainError, Norm, Propagator, stable_motion
 from .response import LinearMotion

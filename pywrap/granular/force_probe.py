@@ -40,9 +40,20 @@ class HistoryChangeError(NotTakenError):
 
 
 @dataclass(frozen=True, eq=False)
-class Particles:
-    """Who is displaced: IDs, places and radii of all particles, shape (N,), (N, 3) and (N,), and q = P Q; and the
-    commands of fix rigid, if there are bodies."""
+class ProbedParticles:
+    """All particles of the copy: those that are displaced, and their neighbours.
+
+    Attributes
+    ----------
+    dimension : int
+        2 or 3.
+    ids, position, radius : ndarray, shape (N,), (N, 3) and (N,)
+        IDs, centres and radii.
+    constraint : scipy.sparse.csr_array, shape (coordinates, coordinates)
+        P of q = P Q.
+    bodies : tuple of str
+        The commands of fix rigid.
+    """
 
     dimension: int
     ids: Indices
@@ -81,7 +92,7 @@ def hold_still(lmp: Any, bodies: tuple[str, ...]) -> None:
     lmp.command(f"fix faultgouge_moves {group} nve/noforce")
 
 
-def _rows(lmp: Any, particles: Particles) -> Indices:
+def _rows(lmp: Any, particles: ProbedParticles) -> Indices:
     ids = owned_array(lmp, "id")
     rows = np.argsort(ids)
     if not np.array_equal(ids[rows], particles.ids):
@@ -89,7 +100,7 @@ def _rows(lmp: Any, particles: Particles) -> Indices:
     return rows
 
 
-def set_coordinate_velocity(lmp: Any, particles: Particles, velocity: Floats) -> None:
+def set_coordinate_velocity(lmp: Any, particles: ProbedParticles, velocity: Floats) -> None:
     """Give the particles velocities of their coordinates, shape (axes N,)."""
     values = np.zeros((6, len(particles.ids)))
     values[particles.axes] = velocity.reshape(len(particles.axes), -1)
@@ -98,7 +109,7 @@ def set_coordinate_velocity(lmp: Any, particles: Particles, velocity: Floats) ->
     owned_array(lmp, "omega")[rows] = values[3:].T / particles.radius[:, None]
 
 
-def _forces(lmp: Any, particles: Particles) -> Floats:
+def _forces(lmp: Any, particles: ProbedParticles) -> Floats:
     """Forces on the coordinates, F and T/R, shape (axes N,)."""
     rows = _rows(lmp, particles)
     torque = owned_array(lmp, "torque")[rows] / particles.radius[:, None]
@@ -118,7 +129,7 @@ class Probe:
     """
 
     lmp: Any
-    particles: Particles
+    particles: ProbedParticles
     duration: float | None
     sizes: tuple[float, ...]
     settles: bool = False

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .analysis import BadInputError, Configuration, RunFile
-from .analysis.configuration import HasConfiguration
+from .analysis.has_configuration import HasConfiguration
 from .analysis.motion.hysteresis import turning_points
 from .figures.browser_page import Axis, equally_spaced, loads_shown, write_view
 from .figures.followed_pairs import seconds

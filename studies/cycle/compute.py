@@ -28,7 +28,7 @@ from scipy.linalg import lu_factor, lu_solve
 
 from ...analysis import Configuration, Packing
 from ...analysis.arrays import Complexes, Floats, derive_frozen
-from ...analysis.configuration import HasConfiguration
+from ...analysis.has_configuration import HasConfiguration
 from ...analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, unit_rounding, zero_uncertainty
 from ...analysis.motion.modes import Modes, participation_ratio
 from ...analysis.motion.motion import Motion

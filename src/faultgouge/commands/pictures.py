@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from faultgouge.figures.film import Film
     from faultgouge.figures.mode import ModeShape
 
-    from ..analysis.configuration import HasConfiguration
+    from ..analysis.has_configuration import HasConfiguration
 
 app = typer.Typer()
 

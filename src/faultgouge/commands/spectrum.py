@@ -23,7 +23,7 @@ from .terminal import (
 
 if TYPE_CHECKING:
     from ..analysis import Spectrum, Stability
-    from ..analysis.configuration import HasConfiguration
+    from ..analysis.has_configuration import HasConfiguration
 
 app = typer.Typer()
 
