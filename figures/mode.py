@@ -27,7 +27,8 @@ from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.has_configuration import HasConfiguration
 
 from .disk_view import View
-from .packing import PACKING_WIDTH, PackingArtist
+from .packing import PACKING_WIDTH
+from .packing_artist import PackingArtist
 from .spheres import add_scale_of_turns, draw_turns, new_figure
 from .style import EDGE, INK, styled
 

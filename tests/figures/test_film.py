@@ -8,7 +8,9 @@ import pytest
 from PIL import Image
 
 from faultgouge.analysis import Packing
-from faultgouge.figures.film import LARGEST_SHOWN, RampFilm, RunFilm, RunMotion
+from faultgouge.figures.film import LARGEST_SHOWN
+from faultgouge.figures.ramp_film import RampFilm
+from faultgouge.figures.run_film import RunFilm, RunMotion
 from faultgouge.figures.writers import UNSEEN, usual_suffix, write_film
 
 
