@@ -32,7 +32,7 @@ there and back leaves a share of step / radius."""
 SUM_OF_RETURN_ERRORS = 1e-3
 """Change of forces that all ways there and back together may leave, as a share of the forces on one way."""
 
-FORCE_ROUNDING = 1e-13
+PROBE_ROUNDING = 1e-13
 """Rounding of forces, as a share of the largest force at rest."""
 
 
@@ -155,7 +155,7 @@ class Probe:
             sides = []
             for way in (sign * size for size in self.sizes for sign in (1, -1)):
                 there, back = self._go(way * q), self._go(-way * q if self.duration else 0.0 * q)
-                left = np.abs(back - [rest, first]).max(axis=1) - FORCE_ROUNDING * np.abs(first).max()
+                left = np.abs(back - [rest, first]).max(axis=1) - PROBE_ROUNDING * np.abs(first).max()
                 if np.any(left > np.array([RETURN_ERROR, SUM_OF_RETURN_ERRORS]) * np.abs(there - rest).max()):
                     raise HistoryChangeError("Histories change on a way there and back.")
                 if self.duration:

@@ -33,8 +33,9 @@ rounding, 1e-12 of a force whose overlap is 1e-4 of a radius."""
 STEPS_BETWEEN_LOOKS = 2000
 """Steps between two looks: many beside the set-up of a run, few beside a relaxation."""
 
-COORDINATE_ROUNDING = 1e-15
-"""Rounding of a coordinate, as a share of the largest one: nothing comes closer to rest."""
+FORCE_ROUNDING = 1e-15
+"""Rounding of forces: that of the largest coordinate, as a share, times the largest entry of K. Nothing comes closer to
+rest."""
 
 DRAG_RATE = 0.01
 """Rate of the drag at the beginning, per time step: critical for a mode of 1000 steps."""
@@ -227,7 +228,7 @@ class _Drag:
 def _rounding(found: Configuration) -> float:
     """What a rounding of a coordinate makes of the force of the stiffest contact."""
     stiffness = found.contacts.normal_stiffness if found.stiffness is None else found.stiffness.data
-    return COORDINATE_ROUNDING * float(np.abs(found.position).max() * np.abs(stiffness).max(initial=0.0))
+    return FORCE_ROUNDING * float(np.abs(found.position).max() * np.abs(stiffness).max(initial=0.0))
 
 
 def _refuse_long_steps(found: Configuration, timestep: float, where: str) -> None:
