@@ -1,15 +1,19 @@
 r"""What becomes of one-sided motion: it grows, rests or has not settled.
 
-Motions begin with random pushes of all particles alike, and with their opposites, since one-sided motion is not odd. A
-motion *grows* if D has gained `DECADES` and still gains at a steady rate; it *rests* if the sliders have come to rest
-and the packing with sticking contacts does not grow, since then the motion is linear and decays for ever. Where the
-slowest vibration decays slowly, contacts slip on with it: the motion rests, too, if the slips of four spans of time
-each fall about as fast as this vibration, and what is left is little. Otherwise the motion has not settled. The time is
-`STEPS_OF_CHUNK` stable time steps as often as needed, up to `WORK` multiplications.
+Motions begin with random pushes of all particles, and with the opposites of these pushes, since one-sided motion is not
+odd. A motion
 
-Sliders that have come to rest may slide again under a law of two derivatives: vibration wears tangential forces down
-(:mod:`~faultgouge.analysis.motion.creep`), at a rate that falls with the vibration. Such a motion, followed on after
-its sliders have rested, rests as long as D does not gain at a steady rate.
+- *grows* if D has gained `DECADES` and still gains at a steady rate;
+- *rests* if the sliders have come to rest and the packing with sticking contacts does not grow: from then on the motion
+  is linear and decays. A slow vibration lets contacts slip for as long as it lasts. Such a motion rests, too, if the
+  slips in four spans of time fall about as fast as this vibration, and little slip is still to come;
+- *has not settled* otherwise.
+
+A motion is followed in chunks of `STEPS_OF_CHUNK` stable time steps, up to `WORK` multiplications.
+
+Under a law of two derivatives vibration wears tangential forces down (:mod:`~faultgouge.analysis.motion.creep`), at a
+rate that falls with the vibration, so that sliders may slide again after they have come to rest. Such a motion rests as
+long as D does not gain at a steady rate afterwards.
 """
 
 from collections.abc import Callable

@@ -1,14 +1,14 @@
 r"""Two neighbouring loads with all of their modes: which is which, and where a narrow window may hide in between.
 
-**Of functions that are known at both ends** with their slopes, a cubic goes through both values and slopes, and a
-parabola through either slope and both values. The lowest point of the cubic, less the disagreement of the three, is a
-bound (`deepest_dip`). Where the bound is negative the function may be.
+**A function whose values and slopes are known at both ends** has a cubic through both values and slopes, and two
+parabolas through both values and one slope. The lowest point of the cubic, less the disagreement of the three curves,
+is a lower bound (`deepest_dip`): where the bound is negative the function may be negative.
 
-**Two modes without dissipation** have :math:`D = (\lambda_1 - \lambda_2)^2`, whose slope
-:math:`D' = 2 (\lambda_1 - \lambda_2)(\lambda_1' - \lambda_2')` is known at either end. A load at which contacts change
-bends the levels: something may hide, too, if it may as the levels go on from the increment before. Whether one of two
-modes meets a third shows in the product :math:`(\lambda_1 - \lambda)(\lambda_2 - \lambda) = (\bar\lambda - \lambda)^2 -
-D / 4`, which is smooth where the two coalesce.
+**Two modes without dissipation** have :math:`D = (\lambda_1 - \lambda_2)^2`, whose slope :math:`D' = 2 (\lambda_1 -
+\lambda_2)(\lambda_1' - \lambda_2')` is known at either end. A load at which contacts change bends the levels: a window
+may also hide where the levels, continued from the increment before, would allow for one. Whether one of two modes meets
+a third shows in the product :math:`(\lambda_1 - \lambda)(\lambda_2 - \lambda) = (\bar\lambda - \lambda)^2 - D / 4`,
+which is smooth where the two coalesce.
 
 **Two modes with dissipation** that nearly meet may begin and cease to grow between two loads at which neither grows.
 Half the sum m of two eigenvalues and :math:`D = (s_1 - s_2)^2` are smooth even where both coalesce, so that

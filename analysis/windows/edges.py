@@ -1,12 +1,15 @@
 r"""Windows of loads on which a motion grows, and their edges: where the growth goes through zero, or jumps.
 
-At an edge the growth of a motion (:mod:`~faultgouge.analysis.windows.space`) changes its sign. Without dissipation the
-discriminant D of two modes does, at a *coalescence*, where :math:`|y^H x| \to 0`; with it Re s of one mode does, at a
-*Hopf* point, or at a *steady* one if s itself is zero. If the growth goes through zero along a straight line at
-distances far below the increment, the edge is one of these. A few secant steps bracket the root; five points close to
-it then give the last digits, and say how many there are. If the growth jumps, the equilibrium itself does: a contact
-opened, closed or slid. Bisection locates the jump, and the edge is a *contact change*. A mere crossing of two levels
-touches D = 0 without a change of sign.
+At an edge the growth of a motion (:mod:`~faultgouge.analysis.windows.space`) changes its sign. The growth goes through
+zero along a straight line, at distances far below the increment, at
+
+- a *coalescence*: without dissipation, where the discriminant D of two modes changes its sign and
+  :math:`|y^H x| \to 0`;
+- a *Hopf* point: with dissipation, where Re s of one mode changes its sign; a *steady* point if s itself is zero.
+
+A few secant steps bracket the root; five points close to the root then give its last digits, and their number. The
+growth jumps at a *contact change*, where the equilibrium itself jumps: a contact opened, closed or slid. Bisection
+locates the jump. A mere crossing of two levels touches D = 0 without a change of sign.
 """
 
 from collections.abc import Callable, Sequence

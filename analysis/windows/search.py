@@ -1,12 +1,12 @@
 r"""The walk along a ramp: all windows of a family of systems, with dissipation or without.
 
-**From load to load.** What grows at the upper load of an increment is followed back to the lower one: it grew there
-already, and its window stays open, or its window begins in between, at an edge that is solved for
-(:mod:`~faultgouge.analysis.windows.edges`). What grows at the lower load alone is followed ahead to where its window
-ends. Modes that grow at neither may do so in between, and modes that grow at both may rest: where the bounds of
-:mod:`~faultgouge.analysis.windows.between` allow for that, the modes are looked at in between. An increment that shows
-another number of growing motions inside, or is in doubt for another reason, is divided there and walked in parts; until
-nothing wider than `Search.narrowest` is left to doubt.
+**From load to load.** A motion that grows at the upper load of an increment is followed back to the lower load. If the
+motion grows there, too, its window stays open. Otherwise its window begins in between, at an edge that is solved for
+(:mod:`~faultgouge.analysis.windows.edges`). A motion that grows at the lower load alone is followed ahead to the end of
+its window. Modes that grow at neither load may grow in between, and modes that grow at both may rest in between. Where
+the bounds of :mod:`~faultgouge.analysis.windows.between` allow for this, the modes are computed at a load in between.
+An increment with another number of growing motions there, or in doubt for another reason, is divided and walked in
+parts, until no part in doubt is wider than `Search.narrowest`.
 
 **Few motions.** On most increments nothing happens, and to know that takes no decomposition. A screen
 (:mod:`~faultgouge.analysis.windows.screens`) names the few motions that may change. Where too many are named, or the

@@ -51,7 +51,7 @@ from .law_remarks import remark_on
 from .looks import box_of, particles_of
 from .mobility import mobility
 
-AGREES = 1e-6
+FORCE_AGREEMENT = 1e-6
 """Relative difference of the normal forces of LAMMPS from those of its commands, besides that of roundings."""
 
 OVERLAP_ROUNDING = 1e-14
@@ -85,7 +85,7 @@ def configuration_by_laws(lmp: Any, commands: Commands, found: Arrays, laws: Kno
 def check_friction(contacts: LinearisedContacts, *, rests: bool) -> None:
     """Refuse tangential forces beyond Coulomb's bound, which is that of the commands."""
     size = np.linalg.norm(contacts.tangential_force, axis=1)
-    beyond = size > contacts.friction + AGREES * (contacts.friction + contacts.normal_force)
+    beyond = size > contacts.friction + FORCE_AGREEMENT * (contacts.friction + contacts.normal_force)
     if np.any(beyond):
         most = np.max(size[beyond] / contacts.normal_force[beyond])
         mu = np.min(contacts.friction[beyond] / contacts.normal_force[beyond])
@@ -100,7 +100,7 @@ def check_friction(contacts: LinearisedContacts, *, rests: bool) -> None:
 def _check_torques(others: Floats, commands: Commands, contacts: LinearisedContacts) -> None:
     """Refuse torques besides those of the contacts: in all that is taken here contacts alone turn particles."""
     forces = (
-        AGREES * np.abs(contacts.tangential_force).max(initial=0.0),
+        FORCE_AGREEMENT * np.abs(contacts.tangential_force).max(initial=0.0),
         OVERLAP_ROUNDING * contacts.normal_force.max(initial=0.0),
     )
     if np.abs(others).max() > sum(forces):
@@ -211,7 +211,7 @@ def _linearise_measured(
 def _agree(computed: Floats, stiffness: Floats, contacts: OneLaw) -> None:
     """Refuse normal forces that are not those of the commands."""
     said, rounding = contacts.forces[:, 0], OVERLAP_ROUNDING * stiffness * contacts.geometry["slip_arm"].sum(axis=1)
-    if len(said) and np.any(np.abs(computed - said) > AGREES * np.max(np.abs(said)) + rounding):
+    if len(said) and np.any(np.abs(computed - said) > FORCE_AGREEMENT * np.max(np.abs(said)) + rounding):
         raise NotTakenError(
             f"The normal forces of the {contacts.who} are not those of the commands: {GIVE_LINES}, as they hold now."
         )

@@ -39,7 +39,7 @@ from .force_slopes import Slope, slopes_along, slopes_by_shorter_steps
 from .granular_commands import NotTakenError
 from .look_in_a_copy import in_a_copy
 
-SLOW = 1e12
+LENGTH_OF_STEP = 1e12
 """Length of a step in which particles are displaced, in time steps: dashpots exert nothing, however strong."""
 
 SHARE_OF_OVERLAP = 0.003
@@ -57,15 +57,15 @@ less than 1e-10 of Coulomb's bound, which is 2e-6 of mu of the difference."""
 FREE_DISPLACEMENT = 1e-7
 """A displacement as a share of a radius where no particles overlap."""
 
-PUSH = 1e-4
+DASHPOT_FORCE = 1e-4
 """Force of dashpots as a share of the mean contact force: contacts do not reach Coulomb's bound by it unless they are
 there, and the rounding of forces is 1e-7 of it or less."""
 
-SIDES = 1e-3
+LEAST_JUMP = 1e-3
 """Jump of a derivative, as a share of the largest entry, from which on two sides are said to differ; the extrapolation
 leaves 1e-5 of one."""
 
-SHORTER = 0.03
+NEXT_SIZE = 0.03
 """Size of the next shorter displacement, as a share of the one before: contacts of cohesive particles, which pull about
 as much as they push, may bear a force 1e-5 of the mean one, and slide within 1e-7 of an overlap."""
 
@@ -73,13 +73,13 @@ SHORTEST_OF_COORDINATE, SHORTEST_OF_OVERLAP = 1e-11, 1e-6
 """Shortest displacement as a share of the largest coordinate, whose rounding is 1e-5 of it, and of the median overlap:
 the history that `granular` does not turn is 6e-4 of mu of the difference."""
 
-DIFFERS = 1e-2
+SHORTEST_ERROR = 1e-2
 """Error of the shortest displacement, as a share of the largest force, from which on shorter ones are tried."""
 
 SHORTEST_VELOCITY = 1e-6
 """Lowest velocity as a share of the first one: the rounding of forces is 1e-6 of their differences."""
 
-TOO_LARGE = 0.1
+LARGEST_OPERATOR_ERROR = 0.1
 """Error, relative to the largest entry, beyond which the differences describe nothing."""
 
 
@@ -95,7 +95,7 @@ class ForceDifferences:
         Error of both, as a share of the largest entry.
     jump : ndarray, shape (N,)
         Largest difference of the two one-sided derivatives of the force on each particle, as a share of the largest
-        entry; zero below SIDES.
+        entry; zero below LEAST_JUMP.
     """
 
     stiffness: csr_array
@@ -133,12 +133,12 @@ def _measure(lmp: Any, particles: ProbedParticles, force: float | None) -> Force
     step = displacement(particles, pairs)
     colours = Colours(particles, pairs, 4 * step)
     timestep = float(lmp.extract_global("dt"))
-    lmp.command(f"timestep {SLOW * timestep:.17g}")
+    lmp.command(f"timestep {LENGTH_OF_STEP * timestep:.17g}")
     lmp.command("thermo_style custom step")
-    by_place = Probe(lmp, particles, SLOW * timestep, (0.5, 1.0))
+    by_place = Probe(lmp, particles, LENGTH_OF_STEP * timestep, (0.5, 1.0))
     lengths = _sizes(step, _shortest(particles, pairs))
     stiffness = _derivative(by_place, colours, lengths)
-    if stiffness.unexplained > SIDES:
+    if stiffness.unexplained > LEAST_JUMP:
         farther = Colours(particles, pairs, 4 * step, reach=2)
         other = _derivative(replace(by_place, settles=True), farther, lengths)
         if other.unexplained < 0.5 * stiffness.unexplained:
@@ -146,7 +146,7 @@ def _measure(lmp: Any, particles: ProbedParticles, force: float | None) -> Force
     if force is None:
         force = step * float(np.abs(stiffness.matrix.data).max(initial=0.0)) / SHARE_OF_OVERLAP
     by_velocity = Probe(lmp, particles, None, (1.0,))
-    speed = _speed(by_velocity, step / timestep, PUSH * force)
+    speed = _speed(by_velocity, step / timestep, DASHPOT_FORCE * force)
     if speed == 0.0:
         damping = stiffness._replace(matrix=csr_array(stiffness.matrix.shape))
     else:
@@ -158,7 +158,7 @@ def _measure(lmp: Any, particles: ProbedParticles, force: float | None) -> Force
 
 def _sizes(first: float, last: float) -> list[float]:
     """Ever shorter displacements, or lower velocities, from the first to the last one."""
-    count = max(0, int(np.ceil(np.log(last / first) / np.log(SHORTER))))
+    count = max(0, int(np.ceil(np.log(last / first) / np.log(NEXT_SIZE))))
     return [float(each) for each in np.geomspace(first, last, count + 1)] if count else [first]
 
 
@@ -186,10 +186,10 @@ def _refuse_errors(particles: ProbedParticles, jump: Floats, error: Floats) -> N
     """Refuse operators that describe nothing, with the particle where the error is largest; shape (N,) both."""
     error = np.where(jump > 0, 0.0, error)
     worst = int(np.argmax(error))
-    if error[worst] <= TOO_LARGE:
+    if error[worst] <= LARGEST_OPERATOR_ERROR:
         return
     place = ", ".join(f"{x:.6g}" for x in particles.position[worst, : particles.dimension])
-    others = int(np.sum(error > TOO_LARGE)) - 1
+    others = int(np.sum(error > LARGEST_OPERATOR_ERROR)) - 1
     raise NotTakenError(
         f"K and C by differences of forces are {error[worst]:.2g} of their largest entry from the forces of a "
         f"displacement of all particles at particle {particles.ids[worst]} at ({place})"
@@ -234,14 +234,14 @@ def _derivative(probe: Probe, colours: Colours, sizes: list[float]) -> _Derivati
     *found, first = slopes_along(probe, [*directions, random], sizes[0])
     last = slopes_along(probe, [random], sizes[-1])[0]
     matrix, jump = _assemble(particles, found, owners)
-    differs = _error(particles, matrix, random, last) > DIFFERS
+    differs = _error(particles, matrix, random, last) > SHORTEST_ERROR
     largest = max(np.abs(each.mean).max() for each in (*found, first))
     rough = [
-        k for k, each in enumerate(found) if each.uneven.max() > SIDES * largest or np.any(owners[k][differs] >= 0)
+        k for k, each in enumerate(found) if each.uneven.max() > LEAST_JUMP * largest or np.any(owners[k][differs] >= 0)
     ]
     if rough:
         shorter = slopes_by_shorter_steps(
-            probe, {k: directions[k] for k in rough}, owners, sizes, differs, SIDES * largest
+            probe, {k: directions[k] for k in rough}, owners, sizes, differs, LEAST_JUMP * largest
         )
         found = [shorter.get(k, each) for k, each in enumerate(found)]
         matrix, jump = _assemble(particles, found, owners)
@@ -277,7 +277,7 @@ def _assemble(particles: ProbedParticles, found: list[Slope], owners: list[Indic
     matrix.eliminate_zeros()
     matrix.sort_indices()
     largest = np.abs(matrix.data).max(initial=0.0)
-    return matrix, np.where(jump > SIDES * largest, jump, 0.0) / (largest or 1.0)
+    return matrix, np.where(jump > LEAST_JUMP * largest, jump, 0.0) / (largest or 1.0)
 
 
 def _sums(particles: ProbedParticles) -> csr_array:

@@ -22,7 +22,7 @@ from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError,
 from .instance_queries import open_files, require_instance
 from .look_in_a_copy import can_copy, in_a_copy
 from .looks import look_at_contacts
-from .motion_proof import BOUND, GOOD, NotProvedError, OtherStiffnessError
+from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError, OtherStiffnessError
 from .motion_proof import prove as prove_motion
 
 
@@ -106,7 +106,8 @@ def take_configuration(
         # what acts on velocities, or on particles far apart, is not in differences either, and has been named
         with suppress(NotTakenError):
             found = _by_differences(lmp, given, balance=balance, prove=prove)
-            if found.proof is not None and max(found.proof / BOUND, found.operator_error / GOOD) <= 1:
+            proved = found.proof is not None and found.proof <= LARGEST_DIFFERENCE
+            if proved and found.operator_error <= SMALL_DIFFERENCE:
                 return found
             # no linear motion is that of contacts which slide on one side, and no verdict is given
             if isinstance(reason, OtherStiffnessError) and len(found.one_sided_particles):

@@ -113,24 +113,33 @@ def refuse_impossible(scene: SceneKeys) -> tuple[str, str] | None:
             f"= {law.kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is {rounding:.1g} of F_y, "
             "and no packing comes to rest: lower it, or raise load.fy"
         )
+    return _refuse_long_settling(scene, packing) or _refuse_long_ramp(scene)
+
+
+def _refuse_long_settling(scene: SceneKeys, packing: GeneratedPacking) -> tuple[str, str] | None:
     steps = _settling_steps(scene)
     if packing.settle_friction:
         ends = LEAST_SETTLING_SHARE * steps < STEPS_TO_REST
     else:
         ends = steps < STEPS_TO_REST if packing.disks <= STAGED_DISKS else LEAST_SETTLING_SHARE * steps < SINKING_STEPS
-    if not ends:
-        return "law.kn", (
-            f"= {law.kn:g} is too stiff for load.fy = {fy:g}: settling takes about {_count(steps)} time steps, more "
-            "than are made: lower it, or raise load.fy"
-        )
-    if scene.ramp is not None and scene.ramp.method == "overdamped":
-        steps = _overdamped_steps(scene)
-        if not steps < STEPS_TO_REST:
-            return "relax.time_step", (
-                f"= {scene.relax.time_step:g} needs about {_count(steps)} steps to an equilibrium, more than are made: "
-                f"raise it, or leave it out for {_overdamped_step(scene):.2g}"
-            )
-    return None
+    if ends:
+        return None
+    return "law.kn", (
+        f"= {scene.law.kn:g} is too stiff for load.fy = {scene.load.fy:g}: settling takes about {_count(steps)} time "
+        "steps, more than are made: lower it, or raise load.fy"
+    )
+
+
+def _refuse_long_ramp(scene: SceneKeys) -> tuple[str, str] | None:
+    if scene.ramp is None or scene.ramp.method != "overdamped":
+        return None
+    steps = _overdamped_steps(scene)
+    if steps < STEPS_TO_REST:
+        return None
+    return "relax.time_step", (
+        f"= {scene.relax.time_step:g} needs about {_count(steps)} steps to an equilibrium, more than are made: "
+        f"raise it, or leave it out for {_overdamped_step(scene):.2g}"
+    )
 
 
 def _at_settling(scene: SceneKeys, at: SettlingLoad) -> SceneKeys:

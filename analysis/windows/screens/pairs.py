@@ -26,9 +26,9 @@ So the discriminant is positive up to this order, and the two modes do not meet,
 
     |B_{ii} - B_{jj}| - R_{ii} - R_{jj} > 2 \sqrt{(|w| + R_{ij})^2 - (|s| - R_{ij})^2} ,
 
-without the last square where :math:`|s| < R_{ij}`, and without the root where it is of a negative number. Denominators
-are taken no smaller than twice the coupling: where they would be, that pair does not pass the test itself. Between the
-loads, H and B are taken to stay within `Limits.slack` of the straight line.
+without the last square where :math:`|s| < R_{ij}`, and without the root of a negative number. No denominator is taken
+smaller than twice the coupling: a pair with a smaller distance does not pass its own test. Between the loads, H and B
+are taken to stay within `Limits.slack` of the straight line.
 """
 
 from collections.abc import Sequence

@@ -7,9 +7,9 @@ whose windows the search of small packings finds. What clusters announce is conf
 has the same digits as in the search among all modes.
 
 **Where the clusters are wrong.** Between two loads the projected system is taken to be a straight line, which it is not
-where contacts open, close or slide. What the system has instead shows it: the announced motion is not there, cannot be
-followed, or begins to grow elsewhere. The increment is then divided. What is in doubt even in the finest parts is
-handed out with the result. Elsewhere the onsets of clusters were within a tenth of an increment of the confirmed ones
+where contacts open, close or slide. The system itself then contradicts the clusters: the announced motion is not there,
+cannot be followed, or begins to grow elsewhere. The increment is divided. The finest parts that are still in doubt are
+named with the result. Elsewhere the onsets of clusters were within a tenth of an increment of the confirmed ones
 (packings of 1,000 disks, increments of 1e-3).
 """
 

@@ -2,20 +2,20 @@
 
 Dissipation and the antisymmetric part couple a mode to its neighbours in the spectrum only. So slices are searched as
 for complex pairs (:mod:`~faultgouge.analysis.windows.slices.pairs`). In the eigenbasis of a slice the modes that may
-grow are named, clusters about them announce where one begins to, and the system itself confirms it
+grow are named, clusters about these announce an onset, and the system itself confirms the onset
 (:mod:`~faultgouge.analysis.windows.screens.growth`).
 
 **Slices that are left out.** In each slice the antisymmetric part may be so many times larger before it can feed any
-motion as much as the motion loses (`Reduced.bears`). As long as it has not grown by `Limits.trusted` of that, a
-slice is not looked at again.
+motion as much as the motion loses (`Reduced.bears`). A slice is looked at again once the antisymmetric part has grown
+by `Limits.trusted` of this factor.
 
-**Strong dashpots** couple more modes than a cluster can have, and clusters may miss a motion. From the load on at which
-that is so, all motions that grow are looked for with the operator itself
-(:mod:`~faultgouge.analysis.windows.slices.axis`), at loads whose numbers on the ramp grow by `Limits.stride`. Those
-that grow are followed back to where they begin to, and all are looked for again right below the first onset and at the
-last load of the ramp before, until none grows there. So no other window is open at the first onset, unless increments
-before it are in doubt. A window that opens and ends between two of these loads is not excluded. Of more than
-`Limits.axis` coordinates clusters alone are searched, and all loads before the window are named as in doubt.
+**Strong dashpots** couple more modes than a cluster can have, so that clusters may miss a motion. From the first load
+with such dashpots on, all motions that grow are looked for with the operator itself
+(:mod:`~faultgouge.analysis.windows.slices.axis`), at loads whose numbers on the ramp grow by `Limits.stride`. Motions
+that grow are followed back to their onsets. All growing motions are then looked for once more, right below the first
+onset and at the last load of the ramp before, until none grows there. So no other window is open at the first onset,
+unless increments before it are in doubt. A window that opens and ends between two of these loads is not excluded. Of
+more than `Limits.axis` coordinates clusters alone are searched, and all loads before the window are named as in doubt.
 """
 
 from collections.abc import Iterator, Sequence

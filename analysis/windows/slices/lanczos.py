@@ -9,11 +9,10 @@ serves the slice, and slices know nothing of each other, so that threads share t
 
 **That none is missing** is known from *Sylvester's law of inertia*: in :math:`S - \sigma = L D L^T` the negative pivots
 are as many as there are eigenvalues below :math:`\sigma`. So every eigenvalue of a slice has its number in the whole
-spectrum. Where two slices meet both must give the same eigenvalue the same number.
+spectrum. Two slices that meet must give the same eigenvalue the same number.
 
-Several ranks count together, and each finds a run of neighbouring slices
-(:mod:`~faultgouge.analysis.windows.slices.ranks`) of those that no other search has found or taken
-(:mod:`~faultgouge.analysis.windows.slices.store`).
+Several ranks count together (:mod:`~faultgouge.analysis.windows.slices.ranks`). Each then finds a run of neighbouring
+slices that no other search has found or taken (:mod:`~faultgouge.analysis.windows.slices.store`).
 """
 
 from collections import deque

@@ -91,6 +91,7 @@ def onset(
     with status("settling") as show, show_progress(show, "settling: "):
         bed = shared_bed(wanted)
     found: list[dict[str, Any]] = []
+    failed: Exception | None = None
     for mu in wanted.law.mus:
         try:
             if wanted.damping is not None:
@@ -99,14 +100,14 @@ def onset(
                 found.append(_undamped_onset(part, folder, wanted, mu, bed, not every, tell))
         except (OnsetError, NoEquilibriumError) as error:
             found.append({"mu": mu, "fx_c": None, "no_onset": str(error)} | _only_undamped(mu, error, tell))
-            failed: Exception = error
+            failed = error
             if len(wanted.law.mus) > 1:
                 tell(f"mu = {mu:g}: no onset: {error}")
-                failed = OnsetError(
-                    f"None of the {len(wanted.law.mus)} friction coefficients has an onset on this ramp."
-                )
-    none = all(each["fx_c"] is None for each in found)
-    if none and not any("undamped" in each for each in found):
+    if any(each["fx_c"] is not None for each in found):
+        failed = None
+    elif failed is not None and len(wanted.law.mus) > 1:
+        failed = OnsetError(f"None of the {len(wanted.law.mus)} friction coefficients has an onset on this ramp.")
+    if failed is not None and not any("undamped" in each for each in found):
         raise failed
     tell(f'law of friction: {wanted.law.in_words} (history = "{wanted.law.history}")')
     result = _write_result(output, found)
@@ -114,7 +115,7 @@ def onset(
         shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
     if as_json:
         print_json(result)
-    if none:
+    if failed is not None:
         raise failed
 
 
