@@ -1,8 +1,8 @@
 """A loading path: equilibria as a function of a load, computed when they are asked for.
 
 Equilibria with friction depend on how they were reached. An equilibrium beyond the largest load so far follows from
-the last one, and is kept. Between two loads an equilibrium follows from the kept one just below, and is not kept: what
-is asked for in between does not change the path.
+the last one, and is kept. An equilibrium at a smaller load follows from the kept one just below, and is not kept, so
+that it does not change the path.
 """
 
 from __future__ import annotations

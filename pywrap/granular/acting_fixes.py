@@ -1,7 +1,7 @@
-"""Fixes that may act on particles as contacts do not tell: by their positions, or on their velocities.
+"""Fixes that may exert forces besides the contacts: by positions of particles, or on their velocities.
 
-Whether they do in a given packing is shown by its motion (:mod:`~faultgouge.pywrap.granular.motion_proof`). These lists
-only explain.
+The motion of a packing shows whether a fix does so (:mod:`~faultgouge.pywrap.granular.motion_proof`). These lists only
+explain a difference.
 """
 
 from .granular_commands import MOBILE, WALLS, NotLinearisedError, without_suffix

@@ -1,4 +1,4 @@
-"""Is a packing at rest? What is out of balance, and why forces may be though nothing moves."""
+"""Is a packing at rest? Forces that are out of balance, and the reasons if nothing moves all the same."""
 
 import numpy as np
 

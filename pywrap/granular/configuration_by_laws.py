@@ -1,14 +1,14 @@
 r"""A Configuration whose contacts have the laws that LAMMPS shows.
 
-What LAMMPS says of each contact (compute pair/local, fix wall/gran ... contacts) is its normal, its overlap and both
-forces, without dashpots, since the look is taken at rest (:mod:`~faultgouge.pywrap.granular.lammps_arrays`). The laws
-are measured (:mod:`~faultgouge.pywrap.granular.contact_law_measurement`), with which
+LAMMPS tells the normal, the overlap and both forces of each contact (compute pair/local, fix wall/gran ... contacts),
+without dashpots, since the look is taken at rest (:mod:`~faultgouge.pywrap.granular.lammps_arrays`). With the measured
+laws (:mod:`~faultgouge.pywrap.granular.contact_law_measurement`)
 
 .. math::
 
     f_n' = p\, f_n/\delta, \qquad k_t' = k_t (R\delta)^q, \qquad \mathbf b = \beta\, \mathbf f_t/\delta,
 
-so that the slip itself is not needed. What the styles have was found to be
+so that the slip itself is not needed. Measurements gave
 
 =====================================  =====  =====  =============  =============
 style                                  p      q      beta, closing  beta, parting
@@ -21,9 +21,9 @@ mindlin_rescale                        3/2    1/2    1/2            1
 mindlin_rescale/force                  3/2    1/2    0              1/2
 =====================================  =====  =====  =============  =============
 
-and hooke with a mindlin model, or hertz with linear_history, are as their parts; the wall of fix wall/gran
-hooke/history is as linear_history_classic in the release of 22 Jul 2025. A small vibration shakes a contact at
-Coulomb's bound down to elastic, so that it sticks by default.
+Hooke with a mindlin model, or hertz with linear_history, is as its parts. The wall of fix wall/gran hooke/history is as
+linear_history_classic in the release of 22 Jul 2025. A contact at Coulomb's bound sticks in K by default: what it does
+is for :mod:`~faultgouge.analysis.motion.one_sided`.
 """
 
 from typing import Any

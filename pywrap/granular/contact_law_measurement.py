@@ -1,9 +1,8 @@
 r"""The laws of LAMMPS's granular styles, measured in a second LAMMPS with two particles or one and a wall.
 
-What a wall's tangential stiffness is, where the lever arm of a torque ends, how coefficients of two types mix, and
-which damping a model's name stands for differ between versions of LAMMPS. None of it is looked up. At the overlap
-:math:`\delta`, with the effective radius R and the effective mass m of a contact, every law of these styles is a
-power law,
+Versions of LAMMPS differ in the tangential stiffness of a wall, in the lever arm of a torque, in how coefficients of
+two types mix, and in which damping a name stands for. So the laws are measured. At the overlap :math:`\delta`, with the
+effective radius R and the effective mass m of a contact, every law of these styles is a power law,
 
 .. math::
 
@@ -13,7 +12,7 @@ power law,
 
 with one :math:`\beta` while the contact closes and another one while it parts, :math:`|\mathbf f_t| \le \mu f_n`, and
 the lever arm :math:`R_i - l' \delta`. A second overlap, another mass and another radius tell the exponents, which are
-multiples of 1/4; whatever has others is refused. A push is a rotation for one step without an integrator:
+multiples of 1/4; a law with others is refused. The contact slips by a rotation for one step without an integrator:
 nothing moves, and the slip is known to the last digit.
 """
 

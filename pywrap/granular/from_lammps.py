@@ -1,9 +1,9 @@
 """A Configuration of a live LAMMPS with its own granular styles, or ours: any packing, as it stands.
 
-Where its contacts have a law that can be measured, K and C are those of the law
-(:mod:`~faultgouge.pywrap.granular.configuration_by_laws`). Whatever has none (cohesion, rolling and twisting friction,
-regions, bonds, springs, a lid that moves as one) has K and C by differences of LAMMPS's own forces
-(:mod:`~faultgouge.pywrap.granular.configuration_by_differences`). A few of LAMMPS's own steps prove both
+Where all contacts have laws that can be measured, K and C are those of the laws
+(:mod:`~faultgouge.pywrap.granular.configuration_by_laws`). With other forces (cohesion, rolling and twisting friction,
+regions, bonds, springs, a lid that moves as one) K and C are differences of LAMMPS's own forces
+(:mod:`~faultgouge.pywrap.granular.configuration_by_differences`). A few of LAMMPS's own steps prove either
 (:mod:`~faultgouge.pywrap.granular.motion_proof`).
 """
 

@@ -1,4 +1,4 @@
-"""What a LAMMPS instance says of itself: its ranks, its styles, its log, and why it has stopped."""
+"""Ranks, styles and log of a LAMMPS instance, and the reason why it has stopped."""
 
 import ctypes
 import os

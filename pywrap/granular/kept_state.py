@@ -1,7 +1,7 @@
-"""The last state of a deck is taken, or kept: hours of a run are not lost where a packing cannot be taken.
+"""Keep the last state of a deck whose packing cannot be taken, so that hours of a run are not lost.
 
-The restart is written by a run of one step. LAMMPS forgets tangential histories in a file that `write_restart` writes
-after a run, and has all of them in one that the run itself writes.
+A run of one step writes the restart file: in a file that `write_restart` writes after a run, LAMMPS leaves tangential
+histories out.
 """
 
 from collections.abc import Iterable

@@ -1,17 +1,18 @@
 """The loading path of a live LAMMPS: at each load its own dynamics relax the packing, with drag.
 
-An equilibrium that the path keeps is a copy of the process (`fork`), which waits with LAMMPS in it. Contact histories
-stay what they are, to the bit; a restart file of LAMMPS may lose some. The instance of the user stays as it was.
+An equilibrium that the path keeps is a copy of the process (`fork`), which waits with LAMMPS in it. So contact
+histories are kept to the bit, as no restart file of LAMMPS can keep them. The instance of the user stays as it was.
 
-**Newton's method.** A step of the load in which no contact slides moves particles by :math:`K^{-1}` times what is out
-of balance. LAMMPS moves them in one long step, in which slips advance, and gives the forces; some iterations with the K
-of the last equilibrium do. The copy that has done so is kept if nothing slides, nothing has a negative eigenvalue, and
-the balance is that of a relaxation. Else another copy relaxes.
+**Newton's method.** If no contact slides, a step of the load displaces the particles by :math:`K^{-1}` times the forces
+that are out of balance. LAMMPS makes this displacement in one long time step, in which slips advance, and returns the
+forces. K of the last equilibrium serves for some iterations. The equilibrium is kept if no contact slides, K has no
+negative eigenvalue, and the balance is as close as that of a relaxation. Otherwise another copy of the last equilibrium
+relaxes.
 
-**Relaxation.** Otherwise the load jumps, and the drag takes what the jump sets free. Motion ends soonest at the
-critical damping of the slowest mode, where the force that is out of balance is half of the drag: the rate of the drag
-is doubled where the force is more than twice the drag, and halved where it is less than a quarter, since the packing
-creeps or a loose sphere rolls away.
+**Relaxation.** The load jumps, and a drag takes the energy that the jump sets free. Motion ends soonest at the critical
+damping of the slowest mode, where the force out of balance is half of the drag. So the rate of the drag is doubled
+where the force is more than twice the drag. The rate is halved where the force is less than a quarter of the drag,
+since the packing then creeps, or a loose sphere rolls away.
 """
 
 import os

@@ -1,11 +1,15 @@
 """Look into a LAMMPS instance in a copy of the process (`fork`).
 
-LAMMPS hands out contacts in a run alone, and a run of zero steps sorts particles, may cut a history once more at
-Coulomb's bound, and scales a rescaled one. In a copy all of this may happen: the instance stays as it is. The copy
-shares open files with the process, down to the place at which each of them is written. So the first thing that the copy
-does is to put the null device in the place of every file that is open for writing, whoever has opened it: what LAMMPS,
-zlib or Python write as they close a dump or a log goes nowhere. A copy of one of several ranks could not speak with the
-others, and a copy of a process has none of its threads (:mod:`~faultgouge.pywrap.granular.lammps_arrays`).
+LAMMPS hands out contacts only in a run. A run of zero steps sorts particles, may cut a history once more at Coulomb's
+bound, and scales rescaled histories. In a copy of the process all of this may happen: the instance itself stays as it
+is.
+
+**Files.** The copy shares open files with the process, with the positions at which they are written. So the copy first
+puts the null device in the place of every file that is open for writing, whoever has opened the file. All that LAMMPS,
+zlib or Python write as they close a dump or a log then goes nowhere.
+
+**No copy** is possible on several ranks, since a copy cannot communicate with the other ranks, or with threads, which a
+copy does not have (:mod:`~faultgouge.pywrap.granular.lammps_arrays`).
 """
 
 import ctypes

@@ -1,4 +1,4 @@
-"""What a LAMMPS instance says of its particles, contacts and fixes, in a copy of the process if there can be one."""
+"""Particles, contacts and fixes of a LAMMPS instance, read in a copy of the process if there can be one."""
 
 from contextlib import nullcontext, suppress
 from typing import Any

@@ -1,25 +1,26 @@
 r"""The proof of a Configuration: a few steps of LAMMPS beside the same steps of the linearised packing.
 
-LAMMPS starts from small random velocities, in a copy of the process. The linearised packing, its contacts at Coulomb's
-bound sliding on ahead and sticking on the way back (:mod:`~faultgouge.pywrap.granular.linear_steps`), starts from the
-same velocities and with the forces that are left at rest, and takes LAMMPS's own steps of velocity Verlet. So no error
-of the step is left, and the step may be as long as a stable one. Dashpots feel the velocities of half steps in LAMMPS's
-styles, and extrapolated ones in mindlin/smooth (fix dashpot/velocities).
+LAMMPS starts from small random velocities, in a copy of the process. The linearised packing starts from the same
+velocities, with the residual forces, and takes LAMMPS's own steps of velocity Verlet; its contacts at Coulomb's bound
+slide on ahead and stick on the way back (:mod:`~faultgouge.pywrap.granular.linear_steps`). So the comparison has no
+error of the time step, and the step may be as long as a stable one. Dashpots feel the velocities of half steps in
+LAMMPS's styles, and extrapolated velocities in mindlin/smooth (fix dashpot/velocities).
 
-K by differences of forces has no contacts at the bound. A model that acts one step late differs by less in shorter
-steps, which are taken if the first ones do not agree. Where its forces are one-sided, K is the mean of both sides,
-and no linear motion is LAMMPS's: the difference is said, and refuses nothing.
+**The proof** is :math:`|\Delta v - \Delta u| / |\Delta u|`, weighted with the root of the masses, with the changes of
+the velocities v of LAMMPS and u of the linearised packing. One motion is compared first. If its difference is not
+small, the motions with both signs of the velocities are compared: half of their difference has no terms of second order
+in the amplitude. With contacts at the bound the motions of both signs are not opposite. Then each is compared by
+itself, after the motion from rest has been subtracted.
 
-The proof is :math:`|\Delta v - \Delta u| / |\Delta u|` with the changes of the velocities v of LAMMPS and u of the
-linearised packing, and with the root of the masses. One motion is compared first. If its difference is not small, half
-of the difference of the motions of both signs is, which has no terms of second order in the amplitude. With contacts at
-the bound the motions of both signs are no opposites; each is compared by itself, without the motion from rest.
+**K by differences of forces** has no contacts at the bound. If the model acts one step late, the difference is smaller
+in shorter steps, which are taken if the first steps do not agree. If forces are one-sided, K is the mean of both sides,
+and no linear motion is LAMMPS's: the difference is told, and the packing is not refused.
 
-A force that no contact has, and that depends on the position, may be weak beside those of the contacts, and strong
-beside the lowest eigenvalues of K. Therefore all particles are displaced alike, too. Then no contact between particles
-changes, and only particles at walls may feel other forces. K by differences has such forces, to its own error. A spring
-between particles changes by no common displacement, and bears a part of the weight, so that without the spring the
-motion is another one, too: where there is a spring, laws that do not agree as well as usual are not enough.
+**Forces by position.** A force that depends on the position and belongs to no contact may be weak beside the contacts,
+and strong beside the lowest eigenvalues of K. So all particles are also displaced alike. No contact between particles
+then changes, and only particles at walls may feel other forces. (K by differences contains such forces.) A spring
+between particles does not change, either, but bears a part of the weight, so that the motion without the spring is
+another one. With such a spring the laws have to agree to `SMALL_DIFFERENCE`.
 """
 
 from collections.abc import Callable

@@ -2,8 +2,9 @@
 
 `fix viscous`, and `fix viscous/sphere` where this LAMMPS has one, take energy away. The drag follows the motion: where
 the forces are much larger than the drag, particles accelerate, and the drag grows; where the drag balances the forces,
-particles creep, and the drag falls. A packing rests when forces and drags are far below the mean contact force, both,
-since the forces of a vibration vanish together at times, and those on a sphere that rolls away always.
+particles creep, and the drag falls. A packing rests when both the forces and the drags are far below the mean contact
+force. The forces alone do not tell: those of a vibration may all vanish at one time, and a sphere that rolls away feels
+no force.
 """
 
 from collections.abc import Callable, Iterable
