@@ -2,7 +2,7 @@ r"""Refuse scenes that no computation can complete, before any work starts.
 
 `refuse_impossible` finds impossible numbers in a scene: overlaps beyond the contact law, forces below the rounding of
 the coordinates, a settling that never ends. `refuse_endless` finds a command that would take years, more memory than
-there is, or a file that no disk holds. How long a command takes its progress line tells.
+there is, or a file that no disk holds. The progress line of a command tells how long it takes.
 
 A contact that carries the force f has :math:`\delta = (f/k_n)^{1/p}` and the stiffness :math:`k = p\, k_n
 \delta^{p-1}`, with p = 3/2 for Hertz. A time step is a share of :math:`(m/k)^{1/2}`, a disk falls under :math:`F_y`

@@ -1,4 +1,4 @@
-"""A spring draws the upper layer, which sticks and slips: drive."""
+"""The command drive: a spring draws the upper layer, which sticks and slips."""
 
 from __future__ import annotations
 

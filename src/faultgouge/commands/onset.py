@@ -1,4 +1,4 @@
-"""The load at which a layer becomes unstable: onset."""
+"""The command onset: the load at which a layer becomes unstable."""
 
 from __future__ import annotations
 

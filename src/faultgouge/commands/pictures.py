@@ -1,4 +1,4 @@
-"""Packings, modes and runs to look at: draw, movie, view."""
+"""The commands draw, movie and view: pictures of packings, modes and runs."""
 
 from __future__ import annotations
 

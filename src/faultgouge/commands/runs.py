@@ -1,4 +1,4 @@
-"""A scene, and from it to run.h5: init, settle, ramp, perturb."""
+"""The commands init, settle, ramp and perturb: a scene, its equilibria and its undamped run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a packing is stable, and its eigenvalues: spectrum."""
+"""The command spectrum: whether a stored packing is stable, and its eigenvalues."""
 
 from __future__ import annotations
 
