@@ -51,7 +51,7 @@ class EquilibriumSolver(Protocol[S]):
         """
 
     def close(self) -> None:
-        """End whatever the solver alone uses."""
+        """End the processes and files of the solver."""
 
 
 class LoadPath(Generic[E]):

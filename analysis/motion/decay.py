@@ -169,8 +169,8 @@ def _work(motion: Motion, slow: SlowMotions, limit: float) -> tuple[float, float
 
 
 def _steps(motion: Motion, reference: float, slow: SlowMotions | None, limit: float) -> ExplicitSteps | ImplicitSteps:
-    """Implicit steps where these come to an end, and before explicit ones do: what grows unseen in the time that is
-    left is known for explicit steps alone, whatever its frequency."""
+    """Implicit steps if these come to an end, and do so before explicit ones. If neither do, explicit steps: only they
+    bound the growth that may be unseen at every frequency."""
     if slow is not None:
         explicit, implicit = _work(motion, slow, limit)
         if implicit < min(explicit, WORK_OF_DECAY):

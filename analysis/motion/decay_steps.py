@@ -122,7 +122,8 @@ class ExplicitSteps:
             self.z, self.v = state[: len(self.z)] / self.reference, state[len(self.z) :].copy()
 
     def growth(self, logs: list[float]) -> tuple[float, float]:
-        """2 Re s of what grows, and its error: by the rate so far, and by that of shorter steps, from where it is."""
+        """2 Re s of the motion that grows, and its error: by the rate so far, and by shorter steps from the present
+        state."""
         coarse = slope(logs[int(np.argmin(logs)) :], self.time_of_look)
         short = self.time_of_look / FINER_STEP
         count = int(np.ceil(E_FOLDS / max(coarse, 1 / (self.time_of_look * len(logs))) / short)) + 1

@@ -206,6 +206,6 @@ def sampled_response(
 
 
 def floor_force(packing: Packing) -> Floats:
-    """The force -m along x on every disk, (x.., y.., R theta..): that of a unit acceleration of the floor, seen from
-    the floor; shape (3N,)."""
+    """The force -m along x on every disk, (x.., y.., R theta..), shape (3N,): in the frame of a floor with a unit
+    acceleration."""
     return np.concatenate([-packing.mass, np.zeros(2 * len(packing))])

@@ -291,7 +291,7 @@ class OneSidedSystem:
 
 
 def _by_column(matrix: bsr_array, columns: Floats) -> Floats:
-    """Products in a time that is less than half of that of all columns at once."""
+    """The product with several columns, one after the other: in less than half of the time of one product."""
     made = np.empty(columns.shape, order="F")
     for k in range(columns.shape[1]):
         made[:, k] = matrix @ columns[:, k]

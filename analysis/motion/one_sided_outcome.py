@@ -130,7 +130,7 @@ class OneSidedOutcome(FieldsByName):
 
 @dataclass(frozen=True)
 class _Looks:
-    """What was seen of P motions: times, D, shape (P,) each, and p of sliders, shape (B, P), from the start on."""
+    """Looks at P motions: times; D, shape (P,) each; and p of sliders, shape (B, P) each, from the start on."""
 
     times: list[float]
     sizes: list[Floats]
@@ -269,14 +269,14 @@ def _gained(size: Floats) -> Floats:
 
 
 def _slip_dies(half: Floats, three: Floats, end: Floats, over: Callable[..., Floats]) -> NDArray[np.bool_]:
-    """Whether the largest slip of a contact, or that of all contacts, dies away, of each push; p at three times."""
+    """Whether the largest slip of a contact, or the sum of all slips, dies away, for each push; p at three times."""
     whole, before, after = (over(np.abs(slip), axis=0) for slip in (end, three - half, end - three))
     falls = (after <= 0.5 * before) | (after <= np.finfo(float).eps * whole)
     return np.asarray(falls & (before <= SLIP_CHANGE * whole))
 
 
 def _slip_left(slid: list[Floats], decay: float) -> float:
-    """Slip that is still to come, as a share of all slip, at most; infinite if slips do not fall with vibration.
+    """Bound of the slip that is still to come, as a share of all slip; infinite if slips do not fall with vibration.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ def stable_motion(packing: HasConfiguration) -> LinearMotion:
 
 @dataclass(frozen=True, eq=False)
 class Propagator:
-    """P(t) = O f(t) I of modes: from starts, by I, to amplitudes, and by O to what is measured."""
+    """P(t) = O f(t) I of modes: I takes starts to amplitudes, and O takes amplitudes to the measured quantities."""
 
     modes: BlockDiagonal
     outward: Complexes
@@ -180,7 +180,7 @@ class Propagator:
         return replace(self, outward=left.T @ self.outward, inward=self.inward @ right)
 
     def bound(self) -> float:
-        """No P(t) has a larger norm squared: that of the modes with balanced sizes."""
+        """Bound of the norm squared of every P(t): that of the modes with balanced sizes."""
         outward, inward = self.outward.copy(), self.inward.copy()
         for column, block in self.modes.blocks.items():
             pair = [column, column + 1]

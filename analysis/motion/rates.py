@@ -143,7 +143,7 @@ def _damped_rates(motion: Motion) -> Rates:
 
 
 def _drifts(motion: Motion, z: Floats, values: Complexes, grows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which s that seem to grow are those of motions that no force opposes, as forces are not in balance.
+    """Which s with Re s > 0 belong to motions that no force opposes, because forces are not in balance.
 
     The imbalance leaves such a motion an eigenvalue -s (s + g) of A, with the damping g that the motion feels.
     """

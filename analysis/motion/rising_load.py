@@ -321,7 +321,8 @@ def _parts(system: OneSidedSystem, span: list[Span]) -> Floats:
 
 
 def _of_parts(parts: Floats, differs: float) -> DriftAndVibration:
-    """What the drift and the vibration of a span and of its parts say, shape (7, 2), whose halves may differ so far."""
+    """The motion of a span, from drift and vibration of the span and of its parts, shape (7, 2); halves that differ by
+    no more than `differs` are steady."""
     (drift, vibration), before, after = parts[:3]
     alike = abs(after[1] - before[1]) <= differs * after[1] and after[1] > VIBRATION_SHARE * after[0]
     vanishes = (

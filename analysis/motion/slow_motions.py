@@ -100,7 +100,7 @@ class SlowMotions:
 
     @property
     def rate_beyond(self) -> float:
-        """Re s of about the slowest decay of what is not known, as of the outer half of what is known."""
+        """Re s of about the slowest motion beyond the disc, estimated from the outer half of the known ones."""
         outer = self.values[np.abs(self.values) > 0.7 * self.radius]
         return float(outer.real.max(initial=-np.inf))
 

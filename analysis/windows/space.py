@@ -286,7 +286,7 @@ def _inverse_iteration(guess: Space, inverse: Inverse) -> Iterator[Planes]:
 
 
 def _complex_inverse_iteration(guess: Space, inverse: Inverse) -> Iterator[Planes]:
-    """Inverse iteration of a complex pair with its own eigenvalue: with both members of it, in real numbers."""
+    """Inverse iteration of a complex pair with its own eigenvalue as the shift, for both members, in real numbers."""
     v, u = guess.right, guess.left
     while True:
         v, u = (np.linalg.qr(inverse.solve(b, turn).imag)[0] for b, turn in ((v, False), (u, True)))

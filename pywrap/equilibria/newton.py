@@ -209,7 +209,7 @@ class _Course:
         return residual < self.floor and factor * self._last < 0.1 * self.floor
 
     def may_reuse_factors(self, residual: float, disks: int) -> bool:
-        """Whether the factors of K at hand do for the next iteration."""
+        """Whether the factors of an earlier K serve for the next iteration."""
         if residual * (residual / self._last) ** REUSE_ITERATIONS < 0.1 * self.floor:
             return True
         return disks > REUSE_SIZE and residual <= REUSE_LIMIT * self._last

@@ -35,7 +35,7 @@ ACTING = HOLDING | {
 
 
 def acting_fixes(styles: dict[str, str]) -> dict[str, str]:
-    """Fixes that may act as contacts do not tell, by ID, with a clause on each."""
+    """Fixes that may exert forces besides the contacts, by ID, with a clause on each."""
     found = {}
     for name, style in styles.items():
         plain = without_suffix(style)
@@ -53,7 +53,7 @@ def drag_remarks(styles: dict[str, str]) -> tuple[str, ...]:
 
 
 def check_holding(styles: dict[str, str]) -> None:
-    """Refuse fixes that hold, push or pull particles, where no motion shows whether they do."""
+    """Refuse fixes that may hold, push or pull particles, where no motion can show whether they do."""
     held = {name: style for name, style in styles.items() if style.startswith(tuple(HOLDING))}
     for says in acting_fixes(held).values():
         raise NotLinearisedError(f"{says}.")

@@ -65,7 +65,7 @@ def touch_twice(i: Indices, j: Indices) -> bool:
 
 
 def restless_fix(commands: Commands) -> str:
-    """What is said of a fix that keeps particles from resting; empty if there is none."""
+    """The sentence on a fix that keeps particles from resting; empty if there is none."""
     for name, line in commands.fixes.items():
         words = line.split()
         style = without_suffix(words[3])

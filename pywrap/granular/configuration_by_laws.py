@@ -83,7 +83,7 @@ def configuration_by_laws(lmp: Any, commands: Commands, found: Arrays, laws: Kno
 
 
 def check_friction(contacts: LinearisedContacts, *, rests: bool) -> None:
-    """Refuse tangential forces beyond Coulomb's bound, which is that of the commands."""
+    """Refuse tangential forces beyond Coulomb's bound of the commands."""
     size = np.linalg.norm(contacts.tangential_force, axis=1)
     beyond = size > contacts.friction + FORCE_AGREEMENT * (contacts.friction + contacts.normal_force)
     if np.any(beyond):
@@ -98,7 +98,7 @@ def check_friction(contacts: LinearisedContacts, *, rests: bool) -> None:
 
 
 def _check_torques(others: Floats, commands: Commands, contacts: LinearisedContacts) -> None:
-    """Refuse torques besides those of the contacts: in all that is taken here contacts alone turn particles."""
+    """Refuse torques besides those of the contacts: only contacts may turn particles here."""
     forces = (
         FORCE_AGREEMENT * np.abs(contacts.tangential_force).max(initial=0.0),
         OVERLAP_ROUNDING * contacts.normal_force.max(initial=0.0),

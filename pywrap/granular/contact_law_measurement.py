@@ -253,7 +253,7 @@ def quarter(value: float, what: str) -> float:
 
 
 def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, float]]:
-    """What one contact has of a MeasuredLaw's fields, by its forces at rest and in motion."""
+    """The numbers of a MeasuredLaw for one contact, from its forces at rest and in motion."""
     state = bench.place_at(wanted)
     fn, delta = bench.force()[0], state.overlap
     if not fn > 0:

@@ -169,7 +169,7 @@ class Probe:
         return in_a_copy(partial(self._from_rest, q))
 
     def _from_rest(self, q: Floats) -> Floats:
-        """Forces along a direction, in a copy of its own; those at rest for none."""
+        """Forces along a direction, in a copy that goes this way alone; for a direction of zero the forces at rest."""
         set_coordinate_velocity(self.lmp, self.particles, np.zeros(len(q)))
         self.lmp.command("run 0 post no")
         return self._go(q)

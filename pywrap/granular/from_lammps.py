@@ -85,7 +85,7 @@ def take_configuration(
     prove: bool,
     differences: bool = False,
 ) -> Configuration:
-    """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
+    """As :func:`from_lammps`, with known laws: these are not measured again, and new ones are added to them."""
     check_balance(balance)
     require_instance(lmp, "from_lammps")
     given = None if commands is None else read_commands(commands)

@@ -62,7 +62,7 @@ def explain_error(error: BaseException) -> str:
 
 
 def name_of(file: IO[Any]) -> str:
-    """A name by which LAMMPS opens a file of this process: a file that has no name is left behind by no end of it."""
+    """A name by which LAMMPS opens a nameless file of this process, which no end of the process can leave behind."""
     return f"/dev/fd/{file.fileno()}"
 
 

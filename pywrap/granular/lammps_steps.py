@@ -25,7 +25,7 @@ STILL_STEP = 1e-12
 
 
 class Steps(NamedTuple):
-    """What some steps of LAMMPS end with.
+    """The end of some steps of LAMMPS.
 
     `velocity` has the velocities of the coordinates, shape (axes N,); `force_change` by how much a common displacement
     of all particles changes each force (F, T/R) at rest, shape (axes N,), or None if none was asked for. It is the

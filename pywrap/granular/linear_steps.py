@@ -40,7 +40,7 @@ class LinearForces(Protocol):
     """Changes of the forces on the coordinates, to first order."""
 
     def at_rest(self) -> Memory:
-        """What contacts remember at the beginning."""
+        """The memory of contacts at the beginning."""
 
     def change(self, displacement: Floats, velocity: Floats, memory: Memory) -> Floats:
         """By how much a displacement and a velocity, shape (axes N,), change the forces (F, T/R); shape (axes N,)."""
@@ -183,7 +183,7 @@ class ContactForces:
         )
 
     def at_rest(self) -> Memory:
-        """Sliders remember what is missing to the bound."""
+        """The memory at rest: sliders begin with the force that is missing to the bound."""
         return Memory(self._missing, np.zeros(len(self.pair)), np.zeros(len(self.pair)))
 
     @property

@@ -77,7 +77,8 @@ def _silence(keep: tuple[int, ...]) -> None:
 
 
 def in_a_copy(work: Callable[[], Found]) -> Found:
-    """What some work finds in a copy of this process, whose traces end with it; so does an interrupt of this process.
+    """The result of some work in a copy of this process. All traces of the work end with the copy, and an interrupt of
+    this process ends the copy, too.
 
     Raises
     ------

@@ -95,7 +95,7 @@ USUAL_OVERLAP = 1e-4
 
 
 class NotProvedError(NotLinearisedError):
-    """Something acts on particles as the laws of contacts do not tell, and LAMMPS's motion shows it."""
+    """LAMMPS's motion shows a force on particles besides those of the contacts."""
 
 
 class OtherStiffnessError(NotProvedError):
@@ -162,7 +162,7 @@ def _other_stiffness(others: dict[str, str], moves: Moves) -> OtherStiffnessErro
 
 
 def _differs(difference: float) -> str:
-    """What a difference is, without a stop."""
+    """A difference in words, without a full stop."""
     return (
         f"LAMMPS's forces do not change as K says: in {STEPS_OF_PROOF} steps from small velocities the change differs "
         f"by {difference:.2g} of itself"
@@ -343,6 +343,6 @@ def _deformation(configuration: Configuration, displacement: Floats) -> float:
 
 
 def _overlaps(configuration: Configuration) -> Floats:
-    """Sizes of overlaps, of which those of cohesive contacts may be gaps; a small one where no contact is known."""
+    """Sizes of overlaps, or of the gaps of cohesive contacts; a small one where no contact is known."""
     overlap = np.abs(configuration.contacts.overlap)
     return overlap if len(overlap) else np.array([USUAL_OVERLAP * configuration.radius.mean()])

@@ -227,7 +227,7 @@ class _Drag:
 
 
 def _rounding(found: Configuration) -> float:
-    """What a rounding of a coordinate makes of the force of the stiffest contact."""
+    """Change of the force of the stiffest contact by the rounding of a coordinate."""
     stiffness = found.contacts.normal_stiffness if found.stiffness is None else found.stiffness.data
     return FORCE_ROUNDING * float(np.abs(found.position).max() * np.abs(stiffness).max(initial=0.0))
 

@@ -200,7 +200,7 @@ class _Part(Section):
 
 
 def _check_keys(mapping: Mapping[str, Any]) -> None:
-    """Refuse unknown sections and keys, whatever their values and whichever of them are read."""
+    """Refuse unknown sections and keys, also in sections that are not read."""
     errors: list[InitErrorDetails] = []
     for name, section in mapping.items():
         keys = section if isinstance(section, Mapping) else {}

@@ -147,7 +147,7 @@ class Cluster:
             return False
 
     def owns(self, frequency: float) -> bool:
-        """Whether a motion of this frequency is its own, and no other cluster's."""
+        """Whether a motion of this frequency belongs to this cluster, and not to another one."""
         return self.own_range[0] <= frequency <= self.own_range[1]
 
     def lift(self, mode: Space) -> tuple[Floats, Floats]:

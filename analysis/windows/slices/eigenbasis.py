@@ -210,7 +210,7 @@ class Bases:
         return ((basis, basis.levels(matrix)) for basis in bases)
 
     def _usable_bases(self, matrix: csr_array) -> list[tuple[Basis, Levels]] | None:
-        """The bases that are kept and the operator in them; None if the bases of all ranks do not serve."""
+        """The stored bases, and the operator in them; None if the bases of some rank do not serve."""
         covering = all(basis.covers(matrix) for basis in self._kept)
         known = [(basis, basis.levels(matrix)) for basis in self._kept if covering]
         mine = [each for basis, levels in known for each in basis.mixing(levels)] if covering else [np.inf]

@@ -274,7 +274,7 @@ def antisymmetric(place: System) -> float:
 
 
 def find_growing(cluster: Cluster, limits: Limits = LIMITS) -> Iterator[Candidate]:
-    """The modes of a cluster that begin to grow, and those that nearly do so at its upper load."""
+    """Modes of a cluster that begin to grow, and modes that nearly grow at its upper load."""
     below, above = cluster.loads
     search = cluster.search(limits)
     for window in search.windows:
