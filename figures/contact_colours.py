@@ -45,7 +45,7 @@ COLOURS: dict[str, tuple[str, Callable[[HasConfiguration], Floats], Callable[[Fl
     "slip": ("slip / slip limit", slip_share, _share_scale, MOBILIZATION),
     "force": ("normal force $f_n$", attrgetter("normal_force"), _force_scale, "viridis_r"),
 }
-"""What the bars of the contacts may show: label, values of the contacts, scale, colours."""
+"""Quantities that the bars of contacts may show: label, values of the contacts, scale, colours."""
 
 
 def style_of_bars(packing: HasConfiguration, color: str) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from faultgouge.analysis import Packing
 from .disk_view import View
 from .style import INK, styled
 
-Frame = NDArray[np.uint8]
+Picture = NDArray[np.uint8]
 
 DOTS = 110
 """Dots an inch of a frame of a GIF, unless others are asked for: a GIF of more dots is too large for a page."""
@@ -69,7 +69,7 @@ class Film(ABC):
         return self._canvas.get_width_height()
 
     @styled
-    def frame(self, number: int) -> Frame:
+    def frame(self, number: int) -> Picture:
         """Colours of the frame, shape (height, width, 3)."""
         self.show(number)
         self._canvas.restore_region(self._still)

@@ -37,7 +37,7 @@ LOOKS_OF_SPAN = 40
 """Looks at D in a span."""
 
 REMAINING_SHARE = 0.1
-"""What is left to come, as a share of the displacement, from which on motion is not followed any longer."""
+"""Displacement still to come, as a share of the displacement so far, below which motion is not followed any longer."""
 
 LARGEST_CREEP_GROWTH = 100.0
 """Growth of D in the second half of the time that is no creep: as the square of the time it is 4."""

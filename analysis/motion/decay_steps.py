@@ -43,7 +43,7 @@ FINER_STEP = 4
 """Share of the explicit steps in which growth is measured once more."""
 
 E_FOLDS = 4.0
-"""For how many e-folds of |u|^2 this is done."""
+"""E-folds of |u|^2 for which growth is measured once more."""
 
 FREE_FORCE = 1e-12
 """Force on a common displacement, as a share of the largest entry of A, that is no force."""

@@ -25,15 +25,15 @@ from .rates import rates_of
 from .spectrum import spectrum
 
 NOISE_SHARE = 0.1
-"""Of the fastest motion in the noise, in units of that of a mean mode: 1/1800 of 300 modes was measured, since a pair
-near its coalescence is excited less than others are."""
+"""Share of the fastest motion in the noise, in units of the share of a mean mode. A pair near its coalescence is
+excited less than others: 1/1800 was measured with 300 modes."""
 
 PLATEAU_SHARE = 1e-3
 """Share of the largest D up to which D has not levelled off."""
 
 LINEAR_RANGE = 0.1
-"""Root of D, in units of the smallest overlap, up to which the motion may be linear: of eight runs that were made
-before the rule, D stopped at 0.7 to 31 times the square of that."""
+"""Root of D, in units of the smallest overlap, up to which the motion may be linear. In eight runs made before this
+rule D stopped at 0.7 to 31 times the square of this limit."""
 
 JUMP_SHARE = 0.05
 """Share of the run with mu(v) that shows the jump, from the moment on at which friction weakens: 10 of 200 time units,

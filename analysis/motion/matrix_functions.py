@@ -43,7 +43,7 @@ CIRCLE_POINTS = 16
 Function = Callable[[Complexes, Floats], Sequence[Complexes]]
 """(eigenvalues, times) -> some arrays, entire in the eigenvalue."""
 
-Reach = Callable[[complex, Floats], Floats]
+CircleRadius = Callable[[complex, Floats], Floats]
 """(eigenvalue, times) -> how far the eigenvalue may move while its motion grows by no more than a factor e."""
 
 
@@ -78,10 +78,10 @@ class BlockDiagonal:
     inverse: Complexes
     values: Complexes
     blocks: dict[int, Complexes]
-    reach: Reach = second_order
+    reach: CircleRadius = second_order
 
     @classmethod
-    def of(cls, matrix: ArrayLike, reach: Reach = second_order) -> "BlockDiagonal":
+    def of(cls, matrix: ArrayLike, reach: CircleRadius = second_order) -> "BlockDiagonal":
         """Decompose a square matrix.
 
         Parameters

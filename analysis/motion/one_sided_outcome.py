@@ -36,8 +36,8 @@ VERDICT_STEP = 0.1
 """Time step of one-sided motion as a share of the largest stable one: rates of growth are right to some per cent."""
 
 STEP_OF_LARGE = 0.3
-"""The same of large packings. With 0.4, beside steps of a sixteenth, rates of growth of four packings of 50 spheres are
-3 to 5 % too large."""
+"""Time step for large packings, as a share of the largest stable one. With 0.4 rates of growth of four packings of 50
+spheres are 3 to 5 % larger than with steps of a sixteenth."""
 
 STEPS_OF_CHUNK = 300
 """Stable time steps between two looks at whether a motion has settled: some ten periods of a slow mode."""
@@ -76,7 +76,7 @@ SLIP_SPANS = 8
 """Spans of the time, over the last four of which slips are to fall with the slowest vibration."""
 
 DECAY_SHARE = 0.5
-"""Least rate at which slips fall, as a share of that of the slowest vibration: their sums of spans are uneven."""
+"""Least rate at which slips fall, as a share of the rate of the slowest vibration: the sums over spans are uneven."""
 
 SLIP_LEFT_SHARE = 0.05
 """Slip that may be left, as a share of all slip; D then changes by less than a tenth."""

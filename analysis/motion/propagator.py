@@ -23,7 +23,7 @@ LEAST_OBLIQUITY = 1.1
 """Modes with a larger |x| |l| have a part in the sampling: 1 is what a mode of a symmetric matrix has."""
 
 OBLIQUITY_SHARE = 0.05
-"""And of these the ones with this share of the largest."""
+"""Modes whose |x| |l| is at least this share of the largest have a part in the sampling."""
 
 FEWEST_MODES, MOST_MODES = 4, 16
 """The fewest and the most modes that are sampled; with dissipation a motion is two of them."""
@@ -43,7 +43,7 @@ MOST_PERIODS = 20_000
 
 RATE_NOISE = 1e-7
 """Growth rates and differences of frequencies below this share of the largest frequency are rounding where two modes
-are about to coalesce: the root of that of a well-conditioned eigenvalue."""
+are about to coalesce: the root of the rounding of a well-conditioned eigenvalue."""
 
 NORM_ACCURACY = 1e-9
 """Relative error of the largest singular value."""

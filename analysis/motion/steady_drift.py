@@ -21,7 +21,7 @@ from .one_sided import OneSidedSystem
 from .rates import rates_of
 
 DIAGONAL_SHIFT = 1e-11
-"""What is added to the diagonal of K, as a share of the largest entry, so that free motions do not divide by zero."""
+"""Number added to the diagonal of K, as a share of the largest entry, so that free motions do not divide by zero."""
 
 REFINEMENTS = 3
 """Steps of iterative refinement, each of which takes this shift out once more."""

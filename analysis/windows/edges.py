@@ -218,20 +218,20 @@ def sign_change(value: Callable[[float], float], below: float, above: float, lim
     if ends[0] * ends[1] >= 0:
         fx = below if abs(ends[0]) <= abs(ends[1]) else above
         return SignChange(fx, min(map(abs, ends)) / (abs(ends[1] - ends[0]) / (above - below)), [fx], smooth=True)
-    known: dict[float, float] = {}
+    values: dict[float, float] = {}
 
     def look_at(fx: float) -> float:
-        known[fx] = value(fx)
-        return known[fx]
+        values[fx] = value(fx)
+        return values[fx]
 
     root = _smooth_root(look_at, below, above, limits)
     if root is not None:
         return root
     width = _jump_width(below, above, limits)
-    left, right = next((a, b) for a, b in pairwise(sorted(known)) if known[a] * known[b] <= 0)
+    left, right = next((a, b) for a, b in pairwise(sorted(values)) if values[a] * values[b] <= 0)
     while right - left > width:
         middle = 0.5 * (left + right)
-        left, right = (middle, right) if look_at(middle) * known[left] > 0 else (left, middle)
+        left, right = (middle, right) if look_at(middle) * values[left] > 0 else (left, middle)
     return SignChange(0.5 * (left + right), 0.5 * (right - left), [left, right], smooth=False)
 
 
@@ -287,14 +287,14 @@ def follow_to(space: Space, system: System, limits: Limits = LIMITS) -> Space:
     return found
 
 
-def track(at: SystemOfLoad, known: dict[float, Space], limits: Limits = LIMITS) -> Callable[[float], Space]:
-    """A function of the load that follows a motion there from the nearest load in `known`, and adds it to `known`."""
+def track(at: SystemOfLoad, spaces: dict[float, Space], limits: Limits = LIMITS) -> Callable[[float], Space]:
+    """A function of the load that follows a motion there from the nearest load in `spaces`, and adds it to `spaces`."""
 
     def look_at(fx: float) -> Space:
-        if fx not in known:
-            near = [known[load] for load in sorted(known, key=lambda load: abs(load - fx))]
-            known[fx] = _follow_from(near, at(fx), limits)
-        return known[fx]
+        if fx not in spaces:
+            near = [spaces[load] for load in sorted(spaces, key=lambda load: abs(load - fx))]
+            spaces[fx] = _follow_from(near, at(fx), limits)
+        return spaces[fx]
 
     return look_at
 

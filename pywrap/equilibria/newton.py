@@ -47,9 +47,9 @@ PATIENCE = 200, 0.95
 carries next to nothing, or slides nearly, the residual may fall by no more than 0.7 an iteration."""
 
 FREEING_ITERATIONS = 3
-"""Iterations in which a disk that is pushed out, and yet was not moved out of the way, gets p times Newton's step:
-its force goes as delta^p, a root of that order, and the factor makes the convergence quadratic again. Later ones take
-Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
+"""Iterations in which a disk that is pushed out, and yet was not moved out of the way, takes p times Newton's step. Its
+force goes as delta^p, a root of the order p, and the factor p makes the convergence quadratic again. Later iterations
+take Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
 
 RATTLER_MOVES = 3
 """Times that a rattler is moved in an increment: what it lies against may be another one that is moved later."""

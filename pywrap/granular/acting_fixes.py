@@ -31,7 +31,7 @@ ACTING = HOLDING | {
     "recenter": "moves particles: unfix it",
     "damping/cundall": "damps as the forces on particles tell, which is not linearised here: use fix viscous",
 }
-"""What is said of fixes, by the beginnings of their styles, without which LAMMPS moves as K says."""
+"""Clauses on fixes, by the beginnings of their styles: without such a fix LAMMPS moves as K says."""
 
 
 def acting_fixes(styles: dict[str, str]) -> dict[str, str]:

@@ -7,8 +7,8 @@ from ...analysis.arrays import Indices
 from .granular_commands import OWN, Commands, NotTakenError, without_suffix
 
 BALANCE = 1e-4
-"""Share of the mean contact force that may be out of balance: then the motion is that of a packing which comes to rest
-elsewhere, and K says nothing of it."""
+"""Share of the mean contact force that may be out of balance. Beyond, the packing moves to another place of rest, and K
+says nothing of this motion."""
 
 
 def check_balance(balance: float) -> None:

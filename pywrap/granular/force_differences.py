@@ -58,8 +58,8 @@ FREE_DISPLACEMENT = 1e-7
 """A displacement as a share of a radius where no particles overlap."""
 
 DASHPOT_FORCE = 1e-4
-"""Force of dashpots as a share of the mean contact force: contacts do not reach Coulomb's bound by it unless they are
-there, and the rounding of forces is 1e-7 of it or less."""
+"""Force of dashpots as a share of the mean contact force: contacts below Coulomb's bound do not reach the bound, and
+the rounding of forces is 1e-7 of this force or less."""
 
 LEAST_JUMP = 1e-3
 """Jump of a derivative, as a share of the largest entry, from which on two sides are said to differ; the extrapolation
@@ -70,8 +70,8 @@ NEXT_SIZE = 0.03
 as much as they push, may bear a force 1e-5 of the mean one, and slide within 1e-7 of an overlap."""
 
 SHORTEST_OF_COORDINATE, SHORTEST_OF_OVERLAP = 1e-11, 1e-6
-"""Shortest displacement as a share of the largest coordinate, whose rounding is 1e-5 of it, and of the median overlap:
-the history that `granular` does not turn is 6e-4 of mu of the difference."""
+"""Shortest displacement: as a share of the largest coordinate, whose rounding is 1e-5 of the displacement, and of the
+median overlap, where the history that `granular` does not turn is 6e-4 of mu of the difference."""
 
 SHORTEST_ERROR = 1e-2
 """Error of the shortest displacement, as a share of the largest force, from which on shorter ones are tried."""
@@ -130,7 +130,7 @@ def _measure(lmp: Any, particles: ProbedParticles, force: float | None) -> Force
     hold_still(lmp, particles.bodies)
     set_coordinate_velocity(lmp, particles, np.zeros(particles.constraint.shape[0]))
     pairs = neighbouring_pairs(lmp, particles)
-    step = displacement(particles, pairs)
+    step = probe_displacement(particles, pairs)
     colours = Colours(particles, pairs, 4 * step)
     timestep = float(lmp.extract_global("dt"))
     lmp.command(f"timestep {LENGTH_OF_STEP * timestep:.17g}")
@@ -200,7 +200,7 @@ def _refuse_errors(particles: ProbedParticles, jump: Floats, error: Floats) -> N
     )
 
 
-def displacement(particles: ProbedParticles, pairs: Pairs) -> float:
+def probe_displacement(particles: ProbedParticles, pairs: Pairs) -> float:
     """A step far below the smallest overlap and gap, as far as rounding allows."""
     gaps = np.abs(pairs.gap[np.isfinite(pairs.gap)])
     overlaps = -pairs.gap[pairs.gap < 0]

@@ -20,7 +20,7 @@ from .instance_queries import communicator
 Arrays = dict[str, Any]
 
 ATOM_ARRAYS = ("x", "image", "v", "omega", "f", "torque")
-"""What `given_back` restores."""
+"""Arrays that `given_back` restores."""
 
 NO_FORCE = 1.2345678e300
 """A number that is no force."""

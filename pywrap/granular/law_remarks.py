@@ -20,7 +20,7 @@ NAMES_OF_NUMBERS = {
     "tangential": "a tangential stiffness",
     "mu": "a friction coefficient",
 }
-"""What the numbers are called."""
+"""Names of the numbers in sentences."""
 
 
 def remark_on(law: MeasuredLaw, commands: Commands, name: tuple[int, int] | str, state: State) -> str | None:

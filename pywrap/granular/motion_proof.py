@@ -60,8 +60,8 @@ SHORTER_STEPS = 10
 difference falls as the step, and that of a K which is not LAMMPS's does not."""
 
 STEP_PHASE = 1.5
-"""A step times a bound of the fastest rate, some three times the fastest rate: five steps are half an oscillation of
-it. Below 2 steps are stable."""
+"""Time step times a bound of the fastest rate, which is some three times this rate: five steps are half an oscillation
+of the fastest motion. Below 2 steps are stable."""
 
 COMMON_VELOCITY = 1.0
 """Velocity that all particles share, in units of their random ones. A fix that changes the total momentum changes this

@@ -41,8 +41,8 @@ SETTLING_STEPS = 100.0
 """Steps to rest, in units of the time step that F_y's own time has: 26,000 at k_n = 2e5, F_y = 3, as many for 30 disks
 as for 100, and growing with (k_n/F_y)^(1/3) from 26,000 to 665,000."""
 SETTLING_WITH_FRICTION = 25.0
-"""The same with packing.settle_friction, in units of the overdamped time step: between 11 and 33 for 30 disks, Hertz
-with k_n = 2e5 and 2e6 and harmonic with 2e4."""
+"""Steps to rest with packing.settle_friction, in units of the overdamped time step: between 11 and 33 for 30 disks,
+Hertz with k_n = 2e5 and 2e6 and harmonic with 2e4."""
 OVERDAMPED_STEPS = 16_000
 """Steps of the default length in one increment of overdamped dynamics."""
 STAGED_DISKS = 300

@@ -184,7 +184,7 @@ class GrowthScreen:
         self._basis: Basis | None = None
         self._seen: tuple[System, Reduced] | None = None
 
-    def __call__(self, here: System, there: System, known: Sequence[Space], depth: int) -> Few | None:
+    def __call__(self, here: System, there: System, growing: Sequence[Space], depth: int) -> Few | None:
         """The modes of the system that grow at the upper load, sought where a few clusters announce them.
 
         None if the clusters are not known, or too many. A DoubtError says where a cluster has a window in between.
@@ -193,14 +193,14 @@ class GrowthScreen:
         most = max(1, self.limits.clusters * here.stiffness.shape[0] ** 2) / 2**depth
         if clusters is None or len(clusters) > most:
             return None
-        growing: list[Space] = []
+        found: list[Space] = []
         for guess, rate in [each for cluster in clusters for each in self._guesses(cluster, there)]:
             mode = guess.at(there, self.limits, rate)
             if mode is None:
                 raise DoubtError
-            if mode.grows and not any(mode.equals(each) for each in growing):
-                growing.append(mode)
-        return Few([(None, mode) for mode in growing], len(clusters))
+            if mode.grows and not any(mode.equals(each) for each in found):
+                found.append(mode)
+        return Few([(None, mode) for mode in found], len(clusters))
 
     def _guesses(self, cluster: "Cluster", there: System) -> list[tuple[Space, complex]]:
         """Modes of a cluster that grow or nearly grow at the upper load: guesses for modes of the system."""

@@ -114,10 +114,10 @@ class PairScreen:
         self._seen: tuple[csr_array, Levels] | None = None
         self._reached: list[Space] = []
 
-    def __call__(self, here: System, there: System, known: Sequence[Space], depth: int) -> Few | None:
+    def __call__(self, here: System, there: System, growing: Sequence[Space], depth: int) -> Few | None:
         """The pairs at both loads; None if they are more than `Limits.few`, or one is a pair to within rounding."""
-        planes = self._planes(here.stiffness, there.stiffness, len(known))
-        reached = [*known, *(each for each in self._reached if each.system is here)]
+        planes = self._planes(here.stiffness, there.stiffness, len(growing))
+        reached = [*growing, *(each for each in self._reached if each.system is here)]
         self._reached = []
         pairs: list[tuple[Space, Space]] = []
         for plane in planes or []:
@@ -134,15 +134,15 @@ class PairScreen:
         self._reached = [above for _, above in pairs]
         return Few(pairs, len(pairs))
 
-    def _planes(self, here: csr_array, there: csr_array, known: int) -> list[Floats] | None:
+    def _planes(self, here: csr_array, there: csr_array, complex_pairs: int) -> list[Floats] | None:
         """Orthonormal bases of the pairs, shape (n, 2); None if they are too many, or if the coordinates change.
 
-        The basis is renewed where it names more pairs than those that are known to be complex.
+        The basis is renewed where it names more pairs than those that are complex_pairs to be complex.
         """
-        if known > self.limits.few:
+        if complex_pairs > self.limits.few:
             return None
         found = None if self._basis is None else self._look(self._basis, here, there)
-        if (found is None or len(found) > known) and self._base is not here:
+        if (found is None or len(found) > complex_pairs) and self._base is not here:
             self._base, self._basis, self._seen = here, Basis.of(here, self.limits), None
             found = self._look(self._basis, here, there)
         return found

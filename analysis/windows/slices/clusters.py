@@ -149,10 +149,10 @@ class SliceSearch(ABC):
         """Results of the slices of all ranks, in the order of the spectrum; waits for the slices of other searches."""
         first, stop = self.bases.range(places[0].matrices[0])
         while True:
-            known = self._stored_slices(places)
-            fresh = self.ranks.together(partial(self._search_slices, places, known))
-            found = sorted(chain(known.found, *fresh), key=lambda each: each.border.modes)
-            if known.folder is None or sum(each.border.size for each in found) == stop - first:
+            stored = self._stored_slices(places)
+            fresh = self.ranks.together(partial(self._search_slices, places, stored))
+            found = sorted(chain(stored.found, *fresh), key=lambda each: each.border.modes)
+            if stored.folder is None or sum(each.border.size for each in found) == stop - first:
                 return found
             if not any(fresh):
                 time.sleep(self.limits.wait)
@@ -165,18 +165,18 @@ class SliceSearch(ABC):
         folder = pass_folder(self.folder, places, self.bases.range(matrix), self.limits)
         return self.ranks.together(lambda: SlicePass.read(folder) if self.ranks.rank == 0 else NEW_PASS)[0]
 
-    def _search_slices(self, places: Sequence[System], known: SlicePass) -> list[SliceResult]:
-        """Results of this rank's slices, without the slices that are known."""
+    def _search_slices(self, places: Sequence[System], stored: SlicePass) -> list[SliceResult]:
+        """Results of this rank's slices, without the slices that are stored."""
         found: list[SliceResult] = []
         first, stop = self.bases.range(places[0].matrices[0])
-        before = sum(each.size for each in known.borders)
+        before = sum(each.size for each in stored.borders)
         done, wanted = (-(-modes // self.ranks.size) for modes in (before, stop - first))
         failure: FaultgougeError | None = None
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
         report_progress(
-            f"{where}: {f'{before} of {stop - first} modes are known' if known.shifts else 'modes are counted'}"
+            f"{where}: {f'{before} of {stop - first} modes are known' if stored.shifts else 'modes are counted'}"
         )
-        for basis, levels in self.bases.at(places[0].matrices[0], known):
+        for basis, levels in self.bases.at(places[0].matrices[0], stored):
             done += basis.own.stop - basis.own.start
             report_progress(f"{where}: {min(done, wanted)} of {wanted} modes")
             try:
@@ -184,7 +184,7 @@ class SliceSearch(ABC):
             except FaultgougeError as error:
                 failure = failure or error  # it waits: the ranks meet at the end of their bases
                 continue
-            known.keep(found[-1])
+            stored.keep(found[-1])
         if failure is not None:
             raise failure
         return found

@@ -142,12 +142,12 @@ class SlicedGrowth(SliceSearch):
         UncoveredAxisError, LostPairError
             If the motions of a load cannot be told, or none of those that grow can be followed.
         """
-        known = self.passed[-1].fx
+        quiet = self.passed[-1].fx
         if not self._few_enough(self.passed[-1]):
-            return self.first, (*doubtful, (self.passed[0].fx, known))
+            return self.first, (*doubtful, (self.passed[0].fx, quiet))
         while True:
             done = int(np.searchsorted(loads, self.passed[-1].fx, side="right"))
-            farther = self.limits.stride * int(np.searchsorted(loads, known, side="right"))
+            farther = self.limits.stride * int(np.searchsorted(loads, quiet, side="right"))
             flows = self._pass_loads(loads[done : max(done + 1, farther)])
             growing = self._all_growing(self.passed[-1])
             if growing:
@@ -156,31 +156,31 @@ class SlicedGrowth(SliceSearch):
                 raise flows
             if self.passed[-1].fx >= loads[-1]:
                 return None, doubtful
-            known = self.passed[-1].fx
-        first = self._earliest_of(growing, None, known)
+            quiet = self.passed[-1].fx
+        first = self._earliest_of(growing, None, quiet)
         while first is not None:
-            earlier = self._earlier_than(first, known)
+            earlier = self._earlier_than(first, quiet)
             if earlier is first:  # nothing that grows there was followed back: the increments are named as in doubt
                 break
             first = earlier
         return first, (*doubtful, *self.doubtful)
 
-    def _earlier_than(self, first: Window, known: float) -> Window:
+    def _earlier_than(self, first: Window, quiet: float) -> Window:
         """A window that opens before the first one so far, by motions that grow where this one opens; else the same.
 
         They are looked for right below its onset and, if none is followed back from there, at the last load before.
         """
-        below = [each for each in self.passed if known < each.fx < first.fx_onset]
-        beside = first.fx_onset - max(self.limits.below_onset * (first.fx_onset - known), 10 * first.error)
+        below = [each for each in self.passed if quiet < each.fx < first.fx_onset]
+        beside = first.fx_onset - max(self.limits.below_onset * (first.fx_onset - quiet), 10 * first.error)
         places = []
-        if beside > known:
+        if beside > quiet:
             try:
                 places.append(self.at(beside))
             except NoEquilibriumError:  # nobody has looked there
-                self.doubtful.append((known, first.fx_onset))
+                self.doubtful.append((quiet, first.fx_onset))
         for place in [*places, *below[-1:]]:
             growing = self._all_growing(place)
-            earlier = self._earliest_of(growing, first, known) if growing else first
+            earlier = self._earliest_of(growing, first, quiet) if growing else first
             if earlier is not None and earlier is not first:
                 return earlier
         return first
@@ -199,8 +199,9 @@ class SlicedGrowth(SliceSearch):
         report_progress(f"all motions that grow at F_x = {place.fx:.6g}, as the dashpots couple many modes")
         return sorted(growing_modes(place), key=lambda mode: -mode.mean.real)
 
-    def _earliest_of(self, growing: list[Space], first: Window | None, known: float) -> Window | None:
-        """The first window, once all motions that grow at a load are followed back; at the load `known` none grows."""
+    def _earliest_of(self, growing: list[Space], first: Window | None, quiet: float) -> Window | None:
+        """The first window, once all motions that grow at a load are followed back; no motion grows at the load
+        `quiet`."""
         below = [each for each in self.passed if each.fx < growing[0].fx]
         lost: FaultgougeError | None = None
         for mode in growing:
@@ -210,7 +211,7 @@ class SlicedGrowth(SliceSearch):
                     first = window if first is None or window.fx_onset < first.fx_onset else first
             except (LostPairError, NoEquilibriumError) as error:
                 lost = error
-                self.doubtful.append((known, mode.fx))
+                self.doubtful.append((quiet, mode.fx))
         if first is None and lost is not None:
             raise lost
         return first
@@ -250,19 +251,19 @@ class SlicedGrowth(SliceSearch):
         try:
             ends = [follow_to(mode, place, self.limits) for place in (here, there)]
             at = track(self.at, {each.fx: each for each in (mode, *ends)}, self.limits)
-            known = {each.fx: each for each in (mode, *ends)}
-            if len(known) < 3:
+            modes = {each.fx: each for each in (mode, *ends)}
+            if len(modes) < 3:
                 middle = 0.5 * (here.fx + there.fx)
-                known[middle] = at(middle)
+                modes[middle] = at(middle)
             for _ in range(self.limits.places):
-                best = max(known.values(), key=lambda each: each.mean.real)
+                best = max(modes.values(), key=lambda each: each.mean.real)
                 if best.grows:
                     return best
-                fx = parabola_vertex(sorted(known.values(), key=lambda each: abs(each.fx - best.fx))[:3])
+                fx = parabola_vertex(sorted(modes.values(), key=lambda each: abs(each.fx - best.fx))[:3])
                 fx = float(np.clip(fx, here.fx, there.fx))
-                if min(abs(fx - load) for load in known) < self.limits.settled * (there.fx - here.fx):
+                if min(abs(fx - load) for load in modes) < self.limits.settled * (there.fx - here.fx):
                     return None
-                known[fx] = at(fx)
+                modes[fx] = at(fx)
         except LostPairError as error:  # nothing is lost but what a cluster has announced
             raise DoubtError from error
         raise DoubtError

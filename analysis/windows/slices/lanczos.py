@@ -46,7 +46,7 @@ def slices(
     limits: Limits = LIMITS,
     factorise: Callable[[csc_array, float], Factorization] | None = None,
     ranks: Ranks = ALONE,
-    known: SlicePass = NEW_PASS,
+    stored: SlicePass = NEW_PASS,
 ) -> Iterator[Slice]:
     """Eigenvalues and eigenvectors of a symmetric matrix, slice by slice in the order of the spectrum.
 
@@ -63,7 +63,7 @@ def slices(
     ranks : Ranks
         Who shares the slices; those of this rank are found. Its threads are also the slices at the most that are under
         way beyond the one that is asked for. All ranks must come to the end of their slices.
-    known : SlicePass
+    stored : SlicePass
         The slices in it are left out, and those that another search takes. The shifts are taken from it; if it has
         none, the first rank keeps them there.
 
@@ -76,14 +76,14 @@ def slices(
     mine: list[Border] = []
     failure: FaultgougeError | None = None
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(ranks.workers) as pool:
-        shifts = known.shifts or spectrum.shifts(pool, *(modes or (0, matrix.shape[0])))
-        if ranks.rank == 0 and not known.shifts:
-            known.keep_shifts(shifts)
-        found = {each.modes for each in known.borders}
+        shifts = stored.shifts or spectrum.shifts(pool, *(modes or (0, matrix.shape[0])))
+        if ranks.rank == 0 and not stored.shifts:
+            stored.keep_shifts(shifts)
+        found = {each.modes for each in stored.borders}
         wanted = [each for each in shifts if each[1] not in found]
         own = wanted[ranks.part(len(wanted))]
         try:
-            with known.lock_slices() as take:
+            with stored.lock_slices() as take:
                 for part in _in_turn(pool, ranks.workers, spectrum, own, margin, take):
                     mine.append(part.border)
                     _compare_slices(*mine[-2:])
@@ -96,7 +96,7 @@ def slices(
             raise failure
         return mine
 
-    _compare_slices(*sorted(chain(known.borders, *ranks.together(borders))))
+    _compare_slices(*sorted(chain(stored.borders, *ranks.together(borders))))
 
 
 def _in_turn(

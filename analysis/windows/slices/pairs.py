@@ -84,12 +84,12 @@ class SlicedPairs(SliceSearch):
             raise DoubtError
         here = self.passed[-1]
         try:
-            known = [pair, *(follow_to(pair, each, self.limits) for each in (here, there) if each.fx != pair.fx)]
-            inside = next((each for each in known if each.grows), None)
+            images = [pair, *(follow_to(pair, each, self.limits) for each in (here, there) if each.fx != pair.fx)]
+            inside = next((each for each in images if each.grows), None)
             if inside is not None:
                 return inside
             narrowest = self.limits.finest * (there.fx - here.fx)
-            found = other_growth(self.at, [[each] for each in known], narrowest, limits=self.limits)
+            found = other_growth(self.at, [[each] for each in images], narrowest, limits=self.limits)
             return None if found is None else found[0]
         except LostPairError as error:
             raise DoubtError from error

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
-Source = Annotated[
+SourceFile = Annotated[
     Path,
     typer.Argument(
         metavar="FILE",
@@ -28,7 +28,7 @@ Source = Annotated[
     ),
 ]
 
-Layer = Annotated[
+UpperLayer = Annotated[
     str | None,
     typer.Option(
         metavar="LAYER",
@@ -38,14 +38,16 @@ Layer = Annotated[
     ),
 ]
 
-Like = Annotated[Path | None, typer.Option(help="Law, load, damping and inertia of this scene.", show_default=False)]
+LawOfScene = Annotated[
+    Path | None, typer.Option(help="Law, load, damping and inertia of this scene.", show_default=False)
+]
 
-Width = Annotated[
+Period = Annotated[
     str | None, typer.Option(metavar="L|open", help="Period along x, or open sides; by default as in the file.")
 ]
 
-Slips = Annotated[
-    Path | None, typer.Option(help="Slips: CSV with id1, id2 (0: the floor), slip; or a LAMMPS dump local.")
+SlipsFile = Annotated[
+    Path | None, typer.Option(help="SlipsFile: CSV with id1, id2 (0: the floor), slip; or a LAMMPS dump local.")
 ]
 
 
@@ -55,10 +57,10 @@ Slips = Annotated[
 )
 def import_(
     context: typer.Context,
-    file: Source,
+    file: SourceFile,
     output: Annotated[Path, typer.Option("-o", "--output", help="The run.h5 to write.")] = Path("packing.h5"),
-    top: Layer = None,
-    scene: Like = None,
+    top: UpperLayer = None,
+    scene: LawOfScene = None,
     kn: Annotated[float | None, typer.Option(help="Normal stiffness, without a scene.", show_default=False)] = None,
     kt: Annotated[str | None, typer.Option(help="Tangential stiffness: a number, or '2/7 kn'.")] = None,
     mu: Annotated[float | None, typer.Option(help="Friction coefficient; 1 by default.", show_default=False)] = None,
@@ -69,8 +71,8 @@ def import_(
     floor: Annotated[
         float, typer.Option(help="y of the floor in the file; the packing is shifted so that the floor is at 0.")
     ] = 0.0,
-    width: Width = None,
-    contacts: Slips = None,
+    width: Period = None,
+    contacts: SlipsFile = None,
     frame: Annotated[
         int | None, typer.Option(help="Number of the frame; negative numbers count from the last.")
     ] = None,
