@@ -88,7 +88,7 @@ class RunMotion:
         largest = np.maximum.accumulate(np.sqrt(np.sum(self.displacement**2, axis=2)).max(axis=1))
         if not largest[-1]:
             return np.ones(len(largest))
-        # before anything has moved the factor is already that of the first displacement
+        # before any displacement the factor is that of the first displacement
         largest = np.maximum(largest, largest[largest > 0][0])
         return 10.0 ** np.floor(np.log10(LARGEST_SHOWN * self.packing.radius.min() / largest))
 

@@ -79,7 +79,7 @@ class LoadPath(Generic[E]):
         if below is not None and below.fx == load:
             return below.packing
         if not kept or load > kept[-1].fx:
-            # from the kept ones alone, so that it does not depend on what is asked for in between
+            # from kept equilibria alone, so that the result does not depend on other loads that were asked for
             found = self.solver.solve(load, below, kept[-2] if len(kept) > 1 else None, ahead=self._onward)
             kept.append(found)
             return found.packing

@@ -49,7 +49,7 @@ CircleRadius = Callable[[complex, Floats], Floats]
 
 def second_order(middle: complex, time: Floats) -> Floats:
     """The reach of an eigenvalue lambda of x'' = -lambda x."""
-    inverse = 1 / np.where(time > 0, time, 1.0)  # frequencies on this circle differ by 1/t from that of its centre
+    inverse = 1 / np.where(time > 0, time, 1.0)  # frequencies on this circle are 1/t from the centre's
     return np.asarray(inverse * (2 * np.sqrt(abs(middle)) + inverse))
 
 

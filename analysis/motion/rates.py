@@ -119,7 +119,7 @@ def _undamped_rates(motion: Motion) -> Rates:
     grows, kept = oscillates | buckles, values.imag >= 0
     free = ~grows & (np.abs(values) <= zero)
     s = 1j * np.sqrt(np.where(grows, values, np.abs(values.real)).astype(complex))
-    s = np.where(s.real < 0, -s, s)  # of a pair of roots the one that grows
+    s = np.where(s.real < 0, -s, s)  # one root of each pair: the one that grows
     order = np.flatnonzero(kept & ~free)
     order = order[np.argsort(-s[order].real, kind="stable")]
     return Rates(s[order], grows[order], int(free.sum()))

@@ -192,7 +192,7 @@ class _Course:
         if self.best is not None and residual > self._gain * self.best.residual:
             if self.best.residual < FLOORS_OF_ROUNDING * self.floor:
                 if residual < self.best.residual and self.floor < self.best.residual:
-                    self.best = trial  # below the floor the one that moved less is as good
+                    self.best = trial  # below the floor the trial that moved less is as good
                 return True
             self._worse += 1
             if self._worse > ITERATIONS_WITHOUT_GAIN:

@@ -136,7 +136,7 @@ def _linearised_contacts(
         for name, group in groups.items():
             if len(group.forces) == 0:
                 continue
-            # a law is that of its commands, which a user may change
+            # laws belong to commands, which a user may change
             key = (*commands.pair, commands.fixes.get(name), name)
             state = median_state(group, found)
             if key not in laws:

@@ -265,7 +265,7 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
     bench.place_at(wanted)
     bench.move(slipping=1e12 * delta / step)  # far beyond Coulomb's bound, of soft springs too
     bench.run("run 1 post no")
-    mu = bench.force()[1] / fn  # while the contact slides: a dashpot has its share of it
+    mu = bench.force()[1] / fn  # while the contact slides: dashpots bear a part of the force
     if mu == 0:
         none = dict.fromkeys(("tangential", "tangential_dashpot", "closing", "parting", "mu", "lever"), 0.0)
         return state, {"stiffness": fn / delta, "normal_dashpot": normal_dashpot} | none

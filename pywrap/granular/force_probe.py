@@ -161,7 +161,7 @@ class Probe:
                 if self.duration:
                     self._put(place)
                 sides.append(there)
-                rest = back  # what is left of a way is of second order in the step
+                rest = back  # the change that a way leaves is of second order in the step
             found.append((rest, list(zip(sides[::2], sides[1::2], strict=True))))
         return found
 

@@ -103,13 +103,13 @@ def take_configuration(
             ) from reason
         if not isinstance(reason, NotProvedError):
             return _by_differences(lmp, given, balance=balance, prove=prove)
-        # what acts on velocities, or on particles far apart, is not in differences either, and has been named
+        # differences lack forces on velocities, or between particles far apart, too, and these have been named
         with suppress(NotTakenError):
             found = _by_differences(lmp, given, balance=balance, prove=prove)
             proved = found.proof is not None and found.proof <= LARGEST_DIFFERENCE
             if proved and found.operator_error <= SMALL_DIFFERENCE:
                 return found
-            # no linear motion is that of contacts which slide on one side, and no verdict is given
+            # contacts that slide on one side have no linear motion, and no verdict is given
             if isinstance(reason, OtherStiffnessError) and len(found.one_sided_particles):
                 return found
         raise
@@ -123,7 +123,7 @@ def _by_laws(
     deck, fixes, found = in_a_copy(look) if can_copy(lmp) else look()
     try:
         configuration = configuration_by_laws(lmp, deck, found, laws)
-    except ValueError as error:  # of what no contact at rest has
+    except ValueError as error:  # numbers that no contact at rest has
         raise NotTakenError(f"The packing moves: {error}; bring it to rest by faultgouge.relax(lmp).") from error
     configuration = derive_frozen(configuration, remarks=(*configuration.remarks, *drag_remarks(fixes)))
     contacts = configuration.contacts

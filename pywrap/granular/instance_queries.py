@@ -44,7 +44,7 @@ def styles_of(lmp: Any) -> Styles:
         said = communicator(lmp).bcast(answer.read(), root=0)
     fixes = re.findall(r"^ *Fix\[ *\d+\]: *(\w+), *style = ([^,\s]+), *group = (\S+)", said, re.MULTILINE)
     values = dict(re.findall(r"^ *(Atoms|Atom style) *= *(.*?) *$", said, re.MULTILINE))
-    # Atoms = N, types = T, style = that of the pairs
+    # Atoms = N, types = T, style = the pair style
     styles, groups = ({name: each[k] for name, *each in fixes} for k in (0, 1))
     return Styles(values["Atoms"].rpartition("style = ")[2], styles, groups, values["Atom style"])
 

@@ -56,7 +56,7 @@ def _keep(lmp: Any, file: Path) -> Path | None:
     """Write a restart; None if LAMMPS cannot, if there is nothing to write, or there is such a file."""
     if file.exists() or lmp.get_natoms() == 0:
         return None
-    with suppress(Exception):  # LAMMPS raises what its bindings choose, and the first error is the one to be said
+    with suppress(Exception):  # LAMMPS's bindings raise any error, and the first error is told
         lmp.command("timer timeout unlimited")
         lmp.command(f'restart 1 "{file.resolve()}.*"')
         lmp.command("run 1 post no")

@@ -244,7 +244,7 @@ class _Relaxation:
             # the first of all others, which are forked from it
             self.found = found = self.look(prove=True) if self.found is None else found
             change = in_a_copy(lambda: self.force_change(value))
-        except Exception as error:  # LAMMPS, and a user's function, raise what they choose
+        except Exception as error:  # LAMMPS, and a user's function, raise any error
             if not relaxes:
                 return None  # particles that nothing holds fly off: the relaxation has its own words for it
             return (
@@ -304,7 +304,7 @@ class _Relaxation:
         if not np.array_equal(start.contacts.closing, start.contacts.parting):
             return None
         stiffness = stiffness_matrix(start)
-        # what no contact feels has zero rows, and stays where it is
+        # a coordinate that no contact feels has a zero row, and does not move
         solver = general_lu(csc_array(stiffness + 1e-9 * abs(stiffness).max() * eye_array(start.coordinates)))
         files = open_files()
         given = self.commands or in_a_copy(lambda: log_of(lmp, files)) or []

@@ -53,7 +53,7 @@ def silent_copy(*keep: int) -> int:
 
     The process decides what Ctrl-C ends: call this where :func:`interrupts_wait`.
     """
-    ctypes.CDLL(None).fflush(None)  # what is buffered would be written twice
+    ctypes.CDLL(None).fflush(None)  # buffered text would be written twice
     child = os.fork()
     if child == 0:
         if threading.current_thread() is threading.main_thread():
@@ -66,7 +66,7 @@ def _silence(keep: tuple[int, ...]) -> None:
     """Put the null device in the place of all files, pipes and terminals that are open for writing."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     for descriptor in map(int, os.listdir("/dev/fd")):
-        with suppress(OSError):  # that of the list itself is closed
+        with suppress(OSError):  # the file of the list itself is closed
             writes = fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE != os.O_RDONLY
             kind = os.fstat(descriptor).st_mode
             shared = stat.S_ISREG(kind) or stat.S_ISFIFO(kind) or os.isatty(descriptor)

@@ -161,7 +161,7 @@ def bring_to_rest(
             if force == 0.0 or residual <= max(balance * force, rounding):
                 found = look()
                 force = force_scale(found)
-                # what touches nothing has no residual; without a load, LAMMPS's forces are those of the drag
+                # particles without contacts have no residual; without a load, LAMMPS's forces are those of the drag
                 falls = force == 0.0 and np.linalg.norm(forces + drag_forces) > 0.5 * np.linalg.norm(drag_forces)
                 if found.residual <= max(balance * force, rounding) and not falls:
                     set_velocity(lmp, found, np.zeros(found.coordinates))
@@ -249,7 +249,7 @@ def _run(lmp: Any, count: int, where: str, *, set_up: bool) -> None:
             set_up_run(lmp)
         began = lmp.extract_global("ntimestep")
         lmp.command(f"run {STEPS_BETWEEN_LOOKS} pre no post no")
-    except Exception as error:  # LAMMPS raises what its bindings choose
+    except Exception as error:  # LAMMPS's bindings raise any error
         raise NotTakenError(f"While the packing came to rest{where}, {explain_error(error)}") from error
     if lmp.extract_global("ntimestep") != began + STEPS_BETWEEN_LOOKS:
         raise NotTakenError(

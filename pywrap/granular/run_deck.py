@@ -138,7 +138,7 @@ def _carry_out(lmp: Any, path: Path, name: str) -> None:
     try:
         os.chdir(path.parent.resolve())
         lmp.file(name)
-    except Exception as error:  # LAMMPS raises what its bindings choose
+    except Exception as error:  # LAMMPS's bindings raise any error
         raise NotTakenError(f"{path}: {explain_error(error)}") from error
     finally:
         os.chdir(here)

@@ -91,7 +91,7 @@ def triggering_run(scene: Scene, runs: list[Onset], path: Path) -> Triggering | 
             f"F_x = {fx:g} is below the onset {weakened[0].fx_c:g} of the weakened friction, too: no "
             "window between the two, and nothing to erupt."
         )
-    *_, start = reach(scene, fx)  # to the bit the one of `perturb`, and so is v_0
+    *_, start = reach(scene, fx)  # to the bit the equilibrium of `perturb`, with its v_0
     modes = spectrum(start.packing)
     if modes.is_stable is False:
         what = f"{counted(len(modes.pairs), 'complex pair')} and {counted(len(modes.negative), 'negative eigenvalue')}"

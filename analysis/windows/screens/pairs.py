@@ -61,7 +61,7 @@ def may_meet(here: Levels, there: Levels, slack: float) -> Indices:
     second += second.T.copy()
     second *= 0.5
     aside = slack * np.abs(there.diagonal - here.diagonal).astype(np.float32)
-    # A coarse test of all, in which the second order is a bound as well, and the sharp one of those that fail.
+    # A coarse test of all pairs, in which the second order is a bound as well; then the sharp test of pairs that fail.
     shift = np.diag(second) + aside
     reach = 2 * (largest + second) + shift
     reach += shift[:, None]

@@ -219,7 +219,7 @@ class SliceSearch(ABC):
         if it finds no window.
         """
         here = self.passed[-1]
-        off = 2 * self.limits.reach  # of what clusters locate, in shares of the way or of the increment
+        off = 2 * self.limits.reach  # error of loads that clusters locate, as a share of the way or of the increment
         first: Window | None = None
         lost: Exception | None = None
         doubt = False

@@ -54,7 +54,7 @@ class Levels:
     def block(self, cluster: ModeCluster) -> Floats:
         """The operator in a cluster, with the second order of the modes outside; 1 / time^2."""
         diagonal = self.diagonal[cluster.modes]
-        # Modes of the margin may lie close to modes outside: what these do is right for the core.
+        # Modes of the margin may lie close to modes outside, whose effect is right for the core.
         core = np.sort(diagonal[cluster.core[0] : cluster.core[1] + 1])
         distance = np.clip(diagonal, core[0], core[-1])[:, None] - self.diagonal
         weight = np.divide(1.0, distance, out=np.zeros_like(distance), where=distance != 0)

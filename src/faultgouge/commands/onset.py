@@ -112,7 +112,7 @@ def onset(
     tell(f'law of friction: {wanted.law.in_words} (history = "{wanted.law.history}")')
     result = _write_result(output, found)
     if is_root() and folder is not None and not slices:
-        shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
+        shutil.rmtree(folder, ignore_errors=True)  # the result is there: files left over do no harm
     if as_json:
         print_json(result)
     if failed is not None:
