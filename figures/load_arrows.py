@@ -61,7 +61,7 @@ def _free_begin(view: View, reaching: Floats, sense: float, length: float) -> fl
 
 
 def _free_place(artist: PackingArtist, x: Floats, crest: Floats, length: float, shear_x: Floats) -> Floats:
-    """Where the name of F_y stands: beside the arrow with the most room for it, away from disks, arrows and borders."""
+    """Place of the name of F_y: beside the arrow with the most room, away from disks, arrows and borders."""
     view = artist.view
     places = np.column_stack([x + 0.5 * length, crest + 0.55 * length])
     shear = np.column_stack([shear_x, np.full(len(shear_x), view.ceiling - 0.3 * length)])

@@ -273,7 +273,7 @@ def _steps(dynamics: Dynamics) -> int:
 
 
 def _defaults(scene: Scene) -> dict[str, Any]:
-    """Keys that the scene's sections leave to a default that is a value of its own."""
+    """Keys that the scene leaves out, whose default is a value and not none."""
     resolved = scene.resolved()
     unused = {"relax"} if scene.ramp is None or scene.ramp.method == "newton" else set()
     return {

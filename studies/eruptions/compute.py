@@ -144,7 +144,7 @@ def growth_rate(packing: Packing) -> float:
 
 
 def _course(dynamics: Dynamics, dt: float, longest: float) -> Iterator[tuple[float, MotionState]]:
-    """Samples that are close together at first and further apart later, each at a step of its own."""
+    """Samples, close together at first and farther apart later, no two at one step."""
     last = int(longest / dt)
     early = np.geomspace(min(100, last), last, SAMPLES_OF_RUN).astype(np.int64)
     steps = np.union1d(early, np.linspace(min(100, last), last, SAMPLES_OF_RUN).astype(np.int64))

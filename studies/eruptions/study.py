@@ -52,7 +52,7 @@ def _compute(scene: Scene, work: Work) -> Result:
 
 
 def _runs(rows: Rows, wanted: Sequence[float], time: float) -> list[dict[str, Any]]:
-    """The runs of that length at these loads."""
+    """Runs of the given length at the given loads."""
     runs = [row for row in rows.rows if row["fx"] in wanted and row["longest"] == time]
     return sorted(runs, key=lambda row: (row["fx"], row["damped"]))
 

@@ -160,7 +160,7 @@ def _import_deck(file: Path, output: Path, slides: bool, balance: float | None, 
 
 
 def _verdict(configuration: Configuration, output: Path) -> str:
-    """What `spectrum` says first of the packing, for those whose spectrum takes seconds."""
+    """The verdict of `spectrum`, if the packing's spectrum takes seconds."""
     from faultgouge.analysis import stability
     from faultgouge.analysis.motion.stability import LARGE
     from faultgouge.analysis.progress import show_progress
@@ -173,7 +173,7 @@ def _verdict(configuration: Configuration, output: Path) -> str:
 
 
 def _time_steps(configuration: Configuration) -> str:
-    """The largest stable time step beside the one that the speed of Rayleigh's wave would give."""
+    """The largest stable time step beside the time step by the speed of Rayleigh's wave."""
     from faultgouge.analysis import rayleigh_timestep, stable_timestep
 
     found, usual = stable_timestep(configuration), rayleigh_timestep(configuration)
@@ -183,7 +183,7 @@ def _time_steps(configuration: Configuration) -> str:
 
 
 def _place_disks(file: Path, frame: int | None, floor: float, width: str | None, contacts: Path | None) -> Disks:
-    """The disks of the file, with what options say instead of it."""
+    """The disks of the file; options replace numbers of the file."""
     from dataclasses import replace
 
     from faultgouge.analysis.files.formats.csv_json import read_slips
@@ -252,7 +252,7 @@ def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict
 
 
 def _scene(scene: Path | None, values: dict[str, Any], smallest: float) -> Scene:
-    """The scene, or one that says what options and file say; with disks of the smallest radius in place of its own."""
+    """The scene, or a scene made of options and file; its disks have the smallest radius of the packing."""
     from faultgouge.pywrap.scenes.scene import Scene
 
     packing = {"radii": [smallest], "width": 20 * smallest}

@@ -120,7 +120,7 @@ def onset(
 
 
 def _only_undamped(mu: float, error: Exception, tell: Tell) -> dict[str, Any]:
-    """What JSON and user are told of a ramp on which motion grows without dissipation alone; nothing of others."""
+    """The JSON of a ramp on which motion grows only without dissipation, told to the user, too; empty for others."""
     from faultgouge.analysis.windows import NoGrowthError
 
     if not isinstance(error, NoGrowthError) or error.undamped is None:
@@ -155,7 +155,7 @@ def _check_all_windows(scene: Scene, modes: tuple[int, int] | None) -> None:
 
 
 def _write_result(output: Path | None, found: list[dict[str, Any]]) -> dict[str, Any]:
-    """The JSON of all friction coefficients, beside that of the first with an onset, written if there is a file."""
+    """The JSON of the first friction coefficient with an onset, and of all, written if there is a file."""
     from faultgouge.analysis.files.atomic_write import write_json
 
     first = next((each for each in found if each["fx_c"] is not None), found[0])
@@ -188,7 +188,7 @@ def _undamped_onset(
     first: bool,
     tell: Tell,
 ) -> dict[str, Any]:
-    """The onset of a scene, as its JSON; and what a user reads of it."""
+    """The onset of a scene as JSON, told to the user in words."""
     from faultgouge.pywrap.onset import onset_run
 
     with status(f"mu = {mu:g}") as show:
@@ -220,7 +220,7 @@ def _damped_onset(
     folder: Path | None,
     before: list[dict[str, Any]],
 ) -> dict[str, Any]:
-    """The onset of a scene with dissipation, as its JSON; and what a user reads of it.
+    """The onset of a scene with dissipation as JSON, told to the user in words.
 
     What is known is written as it comes, beside what is known `before` of other friction coefficients, with the load
     up to which that is all as the key `searched_to`.

@@ -210,7 +210,7 @@ def _weakening(scene: Scene, record: Record) -> Weakening | None:
 
 
 def _hysteresis(path: Path, settings: Ramp) -> Hysteresis | None:
-    """What is left when F_x comes back; None on a ramp without turning points."""
+    """Displacement and work that remain when F_x returns; None on a ramp without turning points."""
     from faultgouge.analysis import RunFile
     from faultgouge.analysis.motion.hysteresis import hysteresis
 
