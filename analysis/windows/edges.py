@@ -101,7 +101,7 @@ class Edge:
         kind: Kind = "coalescence"
         if middle.system.dissipative:
             size = float(np.sqrt(np.abs(entries(middle.system.stiffness)).max()))
-            kind = "steady" if middle.mean.imag <= LIMITS.steady * size else "hopf"
+            kind = "steady" if middle.mean.imag <= LIMITS.steady_share * size else "hopf"
         overlap = min(each.overlap for each in spaces)
         return cls(fx, error + middle.system.balance, mean.item(), overlap, kind)
 
@@ -240,16 +240,16 @@ def _smooth_root(value: Callable[[float], float], below: float, above: float, li
     from scipy.optimize import brentq
 
     span = above - below
-    root = float(brentq(value, below, above, xtol=limits.root * span))
+    root = float(brentq(value, below, above, xtol=limits.root_width * span))
     room = min(root - below, above - root)
     # As near as the noise allows: the function should be straight, and yet stand out of the scatter.
-    distance = min(limits.points_in_room * room, limits.points * limits.root * span)
-    while 0 < distance < limits.points_farthest * room:
+    distance = min(limits.point_distance_share * room, limits.point_distance * limits.root_width * span)
+    while 0 < distance < limits.largest_point_share * room:
         loads = [float(fx) for fx in root + distance * np.arange(-2.0, 3.0)]
         found = _root_of_five(loads, np.array([value(fx) for fx in loads]), limits)
         if found is not None:
             return SignChange(*found, loads, smooth=True)
-        distance *= limits.points_farther
+        distance *= limits.point_factor
     return None
 
 
@@ -269,7 +269,7 @@ def _root_of_five(loads: list[float], values: Floats, limits: Limits) -> tuple[f
 def _jump_width(here: float, there: float, limits: Limits) -> float:
     """Width to which a jump between two loads is bracketed, force."""
     rounding = float(np.spacing(max(abs(here), abs(there))))
-    return max(limits.jump * abs(there - here), 4 * rounding)
+    return max(limits.jump_width * abs(there - here), 4 * rounding)
 
 
 SystemOfLoad = Callable[[float], System]

@@ -280,7 +280,7 @@ def _complex_at_start(start: HasConfiguration, limits: Limits) -> Spectrum | Non
     None if it has none, or if the packing is too large for all eigenvalues to be asked for. Of a symmetric operator,
     as without tangential forces, nothing is computed.
     """
-    if start.coordinates > limits.lapack or _symmetric(full_operator(start, limits)):
+    if start.coordinates > limits.lapack_coordinates or _symmetric(full_operator(start, limits)):
         return None
     found = spectrum(force_bearing(start, limits))
     return found if found.pairs else None

@@ -124,7 +124,7 @@ class Search:
 
     def _steps(self, here: System, there: System) -> list[System]:
         """The steps that lead to a load; where contacts change on the way, a short step about each change."""
-        shortest = self.limits.bending * (there.fx - here.fx)
+        shortest = self.limits.bend_length * (there.fx - here.fx)
 
         def divide(below: System, above: System) -> list[System]:
             if above.fx - below.fx <= shortest or below.states == above.states:
@@ -146,7 +146,7 @@ class Search:
             self._modes = {fx: each for fx, each in self._modes.items() if fx >= there.fx}
             return
         except DoubtError as doubt:
-            share = self.limits.share
+            share = self.limits.division_share
             fx = (1 - share) * here.fx + share * there.fx if doubt.fx is None else doubt.fx
         middle = []
         if there.fx - here.fx > self.narrowest:
@@ -162,7 +162,7 @@ class Search:
     def _carry(self, here: System, there: System, depth: int) -> tuple[Open, list[Window]]:
         """The motions that grow at the upper load, and the windows that end before; DoubtError if that is not sure."""
         growing = [space for space, _ in self.open or []]
-        if self.screen is None or depth > self.limits.screened:
+        if self.screen is None or depth > self.limits.screen_divisions:
             return self._by_all_modes(here, there, depth)
         try:
             few = self.screen(here, there, growing, depth)
@@ -172,7 +172,7 @@ class Search:
                 # of a few pairs no more than one may change, as two might meet
                 return self._settle(here, there, few.courses, [], lambda changes: here.dissipative or len(changes) <= 1)
         except DoubtError:
-            if depth < self.limits.screened:
+            if depth < self.limits.screen_divisions:
                 raise
         return self._by_all_modes(here, there, depth)
 
@@ -196,7 +196,7 @@ class Search:
         def sure(changes: Changes) -> bool:
             if here.dissipative:
                 return True
-            parts = self.limits.bent if step.bent else self.limits.changing
+            parts = self.limits.bend_divisions if step.bent else self.limits.change_divisions
             return not ((changes or hiding) and depth < parts) and step.apart(changes, self.narrowest)
 
         return self._settle(here, there, step.courses, hiding, sure)

@@ -250,7 +250,7 @@ def test_pairs_counted_in_slices_are_those_of_all_eigenvalues():
     rest = settle(Scene.from_mapping(SMALL | {"packing": {"disks": 60, "width": 9.2, "seed": 77}}))
     with Engine(rest.packing) as engine:
         packing = equilibrate(engine, rest, fx=0.3).packing
-    (found, error), every = count_in_slices(packing, replace(LIMITS, own=35)), count_pairs(packing)
+    (found, error), every = count_in_slices(packing, replace(LIMITS, slice_size=35)), count_pairs(packing)
     assert abs(len(found) - len(every.omega)) <= error <= 2
     assert np.sqrt(found).imag.max() == pytest.approx(every.omega[0].imag, rel=1e-2)
 

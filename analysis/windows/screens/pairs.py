@@ -115,7 +115,8 @@ class PairScreen:
         self._reached: list[Space] = []
 
     def __call__(self, here: System, there: System, growing: Sequence[Space], depth: int) -> Few | None:
-        """The pairs at both loads; None if they are more than `Limits.few`, or one is a pair to within rounding."""
+        """The pairs at both loads; None if they are more than `Limits.few_pairs`, or one is a pair to within
+        rounding."""
         planes = self._planes(here.stiffness, there.stiffness, len(growing))
         reached = [*growing, *(each for each in self._reached if each.system is here)]
         self._reached = []
@@ -139,7 +140,7 @@ class PairScreen:
 
         The basis is renewed where it names more pairs than those that are complex_pairs to be complex.
         """
-        if complex_pairs > self.limits.few:
+        if complex_pairs > self.limits.few_pairs:
             return None
         found = None if self._basis is None else self._look(self._basis, here, there)
         if (found is None or len(found) > complex_pairs) and self._base is not here:
@@ -156,4 +157,4 @@ class PairScreen:
         after = basis.change(before, there - here)
         self._seen = there, after
         pairs = may_meet(before, after, self.limits.slack)
-        return [basis.lift(pair) for pair in pairs] if len(pairs) <= self.limits.few else None
+        return [basis.lift(pair) for pair in pairs] if len(pairs) <= self.limits.few_pairs else None

@@ -210,11 +210,11 @@ def _cover_axis(scaled: _Scaled) -> tuple[list[Space], list[Rectangle]]:
         middle = covered + LIMITS.next_disc * radius
         reach, more = scaled.look(1j * middle)
         found += more
-        if middle - LIMITS.covered * reach > covered:
+        if middle - LIMITS.covered_share * reach > covered:
             radius = min(reach, 0.8 * radius)
             continue
-        begin, covered, radius = covered, middle + LIMITS.covered * reach, min(reach, 1.0)
-        height, fastest = float(np.sqrt(1 - LIMITS.covered**2) * reach), scaled.fastest_growth(begin, covered)
+        begin, covered, radius = covered, middle + LIMITS.covered_share * reach, min(reach, 1.0)
+        height, fastest = float(np.sqrt(1 - LIMITS.covered_share**2) * reach), scaled.fastest_growth(begin, covered)
         if height < fastest:
             beside.append((complex(height, begin), complex(fastest, covered)))
     return found, beside
@@ -223,7 +223,7 @@ def _cover_axis(scaled: _Scaled) -> tuple[list[Space], list[Rectangle]]:
 def _solve(system: System, x: Complexes, s: complex, distance: float) -> list[Space]:
     """The mode of a nearly known eigenvalue; if the iteration strays, the growing modes next to the eigenvalue."""
     mode = Space.of(system, x, x.conj(), s).refine(s)
-    if mode is not None and abs(mode.mean - s) < LIMITS.strayed * distance:
+    if mode is not None and abs(mode.mean - s) < LIMITS.stray_share * distance:
         return [mode]
     try:
         return find_growing_near(system, s, 1)
@@ -236,8 +236,8 @@ def _largest_eigenvalue(matrix: csr_array) -> float:
     if matrix.shape[0] < 3:
         return float(np.linalg.eigvalsh(matrix.toarray())[-1])
     start = np.random.default_rng(0).standard_normal(matrix.shape[0]).astype(matrix.dtype)
-    largest = eigsh(matrix, k=1, which="LA", v0=start, tol=LIMITS.norm, return_eigenvectors=False)[0]
-    return float((1 + LIMITS.norm) * largest)
+    largest = eigsh(matrix, k=1, which="LA", v0=start, tol=LIMITS.norm_error, return_eigenvectors=False)[0]
+    return float((1 + LIMITS.norm_error) * largest)
 
 
 def _factors(matrix: csc_array) -> Factors:

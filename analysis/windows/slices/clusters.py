@@ -92,12 +92,12 @@ class SliceSearch(ABC):
 
     def ahead(self, done: int) -> int:
         """Increments that are looked at while bases that are not kept pass by, after so many others."""
-        return self.limits.ahead
+        return self.limits.increments_ahead
 
     def along(self, loads: Floats) -> None:
         """Walk along a ramp, to the first window or to the last load.
 
-        Loads beyond the one above the onset are not asked for, except those of `Limits.ahead` increments; a
+        Loads beyond the one above the onset are not asked for, except those of `Limits.increments_ahead` increments; a
         NoEquilibriumError at one of them is raised if no window has been found before.
         """
         here = self.at(float(loads[0]))
@@ -155,7 +155,7 @@ class SliceSearch(ABC):
             if stored.folder is None or sum(each.border.size for each in found) == stop - first:
                 return found
             if not any(fresh):
-                time.sleep(self.limits.wait)
+                time.sleep(self.limits.wait_seconds)
 
     def _stored_slices(self, places: Sequence[System]) -> SlicePass:
         """Results that other searches have left; none if bases are kept, since later increments need them."""
@@ -219,7 +219,8 @@ class SliceSearch(ABC):
         if it finds no window.
         """
         here = self.passed[-1]
-        off = 2 * self.limits.reach  # error of loads that clusters locate, as a share of the way or of the increment
+        # error of loads that clusters locate, as a share of the way or of the increment
+        off = 2 * self.limits.cluster_reach
         first: Window | None = None
         lost: Exception | None = None
         doubt = False

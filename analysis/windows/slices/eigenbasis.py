@@ -192,7 +192,7 @@ class Bases:
         """Whether there is memory for the bases of all modes that are looked at."""
         first, stop = self.range(matrix)
         limits = self.limits
-        margins = 2 * (limits.margin + limits.beyond) * max(1, round((stop - first) / limits.own))
+        margins = 2 * (limits.margin + limits.modes_beyond) * max(1, round((stop - first) / limits.slice_size))
         return (stop - first + margins) * matrix.shape[0] <= limits.largest_basis
 
     def at(self, matrix: csr_array, stored: SlicePass = NEW_PASS) -> Iterable[tuple[Basis, Levels]]:
@@ -227,6 +227,6 @@ class Bases:
         from .lanczos import slices  # with libraries that nothing else needs
 
         inner = matrix[active][:, active]
-        symmetric, margin = csc_array(0.5 * (inner + inner.T)), limits.margin + limits.beyond
+        symmetric, margin = csc_array(0.5 * (inner + inner.T)), limits.margin + limits.modes_beyond
         for part in slices(symmetric, margin, self.range(matrix), limits, ranks=self.ranks, stored=stored):
             yield Basis(part.first, part.values, part.vectors, part.own, matrix.shape[0], active, limits)

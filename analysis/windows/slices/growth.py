@@ -7,7 +7,7 @@ grow are named, clusters about these announce an onset, and the system itself co
 
 **Slices that are left out.** In each slice the antisymmetric part may be so many times larger before it can feed any
 motion as much as the motion loses (`Reduced.bears`). A slice is looked at again once the antisymmetric part has grown
-by `Limits.trusted` of this factor.
+by `Limits.bearing_share` of this factor.
 
 **Strong dashpots** couple more modes than a cluster can have, so that clusters may miss a motion. From the first load
 with such dashpots on, all motions that grow are looked for with the operator itself
@@ -15,7 +15,8 @@ with such dashpots on, all motions that grow are looked for with the operator it
 that grow are followed back to their onsets. All growing motions are then looked for once more, right below the first
 onset and at the last load of the ramp before, until none grows there. So no other window is open at the first onset,
 unless increments before it are in doubt. A window that opens and ends between two of these loads is not excluded. Of
-more than `Limits.axis` coordinates clusters alone are searched, and all loads before the window are named as in doubt.
+more than `Limits.axis_coordinates` coordinates clusters alone are searched, and all loads before the window are named
+as in doubt.
 """
 
 from collections.abc import Iterator, Sequence
@@ -65,11 +66,11 @@ class SlicedGrowth(SliceSearch):
 
     def _few_enough(self, place: System) -> bool:
         """Whether all motions that grow at a load can be looked for."""
-        return place.stiffness.shape[0] <= self.limits.axis
+        return place.stiffness.shape[0] <= self.limits.axis_coordinates
 
     def ahead(self, done: int) -> int:
         """More and more increments, as dissipation may put off the onset by much; each costs a tenth of the bases."""
-        return min(done + 1, self.limits.most_ahead)
+        return min(done + 1, self.limits.most_increments_ahead)
 
     def first_window(self, loads: Floats) -> tuple[Window | None, Increments]:
         first, doubtful = super().first_window(loads)
@@ -97,7 +98,7 @@ class SlicedGrowth(SliceSearch):
             return [[] for _ in places[1:]]
         first, stop = self.bases.modes or (0, 0)
         if min(self._borne[:first].min(initial=np.inf), self._borne[stop:].min(initial=np.inf)) <= feed:
-            feed *= self.limits.wider
+            feed *= self.limits.bearing_factor
         loud = np.flatnonzero(self._borne <= feed)
         self.bases.narrow((int(loud[0]), int(loud[-1]) + 1))
         self._passing = not self.bases.keeps(places[0].stiffness)
@@ -111,7 +112,7 @@ class SlicedGrowth(SliceSearch):
             return [replace(each, candidates=[[] for _ in places[1:]]) for each in found]
         if self._borne is not None:
             for each in found:
-                self._borne[slice(*each.border.modes)] = self.limits.trusted * each.bears
+                self._borne[slice(*each.border.modes)] = self.limits.bearing_share * each.bears
         return found
 
     def look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[System]) -> SliceResult:
@@ -238,7 +239,9 @@ class SlicedGrowth(SliceSearch):
         """
         try:
             for place in places:
-                growing = find_growing_near(place, rate if rate.imag == 0 else 1j * rate.imag, self.limits.nearest)
+                growing = find_growing_near(
+                    place, rate if rate.imag == 0 else 1j * rate.imag, self.limits.nearest_modes
+                )
                 if growing:
                     return min(growing, key=lambda each: abs(each.mean - rate))
         except ArpackError as error:
@@ -261,7 +264,7 @@ class SlicedGrowth(SliceSearch):
                     return best
                 fx = parabola_vertex(sorted(modes.values(), key=lambda each: abs(each.fx - best.fx))[:3])
                 fx = float(np.clip(fx, here.fx, there.fx))
-                if min(abs(fx - load) for load in modes) < self.limits.settled * (there.fx - here.fx):
+                if min(abs(fx - load) for load in modes) < self.limits.place_tolerance * (there.fx - here.fx):
                     return None
                 modes[fx] = at(fx)
         except LostPairError as error:  # nothing is lost but what a cluster has announced

@@ -145,8 +145,10 @@ class _Spectrum:
 
     def shifts(self, pool: ThreadPoolExecutor, first: int, stop: int) -> list[Shift]:
         """The shifts of all slices from eigenvalue number `first` on, and before eigenvalue number `stop`."""
-        places, numbers = count_places(self.matrix, partial(self.count_below, pool), (first, stop), self.limits.coarse)
-        pieces = max(1, round((stop - first) / self.limits.own))
+        places, numbers = count_places(
+            self.matrix, partial(self.count_below, pool), (first, stop), self.limits.count_spacing
+        )
+        pieces = max(1, round((stop - first) / self.limits.slice_size))
         ends = first + np.arange(pieces + 1) * (stop - first) // pieces
         borders = places_of_numbers(places, numbers, ends)
         middles = 0.5 * (borders[:-1] + borders[1:])
@@ -170,7 +172,9 @@ class _Spectrum:
             if ends[0] >= 0 and ends[1] <= len(values):
                 inner = slice(*ends)
                 spacing = np.ptp(values[inner]) / (ends[1] - ends[0])
-                if np.all(residuals[order[inner]] <= self.limits.accurate * spacing * inverse[order[inner]] ** 2):
+                if np.all(
+                    residuals[order[inner]] <= self.limits.vector_residual * spacing * inverse[order[inner]] ** 2
+                ):
                     break
             krylov.extend(self.limits.looks)
         kept = slice(max(0, own[0] - first - margin), min(len(values), own[1] - first + margin))
@@ -198,7 +202,7 @@ class _Spectrum:
         for rows in self.limits.chunks(len(vectors)):
             quotients += np.einsum("ij,ij->j", vectors[rows], self.given[rows] @ vectors)
         worst = int(np.argmax(np.abs(quotients - values)))
-        if abs(quotients[worst] - values[worst]) > self.limits.accurate * part.border.spacing:
+        if abs(quotients[worst] - values[worst]) > self.limits.vector_residual * part.border.spacing:
             number = part.first + part.own.start + worst
             raise SliceError(
                 f"the eigenvalue of number {number} is {values[worst]:.10g} from the factors and "
@@ -225,7 +229,8 @@ class _Krylov:
         self.basis[:block] = qr(start.T, mode="economic")[0].T
         self.next = np.zeros((block, block))
         self.used = self.firm = block  # vectors, and those of them that are orthogonal to all others
-        self.together = limits.together  # blocks that settle at a time; 0: each is orthogonal to all before it at once
+        # blocks that are made orthogonal at a time; 0: each is orthogonal to all before it at once
+        self.together = limits.blocks_together
 
     def extend(self, blocks: int) -> None:
         """So many blocks more, each orthogonal to all before it."""
