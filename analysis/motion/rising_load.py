@@ -23,8 +23,9 @@ by its start.
 
 **How far.** While the load rises slowly the mean motion takes sticking contacts to the bound and opens others, as
 :mod:`~faultgouge.analysis.motion.next_change` says from the drift. From there on the packing is another one. A contact
-that counts as at the bound lacks some force, up to the tolerance of that, and slides once the load has risen enough. A
-load that brings another contact to the bound before has no motion of this kind.
+that counts as at the bound lacks some force, up to the tolerance of that, and slides once the load has risen enough.
+The residual forces move the packing, too, and count until the load has moved the packing ten times as far. A load that
+changes another contact before has no motion of this kind.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -42,7 +43,7 @@ from ..factors.sparse_lu import general_lu
 from ..progress import report_progress
 from .eigenvalues import operator_rounding, zero_uncertainty
 from .next_change import next_change
-from .one_sided import OneSidedSystem, reaching_scale
+from .one_sided import LEFT_ALONE, OneSidedSystem, reaching_scale
 from .one_sided_outcome import window_and_most
 from .rates import rates_of
 
@@ -136,7 +137,13 @@ class Span:
 
 
 def motion_under_load(
-    system: OneSidedSystem, direction: Floats, time: float | None = None, *, free: int = 0, decays: bool = True
+    system: OneSidedSystem,
+    direction: Floats,
+    time: float | None = None,
+    *,
+    free: int = 0,
+    decays: bool = True,
+    residual: float = 0.0,
 ) -> dict[str, Any]:
     """Drift and vibration under a load that rises at the rate 1: `Stability.rising`.
 
@@ -152,20 +159,35 @@ def motion_under_load(
         Motions that no force opposes.
     decays : bool
         Whether it is known that no motion grows with sticking contacts.
+    residual : float
+        Root mean square displacement of the particles by the residual forces, length.
 
     Raises
     ------
     NotFollowedError
-        If the load accelerates a motion that no force opposes.
+        If the load accelerates a motion that no force opposes, or particles that touch nothing.
     """
+    _refuse_flight(system, direction)
     velocity = steady_velocity(system, direction, free) if decays else None
     if velocity is None:
-        return follow_load(system, direction, time)
+        return follow_load(system, direction, time, residual)
     paths = np.abs(system.rescaled[0] @ velocity)
     still = Span(1.0, velocity, paths, system.displacement(velocity) ** 2, np.zeros((0, 1)))
     drift = float(still.drift_and_vibration(system)[0, 0])
     alone: dict[str, Any] = {"drift": drift, "drift_error": 0.0, "vibration": 0.0, "vibration_error": 0.0}
-    return alone | {"steady": True, "time": None, "span": None, "other_start": None} | _range(system, still)
+    return alone | {"steady": True, "time": None, "span": None, "other_start": None} | _range(system, still, residual)
+
+
+def _refuse_flight(system: OneSidedSystem, direction: Floats) -> None:
+    """Refuse a load on particles that touch nothing, which accelerate for ever."""
+    motion = system.motion
+    loaded = motion.configuration.coordinate_free & (direction[:, 0] != 0)
+    loaded[motion.active] = False
+    flying = np.unique(np.flatnonzero(loaded) % len(motion.configuration))
+    if len(flying):
+        raise NotFollowedError(
+            f"the load accelerates {counted(len(flying), 'particle')} that nothing touches: give no forces on these"
+        )
 
 
 def steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Floats | None:
@@ -213,8 +235,10 @@ def _solution(motion: Any, load: Floats, free: int) -> Floats:
     return velocity
 
 
-def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = None) -> dict[str, Any]:
-    """Drift and vibration of a motion that is followed, as of `motion_under_load`."""
+def follow_load(
+    system: OneSidedSystem, direction: Floats, time: float | None = None, residual: float = 0.0
+) -> dict[str, Any]:
+    """Drift and vibration of a motion that is followed, as of `motion_under_load`; `residual` as there."""
     length, most = window_and_most(system, 1, time)
     windows: list[Span] = []
     for window in islice(windows_under_load(system, direction, length), most):
@@ -231,11 +255,20 @@ def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = 
     first, *others = found
     time = length * len(windows)
     whole = {**first, "time": time, "span": span.time, "other_start": others[0] if others else None}
-    return whole | _range(system, span)
+    return whole | _range(system, span, residual)
 
 
-def _range(system: OneSidedSystem, span: Span) -> dict[str, Any]:
+def _range(system: OneSidedSystem, span: Span, residual: float) -> dict[str, Any]:
     """Between which increases of the load the motion of a span holds: `least_rise`, `next_change` and `next_event`.
+
+    Parameters
+    ----------
+    system : OneSidedSystem
+        Of the configuration.
+    span : Span
+        The motion at the rate 1.
+    residual : float
+        Root mean square displacement of the particles by the residual forces, length.
 
     Raises
     ------
@@ -243,12 +276,15 @@ def _range(system: OneSidedSystem, span: Span) -> dict[str, Any]:
         If there is none.
     """
     velocity, paths, slid = (each[:, :1] / span.time for each in (span.displacement, span.paths, span.slid))
-    least, change = reaching_scale(system, slid), next_change(system, velocity, paths)
-    most = change["next_change"]
+    reached, change = reaching_scale(system, slid), next_change(system, velocity, paths)
+    moves = float(np.sqrt(system.mean_square_displacement(velocity)[0]))
+    moved = LEFT_ALONE * residual / moves if moves else 0.0
+    least, most = max(reached, moved), change["next_change"]
     if most is not None and least >= most:
+        what = "contacts that count as at Coulomb's bound reach it" if reached > moved else "residual forces count less"
         raise NotFollowedError(
-            f"contacts that count as at Coulomb's bound reach it once the load has risen by {least:.1g}, and another "
-            f"{change['next_event']} before, at {most:.1g}: bring the packing to rest more closely"
+            f"{what} once the load has risen by {least:.1g}, and another contact {change['next_event']} before, at "
+            f"{most:.1g}: bring the packing to rest more closely"
         )
     return {"least_rise": least, **change}
 

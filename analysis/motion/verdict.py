@@ -109,8 +109,9 @@ class Stability:
         drift and vibration over the rate of loading, with drift_error and vibration_error; steady; time, None if the
         motion was not followed but solved for; span, the last part of this time, of which drift and vibration are;
         other_start: the first five from another start, or None; least_rise, the increase of the load from which on
-        contacts that count as at the bound reach it; next_change, at which the first other contact reaches it or opens,
-        to first order, and next_event, which of the two. None unless asked, and where it was `not_followed`.
+        contacts that count as at the bound reach it, and the load moves the packing ten times as far as the residual
+        forces do; next_change, at which the first other contact reaches it or opens, to first order, and next_event,
+        which of the two. None unless asked, and where it was `not_followed`.
     sticking, sliding : LinearNeighbour
         If all contacts at the bound stuck, and if all slid on; no bounds of what they do.
     asymmetry : dict
@@ -290,7 +291,8 @@ class Stability:
             starts = [self.rising, other] if other and vibrate_otherwise(self.rising, other) else [self.rising]
             says = ", and from another start ".join(map(_drift_and_vibration, starts))
             least, change, event = (self.rising[name] for name in ("least_rise", "next_change", "next_event"))
-            since = f"; from a rise of {least:.1g} on, where all contacts at the bound have reached it" if least else ""
+            slide = "all contacts at the bound have reached it and " if self.one_sided is not None else ""
+            since = f"; from a rise of {least:.1g} on, where {slide}residual forces do not count" if least else ""
             until = "" if change is None else f"; until the load has risen by {change:.2g} (a contact {event})"
             yield f"under a load that rises at the rate 1: {says}{since}{until}"
 
