@@ -56,7 +56,7 @@ RESISTS = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """The eigenvalues s of small motion, those with Im s >= 0; each is uncertain by `uncertainty`.
+    """The eigenvalues s of small motion, those with Im s >= 0.
 
     Attributes
     ----------
@@ -73,6 +73,8 @@ class Rates:
         What became of a random state, where not all eigenvalues are known.
     at_least : bool
         Whether Re s is only known to be no less, as the search for the fastest motion did not converge.
+    uncertainty : float
+        Of Re s that is perfectly conditioned, 1 / time; 0 where eigenvalues have errors of their own.
     """
 
     values: Complexes
@@ -81,6 +83,7 @@ class Rates:
     searched: float = 0.0
     decay: Decay | None = None
     at_least: bool = False
+    uncertainty: float = 0.0
 
     def decided(self, decay: Decay) -> "Rates":
         """Where no motion was found to grow: with what has become of a random state, and of slow motions."""
@@ -91,8 +94,10 @@ class Rates:
 
     @property
     def growth_rate(self) -> float:
-        """Of D, 1 / time: the largest 2 Re s; zero where no eigenvalue is known, as none was found to grow."""
-        return 2 * float(self.values.real.max(initial=-np.inf)) if len(self.values) else 0.0
+        """Of D, 1 / time: the largest 2 Re s; zero if that is zero but for rounding, or if no eigenvalue is known, as none
+        was found to grow."""
+        largest = float(self.values.real.max(initial=-np.inf)) if len(self.values) else 0.0
+        return 2 * largest if self.grows.any() or abs(largest) > self.uncertainty else 0.0
 
 
 def rates_of(motion: Motion) -> Rates:
@@ -174,7 +179,8 @@ def _damped_rates(motion: Motion) -> Rates:
         grows &= ~free
     order = np.flatnonzero((values.imag >= 0) & ~free)
     order = order[np.argsort(-values[order].real, kind="stable")]
-    return Rates(values[order], grows[order], 0 if stiffness is None else int(stiffness.free.sum()))
+    free_motions = 0 if stiffness is None else int(stiffness.free.sum())
+    return Rates(values[order], grows[order], free_motions, uncertainty=SAFETY * rounding)
 
 
 def _may_resist(motion: Motion, slow: Floats, softest: float) -> bool:

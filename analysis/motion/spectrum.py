@@ -157,6 +157,8 @@ class Spectrum(TableDisplay):
         if damped is None:
             return "no motion grows" if self.is_stable else f"unstable, D as exp({self.growth_rate():.6g} t): {counts}"
         verdict = "every motion decays" if self.is_stable else "unstable"
+        if self.is_stable and damped.growth_rate == 0:
+            return f"no motion grows with the packing's dissipation; {alone}"
         rate = exponential(damped.growth_rate, 6, damped.at_least)
         return f"{verdict} with the packing's dissipation, {rate}; {alone}"
 

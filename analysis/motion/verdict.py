@@ -77,8 +77,8 @@ class Stability:
     stable : bool or None
         None: unknown, for the `reasons`.
     growth_rate : float
-        Of D, 1 / time, with dissipation: largest 2 Re s, negative if every motion decays. Where contacts at the bound
-        make the packing grow, the rate of the one-sided motion.
+        Of D, 1 / time, with dissipation: largest 2 Re s, negative if every motion decays, and zero if that is zero but
+        for rounding. Where contacts at the bound make the packing grow, the rate of the one-sided motion.
     at_least : bool
         Whether the growth rate is only known to be no less.
     undamped : WithoutDissipation

@@ -111,3 +111,50 @@ def test_a_small_sphere_that_rolls_hides_no_growth_of_others(lammps_with):
         lmp.command("run 8000 post no")
         places.append(of_particle(lmp, "x", 2)[0])
     assert 2 * np.log(places[1] / places[0]) / 4 == pytest.approx(verdict.growth_rate, rel=0.01)
+
+
+APART = """
+units lj
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -4 4 -4 4 0 8 units box
+create_box 2 box
+create_atoms 1 single 0 0 {height:.17g} units box
+create_atoms 2 single 2 0 {height:.17g} units box
+set group all diameter 1.0
+set group all density 1.0
+pair_style granular
+pair_coeff * * {law}
+group bounces type 1
+group lossy type 2
+fix spring bounces wall/gran granular hooke 500 0 tangential linear_history 200 0.0 0.5 damping velocity zplane 0 NULL
+fix dashpot lossy wall/gran granular {law} zplane 0 NULL
+fix load all gravity 1.0 vector 0 0 -1
+fix move all nve/sphere
+timestep 1e-3
+thermo 1000000
+run 0
+"""
+
+
+def test_a_sphere_without_dashpots_bounces_on_beside_one_that_has_them(lammps_with):
+    """Its Re s is zero but for rounding, of either sign."""
+    lmp = lammps_with(APART.format(law=LINEAR, height=0.5 - MASS / 500))
+    from faultgouge.pywrap import from_lammps
+
+    here = from_lammps(lmp)
+    verdict = stability(here)
+    assert verdict.stable is True
+    assert verdict.growth_rate == 0
+    assert str(verdict).startswith("stable: no motion grows, except for ")
+    assert "no motion grows with the packing's dissipation" in repr(spectrum(here))
+    of_particle(lmp, "v", 1)[:] = [1e-5, 0, 1e-5]
+    of_particle(lmp, "v", 2)[:] = [1e-5, 0, 1e-5]
+    lmp.command("run 20000 post no")  # a hundred oscillations
+    speeds = []
+    for _ in range(200):
+        lmp.command("run 2 post no")
+        speeds.append([of_particle(lmp, "v", k)[2] for k in (1, 2)])
+    assert np.abs(speeds).max(axis=0) == pytest.approx([1e-5, 0.0], rel=0.01, abs=1e-10)
