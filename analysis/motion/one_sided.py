@@ -45,142 +45,28 @@ MOTION_STEP = 0.05
 """Time step, as a share of the largest stable one. Beside LAMMPS D is right to some per cent after growth by twelve
 decades; with twice the step, to some 8 per cent."""
 
-
-SLIPS = 0.1
-"""Slip of a contact as a share of the largest, from which on it counts that the contact reaches the bound."""
-
 CLOSE_STEP = 0.3
-"""Time between two close looks at contacts, as a share of the largest stable time step: ten of the fastest period."""
-
-CLOSE_LOOKS = 1000
-"""Close looks, over some ten periods of a slow mode. Contacts go farthest at the beginning."""
-
-LEFT_ALONE = 10.0
-"""Displacement by a push over that by the residual forces, from which on the push counts: D then is right to a fifth,
-and to a hundredth where the two displacements have nothing in common."""
-
-
-@dataclass(frozen=True, eq=False)
-class OneSidedMotion:
-    """Displacements of the particles from the equilibrium, for the push or the rate of loading as it was given.
-
-    Attributes
-    ----------
-    times : ndarray, shape (T,)
-        Times.
-    displacement, velocity : ndarray, shape (T, N, d)
-        Length, and length / time.
-    slid : ndarray, shape (T, B)
-        p of each contact at the bound: the tangential force that its slider has taken away, force.
-    scales : tuple of float
-        Between which multiples of the push, or of the rate, the motion holds, as it was seen in `CLOSE_LOOKS` at its
-        beginning and at these times: with smaller ones contacts that count as at the bound do not reach it, or the
-        residual forces move the packing as well, and with larger ones other contacts reach the bound, or open.
-    """
-
-    times: Floats
-    displacement: Floats
-    velocity: Floats
-    slid: Floats
-    scales: tuple[float, float]
-
-    @property
-    def mean_square_displacement(self) -> Floats:
-        """D: mean over the particles of |displacement|^2, length^2, shape (T,)."""
-        return np.asarray(np.sum(self.displacement**2, axis=2).mean(axis=1))
+"""Time step of motion whose contacts are looked at after each step, as a share of the largest stable one: ten of the
+fastest period."""
 
 
 @dataclass
 class OneSidedState:
     """Several motions at one time, in columns: mass-weighted displacement z and velocity v, shape (E, P), and what
-    contacts remember: p of sliders, shape (B, P), and r, shape (R, P), of contacts with two derivatives."""
+    contacts remember: p of sliders, shape (B, P), and r, shape (R, P), of contacts with two derivatives. Sliders may
+    lack some force to the bound, which is `missing`, shape (B, P)."""
 
     time: float
     z: Floats
     v: Floats
     p: Floats
     r: Floats
+    missing: Floats | float = 0.0
 
-
-@dataclass(eq=False)
-class ContactReach:
-    """How far a motion goes, and takes contacts: the largest D, shape (P,), and products of margins with displacements,
-    shape (R, P), that were seen, and p of sliders, shape (B, P).
-
-    `alone` is that of the motion of the residual forces, which nothing pushes."""
-
-    system: "OneSidedSystem"
-    size: Floats | None = None
-    farthest: Floats | None = None
-    slid: Floats | None = None
-    alone: "ContactReach | None" = None
-
-    def look(self, state: OneSidedState) -> None:
-        """Look at the motion once more."""
-        size, now = self.system.mean_square_displacement(state.z), self.system.margins[0] @ state.z
-        self.size = size if self.size is None else np.maximum(self.size, size)
-        self.farthest = now if self.farthest is None else np.maximum(self.farthest, now)
-        self.slid = state.p.copy()
-
-    def look_closely(self, start: OneSidedState, time: float = np.inf, rise: Floats | None = None) -> None:
-        """Look at the beginning of a motion up to a time, step by step, and at that of the residual forces; the state
-        stays as it is."""
-        system, self.alone = self.system, ContactReach(self.system)
-        step = CLOSE_STEP / system.step_share * system.time_step
-        count = int(min(CLOSE_LOOKS, np.ceil((time - start.time) / step)))
-        state = OneSidedState(start.time, *(each.copy() for each in (start.z, start.v, start.p, start.r)))
-        system.take_steps(state, step, count, rise=None if rise is None else system.on_active(rise), look=self.look)
-        still = system.start(np.zeros((system.motion.configuration.coordinates, 1)))
-        system.take_steps(still, step, count, constant=system.residual_force, look=self.alone.look)
-
-    @property
-    def residual_displacement(self) -> float:
-        """The root of the largest D to which the residual forces alone move the packing, length."""
-        seen = None if self.alone is None else self.alone.size
-        return 0.0 if seen is None else float(np.sqrt(seen.max(initial=0.0)))
-
-    @property
-    def residual_scale(self) -> float:
-        """The multiple of the motion that goes as far as the residual forces move the packing."""
-        if self.size is None or self.alone is None or self.alone.size is None:
-            return 0.0
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return float(np.nan_to_num(np.sqrt(self.alone.size / self.size), nan=0.0).max(initial=0.0))
-
-    @property
-    def least_scale(self) -> float:
-        """The multiple from which on sliders have slipped by more than was missing to the bound, and residual forces
-        do not count; infinite if these alone take another contact to the bound, or open one."""
-        if self.alone is not None and self.alone.largest_scale < 1:
-            return np.inf
-        missing = 0.0 if self.slid is None else reaching_scale(self.system, self.slid)
-        return max(missing, LEFT_ALONE * self.residual_scale)
-
-    @property
-    def largest_scale(self) -> float:
-        """The multiple up to which no contact that is not at the bound reaches the bound or opens."""
-        if self.farthest is None:
-            return np.inf
-        with np.errstate(divide="ignore", invalid="ignore"):
-            limit = self.system.margins[1][:, None] / self.farthest
-        return float(limit[self.farthest > 0].min(initial=np.inf))
-
-
-def reaching_scale(system: "OneSidedSystem", slid: Floats) -> float:
-    """The multiple of a motion from which on contacts that count as at Coulomb's bound reach it.
-
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of the configuration.
-    slid : ndarray, shape (B, P)
-        p of each contact at the bound; of contacts that hardly slip it does not matter what is missing.
-    """
-    c = system.motion.configuration.contacts
-    missing = np.maximum(c.friction - np.linalg.norm(c.tangential_force, axis=1), 0.0)[c.one_sided, None]
-    missing = np.broadcast_to(missing, slid.shape)
-    counts = slid > SLIPS * slid.max(axis=0, initial=0.0)
-    return float((missing[counts] / slid[counts]).max(initial=0.0))
+    def copy(self) -> "OneSidedState":
+        """The same state, which changes by itself."""
+        z, v, p, r = (each.copy() for each in (self.z, self.v, self.p, self.r))
+        return OneSidedState(self.time, z, v, p, r, self.missing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,6 +135,12 @@ class OneSidedSystem:
             s.viscous_excess.data[:] = 0.0
         grip, excess, viscous = self._weight.T @ s.force, s.excess @ self._weight, s.viscous_excess @ self._weight
         return csr_array(grip), csr_array(excess), csr_array(viscous), s.rectified[:, None], s.viscous[:, None]
+
+    @cached_property
+    def missing_forces(self) -> Floats:
+        """What contacts that count as at Coulomb's bound lack to it, shape (B, 1), force."""
+        c = self.motion.configuration.contacts
+        return np.maximum(c.friction - np.linalg.norm(c.tangential_force, axis=1), 0.0)[c.one_sided, None]
 
     @cached_property
     def margins(self) -> tuple[csr_array, Floats]:
@@ -376,6 +268,7 @@ class OneSidedSystem:
             springs = excess @ state.z
             if len(state.r):
                 springs += rectified * (self.rescaled[2] @ state.r)
+            springs = springs - state.missing
             whole = springs if damping is None else springs + viscous_excess @ velocity
             np.maximum(state.p, np.where(viscous, whole, springs), out=state.p)
             force -= grip @ np.maximum(state.p, whole)
@@ -421,59 +314,6 @@ def _by_column(matrix: bsr_array, columns: Floats) -> Floats:
     return made
 
 
-def one_sided_motion(
-    packing: HasConfiguration,
-    velocity: ArrayLike | None = None,
-    rise: str | ArrayLike | None = None,
-    times: ArrayLike = (0.0,),
-) -> OneSidedMotion:
-    """Small motion of a configuration after a push, or under a load that rises, contacts at the bound as they are.
-
-    Parameters
-    ----------
-    packing : Configuration or Packing
-        The equilibrium, with its dashpots and drag.
-    velocity : array_like, shape (N, d), optional
-        Velocities at t = 0, length / time; none by default. The motion is homogeneous, so that numbers of order one do.
-    rise : "fx" or array_like, shape (N, d), optional
-        Forces per unit of time that are added to the load, or a unit force on each particle of the upper layer along x;
-        none by default.
-    times : array_like, shape (T,)
-        When to look, increasing, not negative.
-
-    Returns
-    -------
-    OneSidedMotion
-        Particles that touch nothing fly on, with their drag.
-
-    Raises
-    ------
-    ValueError
-        If a shape does not fit, times are not finite and increasing, or rise is "fx" without an upper layer.
-    """
-    configuration = packing.configuration
-    time = np.atleast_1d(np.asarray(times, dtype=np.float64))
-    if time.ndim != 1 or not np.all(np.isfinite(time)) or np.any(np.diff(time, prepend=0.0) < 0):
-        raise ValueError("The times of a motion are finite, not negative, and in increasing order.")
-    system = OneSidedSystem.of(configuration)
-    push = _of_all_coordinates(configuration, "velocity", velocity)
-    state = system.start(push)
-    load = None if rise is None else forces_on_coordinates(configuration, rise)
-    seen, reach = [], ContactReach(system)
-    reach.look_closely(state, float(time[-1]), load)
-    advance = system.advance_exactly if system.remembers_nothing else system.advance
-    for each in time:
-        advance(state, float(each), load)
-        reach.look(state)
-        flight = system.free_flight(push, load, float(each))
-        moved, speed = (
-            system.displacement(z, free)[..., 0] for z, free in zip((state.z, state.v), flight, strict=True)
-        )
-        seen.append((moved, speed, state.p[:, 0].copy()))
-    displacement, speed, slid = (np.array(each) for each in zip(*seen, strict=True))
-    return OneSidedMotion(time, displacement, speed, slid, (reach.least_scale, reach.largest_scale))
-
-
 def forces_on_coordinates(configuration: Configuration, rise: str | ArrayLike) -> Floats:
     """Forces on particles, shape (N, d), on all coordinates, shape (coordinates, 1): a sum where several move as one.
 
@@ -488,11 +328,11 @@ def forces_on_coordinates(configuration: Configuration, rise: str | ArrayLike) -
         if rise != "fx" or not configuration.top.any():
             raise ValueError('rise is "fx" of a packing with an upper layer, or an array of forces, shape (N, d).')
         rise = np.outer(configuration.top, np.eye(configuration.dimension)[0])
-    whole = _of_all_coordinates(configuration, "rise", rise)
+    whole = on_all_coordinates(configuration, "rise", rise)
     return whole if configuration.constraint is None else np.asarray((configuration.constraint != 0).T @ whole)
 
 
-def _of_all_coordinates(configuration: Configuration, name: str, values: ArrayLike | None) -> Floats:
+def on_all_coordinates(configuration: Configuration, name: str, values: ArrayLike | None) -> Floats:
     """Vectors of the particles as numbers of all coordinates, shape (coordinates, 1); without rotations."""
     whole = np.zeros((configuration.axes, len(configuration)))
     if values is not None:

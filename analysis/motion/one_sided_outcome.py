@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..configuration import Configuration
 from ..progress import report_progress
-from .one_sided import ContactReach, OneSidedSystem
+from .contact_reach import ContactReach
+from .one_sided import OneSidedSystem
 
 PUSHES = 2
 """Random pushes; the opposite of each is followed, too, since one-sided motion is not odd."""

@@ -94,8 +94,8 @@ class Rates:
 
     @property
     def growth_rate(self) -> float:
-        """Of D, 1 / time: the largest 2 Re s; zero if that is zero but for rounding, or if no eigenvalue is known, as none
-        was found to grow."""
+        """Of D, 1 / time: the largest 2 Re s; zero if that is zero but for rounding, or if no eigenvalue is known, as
+        none was found to grow."""
         largest = float(self.values.real.max(initial=-np.inf)) if len(self.values) else 0.0
         return 2 * largest if self.grows.any() or abs(largest) > self.uncertainty else 0.0
 

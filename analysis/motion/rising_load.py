@@ -41,9 +41,10 @@ from ..counted import counted
 from ..errors import FaultgougeError
 from ..factors.sparse_lu import general_lu
 from ..progress import report_progress
+from .contact_reach import LEFT_ALONE, reaching_scale
 from .eigenvalues import operator_rounding, zero_uncertainty
 from .next_change import next_change
-from .one_sided import LEFT_ALONE, OneSidedSystem, reaching_scale
+from .one_sided import OneSidedSystem
 from .one_sided_outcome import window_and_most
 from .rates import rates_of
 

@@ -11,17 +11,19 @@ from typing import Any
 import numpy as np
 
 from ..configuration import Configuration
+from .contact_reach import LEFT_ALONE, ContactReach
 from .creep import Creep, follow_creep
 from .decay import Decay, follow_decay
 from .motion import Motion
-from .one_sided import LEFT_ALONE, ContactReach, OneSidedSystem
+from .one_sided import OneSidedSystem
 from .one_sided_outcome import follow_pushes, random_pushes
 from .rates import Rates, rates_of
 from .spectrum import Spectrum, spectrum
 from .verdict import LinearNeighbour, WithoutDissipation
 
 UNSETTLED = (
-    "its residual forces alone take a contact to Coulomb's bound, or open one: bring the packing to rest more closely"
+    "its residual forces alone take a contact to Coulomb's bound, open or close one: bring the packing to rest more "
+    "closely"
 )
 """Why there is no verdict where the residual forces alone change a contact."""
 
@@ -165,8 +167,8 @@ def _after_pushes(sticks: SmallMotion, found: dict[str, Any], reach: ContactReac
     elif not found["grows"] and least >= most and least > LEFT_ALONE * residual:
         reasons.append(
             f"contacts that count as at Coulomb's bound reach it after pushes above {least:.1g} (velocity along an "
-            f"axis) alone, and others reach it, or open, after pushes above {most:.1g}: bring the packing to rest more "
-            "closely"
+            f"axis) alone, and others reach it, open or close, after pushes above {most:.1g}: bring the packing to "
+            "rest more closely"
         )
     return replace(
         sticks.beside_residual_forces(reach),

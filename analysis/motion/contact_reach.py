@@ -1,0 +1,184 @@
+r"""How small and how large a motion may be that one-sided equations describe.
+
+A motion that is too large takes other contacts to Coulomb's bound, opens contacts, or closes others. One that is too
+small is not that of contacts at the bound: each lacks some force :math:`m_c`, up to the tolerance of that, and slides
+where
+
+.. math:: p_c(t) = \max_{t' \le t} \left(Y_c q + Z_c \dot q - m_c\right)_+ .
+
+A motion of s times the size is that of :math:`m_c / s`. What is lacking acts as a force along the contact, and where
+sliding contacts make a packing that grows, the motion may turn back before it has begun to grow. So this motion is
+followed, for larger and larger s, until it is that of contacts at the bound. The forces that are left in a packing at
+rest move the packing, too; the motion counts if it goes much farther.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from .one_sided import CLOSE_STEP, OneSidedState, OneSidedSystem
+
+SLIPS = 0.1
+"""Slip of a contact as a share of the largest, from which on it counts that the contact reaches the bound."""
+
+CLOSE_LOOKS = 1000
+"""Close looks, over some ten periods of a slow mode. Contacts go farthest at the beginning."""
+
+LEFT_ALONE = 10.0
+"""Displacement by a push over that by the residual forces, from which on the push counts: D then is right to a fifth,
+and to a hundredth where the two displacements have nothing in common."""
+
+COMPARED_STEPS = 300
+"""Close looks in which motions of two sizes are compared: three periods of a slow mode. A motion that is to turn back
+does so at once, and what it lacks when it grows it lacks for ever."""
+
+LOOKS = 10
+"""Looks at which two motions are compared; those of the second half count."""
+
+AGREES = 0.1
+"""Relative difference of two displacements that are the same: D then is right to a fifth."""
+
+SIZES = 8
+"""Sizes that are tried, each ten times the one before."""
+
+COMPARED_UP_TO = 6000
+"""Coordinates of packings whose motion at another size is followed: each size takes as long as the close looks."""
+
+
+@dataclass(eq=False)
+class ContactReach:
+    """How far a motion goes, and takes contacts: the largest D, shape (P,), and products of margins with displacements,
+    shape (R, P), that were seen.
+
+    `reaching` is the multiple of the motion from which on contacts that count as at Coulomb's bound reach it so soon
+    that the motion is the same; `alone` is the reach of the motion of the residual forces, which nothing pushes."""
+
+    system: OneSidedSystem
+    size: Floats | None = None
+    farthest: Floats | None = None
+    reaching: float = 0.0
+    alone: "ContactReach | None" = None
+
+    def look(self, state: OneSidedState) -> None:
+        """Look at the motion once more."""
+        size, now = self.system.mean_square_displacement(state.z), self.system.margins[0] @ state.z
+        self.size = size if self.size is None else np.maximum(self.size, size)
+        self.farthest = now if self.farthest is None else np.maximum(self.farthest, now)
+
+    def look_closely(self, start: OneSidedState, time: float = np.inf, rise: Floats | None = None) -> None:
+        """Look at the beginning of a motion up to a time, step by step, and at that of the residual forces; the state
+        stays as it is."""
+        system, self.alone = self.system, ContactReach(self.system)
+        step = CLOSE_STEP / system.step_share * system.time_step
+        count = int(min(CLOSE_LOOKS, np.ceil((time - start.time) / step)))
+        load = None if rise is None else system.on_active(rise)
+        state, compared = start.copy(), min(count, COMPARED_STEPS)
+        seen = _follow(system, state, step, compared, load, look=self.look)
+        self.reaching = _reaching_scale(system, start, seen, step, load)
+        system.take_steps(state, step, count - compared, rise=load, look=self.look)
+        still = system.start(np.zeros((system.motion.configuration.coordinates, 1)))
+        system.take_steps(still, step, count, constant=system.residual_force, look=self.alone.look)
+
+    @property
+    def residual_displacement(self) -> float:
+        """The root of the largest D to which the residual forces alone move the packing, length."""
+        seen = None if self.alone is None else self.alone.size
+        return 0.0 if seen is None else float(np.sqrt(seen.max(initial=0.0)))
+
+    @property
+    def residual_scale(self) -> float:
+        """The multiple of the motion that goes as far as the residual forces move the packing."""
+        if self.size is None or self.alone is None or self.alone.size is None:
+            return 0.0
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return float(np.nan_to_num(np.sqrt(self.alone.size / self.size), nan=0.0).max(initial=0.0))
+
+    @property
+    def least_scale(self) -> float:
+        """The multiple from which on it does not count what sliders lacked to the bound, nor residual forces do;
+        infinite if these alone take another contact to the bound, open one or close one."""
+        if self.alone is not None and self.alone.largest_scale < 1:
+            return np.inf
+        return max(self.reaching, LEFT_ALONE * self.residual_scale)
+
+    @property
+    def largest_scale(self) -> float:
+        """The multiple up to which no contact that is not at the bound reaches the bound, opens or closes."""
+        if self.farthest is None:
+            return np.inf
+        with np.errstate(divide="ignore", invalid="ignore"):
+            limit = self.system.margins[1][:, None] / self.farthest
+        return float(limit[self.farthest > 0].min(initial=np.inf))
+
+
+def reaching_scale(system: OneSidedSystem, slid: Floats) -> float:
+    """The multiple of a motion from which on contacts that count as at Coulomb's bound reach it.
+
+    Parameters
+    ----------
+    system : OneSidedSystem
+        Of the configuration.
+    slid : ndarray, shape (B, P)
+        p of each contact at the bound; of contacts that hardly slip it does not matter what is missing.
+    """
+    missing = np.broadcast_to(system.missing_forces, slid.shape)
+    counts = slid > SLIPS * slid.max(axis=0, initial=0.0)
+    return float((missing[counts] / slid[counts]).max(initial=0.0))
+
+
+def _follow(
+    system: OneSidedSystem,
+    state: OneSidedState,
+    step: float,
+    count: int,
+    load: Floats | None,
+    look: Callable[[OneSidedState], None] | None = None,
+) -> list[OneSidedState]:
+    """Take some steps, and give the states at `LOOKS` times among them."""
+    seen, done = [], 0
+    for number in range(1, LOOKS + 1):
+        steps = count * number // LOOKS - done
+        system.take_steps(state, step, steps, rise=load, look=look)
+        done += steps
+        seen.append(state.copy())
+    return seen
+
+
+def _reaching_scale(
+    system: OneSidedSystem, start: OneSidedState, seen: list[OneSidedState], step: float, load: Floats | None
+) -> float:
+    """The multiple of a motion from which on what sliders lack to Coulomb's bound does not change it.
+
+    Parameters
+    ----------
+    system : OneSidedSystem
+        Of the configuration.
+    start : OneSidedState
+        Where the motion begins.
+    seen : list of OneSidedState
+        The motion of contacts at the bound, at `LOOKS` times.
+    step : float
+        Its time step.
+    load : ndarray, shape (E, P), optional
+        Mass-weighted forces that rise, per time.
+    """
+    size = next((scale for each in seen if (scale := reaching_scale(system, each.p))), 0.0)
+    if not size or system.motion.configuration.coordinates > COMPARED_UP_TO:
+        return size
+    count = round((seen[-1].time - start.time) / step)
+    for _ in range(SIZES):
+        state = start.copy()
+        state.missing = system.missing_forces / size
+        other = _follow(system, state, step, count, load)
+        if all(_agree(*pair) for pair in zip(seen[LOOKS // 2 :], other[LOOKS // 2 :], strict=True)):
+            return size
+        size *= 10
+    return np.inf
+
+
+def _agree(one: OneSidedState, other: OneSidedState) -> bool:
+    """Whether the displacements of two states are the same."""
+    apart, size = (np.linalg.norm(each, axis=0) for each in (one.z - other.z, one.z))
+    return bool(np.all(apart <= AGREES * size))
