@@ -47,17 +47,28 @@ MOTION_STEP = 0.05
 """Time step, as a share of the largest stable one. Beside LAMMPS D is right to some per cent after growth by twelve
 decades; with twice the step, to some 8 per cent."""
 
+LOOK_STEP = 0.3
+"""Time step of motion whose contacts are looked at after each step, as a share of the largest stable one: ten of the
+fastest period."""
+
 
 @dataclass
 class OneSidedState:
     """Several motions at one time, in columns: mass-weighted displacement z and velocity v, shape (E, P), and what
-    contacts remember: p of sliders, shape (B, P), and r, shape (R, P), of contacts with two derivatives."""
+    contacts remember: p of sliders, shape (B, P), and r, shape (R, P), of contacts with two derivatives. Sliders may
+    lack some force to the bound, which is `missing`, shape (B, P)."""
 
     time: float
     z: Floats
     v: Floats
     p: Floats
     r: Floats
+    missing: Floats | float = 0.0
+
+    def copy(self) -> "OneSidedState":
+        """The same state, which changes by itself."""
+        z, v, p, r = (each.copy() for each in (self.z, self.v, self.p, self.r))
+        return OneSidedState(self.time, z, v, p, r, self.missing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +137,12 @@ class OneSidedSystem:
             s.viscous_excess.data[:] = 0.0
         grip, excess, viscous = self._weight.T @ s.force, s.excess @ self._weight, s.viscous_excess @ self._weight
         return csr_array(grip), csr_array(excess), csr_array(viscous), s.rectified[:, None], s.viscous[:, None]
+
+    @cached_property
+    def missing_forces(self) -> Floats:
+        """What contacts that count as at Coulomb's bound lack to it, shape (B, 1), force."""
+        c = self.motion.configuration.contacts
+        return np.maximum(c.friction - np.linalg.norm(c.tangential_force, axis=1), 0.0)[c.one_sided, None]
 
     @cached_property
     def margins(self) -> tuple[csr_array, Floats]:
@@ -253,6 +270,7 @@ class OneSidedSystem:
             springs = excess @ state.z
             if len(state.r):
                 springs += rectified * (self.rescaled[2] @ state.r)
+            springs = springs - state.missing
             whole = springs if damping is None else springs + viscous_excess @ velocity
             np.maximum(state.p, np.where(viscous, whole, springs), out=state.p)
             force -= grip @ np.maximum(state.p, whole)
