@@ -34,10 +34,10 @@ COMPARED_STEPS = 300
 """Close looks in which motions of two sizes are compared: three periods of a slow mode. A motion that is to turn back
 does so at once, and what it lacks when it grows it lacks for ever."""
 
-LOOKS = 10
+COMPARED_LOOKS = 10
 """Looks at which two motions are compared; those of the second half count."""
 
-AGREES = 0.1
+SAME_WAY = 0.1
 """Relative difference of two displacements that are the same: D then is right to a fifth."""
 
 SIZES = 8
@@ -136,10 +136,10 @@ def _follow(
     load: Floats | None,
     look: Callable[[OneSidedState], None] | None = None,
 ) -> list[OneSidedState]:
-    """Take some steps, and give the states at `LOOKS` times among them."""
+    """Take some steps, and give the states at `COMPARED_LOOKS` times among them."""
     seen, done = [], 0
-    for number in range(1, LOOKS + 1):
-        steps = count * number // LOOKS - done
+    for number in range(1, COMPARED_LOOKS + 1):
+        steps = count * number // COMPARED_LOOKS - done
         system.take_steps(state, step, steps, rise=load, look=look)
         done += steps
         seen.append(state.copy())
@@ -158,7 +158,7 @@ def _reaching_scale(
     start : OneSidedState
         Where the motion begins.
     seen : list of OneSidedState
-        The motion of contacts at the bound, at `LOOKS` times.
+        The motion of contacts at the bound, at `COMPARED_LOOKS` times.
     step : float
         Its time step.
     load : ndarray, shape (E, P), optional
@@ -172,7 +172,7 @@ def _reaching_scale(
         state = start.copy()
         state.missing = system.missing_forces / size
         other = _follow(system, state, step, count, load)
-        if all(_agree(*pair) for pair in zip(seen[LOOKS // 2 :], other[LOOKS // 2 :], strict=True)):
+        if all(_agree(*pair) for pair in zip(seen[COMPARED_LOOKS // 2 :], other[COMPARED_LOOKS // 2 :], strict=True)):
             return size
         size *= 10
     return np.inf
@@ -181,4 +181,4 @@ def _reaching_scale(
 def _agree(one: OneSidedState, other: OneSidedState) -> bool:
     """Whether the displacements of two states are the same."""
     apart, size = (np.linalg.norm(each, axis=0) for each in (one.z - other.z, one.z))
-    return bool(np.all(apart <= AGREES * size))
+    return bool(np.all(apart <= SAME_WAY * size))
