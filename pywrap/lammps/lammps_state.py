@@ -32,9 +32,12 @@ Arrays: TypeAlias = dict[str, Floats]
 Channel: TypeAlias = tuple[Floats, Callable[[], None], Callable[[], None]]
 """Memory whose address is looked up once, and what takes one array of LAMMPS there and back."""
 
-DOUBLE = 1
-LOW_COLUMNS = 5
-STATE_COLUMNS = 10
+LAMMPS_DOUBLE = 1
+"""The number for doubles in LAMMPS's library."""
+
+LOW_COLUMNS, STATE_COLUMNS = 5, 10
+"""Columns of fix ``low``, and of fix displace/disc."""
+
 GIVEN, POSITION, ANGLE, VELOCITY, FORCE = 0, slice(1, 3), 3, slice(4, 7), slice(7, 10)
 """Columns of fix displace/disc."""
 
@@ -338,7 +341,13 @@ class LammpsState:
         if (name, columns) not in self._channels:
             kind = "" if name[:2] in ("f_", "d_") else "_atoms"
             values = np.zeros((len(self._static), columns))
-            arguments: tuple[Any, ...] = self._decks.lammps.lmp, name.encode(), DOUBLE, columns, values.ctypes.data
+            arguments: tuple[Any, ...] = (
+                self._decks.lammps.lmp,
+                name.encode(),
+                LAMMPS_DOUBLE,
+                columns,
+                values.ctypes.data,
+            )
             gather, scatter = (
                 partial(getattr(self._library, f"lammps_{way}{kind}"), *arguments) for way in ("gather", "scatter")
             )
