@@ -79,6 +79,7 @@ def test_at_the_angle_of_repose_a_block_slides_on_ahead(block):
     assert "has not settled" in str(verdict)
 
 
+@pytest.mark.long
 def test_a_load_that_rises_accelerates_a_block_that_slides_and_pushes_one_back_that_sticks(block):
     """At the angle of repose: ahead nothing bears the load, which displaces the block by t^3 / (6 m); back the spring
     of the contact does. The drift is a root mean square over three axes."""
