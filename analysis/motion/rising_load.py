@@ -76,6 +76,10 @@ ACCELERATION_RATIO = 3.0
 """Ratio of the mean velocities of the last and the first quarter of the time from which on a motion has no constant
 drift: 4 for a velocity that rises as the time after the drag has faded, and 17 for one that rises as its square."""
 
+ACCELERATION_SHARE = 0.2
+"""Time in windows of the usual length, two periods of a slow mode, after which a motion that only begins is told from
+one that the load accelerates for ever."""
+
 LARGEST_GROWTH = 1e12
 """Growth of the vibration of a motion that has no drift."""
 
@@ -263,6 +267,8 @@ def follow_load(
 
 def _refuse_acceleration(system: OneSidedSystem, windows: list[Span], length: float) -> None:
     """Refuse a motion whose mean velocity rises on, as of contacts that slide on and on."""
+    if length * len(windows) < ACCELERATION_SHARE * window_and_most(system, 1, None)[0]:
+        return
     quarters = _parts(system, windows[FADE_WINDOWS:] or windows)[0, 3:, 0]
     if np.all(np.diff(quarters) > 0) and quarters[-1] > ACCELERATION_RATIO * quarters[0]:
         raise NotFollowedError(
