@@ -80,8 +80,8 @@ def _run(
     The files of other scenes, which differ in the signal, begin where the signal does.
     """
     from faultgouge.pywrap import Equilibrium
-    from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
     from faultgouge.pywrap.runs.drive_recorder import DriveRecord
+    from faultgouge.pywrap.runs.drive_setup import check_drive, settle_for_drive
 
     with DriveRecord(output, scene, saved=keeps) as record:
         if record.last is None:
