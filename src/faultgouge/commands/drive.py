@@ -38,7 +38,7 @@ def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = Fa
     The packing settles at F_x = 0; then the spring of [drive] draws, with the dashpots
     of [damping]. The file contains the force on each disk of the layer, the displacement
     and the mean height of the layer and the kinetic energy over time, and states at
-    intervals and before and after each slip, which spectrum and draw take by --frame.
+    intervals and at both ends of each slip, which spectrum and draw take by --frame.
     The slips are also written as a table beside the file, with the suffix .csv.
     """
     from faultgouge.pywrap.scenes.validation import require_section
