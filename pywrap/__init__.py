@@ -25,7 +25,9 @@ from .lammps.engine import Engine
 from .lammps.instance import EngineError, lammps_instance
 from .load_path import LoadPath
 from .onset import onset_run
-from .runs.drive import DriveSample, DriveStep, drive, settle_for_drive
+from .runs.drive import drive
+from .runs.drive_setup import settle_for_drive
+from .runs.drive_states import DriveCheckpoint, DriveSample, DriveStep
 from .runs.ramp import ramp, reach
 from .runs.ramp_loads import ramp_loads
 from .runs.run_recorder import Record
@@ -42,6 +44,7 @@ SnapshotError = NotTakenError
 
 __all__ = [
     "Checkpoint",
+    "DriveCheckpoint",
     "DriveSample",
     "DriveStep",
     "Dynamics",

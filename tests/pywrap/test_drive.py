@@ -12,7 +12,7 @@ from faultgouge.analysis import RunFile, read_dump
 from faultgouge.pywrap import Equilibrium, Scene, SceneError
 from faultgouge.pywrap.lammps.data_file import data_file
 from faultgouge.pywrap.lammps.decks import DECKS
-from faultgouge.pywrap.runs.drive import check_drive, drive, settle_for_drive
+from faultgouge.pywrap.runs.drive import drive
 from faultgouge.pywrap.runs.drive_recorder import (
     CONFIDENCE,
     NOISES,
@@ -21,6 +21,7 @@ from faultgouge.pywrap.runs.drive_recorder import (
     clock_advance,
     slips_in,
 )
+from faultgouge.pywrap.runs.drive_setup import check_drive, settle_for_drive
 from faultgouge.pywrap.runs.run_recorder import Record
 
 BASE = {
