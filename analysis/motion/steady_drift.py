@@ -9,7 +9,7 @@ accelerates the packing for ever.
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array, eye_array
+from scipy.sparse import csc_array, csr_array, diags_array, eye_array
 
 from ..arrays import Floats
 from ..counted import counted
@@ -60,7 +60,7 @@ def steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Flo
     rates, forces, _ = system.rescaled
     way = np.zeros(rates.shape[0])
     for _ in range(WAY_CHANGES):
-        stiffness = motion.stiffness - forces @ diags_array(way) @ rates if len(way) else motion.stiffness
+        stiffness = csr_array(motion.stiffness - forces @ diags_array(way) @ rates) if len(way) else motion.stiffness
         velocity = _solution(replace(motion, stiffness=stiffness), load, free)
         before, way = way, np.sign(rates @ velocity)[:, 0]
         if np.array_equal(before, way):
