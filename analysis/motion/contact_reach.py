@@ -78,6 +78,12 @@ class ContactReach:
         system.take_steps(still, step, count, constant=system.residual_force, look=self.by_residual.look)
 
     @property
+    def residual_displacement(self) -> float:
+        """The root of the largest D to which the residual forces alone move the packing, length."""
+        seen = None if self.by_residual is None else self.by_residual.size
+        return 0.0 if seen is None else float(np.sqrt(seen.max(initial=0.0)))
+
+    @property
     def residual_scale(self) -> float:
         """The multiple of the motion that goes as far as the residual forces move the packing."""
         if self.size is None or self.by_residual is None or self.by_residual.size is None:

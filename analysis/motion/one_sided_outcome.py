@@ -161,8 +161,8 @@ def window_and_most(system: OneSidedSystem, columns: int, time: float | None) ->
 
 def follow_pushes(
     system: OneSidedSystem, sticking: float, sticking_grows: bool, time: float | None = None, pushes: int = PUSHES
-) -> tuple[OneSidedOutcome, float]:
-    """Whether one-sided motion grows from some pushes: `Stability.one_sided` and `Stability.residual_push`.
+) -> tuple[OneSidedOutcome, ContactReach]:
+    """Whether one-sided motion grows from some pushes: `Stability.one_sided`, and how far the motion took contacts.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def follow_pushes(
         pushes=2 * pushes,
         scales=(reach.least_scale, reach.largest_scale),
     )
-    return found, reach.residual_scale
+    return found, reach
 
 
 def random_pushes(configuration: Configuration, pushes: int) -> Floats:

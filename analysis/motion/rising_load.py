@@ -20,8 +20,9 @@ by its start.
 
 **How far.** While the load rises slowly the mean motion takes sticking contacts to the bound and opens others, as
 :mod:`~faultgouge.analysis.motion.next_change` says from the drift. From there on the packing is another one. A contact
-that counts as at the bound lacks some force, up to the tolerance of that, and slides once the load has risen enough. A
-load that brings another contact to the bound before has no motion of this kind.
+that counts as at the bound lacks some force, up to the tolerance of that, and slides once the load has risen enough.
+The residual forces move the packing, too, and count until the load has moved the packing ten times as far. A load that
+changes another contact before has no motion of this kind.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,11 +34,11 @@ import numpy as np
 from ..arrays import Floats
 from ..fields_by_name import FieldsByName
 from ..progress import report_progress
-from .contact_reach import reaching_scale
+from .contact_reach import PUSH_OVER_RESIDUAL, reaching_scale
 from .next_change import next_change
 from .one_sided import OneSidedSystem
 from .one_sided_outcome import window_and_most
-from .steady_drift import NotFollowedError, steady_velocity
+from .steady_drift import NotFollowedError, refuse_flight, steady_velocity
 
 SAMPLES_OF_WINDOW = 400
 """Velocities that a window of a load that rises has."""
@@ -126,7 +127,8 @@ class RisingMotion(DriftAndVibration):
     other_start : DriftAndVibration or None
         The motion from another start, if one was followed.
     least_rise : float
-        Increase of the load from which on contacts that count as at Coulomb's bound have reached the bound.
+        Increase of the load from which on contacts that count as at Coulomb's bound have reached the bound, and the
+        load has moved the packing ten times as far as the residual forces do.
     next_change : float or None
         Increase of the load, to first order, at which the first other contact reaches the bound or opens.
     next_event : str or None
@@ -180,7 +182,13 @@ class Span:
 
 
 def motion_under_load(
-    system: OneSidedSystem, direction: Floats, time: float | None = None, *, free: int = 0, decays: bool = True
+    system: OneSidedSystem,
+    direction: Floats,
+    time: float | None = None,
+    *,
+    free: int = 0,
+    decays: bool = True,
+    residual: float = 0.0,
 ) -> RisingMotion:
     """Drift and vibration under a load that rises at the rate 1: `Stability.rising`.
 
@@ -196,23 +204,28 @@ def motion_under_load(
         Motions that no force opposes.
     decays : bool
         Whether it is known that no motion grows with sticking contacts.
+    residual : float
+        Root mean square displacement of the particles by the residual forces, length.
 
     Raises
     ------
     NotFollowedError
-        If the load accelerates a motion that no force opposes.
+        If the load accelerates a motion that no force opposes, or particles that touch nothing.
     """
+    refuse_flight(system, direction)
     velocity = steady_velocity(system, direction, free) if decays else None
     if velocity is None:
-        return follow_load(system, direction, time)
+        return follow_load(system, direction, time, residual)
     paths = np.abs(system.rescaled[0] @ velocity)
     still = Span(1.0, velocity, paths, system.displacement(velocity) ** 2, np.zeros((0, 1)))
     drift = float(still.drift_and_vibration(system)[0, 0])
-    return _rising_motion(DriftAndVibration(drift, 0.0, 0.0, 0.0, True), system, still)
+    return _rising_motion(DriftAndVibration(drift, 0.0, 0.0, 0.0, True), system, still, residual)
 
 
-def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = None) -> RisingMotion:
-    """Drift and vibration of a motion that is followed, as of `motion_under_load`."""
+def follow_load(
+    system: OneSidedSystem, direction: Floats, time: float | None = None, residual: float = 0.0
+) -> RisingMotion:
+    """Drift and vibration of a motion that is followed, as of `motion_under_load`; `residual` as there."""
     length, most = window_and_most(system, 1, time)
     windows: list[Span] = []
     for window in islice(windows_under_load(system, direction, length), most):
@@ -226,12 +239,21 @@ def follow_load(system: OneSidedSystem, direction: Floats, time: float | None = 
         if time is None and 2 * len(windows) >= most and _is_known(system, windows):
             break
     span, (first, *others) = _of_starts(system, windows)
-    motion = _rising_motion(first, system, span)
+    motion = _rising_motion(first, system, span, residual)
     return replace(motion, time=length * len(windows), span=span.time, other_start=others[0] if others else None)
 
 
-def _rising_motion(moves: DriftAndVibration, system: OneSidedSystem, span: Span) -> RisingMotion:
+def _rising_motion(moves: DriftAndVibration, system: OneSidedSystem, span: Span, residual: float) -> RisingMotion:
     """A motion with the increases of the load between which the motion of a span holds.
+
+    Parameters
+    ----------
+    system : OneSidedSystem
+        Of the configuration.
+    span : Span
+        The motion at the rate 1.
+    residual : float
+        Root mean square displacement of the particles by the residual forces, length.
 
     Raises
     ------
@@ -239,11 +261,15 @@ def _rising_motion(moves: DriftAndVibration, system: OneSidedSystem, span: Span)
         If there are none.
     """
     velocity, paths, slid = (each[:, :1] / span.time for each in (span.displacement, span.paths, span.slid))
-    least, (change, event) = reaching_scale(system, slid), next_change(system, velocity, paths)
+    reached, (change, event) = reaching_scale(system, slid), next_change(system, velocity, paths)
+    drift = float(np.sqrt(system.mean_square_displacement(velocity)[0]))
+    moved = PUSH_OVER_RESIDUAL * residual / drift if drift else 0.0
+    least = max(reached, moved)
     if change is not None and least >= change:
+        what = "contacts that count as at Coulomb's bound reach it" if reached > moved else "residual forces count less"
         raise NotFollowedError(
-            f"contacts that count as at Coulomb's bound reach it once the load has risen by {least:.1g}, and another "
-            f"{event} before, at {change:.1g}: bring the packing to rest more closely"
+            f"{what} once the load has risen by {least:.1g}, and another contact {event} before, at {change:.1g}: "
+            "bring the packing to rest more closely"
         )
     return RisingMotion(**moves, least_rise=least, next_change=change, next_event=event)
 

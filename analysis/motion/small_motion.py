@@ -70,7 +70,10 @@ def _without_dissipation(configuration: Configuration, found: Spectrum | None) -
 
 @dataclass(frozen=True)
 class SmallMotion:
-    """What becomes of small motion under a load that is held: `grows` is None if that is not known."""
+    """What becomes of small motion under a load that is held: `grows` is None if that is not known.
+
+    `residual_displacement` is the root of the largest D to which the residual forces move the packing, length; most of
+    the others are those of :class:`~faultgouge.analysis.motion.verdict.Stability`."""
 
     grows: bool | None
     growth_rate: float
@@ -82,6 +85,7 @@ class SmallMotion:
     creep: Creep | None = None
     largest_push: float | None = None
     residual_push: float = 0.0
+    residual_displacement: float = 0.0
     decay: Decay | None = None
 
     @classmethod
@@ -91,13 +95,18 @@ class SmallMotion:
         grows = None if doubts else bool(linear.sticking.grows.any())
         return cls(grows, sticking.growth_rate, sticking, linear.sticking.free, sticking.at_least, doubts)
 
+    def beside_residual_forces(self, reach: ContactReach) -> "SmallMotion":
+        """The outcome with what the residual forces do, beside the motion whose reach is given."""
+        pushes, moves = reach.residual_scale, reach.residual_displacement
+        return replace(self, residual_push=pushes, residual_displacement=moves)
+
 
 def follow_small_motion(system: OneSidedSystem, linear: LinearRates, time: float | None, pushes: int) -> SmallMotion:
     """Follow what eigenvalues do not decide."""
     outcome = SmallMotion.of_linear(linear)
     if linear.one_sided:
-        found, residual = follow_pushes(system, outcome.growth_rate, bool(outcome.grows), time, pushes)
-        outcome = _after_pushes(outcome, found, residual)
+        found, reach = follow_pushes(system, outcome.growth_rate, bool(outcome.grows), time, pushes)
+        outcome = _after_pushes(outcome, found, reach)
     elif outcome.grows is False:
         outcome = _as_contacts_part(outcome, system, time, pushes)
     known = linear.sticking.decay if time is None else None
@@ -130,7 +139,7 @@ def _as_contacts_part(linear: SmallMotion, system: OneSidedSystem, time: float |
     most, reasons = reach.largest_scale, [UNSETTLED] if np.isinf(reach.least_scale) else []
     # with a K that is given the bounds of contacts are not known
     largest = most if np.isfinite(most) and configuration.stiffness is None else None
-    found = replace(linear, largest_push=largest, residual_push=reach.residual_scale, reasons=reasons)
+    found = replace(linear.beside_residual_forces(reach), largest_push=largest, reasons=reasons)
     if system.remembers_nothing:
         return found
     creep = follow_creep(system, pushes, time, decay=max(-0.5 * linear.growth_rate, 0.0))
@@ -142,9 +151,9 @@ def _as_contacts_part(linear: SmallMotion, system: OneSidedSystem, time: float |
     return replace(found, creep=creep, reasons=reasons)
 
 
-def _after_pushes(sticks: SmallMotion, found: OneSidedOutcome, residual: float) -> SmallMotion:
+def _after_pushes(sticks: SmallMotion, found: OneSidedOutcome, reach: ContactReach) -> SmallMotion:
     """The outcome of one-sided motion; unknown, too, if it is the motion after no push of any size."""
-    reasons, (least, most) = [], found.scales
+    reasons, (least, most), residual = [], found.scales, reach.residual_scale
     if found.grows is None:
         reasons.append(
             f"the motion of contacts at Coulomb's bound has not settled within t = {found.time:.4g}, where D is "
@@ -160,11 +169,10 @@ def _after_pushes(sticks: SmallMotion, found: OneSidedOutcome, residual: float) 
             "closely"
         )
     return replace(
-        sticks,
+        sticks.beside_residual_forces(reach),
         grows=found.grows,
         at_least=sticks.at_least and not found.grows,
-        growth_rate=sticks.growth_rate if found.growth_rate is None else found.growth_rate,
+        growth_rate=sticks.growth_rate if not found.grows or found.growth_rate is None else found.growth_rate,
         reasons=reasons,
         one_sided=found,
-        residual_push=residual,
     )

@@ -29,7 +29,7 @@ from .no_verdict import no_verdict
 from .one_sided import OneSidedSystem, forces_on_coordinates
 from .one_sided_outcome import PUSHES, STEP_OF_LARGE, VERDICT_STEP
 from .rising_load import RisingMotion, motion_under_load
-from .small_motion import LinearRates, SmallMotion, follow_small_motion
+from .small_motion import UNSETTLED, LinearRates, SmallMotion, follow_small_motion
 from .spectrum import Spectrum
 from .steady_drift import NotFollowedError
 from .verdict import LinearNeighbour, Stability
@@ -97,9 +97,11 @@ def _rising(
     """The motion under a rising load, or why it was not followed."""
     if outcome.grows:
         return None, "small motion grows"
+    if UNSETTLED in outcome.reasons:
+        return None, UNSETTLED
     try:
-        decays = outcome.grows is False
-        return motion_under_load(system, direction, limit, free=outcome.free, decays=decays), ""
+        decays, residual = outcome.grows is False, outcome.residual_displacement
+        return motion_under_load(system, direction, limit, free=outcome.free, decays=decays, residual=residual), ""
     except NotFollowedError as error:
         return None, str(error)
 

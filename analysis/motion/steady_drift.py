@@ -74,6 +74,24 @@ def steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Flo
     return velocity
 
 
+def refuse_flight(system: OneSidedSystem, direction: Floats) -> None:
+    """Refuse a load on particles that touch nothing, which accelerate for ever.
+
+    Raises
+    ------
+    NotFollowedError
+        If there are such particles.
+    """
+    motion = system.motion
+    loaded = motion.configuration.coordinate_free & (direction[:, 0] != 0)
+    loaded[motion.active] = False
+    flying = np.unique(np.flatnonzero(loaded) % len(motion.configuration))
+    if len(flying):
+        raise NotFollowedError(
+            f"the load accelerates {counted(len(flying), 'particle')} that nothing touches: give no forces on these"
+        )
+
+
 def _solution(motion: Motion, load: Floats, free: int) -> Floats:
     """v of A v = load, without the motions that no force opposes."""
     matrix = motion.stiffness

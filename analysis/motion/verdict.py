@@ -76,8 +76,8 @@ class Stability:
     stable : bool or None
         None: unknown, for the `reasons`.
     growth_rate : float
-        Of D, 1 / time, with dissipation: largest 2 Re s, negative if every motion decays. Where contacts at the bound
-        make the packing grow, the rate of the one-sided motion.
+        Of D, 1 / time, with dissipation: largest 2 Re s, negative if every motion decays, and zero if that is zero but
+        for rounding. Where contacts at the bound make the packing grow, the rate of the one-sided motion.
     at_least : bool
         Whether the growth rate is only known to be no less.
     undamped : WithoutDissipation
@@ -279,7 +279,8 @@ class Stability:
             other, least, change = self.rising.other_start, self.rising.least_rise, self.rising.next_change
             differs = other is not None and not self.rising.vibrates_like(other)
             says = f"{self.rising}, and from another start {other}" if differs else str(self.rising)
-            since = f"; from a rise of {least:.1g} on, where all contacts at the bound have reached it" if least else ""
+            slide = "all contacts at the bound have reached it and " if self.one_sided is not None else ""
+            since = f"; from a rise of {least:.1g} on, where {slide}residual forces do not count" if least else ""
             until = (
                 ""
                 if change is None

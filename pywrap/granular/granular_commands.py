@@ -25,7 +25,7 @@ BODIES = ("rigid", "rigid/nve")
 """Fixes whose bodies may be kept from rotating (:mod:`~faultgouge.pywrap.granular.translating_bodies`)."""
 
 MOBILE = (
-    *INTEGRATORS, *BODIES, "nve", "freeze", "setforce", "aveforce", "lineforce", "planeforce",
+    *INTEGRATORS, *BODIES, "nve", "nve/limit", "freeze", "setforce", "aveforce", "lineforce", "planeforce",
 )  # fmt: skip
 """Fixes that move or hold coordinates as is known here."""
 

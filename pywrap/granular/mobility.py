@@ -19,7 +19,7 @@ from ...analysis.counted import counted
 from .granular_commands import BODIES, NotTakenError, without_suffix
 from .translating_bodies import translating_bodies
 
-INTEGRATES = ("nve", "nve/sphere", "nve/disc", "overdamped/disc", *BODIES)
+INTEGRATES = ("nve", "nve/limit", "nve/sphere", "nve/disc", "overdamped/disc", *BODIES)
 """Fixes that move particles."""
 
 
@@ -131,7 +131,7 @@ def _apply(found: _Coordinates, name: str, style: str, words: list[str], members
         found.moves[:, members] = True
         own = {"nve/disc": 0, "overdamped/disc": 1}.get(style)
         found.factor[members] = (0.5 if "disc" in words else 0.4) if own is None else float(words[own])
-    elif style == "nve":
+    elif style in ("nve", "nve/limit"):  # a limit of steps does not act on small motion
         found.moves[:3, members] = True
     elif style == "setforce":
         for k in range(3):

@@ -51,6 +51,9 @@ OTHER = 1e-6
 """Stiffness that is none of contacts, as a share of the mean normal stiffness of contacts, from which on a packing is
 refused: far below the smallest eigenvalues, some 1e-4 of the largest, and far above rounding, 1e-11 and less."""
 
+SLIDES_ON = "may slide while the packing creeps: run on with drag until it rests"
+"""What is said of contacts that a load which the packing does not quite bear drives."""
+
 STEPS_OF_PROOF = 5
 """Steps of LAMMPS and of the linearised packing."""
 
@@ -171,15 +174,18 @@ def _differs(difference: float) -> str:
 def _not_proved(configuration: Configuration, difference: float, causes: list[str]) -> NotTakenError:
     """The error of a motion that is another one, with its causes, or the likeliest ones."""
     says = _differs(difference)
+    close = configuration.mobilised > CLOSE
     if causes:
-        return NotProvedError(f"{says}; {' and '.join(causes)}.")
+        slide = counted(int(close.sum()), "contact")
+        or_slide = f"; or {slide} at Coulomb's bound or just below {SLIDES_ON}" if close.any() else ""
+        return NotProvedError(f"{says}; {' and '.join(causes)}{or_slide}.")
     if configuration.operators == "differences":
         return NotTakenError(f"{says}, though K and C are differences of these forces: do they depend on the time?")
-    close = np.count_nonzero((configuration.mobilised > CLOSE) & ~configuration.contacts.at_bound)
-    if close:
+    close = close & ~configuration.contacts.at_bound
+    if close.any():
         return NotTakenError(
-            f"{says}; {counted(int(close), 'contact')} just below Coulomb's bound may slide while the packing creeps: "
-            f"run on with drag until it rests; or the commands are not those of the instance: {GIVE_LINES}."
+            f"{says}; {counted(int(close.sum()), 'contact')} just below Coulomb's bound {SLIDES_ON}; or the commands "
+            f"are not those of the instance: {GIVE_LINES}."
         )
     return NotTakenError(
         f"{says}; the commands are those of another run or instance, or some are not in the log (echo none, a full "

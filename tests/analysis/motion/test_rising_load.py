@@ -102,7 +102,7 @@ def test_a_rise_that_comes_after_the_next_change_is_refused(monkeypatch):
     found = stability(at_rest, rise=RISE, time=4.0)
     assert found.rising is None
     assert found.not_followed.endswith(
-        f"another opens before, at {0.5 * least:.1g}: bring the packing to rest more closely"
+        f"another contact opens before, at {0.5 * least:.1g}: bring the packing to rest more closely"
     )
 
 
