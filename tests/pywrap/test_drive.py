@@ -79,7 +79,10 @@ def test_interrupted_run_goes_on_to_the_bit(scene, tmp_path, precision):
         with RunFile(tmp_path / "cut.h5") as file:
             assert not file.complete
             assert file.checkpoint
-    run_to_end(wanted, tmp_path / "cut.h5")
+    with DriveRecord(tmp_path / "cut.h5", wanted) as record:
+        assert list(record.drive())
+    with DriveRecord(tmp_path / "cut.h5", wanted) as record:  # it was killed before it could finish the file
+        assert record.complete
     whole, cut = datasets(tmp_path / "whole.h5"), datasets(tmp_path / "cut.h5")
     assert whole.keys() == cut.keys()
     for name, values in whole.items():
@@ -410,6 +413,10 @@ scale = {scale}
         assert told["clock_advance"] == 0
     with RunFile(tmp_path / "d.h5") as file:
         assert told["clock_advance_error"] >= np.diff(file.series("drive")["time"]).min()
+        times, force = file.observable("time"), file.fx
+    for slip in told["slips"]:
+        for end, frame, said in (("begins", "before", "force_before"), ("ends", "after", "force_after")):
+            assert (times[slip[f"frame_{frame}"]], force[slip[f"frame_{frame}"]]) == (slip[end], slip[said])
 
 
 def test_error_of_a_clock_advance_is_that_of_one_more_draw():
