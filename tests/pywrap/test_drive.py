@@ -200,6 +200,7 @@ def test_rigid_layer_has_force_and_no_slips(scene, tmp_path):
         ({"spring": 10.0, "velocity": 1e-3, "protocol": [[1, 1]]}, "give one of the two"),
         ({"spring": "soft", "velocity": 1e-3}, 'give a stiffness above 0, or "rigid"'),
         ({"spring": 10.0, "velocity": 0.0}, "moves nothing"),
+        ({"spring": 1e-90, "velocity": 1e-300}, "moves nothing"),
         ({"spring": 10.0, "velocity": 1e-3}, "drive.until is missing"),
         ({"spring": 10.0, "protocol": [[1e-3, 0.0]]}, "give pairs of a velocity and a time above 0"),
         ({"spring": "rigid", "velocity": 1e-3, "slips": 3}, "drive.until is missing"),
@@ -268,6 +269,7 @@ def test_drive_in_python_warns_and_refuses_as_the_command_does(scene):
         ({"drive": {"spring": 1e9, "velocity": 1e-11}}, "blows up: lower drive.spring"),
         ({"damping": {"cn": 1e6}}, "blows up: lower damping.cn and damping.ct"),
         ({"drive": {"spring": "rigid", "velocity": 1e3}}, "farther than the smallest radius 0.5: lower drive.velocity"),
+        ({"drive": {"velocity": 1e-20, "until": 1e50}}, "the run would take .* time steps of"),
         ({"drive": {"signal": "pulse", "at": 0.5, "omega": 1e9}}, "has a period of 6.28e-09, and the time step is"),
     ],
 )
