@@ -377,6 +377,8 @@ def test_clock_advance_is_the_time_between_comparable_slips(scene, tmp_path):
 
     store("with.h5", wanted.drive, [(30.0, 0.05), (66.0, 0.045), (100.0, 0.06)])
     store("without.h5", wanted.drive.without_signal(), [(30.0, 0.05), (120.0, 0.1)])
+    with DriveRecord(tmp_path / "with.h5", wanted) as record:
+        assert record.slips == 3
     advance = clock_advance(tmp_path / "with.h5", tmp_path / "without.h5")
     assert advance == pytest.approx(20.0, abs=0.2)
     store("none.h5", wanted.drive.without_signal(), [(30.0, 0.05)])
