@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from ...analysis import Packing
 from ...analysis.motion.slips import SlipDetector
 from ..scenes.drive_section import Drive
+from ..scenes.validation import SceneError
 
 LOADED_SHARE, MOVED_DIAMETERS = 0.016, 0.01
 """Where a scene does not say when states are stored: share of mu F_y by which the spring loads a layer that sticks from
@@ -18,6 +20,12 @@ is the same up to the end of a shorter one."""
 
 SAMPLES_A_PERIOD, SAMPLES_A_PART = 20, 10
 """Rows of the series: so many in a period of the layer on the spring, and at least so many in a part of the run."""
+
+MOST_STEPS = 2**53
+"""Time steps of a run at the most: as many are counted exactly by its time, a double."""
+
+LONGEST_RUN = 2**31 - 1
+"""Time steps of one command `run` of LAMMPS at the most."""
 
 
 @dataclass(frozen=True)
@@ -39,22 +47,30 @@ class Plan:
 
     @classmethod
     def of(cls, settings: Drive, start: Packing, dt: float) -> Plan:
-        """The plan of a run from an equilibrium with a time step."""
-        length = settings.length(strength(start))
-        part = math.ceil((settings.states or _between_states(settings, start)) / dt)
+        """The plan of a run from an equilibrium with a time step; a SceneError of a run that has no end."""
+        steps = settings.length(strength(start)) / dt
+        if steps > MOST_STEPS:
+            raise SceneError(
+                f"the run would take {steps:.1g} time steps of {dt:.3g}, which no machine does: give a shorter "
+                "drive.until, or a faster drive"
+            )
+        between = settings.states or _between_states(settings, start)
+        part = math.ceil(min(between / dt, MOST_STEPS))
         period = layer_period(settings, start)
-        most = max(1, part // SAMPLES_A_PART)
+        most = max(1, min(part // SAMPLES_A_PART, LONGEST_RUN))
         every = most if period is None else min(most, max(1, int(period / SAMPLES_A_PERIOD / dt)))
-        return cls(dt, part, every, math.ceil(length / dt))
+        return cls(dt, part, every, math.ceil(steps))
 
     def is_even(self, time: float) -> bool:
         """Whether a part of the run ends at the time of a row, and the state there is stored."""
         return round(time / self.dt) % self.part == 0
 
-    def steps(self, after: int) -> list[int]:
+    def steps(self, after: int) -> Iterator[int]:
         """Steps at which the run is sampled, after a step."""
-        all_steps = {*range(self.every, self.total, self.every), *range(self.part, self.total, self.part), self.total}
-        return sorted(step for step in all_steps if step > after)
+        step = after
+        while step < self.total:
+            step = min(self.total, *(step - step % each + each for each in (self.every, self.part)))
+            yield step
 
 
 def strength(packing: Packing) -> float:

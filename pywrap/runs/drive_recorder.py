@@ -73,6 +73,11 @@ class DriveRecord(Record):
             self._file.save()
         self.last = equilibrium
 
+    @property
+    def slips(self) -> int:
+        """Slips in the file so far; 0 on ranks that do not write."""
+        return 0 if self._file is None else len(slips_in(self._file))
+
     def drive(self, others: Mapping[Path, Scene] | None = None) -> Iterator[DriveStep]:
         """Run the scene's drive and write its rows and states; an interrupted run continues.
 

@@ -29,7 +29,7 @@ from ..scenes.packing_section import GeneratedPacking
 from ..scenes.scene import Scene
 from ..scenes.validation import SceneError, require_section
 from ..settling.settle import law_of, settle, settle_bed
-from .drive_plan import strength
+from .drive_plan import Plan, strength
 
 LEAST_LOADING_PERIODS, REFUSED_LOADING_PERIODS = 100.0, 10.0
 """Periods of the slowest vibration in which the spring loads the layer to mu F_y: below the first a run is warned, and
@@ -92,8 +92,8 @@ def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = No
         If the drive is not slow against the vibrations of the layer, or time steps do not follow it.
     """
     settings, warnings = require_section(scene.drive, "drive"), list[str]()
-    with driven(settings, start, communicator):
-        pass
+    with driven(settings, start, communicator) as (_, dynamics):
+        Plan.of(settings, start, dynamics.time_step)
     if settings.spring == "rigid":
         return warnings
     matrix, active = dynamical_matrix(start)

@@ -93,11 +93,11 @@ def _run(
             record.append(Equilibrium.of(start))
         assert record.last is not None
         with status(what) as show:
-            slips = 0
+            slips = record.slips
             for step in record.drive(others):
                 slips += step.slip is not None
                 sample = step.sample
-                show(f"{what}: t = {sample.time:.4g}, F = {sample.force:.3g}, {slips} slips")
+                show(f"{what}: t = {sample.time:.4g}, F = {sample.force:.3g}, {slips} slip{'s' * (slips != 1)}")
         record.finish()
         return record.last.packing
 
