@@ -82,7 +82,7 @@ def creeping_law(commands: Commands) -> str:
     """What is said of friction that bears no force at rest; empty if there is none."""
     lines = [*commands.pair, *(line for line in commands.fixes.values() if "wall/gran" in line)]
     words = {without_suffix(word) for line in lines for word in line.split()}
-    styles = [style for style in ("linear_nohistory", "gran/hooke") if style in words]
+    styles: list[str] = [style for style in ("linear_nohistory", "gran/hooke") if style in words]
     if "wall/gran" in words and "hooke" in words and not words & {"granular", "linear_nohistory"}:
         styles.append("wall/gran hooke")
     if not styles:
