@@ -1,13 +1,13 @@
 r"""A packing of another code, in two or three dimensions, with its contacts to first order.
 
 Any contact law enters the operators through a few numbers at each contact: the normal, the distance and the lever arms;
-the normal and the tangential force; and the derivatives of both.
-:class:`~faultgouge.analysis.contacts.LinearisedContacts` has them, `Configuration` adds the particles, and
-:mod:`~faultgouge.analysis.assembly` assembles the operators from them.
+the normal and the tangential force; and the derivatives of both forces.
+:class:`~faultgouge.analysis.contacts.LinearisedContacts` has these numbers, :mod:`~faultgouge.analysis.particles` has
+the particles, and :mod:`~faultgouge.analysis.assembly` makes the operators.
 
-**Operators that are given.** A Configuration whose `stiffness` is given has K and C as they were measured, by
-differences of forces, and its contacts have places and forces alone, as far as these are known: their derivatives are
-zero, and Coulomb's bound is infinite, since nothing is known of either.
+**Operators that are given.** If `stiffness` is given, K and C are differences of another code's forces. The contacts
+then have only their places and forces, as far as the other code tells them. Their derivatives are zero and Coulomb's
+bound is infinite, since neither is known.
 """
 
 from collections.abc import Iterable
@@ -31,7 +31,7 @@ from .arrays import (
     square,
 )
 from .assembly import ContactBlocks, as_springs, spring_of_layer
-from .contacts import UNIT, LinearisedContacts, refuse_first
+from .contacts import UNIT_ERROR, LinearisedContacts, refuse_first
 from .counted import counted
 from .particles import Particles
 
@@ -368,6 +368,6 @@ class Configuration(Particles):
 def _refuse_forces_across(c: LinearisedContacts) -> None:
     """Refuse contacts of disks that leave the plane."""
     scale = np.abs(c.normal_force) + np.linalg.norm(c.tangential_force, axis=1)
-    refuse_first(np.abs(c.normal[:, 2]) > UNIT, "the normal {} of disks is not in the plane", c.normal)
-    outside = np.abs(c.tangential_force[:, 2]) > UNIT * scale
+    refuse_first(np.abs(c.normal[:, 2]) > UNIT_ERROR, "the normal {} of disks is not in the plane", c.normal)
+    outside = np.abs(c.tangential_force[:, 2]) > UNIT_ERROR * scale
     refuse_first(outside, "the tangential force {} on a disk is not in the plane", c.tangential_force)

@@ -113,7 +113,7 @@ class Particles:
         if self.constraint is None:
             return mass
         moved = self.constraint.T @ mass
-        return np.where(moved > 0, moved, mass)  # what leads nothing has no rows
+        return np.where(moved > 0, moved, mass)  # a coordinate that leads no other has no rows
 
     @property
     def coordinate_free(self) -> NDArray[np.bool_]:

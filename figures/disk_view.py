@@ -1,4 +1,4 @@
-"""What a picture of disks shows: images of disks and contacts, walls, and the lines at which the picture repeats."""
+"""Images of disks and contacts in a picture, its walls, and the lines at which the picture repeats."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,4 +1,4 @@
-"""What a page draws of a packing in two or three dimensions: images of particles and contacts, walls and the box."""
+"""A packing on a page, in two or three dimensions: images of particles and contacts, walls and the box."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

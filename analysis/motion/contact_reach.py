@@ -1,8 +1,9 @@
-"""Between which sizes of a push, or of a rate of loading, a motion holds that is known to first order.
+"""The sizes of a push, or of a rate of loading, for which a motion to first order holds.
 
-Motion to first order has no size. A small one leaves contacts that count as at Coulomb's bound short of the bound, and
-the residual forces of the packing move particles as far. A large one takes other contacts to the bound, or opens them.
-`ContactReach` follows how far a motion takes contacts, and says both limits as multiples of this motion.
+Motion to first order has no size of its own. Real motion has: a small motion leaves contacts that count as at Coulomb's
+bound short of the bound, and residual forces move the particles as far; a large motion takes other contacts to the
+bound, or opens them. `ContactReach` follows how far a motion takes contacts, and gives both limits as multiples of this
+motion.
 """
 
 from dataclasses import dataclass

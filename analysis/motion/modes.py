@@ -24,7 +24,7 @@ from .eigenvalues import SAFETY, active_coordinates, mass_weighted, unit_roundin
 
 @dataclass(frozen=True)
 class Mode:
-    """One mode of a packing; of a complex pair the one with the positive imaginary part stands for both.
+    """One mode of a packing. A complex pair has one Mode, with the positive imaginary part.
 
     Attributes
     ----------

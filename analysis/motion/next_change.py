@@ -6,8 +6,7 @@ force of contact c becomes :math:`\mathbf f_t + x\, \mathbf g_c` in the plane of
 
 .. math:: |\mathbf f_t + x\, \mathbf g_c| = \mu f_n + x\, h_c ,
 
-and opens where the overlap is zero. Particles that do not touch yet are not known, and contacts that they make come
-besides.
+and opens where the overlap is zero. New contacts of particles that do not touch yet are not foreseen.
 """
 
 import numpy as np

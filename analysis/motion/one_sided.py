@@ -14,14 +14,15 @@ and r are those of laws with two derivatives, one while a contact closes and one
 (:func:`~faultgouge.analysis.operators.linearised_contacts.rescaling_operators`). Each contact at the bound is a play
 operator; nothing else remembers.
 
-The motion is positively homogeneous of degree one: the motion of a times the push (or of a times the rate of loading)
-is a times the motion, for a > 0. No amplitude enters, and no matrix describes the motion: it may grow where the packing
-with sticking contacts is stable, and rest where the packing with sliding contacts is not. The equations of a slider
+The motion is positively homogeneous of degree one: a times the push (or a times the rate of loading) gives a times the
+motion, for a > 0. No amplitude enters. No matrix describes the motion: it may grow where the packing with sticking
+contacts is stable, and rest where the packing with sliding contacts is unstable. The equations of a slider
 with a load that rises slowly are those of rate-independent plasticity; self-sustained vibration of sliding contacts is
 known as flutter (Bigoni and Noselli, J. Mech. Phys. Solids 59, 2208, 2011).
 
-The steps are those of velocity Verlet, with dashpots at the velocity of the half step, as LAMMPS takes them. Without a
-contact that remembers, the motion is linear, and is that of the exponential function of the first-order matrix.
+The motion is followed in steps of velocity Verlet, with dashpots at the velocity of the half step, as in LAMMPS.
+Without a contact that remembers the motion is linear, and the exponential function of the first-order matrix gives the
+motion to rounding.
 """
 
 from collections.abc import Callable

@@ -1,15 +1,19 @@
 r"""What becomes of one-sided motion: it grows, rests or has not settled.
 
-Motions begin with random pushes of all particles alike, and with their opposites, since one-sided motion is not odd. A
-motion *grows* if D has gained `DECADES` and still gains at a steady rate; it *rests* if the sliders have come to rest
-and the packing with sticking contacts does not grow, since then the motion is linear and decays for ever. Where the
-slowest vibration decays slowly, contacts slip on with it: the motion rests, too, if the slips of four spans of time
-each fall about as fast as this vibration, and what is left is little. Otherwise the motion has not settled. The time is
-`STEPS_OF_CHUNK` stable time steps as often as needed, up to `WORK` multiplications.
+Motions begin with random pushes of all particles, and with the opposites of these pushes, since one-sided motion is not
+odd. A motion
 
-Sliders that have come to rest may slide again under a law of two derivatives: vibration wears tangential forces down
-(:mod:`~faultgouge.analysis.motion.creep`), at a rate that falls with the vibration. Such a motion, followed on after
-its sliders have rested, rests as long as D does not gain at a steady rate.
+- *grows* if D has gained `DECADES` and still gains at a steady rate;
+- *rests* if the sliders have come to rest and the packing with sticking contacts does not grow: from then on the motion
+  is linear and decays. A slow vibration lets contacts slip for as long as it lasts. Such a motion rests, too, if the
+  slips in four spans of time fall about as fast as this vibration, and little slip is still to come;
+- *has not settled* otherwise.
+
+A motion is followed in chunks of `STEPS_OF_CHUNK` stable time steps, up to `WORK` multiplications.
+
+Under a law of two derivatives vibration wears tangential forces down (:mod:`~faultgouge.analysis.motion.creep`), at a
+rate that falls with the vibration, so that sliders may slide again after they have come to rest. Such a motion rests as
+long as D does not gain at a steady rate afterwards.
 """
 
 from collections.abc import Callable
@@ -32,8 +36,8 @@ VERDICT_STEP = 0.1
 """Time step of one-sided motion as a share of the largest stable one: rates of growth are right to some per cent."""
 
 STEP_OF_LARGE = 0.3
-"""The same of large packings. With 0.4, beside steps of a sixteenth, rates of growth of four packings of 50 spheres are
-3 to 5 % too large."""
+"""Time step for large packings, as a share of the largest stable one. With 0.4 rates of growth of four packings of 50
+spheres are 3 to 5 % larger than with steps of a sixteenth."""
 
 STEPS_OF_CHUNK = 300
 """Stable time steps between two looks at whether a motion has settled: some ten periods of a slow mode."""
@@ -72,7 +76,7 @@ SLIP_SPANS = 8
 """Spans of the time, over the last four of which slips are to fall with the slowest vibration."""
 
 DECAY_SHARE = 0.5
-"""Least rate at which slips fall, as a share of that of the slowest vibration: their sums of spans are uneven."""
+"""Least rate at which slips fall, as a share of the rate of the slowest vibration: the sums over spans are uneven."""
 
 SLIP_LEFT_SHARE = 0.05
 """Slip that may be left, as a share of all slip; D then changes by less than a tenth."""
@@ -126,7 +130,7 @@ class OneSidedOutcome(FieldsByName):
 
 @dataclass(frozen=True)
 class _Looks:
-    """What was seen of P motions: times, D, shape (P,) each, and p of sliders, shape (B, P), from the start on."""
+    """Looks at P motions: times; D, shape (P,) each; and p of sliders, shape (B, P) each, from the start on."""
 
     times: list[float]
     sizes: list[Floats]
@@ -265,14 +269,14 @@ def _gained(size: Floats) -> Floats:
 
 
 def _slip_dies(half: Floats, three: Floats, end: Floats, over: Callable[..., Floats]) -> NDArray[np.bool_]:
-    """Whether the largest slip of a contact, or that of all contacts, dies away, of each push; p at three times."""
+    """Whether the largest slip of a contact, or the sum of all slips, dies away, for each push; p at three times."""
     whole, before, after = (over(np.abs(slip), axis=0) for slip in (end, three - half, end - three))
     falls = (after <= 0.5 * before) | (after <= np.finfo(float).eps * whole)
     return np.asarray(falls & (before <= SLIP_CHANGE * whole))
 
 
 def _slip_left(slid: list[Floats], decay: float) -> float:
-    """Slip that is still to come, as a share of all slip, at most; infinite if slips do not fall with vibration.
+    """Bound of the slip that is still to come, as a share of all slip; infinite if slips do not fall with vibration.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@ r"""The eigenvalues s of small motion: all, by LAPACK, or of large systems what 
 
 **What grows** beyond rounding is said by :mod:`~faultgouge.analysis.motion.eigenvalues`, of A without dissipation, and
 of the first-order matrix Z in coordinates of the energy (:mod:`~faultgouge.analysis.motion.energy_norm`) with it. A
-motion that no force opposes has s = 0 twice, in one block of Jordan's: rounding turns that into a pair of either sign.
+motion that no force opposes has s = 0 twice, in one Jordan block, which rounding turns into a pair of either sign.
 """
 
 from dataclasses import dataclass

@@ -6,23 +6,23 @@ The motion is proportional to the rate. Over a span of time its *drift* is the m
 **Without contacts at Coulomb's bound** one solution of a sparse system says the drift
 (:mod:`~faultgouge.analysis.motion.steady_drift`). The packing does not vibrate unless motion about the drift grows.
 
-**With contacts at the bound** the motion is followed in windows. A load that begins to rise makes a packing vibrate
-that would follow a load which always rose, for as long as its dashpots need. So a drag takes this vibration away at
-first, and fades out; what vibrates later sustains itself. Contacts may stick and slide in turn in a cycle of several
-windows, so that the numbers are those of a span of many windows: all after the drag, or else the last half of them. The
-motion is steady if the two halves of this span agree. The error of a number is that of the mean of the quarters of the
-span, and at least what longer steps change.
+**With contacts at the bound** the motion is followed in windows of time. The beginning of the rise alone makes a
+packing vibrate until its dashpots have taken the energy. A drag in the first windows takes this vibration away, and
+fades out: a vibration that is left sustains itself. Contacts may stick and slide in a cycle of several windows. So
+drift and vibration are means over a span of many windows: over all windows after the drag or, if these differ too much,
+over the last half of them. The motion is steady if the two halves of this span agree. The error of a number is the
+error of the mean of the four quarters of the span, and at least the error of the time steps.
 
-Vibration may grow slowly from next to nothing, so that no packing is said to follow the load before the whole time is
-over. A vibration was seen to be steady for ten windows and then to grow to another one; so half of the time at least is
-followed, and from two starts, which differ in whether the drag acts on rotations. One packing may vibrate in two ways,
-by its start.
+Vibration may grow slowly from almost nothing. A packing is therefore said to follow the load only after the whole time.
+One vibration was steady for ten windows and then grew to another one. So at least half of the time is followed, from
+two starts: with a drag on all coordinates, and with a drag that leaves rotations alone. A packing may vibrate in two
+ways, one from each start.
 
-**How far.** While the load rises slowly the mean motion takes sticking contacts to the bound and opens others, as
-:mod:`~faultgouge.analysis.motion.next_change` says from the drift. From there on the packing is another one. A contact
-that counts as at the bound lacks some force, up to the tolerance of that, and slides once the load has risen enough.
-The residual forces move the packing, too, and count until the load has moved the packing ten times as far. A load that
-changes another contact before has no motion of this kind.
+**Range.** While the load rises the drift takes sticking contacts to Coulomb's bound and opens others
+(:mod:`~faultgouge.analysis.motion.next_change`). From then on the packing is another one. A contact that counts as at
+the bound may lack a little force, and slides once the load has risen enough. The residual forces move the packing, too,
+and count until the load has moved the packing ten times as far. If another contact reaches the bound or opens before,
+there is no motion of this kind.
 """
 
 from collections.abc import Iterator, Sequence
@@ -347,7 +347,8 @@ def _parts(system: OneSidedSystem, span: list[Span]) -> Floats:
 
 
 def _of_parts(parts: Floats, differs: float) -> DriftAndVibration:
-    """What the drift and the vibration of a span and of its parts say, shape (7, 2), whose halves may differ so far."""
+    """The motion of a span, from drift and vibration of the span and of its parts, shape (7, 2); halves that differ by
+    no more than `differs` are steady."""
     (drift, vibration), before, after = parts[:3]
     alike = abs(after[1] - before[1]) <= differs * after[1] and after[1] > VIBRATION_SHARE * after[0]
     vanishes = (

@@ -47,7 +47,7 @@ class LinearRates:
 
     @classmethod
     def of(cls, configuration: Configuration, known: Spectrum | None, large: bool) -> "LinearRates":
-        """Compute them; K's spectrum may be known, and that of a large packing is not computed."""
+        """Compute the rates; K's spectrum may be known, and is not computed for a large packing."""
         found = spectrum(configuration) if known is None and not large else known
         undamped, sticking = _without_dissipation(configuration, found)
         if configuration.damped:
@@ -70,7 +70,7 @@ def _without_dissipation(configuration: Configuration, found: Spectrum | None) -
 
 @dataclass(frozen=True)
 class SmallMotion:
-    """What becomes of small motion under a load that is held: `grows` is None if that is not known.
+    """The fate of small motion under a load that is held; `grows` is None if it is unknown.
 
     `residual_displacement` is the root of the largest D to which the residual forces move the packing, length; most of
     the others are those of :class:`~faultgouge.analysis.motion.verdict.Stability`."""
@@ -102,7 +102,7 @@ class SmallMotion:
 
 
 def follow_small_motion(system: OneSidedSystem, linear: LinearRates, time: float | None, pushes: int) -> SmallMotion:
-    """Follow what eigenvalues do not decide."""
+    """The fate of small motion, followed in time where eigenvalues do not decide."""
     outcome = SmallMotion.of_linear(linear)
     if linear.one_sided:
         found, reach = follow_pushes(system, outcome.growth_rate, bool(outcome.grows), time, pushes)

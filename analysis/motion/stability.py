@@ -5,16 +5,18 @@ r"""Does a packing at rest move? The verdict, with its own dissipation and its c
 dashpots and drag. Complex pairs of K alone are the answer without loss, and no verdict on a packing with dashpots.
 
 **Contacts at the bound** slide on ahead and stick on the way back, and no eigenvalue decides
-(:mod:`~faultgouge.analysis.motion.one_sided`). The one-sided motion is followed from random pushes until it grows, or
-rests, and so is the motion under a load that rises (:mod:`~faultgouge.analysis.motion.one_sided_outcome`). If it has
-not settled in the time that was followed, the verdict is unknown.
+(:mod:`~faultgouge.analysis.motion.one_sided`). The one-sided motion is followed from random pushes until it grows or
+rests (:mod:`~faultgouge.analysis.motion.one_sided_outcome`). If the motion has not settled within the time that it was
+followed, the verdict is unknown. The motion under a load that rises is followed in the same way
+(:mod:`~faultgouge.analysis.motion.rising_load`).
 
 **Laws with two derivatives**, one while a contact closes and one while it parts, let vibration carry particles on,
 without a contact at the bound, too (:mod:`~faultgouge.analysis.motion.creep`).
 
 **Large packings.** Where not all eigenvalues are known and the fastest motions do not grow, the motion from a random
 state is followed (:mod:`~faultgouge.analysis.motion.decay`). Sticking contacts are stable only if this motion has
-decayed so far that a motion that grows, however slowly, would be seen. Otherwise there is no verdict."""
+decayed so far that a motion that grows, however slowly, would be seen. Otherwise there is no verdict.
+"""
 
 from collections.abc import Sequence
 

@@ -1,9 +1,9 @@
 r"""The motion with which a packing without contacts at Coulomb's bound follows a load that rises: its drift.
 
-With the load :math:`t\, \mathbf g` the drift u that lasts has :math:`K \dot u = \mathbf g`. Where a law has two
-derivatives, one while a contact closes and one while it parts, K has those of the way that each contact goes. One
-solution of a sparse system says the drift, if no force is left over: a load that a free motion does not bear
-accelerates the packing for ever.
+Under the load :math:`t\, \mathbf g` the lasting drift :math:`\dot u` solves :math:`K \dot u = \mathbf g`. If a law has
+two derivatives, one while a contact closes and one while it parts, K has for each contact the derivative of its own
+way. A force that is left over belongs to a motion that no force opposes, which the load accelerates for ever: then
+there is no drift.
 """
 
 from dataclasses import replace
@@ -21,7 +21,7 @@ from .one_sided import OneSidedSystem
 from .rates import rates_of
 
 DIAGONAL_SHIFT = 1e-11
-"""What is added to the diagonal of K, as a share of the largest entry, so that free motions do not divide by zero."""
+"""Number added to the diagonal of K, as a share of the largest entry, so that free motions do not divide by zero."""
 
 REFINEMENTS = 3
 """Steps of iterative refinement, each of which takes this shift out once more."""

@@ -15,7 +15,7 @@ from .rates import Rates
 from .rising_load import RisingMotion
 
 WORN = "contacts bear less after they have closed and parted, so that vibration carries particles on"
-"""What contacts with two derivatives do."""
+"""The sentence on contacts with two derivatives."""
 
 
 @dataclass(frozen=True)

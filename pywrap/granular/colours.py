@@ -33,7 +33,7 @@ class Pairs:
 
 
 def neighbouring_pairs(lmp: Any, particles: ProbedParticles) -> Pairs:
-    """Pairs that touch or nearly do, and those of bonds and angles; in a copy, where it runs zero steps."""
+    """Pairs that touch or nearly touch, and pairs of bonds and angles. The instance is a copy, and runs zero steps."""
     lmp.command("compute faultgouge_i all property/local patom1 patom2")
     try:
         lmp.command("compute faultgouge_c all pair/local dist force")

@@ -130,7 +130,7 @@ def settle_bed(
 
 
 def shared_bed(scene: Scene) -> Packing | None:
-    """The bed that all friction coefficients of a scene begin from; None if each has its own, or there is one alone."""
+    """The bed that all friction coefficients of a scene share; None if each has its own bed, or there is only one."""
     alone = len(scene.law.mus) == 1
     own = isinstance(scene.packing, GeneratedPacking) and scene.packing.settle_friction
     return None if alone or own else settle_bed(scene)

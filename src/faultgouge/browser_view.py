@@ -1,4 +1,4 @@
-"""A page of a stored file that any browser opens offline: what the command `faultgouge view` writes."""
+"""The page that `faultgouge view` writes: a stored file, for any browser, offline."""
 
 from __future__ import annotations
 

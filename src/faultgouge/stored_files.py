@@ -1,4 +1,4 @@
-"""Packings of files, of whatever kind."""
+"""Read a packing from a file of any kind."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ FX_C = 0.021833056408
 """Onset of the reference packing, by an independent code."""
 
 DISTANCES = np.array([1e-4, 1e-6, 1e-8])
-"""Distances from that onset, in units of it."""
+"""Distances from the onset, in units of the onset."""
 
 CURVATURE = 10.0
 """Curvature of D(F_x), relative to its slope over F_x^c; 3.4 was measured."""
