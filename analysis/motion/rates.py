@@ -43,8 +43,8 @@ PERIODS_OF_LARGE = 2e6
 vector. It takes three seconds without dissipation, fourteen with it, and 35 where many motions grow alike and none
 converges."""
 
-LONGEST_SEARCH = 300.0
-"""Periods of the fastest motion at the most."""
+FIRST_SEARCH, LONGEST_SEARCH = 30.0, 300.0
+"""Periods of the fastest motion at first, which show fast growth in a tenth of the time, and at the most."""
 
 FREE_SHARE = 1e-6
 """Eigenvalues s below this share of the largest may be those of motions that no force opposes: rounding leaves sqrt(u)
@@ -107,17 +107,23 @@ def rates_of(motion: Motion) -> Rates:
         return Rates(np.zeros(0, complex), np.zeros(0, bool), 0)
     if size <= (DENSE_DAMPED if motion.dissipative else SLICED):
         return _damped_rates(motion) if motion.dissipative else _undamped_rates(motion)
-    found = _fastest(motion)
-    decides = motion.dissipative and size <= DECAY_UP_TO and not found.grows.any()
-    return found.decided(follow_decay(motion)) if decides else found
+    longest = min(LONGEST_SEARCH, PERIODS_OF_LARGE / size)
+    if not motion.dissipative or size > DECAY_UP_TO:
+        return _fastest(motion, min(FIRST_SEARCH, longest), longest)
+    found = _fastest(motion, FIRST_SEARCH, FIRST_SEARCH)
+    if found.grows.any() and not found.at_least:
+        return found
+    # that all motion decays is more than a search says, and takes less time than a long one
+    decay = None if found.grows.any() else follow_decay(motion)
+    if decay is None or decay.grows is not False:
+        found = _fastest(motion, FIRST_SEARCH, longest)
+    return found if decay is None or found.grows.any() else found.decided(decay)
 
 
-def _fastest(motion: Motion) -> Rates:
-    """Of motions that surely grow; the others are not known."""
+def _fastest(motion: Motion, first: float, longest: float) -> Rates:
+    """Of motions that surely grow, looked for in so many periods; the others are not known."""
     damping = motion.in_blocks(motion.damping) if motion.dissipative else None
-    length = min(LONGEST_SEARCH, PERIODS_OF_LARGE / len(motion.active))
-    periods = min(30.0, length), length
-    found = fastest_growing(motion.in_blocks(motion.stiffness), damping, count=1, periods=periods)
+    found = fastest_growing(motion.in_blocks(motion.stiffness), damping, count=1, periods=(first, longest))
     values = found.values if motion.dissipative else 1j * np.sqrt(found.values.astype(complex))
     values = np.where(values.real < 0, -values, values)
     if not found.converged:

@@ -16,7 +16,7 @@ from .decay import Decay, follow_decay
 from .motion import Motion
 from .one_sided import OneSidedSystem
 from .one_sided_outcome import OneSidedOutcome, follow_pushes, random_pushes
-from .rates import Rates, rates_of
+from .rates import SLICED, Rates, rates_of
 from .spectrum import Spectrum, spectrum
 from .verdict import LinearNeighbour, WithoutDissipation
 
@@ -47,8 +47,13 @@ class LinearRates:
 
     @classmethod
     def of(cls, configuration: Configuration, known: Spectrum | None, large: bool) -> "LinearRates":
-        """Compute the rates; K's spectrum may be known, and is not computed for a large packing."""
-        found = spectrum(configuration) if known is None and not large else known
+        """Compute the rates; K's spectrum may be known.
+
+        This spectrum decides without dissipation. With dissipation the spectrum is a remark, and where it takes longer
+        than all else, the fastest motion without dissipation stands for it.
+        """
+        wanted = configuration.coordinates <= SLICED if configuration.damped else not large
+        found = spectrum(configuration) if known is None and wanted else known
         undamped, sticking = _without_dissipation(configuration, found)
         if configuration.damped:
             sticking = rates_of(Motion.of(configuration))

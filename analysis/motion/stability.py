@@ -37,8 +37,8 @@ from .steady_drift import NotFollowedError
 from .verdict import LinearNeighbour, Stability
 
 LARGE = 6000
-"""Coordinates beyond which the fastest growing motions stand for all eigenvalues, and one push and its opposite for
-several, in larger steps."""
+"""Coordinates beyond which the fastest growing motions stand for all eigenvalues without dissipation, and one push and
+its opposite for several, in larger steps."""
 
 
 def stability(

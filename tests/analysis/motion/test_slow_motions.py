@@ -114,7 +114,10 @@ def test_rates_of_a_packing_beyond_lapack_have_its_slowest_decay(damped, monkeyp
     assert not expected.grows.any()
     assert expected.growth_rate < 0
     monkeypatch.setattr(module, "DENSE_DAMPED", 100)
+    searches, search = [], module.fastest_growing
+    monkeypatch.setattr(module, "fastest_growing", lambda *a, **k: searches.append(k["periods"]) or search(*a, **k))
     found = rates_of(Motion.of(damped))
+    assert searches == [(module.FIRST_SEARCH, module.FIRST_SEARCH)]  # once all decays, a longer one would say less
     assert not found.grows.any()
     assert found.growth_rate == pytest.approx(expected.growth_rate, rel=1e-6)
     assert found.free == expected.free

@@ -104,6 +104,7 @@ def test_large_packings_have_the_verdict_of_small_ones(monkeypatch):
 def like_a_large_one(monkeypatch):
     """No eigenvalue is computed, and the search sees fast growth alone."""
     monkeypatch.setattr(stability_module, "LARGE", 0)
+    monkeypatch.setattr(small_motion_module, "SLICED", 0)
     for name, value in {"SLICED": 0, "DENSE_DAMPED": 0, "DECAY_UP_TO": 0, "PERIODS_OF_LARGE": 9 * 30.0}.items():
         monkeypatch.setattr(rates_module, name, value)
 

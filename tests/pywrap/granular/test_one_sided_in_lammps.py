@@ -248,6 +248,7 @@ def test_motion_holds_up_to_the_push_that_is_said(growing):
 def test_the_verdict_on_a_random_state_is_that_of_lammps(tmp_path, monkeypatch, dashpot, seed, rests):
     """Spheres as if there were too many for eigenvalues: they rest, or grow so slowly that a search does not see it."""
     from faultgouge.analysis.motion import rates as rates_module
+    from faultgouge.analysis.motion import small_motion as small_motion_module
     from faultgouge.analysis.motion import stability as stability_module
     from faultgouge.pywrap import from_lammps
     from research.lammps_laws.compute import pour, rest
@@ -260,6 +261,7 @@ def test_the_verdict_on_a_random_state_is_that_of_lammps(tmp_path, monkeypatch, 
     assert not here.contacts.one_sided.any()
     slowest = stability(here).growth_rate
     monkeypatch.setattr(stability_module, "LARGE", 0)
+    monkeypatch.setattr(small_motion_module, "SLICED", 0)
     for name, value in {"SLICED": 0, "DENSE_DAMPED": 0, "DECAY_UP_TO": 0, "PERIODS_OF_LARGE": 2e4}.items():
         monkeypatch.setattr(rates_module, name, value)
     told = stability(here)
