@@ -23,8 +23,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..progress import report_progress
-from .contact_reach import LOOK_STEP
-from .one_sided import OneSidedSystem
+from .one_sided import LOOK_STEP, OneSidedSystem
 from .one_sided_outcome import STEPS_OF_CHUNK, random_pushes
 
 CHUNKS_OF_SPAN = 4

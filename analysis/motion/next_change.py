@@ -1,4 +1,4 @@
-r"""How far a load may rise until a sticking contact reaches Coulomb's bound, or a contact opens.
+r"""How far a load may rise until a sticking contact reaches Coulomb's bound, or a contact opens or closes.
 
 While the load rises by :math:`x`, the particles move by :math:`x u`, with the drift u. To first order the tangential
 force of contact c becomes :math:`\mathbf f_t + x\, \mathbf g_c` in the plane of the contact, Coulomb's bound
@@ -6,20 +6,22 @@ force of contact c becomes :math:`\mathbf f_t + x\, \mathbf g_c` in the plane of
 
 .. math:: |\mathbf f_t + x\, \mathbf g_c| = \mu f_n + x\, h_c ,
 
-and opens where the overlap is zero. New contacts of particles that do not touch yet are not foreseen.
+and opens where the overlap is zero. Particles that are nearer than the largest overlap, and do not touch yet, close
+where their gap is zero. Contacts of particles farther apart are not foreseen.
 """
 
 import numpy as np
 
 from ..arrays import Floats
 from ..configuration import Configuration
+from ..operators.gaps import gaps_of
 from .one_sided import OneSidedSystem
 
-REACHES, OPENS = "reaches Coulomb's bound", "opens"
+REACHES, OPENS, CLOSES = "reaches Coulomb's bound", "opens", "closes"
 
 
 def next_change(system: OneSidedSystem, velocity: Floats, paths: Floats) -> tuple[float | None, str | None]:
-    """At which increase of the load a contact changes first, and whether it reaches the bound or opens.
+    """At which increase of the load a contact changes first, and whether it reaches the bound, opens or closes.
 
     None twice if no contact is known that changes.
 
@@ -36,7 +38,10 @@ def next_change(system: OneSidedSystem, velocity: Floats, paths: Floats) -> tupl
     if configuration.stiffness is not None or not len(configuration.contacts):
         return None, None
     slides, opens = _increases(configuration, system.of_particles(velocity), system.of_contacts(paths))
-    first, event = min((float(slides.min()), REACHES), (float(opens.min()), OPENS))
+    gaps = gaps_of(configuration)
+    rates = gaps.rates(configuration) @ system.of_particles(velocity)
+    closes = np.where(rates > 0, gaps.gap / np.where(rates > 0, rates, 1.0), np.inf).min(initial=np.inf)
+    first, event = min((float(slides.min()), REACHES), (float(opens.min()), OPENS), (float(closes), CLOSES))
     return (first, event) if first < np.inf else (None, None)
 
 

@@ -48,6 +48,9 @@ MOTION_STEP = 0.05
 """Time step, as a share of the largest stable one. Beside LAMMPS D is right to some per cent after growth by twelve
 decades; with twice the step, to some 8 per cent."""
 
+LOOK_STEP = 0.3
+"""Time between two looks at contacts as a share of the largest stable time step: ten looks in the fastest period."""
+
 DENSE_ENTRIES = 150**2
 """Entries up to which a product with the dense matrix is as fast: ten times as fast for 60 coordinates and fewer."""
 
@@ -58,13 +61,20 @@ Matrix: TypeAlias = csr_array | Floats
 @dataclass
 class OneSidedState:
     """Several motions at one time, in columns: mass-weighted displacement z and velocity v, shape (E, P), and what
-    contacts remember: p of sliders, shape (B, P), and r, shape (R, P), of contacts with two derivatives."""
+    contacts remember: p of sliders, shape (B, P), and r, shape (R, P), of contacts with two derivatives. Sliders may
+    lack some force to the bound, which is `missing`, shape (B, P)."""
 
     time: float
     z: Floats
     v: Floats
     p: Floats
     r: Floats
+    missing: Floats | float = 0.0
+
+    def copy(self) -> "OneSidedState":
+        """The same state, which changes by itself."""
+        z, v, p, r = (each.copy() for each in (self.z, self.v, self.p, self.r))
+        return OneSidedState(self.time, z, v, p, r, self.missing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +148,12 @@ class OneSidedSystem:
         grip = _for_products(self._weight_transposed @ s.force)
         excess, viscous = (_for_products(rows @ self._weight) for rows in (s.excess, s.viscous_excess))
         return grip, excess, viscous, s.rectified[:, None], s.viscous[:, None]
+
+    @cached_property
+    def missing_forces(self) -> Floats:
+        """What contacts that count as at Coulomb's bound lack to the bound, shape (B, 1), force."""
+        c = self.motion.configuration.contacts
+        return np.maximum(c.friction - np.linalg.norm(c.tangential_force, axis=1), 0.0)[c.one_sided, None]
 
     @cached_property
     def margins(self) -> tuple[Matrix, Floats]:
@@ -268,6 +284,7 @@ class OneSidedSystem:
             springs = excess @ state.z
             if len(state.r):
                 springs += rectified * (self.rescaled[2] @ state.r)
+            springs = springs - state.missing
             whole = springs if damping is None else springs + viscous_excess @ velocity
             np.maximum(state.p, np.where(viscous, whole, springs), out=state.p)
             force -= grip @ np.maximum(state.p, whole)

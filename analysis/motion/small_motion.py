@@ -21,7 +21,8 @@ from .spectrum import Spectrum, spectrum
 from .verdict import LinearNeighbour, WithoutDissipation
 
 UNSETTLED = (
-    "its residual forces alone take a contact to Coulomb's bound, or open one: bring the packing to rest more closely"
+    "its residual forces alone take a contact to Coulomb's bound, open or close one: bring the packing to rest more "
+    "closely"
 )
 """Why there is no verdict where the residual forces alone change a contact."""
 
@@ -170,8 +171,8 @@ def _after_pushes(sticks: SmallMotion, found: OneSidedOutcome, reach: ContactRea
     elif not found.grows and least >= most and least > PUSH_OVER_RESIDUAL * residual:
         reasons.append(
             f"contacts that count as at Coulomb's bound reach it after pushes above {least:.1g} (velocity along an "
-            f"axis) alone, and others reach it, or open, after pushes above {most:.1g}: bring the packing to rest more "
-            "closely"
+            f"axis) alone, and others reach it, open or close, after pushes above {most:.1g}: bring the packing to "
+            "rest more closely"
         )
     return replace(
         sticks.beside_residual_forces(reach),

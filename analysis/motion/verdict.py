@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
+import numpy as np
+
 from ..counted import counted
 from .contact_reach import PUSH_OVER_RESIDUAL
 from .creep import Creep
@@ -91,7 +93,7 @@ class Stability:
         How far a push carries particles if contacts have two derivatives, and none is at the bound.
     largest_push : float or None
         Where motion does not grow, and no contact slides on one side: velocity of a push along an axis up to which
-        contacts neither reach the bound nor open. None where K is given.
+        contacts neither reach the bound nor open, and no others close. None where K is given.
     residual_push : float
         Velocity of a push along an axis that moves the particles as far as the residual forces do; 0 where no motion
         was followed.
@@ -236,19 +238,26 @@ class Stability:
     def _scales(self) -> Iterator[str]:
         if self.stable and self.one_sided is None:
             yield from self._scales_of_linear_motion
-        if self.one_sided is None or self.one_sided.grows is not False:
+        if self.one_sided is None or self.one_sided.grows is None:
             return
         least, most = self.one_sided.scales
+        if self.one_sided.grows:
+            if np.isfinite(least):
+                yield (
+                    f"this growth is seen after pushes from {least:.1g} on (velocity along an axis): after smaller "
+                    "ones contacts that count as at the bound may stay below it, or residual forces count"
+                )
+            return
         if least < most:
             yield (
                 f"this is the motion after pushes of {least:.1g} to {most:.1g} (velocity along an axis): below, "
                 "contacts that count as at the bound do not reach it, or residual forces count; above, others reach "
-                "it, or open"
+                "it, open or close"
             )
         elif self.stable:
             yield (
-                f"no push is small enough for this motion (below {most:.1g}, where no other contact reaches the bound "
-                f"or opens) and large enough (above {least:.1g}, where residual forces do not count)"
+                f"no push is small enough for this motion (below {most:.1g}, where no other contact reaches the bound, "
+                f"opens or closes) and large enough (above {least:.1g}, where residual forces do not count)"
             )
 
     @property
@@ -263,12 +272,12 @@ class Stability:
         elif least < most:
             yield (
                 f"holds for pushes of {least:.1g} to {most:.1g} (velocity along an axis): below, residual forces "
-                "count; above, contacts open or slide"
+                "count; above, contacts open, close or slide"
             )
         else:
             yield (
                 f"holds for no push (velocity along an axis): below {least:.1g}, residual forces count; above "
-                f"{most:.1g}, contacts open or slide"
+                f"{most:.1g}, contacts open, close or slide"
             )
 
     @property

@@ -1,7 +1,8 @@
-"""A block on a slope, whose motion is known: it sticks and vibrates, or slides at a constant velocity."""
+"""A block, whose motion is known: on a slope it sticks and vibrates, or slides at a constant velocity; on top of a
+sphere it slides down faster and faster."""
 
 import pytest
-from granular_packings import command
+from granular_packings import command, of_particle
 from pushes import PUSH
 
 from faultgouge.analysis import one_sided_motion, stability
@@ -25,11 +26,11 @@ fix floor all wall/gran granular {LAW} zplane 0 NULL contacts
 fix load all gravity 1.0 vector 0 0 -1
 variable pull equal mass(all)*v_slope
 fix pull all addforce v_pull 0 0
-fix drag all viscous 2.0
+fix drag all viscous 5.0
 fix move all nve/limit 0.1
 timestep 0.001
 thermo 1000000
-run 15000
+run 5000
 """
 """A sphere that does not turn."""
 
@@ -46,17 +47,16 @@ def block(lammps_with):
     return make
 
 
-def moved(lmp, velocity: float, steps: int) -> float:
-    """By how much the block moves ahead in some steps of 0.001 without drag, over the velocity of the push."""
+def moved(lmp, velocity: float, steps: int, which: int = 1) -> float:
+    """By how much a block moves ahead in some steps of 0.001 without drag, over the velocity of the push."""
     from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy, quieten
 
     def follow():
         quieten(lmp, drag=True)
-        x = lmp.numpy.extract_atom("x")
-        before = float(x[0, 0])
-        lmp.numpy.extract_atom("v")[0, 0] = velocity
+        before = float(of_particle(lmp, "x", which)[0])
+        of_particle(lmp, "v", which)[0] = velocity
         lmp.command(f"run {steps} post no")
-        return (float(lmp.numpy.extract_atom("x")[0, 0]) - before) / abs(velocity)
+        return (float(of_particle(lmp, "x", which)[0]) - before) / abs(velocity)
 
     return in_a_copy(follow)
 
@@ -68,12 +68,12 @@ def test_at_the_angle_of_repose_a_block_slides_on_ahead(block):
     here = from_lammps(lmp)
     assert here.contacts.at_bound.all()
     assert here.free.all()
-    ahead, back = (one_sided_motion(here, [[v, 0, 0]], times=[20.0]).displacement[0, 0, 0] for v in (1.0, -1.0))
-    assert ahead == pytest.approx(20.0, rel=1e-9)
-    assert moved(lmp, PUSH, 20_000) == pytest.approx(ahead, rel=1e-6)
+    ahead, back = (one_sided_motion(here, [[v, 0, 0]], times=[5.0]).displacement[0, 0, 0] for v in (1.0, -1.0))
+    assert ahead == pytest.approx(5.0, rel=1e-9)
+    assert moved(lmp, PUSH, 5000) == pytest.approx(ahead, rel=1e-6)
     # a push back is turned round, and loses energy: 2 % is what steps of one-sided motion change
-    assert 0 < moved(lmp, -PUSH, 20_000) == pytest.approx(back, rel=0.02)
-    verdict = stability(here, time=20.0)
+    assert 0 < moved(lmp, -PUSH, 5000) == pytest.approx(back, rel=0.02)
+    verdict = stability(here, time=5.0)
     assert verdict.stable is None
     assert "has not settled" in str(verdict)
 
@@ -86,13 +86,69 @@ def test_a_block_below_the_angle_of_repose_vibrates_and_rests(block):
     verdict = stability(here)
     assert verdict.stable is True
     assert verdict.free == 0
-    assert abs(moved(lmp, PUSH, 20_000)) < 1e-6
+    assert abs(moved(lmp, PUSH, 5000)) < 1e-6
 
 
 def test_of_a_block_that_slides_the_load_alone_is_not_accused(block):
-    """The slope is 2e-7 beyond the angle of repose: less is out of balance than is allowed, but nothing stops it."""
+    """The slope is 4e-6 beyond the angle of repose: less is out of balance than is allowed, but nothing stops it."""
     from faultgouge.pywrap import from_lammps
     from faultgouge.pywrap.granular.granular_commands import NotTakenError
 
     with pytest.raises(NotTakenError, match="1 contact at Coulomb's bound or just below may slide while"):
-        from_lammps(block(1.0 + 4e-7))
+        from_lammps(block(1.0 + 4e-6))
+
+
+HILL = f"""
+units lj
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -3 6 -3 3 0 6 units box
+create_box 2 box
+create_atoms 1 single 0 0 0.5 units box
+create_atoms 2 single 0 0 1.4995 units box
+set group all diameter 1.0
+set group all density 1.0
+pair_style granular
+pair_coeff * * {LAW}
+group block type 2
+fix load block gravity 1.0 vector 0 0 -1
+variable pull equal mass(block)*v_slope*(1-exp(-0.5*step*dt))
+fix pull block addforce v_pull 0 0
+fix drag block viscous 10.0
+fix move block nve
+timestep 0.001
+thermo 1000000
+run 20000
+unfix pull
+fix pull block addforce $(mass(block)*v_slope) 0 0
+run 5000
+"""
+"""A sphere that does not turn, on top of another one, and pulled sideways until it nearly slides."""
+
+REPOSE = 0.9978189798742391 * FRICTION
+"""The pull over the weight at which the contact lacks 9e-8 of Coulomb's bound: the pull moves the block, and turns the
+contact."""
+
+
+def test_a_block_on_top_of_a_sphere_slides_down_from_the_push_on_that_is_said(lammps_with):
+    """Ahead it slides with s^2 = (1 + mu^2) g / r for the distance r of the centres, or not at all.
+
+    The torque does not turn it. The weight is g, and the pull mu g: as the contact turns by a, the force along it grows
+    by (1 + mu^2) g a."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = lammps_with(f"variable slope equal {REPOSE:.17g}")
+    command(lmp, HILL)
+    here = from_lammps(lmp)
+    verdict = stability(here)
+    assert verdict.at_bound == 1
+    assert verdict.stable is False
+    assert verdict.growth_rate == pytest.approx(2 * (1 + FRICTION**2) ** 0.5, rel=1e-3)  # r is shorter by the overlap
+    least, most = one_sided_motion(here, [[0, 0, 0], [1, 0, 0]], times=[6.0]).scales
+    assert 1e-7 < least < 1e-5 < most
+    assert f"after pushes from {verdict.one_sided['scales'][0]:.1g} on" in str(verdict)
+    expected = one_sided_motion(here, [[0, 0, 0], [1, 0, 0]], times=[6.0]).displacement[0, 1, 0]
+    assert moved(lmp, least, 6000, which=2) == pytest.approx(expected, rel=0.1)
+    assert abs(moved(lmp, 0.01 * least, 6000, which=2)) < 1e-3 * expected

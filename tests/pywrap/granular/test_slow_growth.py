@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from granular_packings import command
+from granular_packings import command, of_particle
 
 from faultgouge.analysis import spectrum, stability
 
@@ -58,12 +58,6 @@ timestep 5e-4
 thermo 1000000
 run 0
 """
-
-
-def of_particle(lmp, name: str, number: int) -> np.ndarray:
-    """The row of an array that belongs to the particle with this ID, which can be changed."""
-    row = int(np.flatnonzero(lmp.numpy.extract_atom("id")[: lmp.extract_setting("nlocal")] == number)[0])
-    return lmp.numpy.extract_atom(name)[row]
 
 
 @pytest.mark.parametrize(("height", "dashpot"), [(0.1, 1e6), (0.2, 1e5)])
