@@ -266,8 +266,8 @@ class _Damped:
 
     @cached_property
     def longest_step(self) -> float:
-        """tau sqrt(L) of one sum."""
-        return float(min(30.0, CANCELLATION / max(np.arcsinh(self.loss), 1e-3)))
+        """tau sqrt(L) of one sum: its terms go up to exp(loss tau sqrt(L)), as the generating function of J_k says."""
+        return float(min(30.0, CANCELLATION / max(self.loss, 1e-3)))
 
     def propagator(self, time: float) -> Step:
         """exp(t Z)."""

@@ -43,6 +43,10 @@ PERIODS_OF_LARGE = 2e6
 vector. It takes three seconds without dissipation, fourteen with it, and 35 where many motions grow alike and none
 converges."""
 
+STRONG = 4.0
+"""Loss of dashpots over the fastest frequency beyond which no fast growth is sought: the search takes short steps, and
+strong dashpots leave slow growth alone. Both are bounds, by sums of rows."""
+
 FIRST_SEARCH, LONGEST_SEARCH = 30.0, 300.0
 """Periods of the fastest motion at first, which show fast growth in a tenth of the time, and at the most."""
 
@@ -122,6 +126,9 @@ def rates_of(motion: Motion) -> Rates:
 
 def _fastest(motion: Motion, first: float, longest: float) -> Rates:
     """Of motions that surely grow, looked for in so many periods; the others are not known."""
+    fastest, loss = (float(abs(each).sum(axis=1).max(initial=0.0)) for each in (motion.stiffness, motion.damping))
+    if loss > STRONG * np.sqrt(fastest):  # nothing grows faster than K alone would have it
+        return Rates(np.zeros(0, complex), np.zeros(0, bool), 0, 2 * float(np.sqrt(fastest)))
     damping = motion.in_blocks(motion.damping) if motion.dissipative else None
     found = fastest_growing(motion.in_blocks(motion.stiffness), damping, count=1, periods=(first, longest))
     values = found.values if motion.dissipative else 1j * np.sqrt(found.values.astype(complex))

@@ -260,7 +260,7 @@ def _of_standard(rows: list[dict[str, Any]], load: float, loss: float) -> dict[s
         "packings": len(each),
         "grows": sum(draws[0]["rate"] > ROUNDED_RATE for draws in each),
         "grown": in_all_and_any(lambda run: run["largest_D"] > SEEN_GROWTH),
-        **{kind: in_all_and_any(lambda run, kind=kind: run["ends"] == kind) for kind in UNREST},
+        **{kind: in_all_and_any(partial(_ends_as, kind)) for kind in UNREST},
         "elsewhere": in_all_and_any(lambda run: run.get("D", 0.0) > ELSEWHERE),
         "slip": float(np.median(slips)) if slips else None,
         "largest": float(np.median([run["largest_D"] for run in runs])) if runs else None,
