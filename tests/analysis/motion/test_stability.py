@@ -52,8 +52,8 @@ def test_a_motion_that_is_that_of_no_push_has_no_verdict(monkeypatch, scales, st
     follow = small_motion_module.follow_pushes
 
     def with_scales(*given):
-        found, residual = follow(*given)
-        return replace(found, scales=scales), residual
+        found, reach = follow(*given)
+        return replace(found, scales=scales), reach
 
     monkeypatch.setattr(small_motion_module, "follow_pushes", with_scales)
     found = stability(at_rest)
