@@ -32,7 +32,6 @@ from itertools import count, islice
 import numpy as np
 
 from ..arrays import Floats
-from ..counted import counted
 from ..fields_by_name import FieldsByName
 from ..progress import report_progress
 from .contact_reach import PUSH_OVER_RESIDUAL, reaching_scale
