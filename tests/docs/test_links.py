@@ -126,6 +126,8 @@ def test_a_page_shows_what_its_commands_print(tmp_path, path):
 def test_scenes_and_sweeps_of_a_page_are_read(tmp_path, path):
     base = {"packing": {}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
     (tmp_path / "packing.json").write_text(REFERENCE.read_text())
+    for name, block in files(path).items():  # the function of a task
+        (tmp_path / name).write_text(block)
     for text in re.findall(r"^```toml\n(.*?)^```", path.read_text(), re.MULTILINE | re.DOTALL):
         (tmp_path / "block.toml").write_text(text)
         if "[sweep]" in text:
