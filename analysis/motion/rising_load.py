@@ -71,6 +71,10 @@ VIBRATION_SHARE = 1e-2
 LEAST_WINDOWS = 8
 """Windows of a span whose halves and quarters can be compared."""
 
+ACCELERATION_RATIO = 3.0
+"""Ratio of the mean velocities of the last and the first quarter of the time from which on a motion has no constant
+drift: 4 for a velocity that rises as the time after the drag has faded, and 17 for one that rises as its square."""
+
 LARGEST_GROWTH = 1e12
 """Growth of the vibration of a motion that has no drift."""
 
@@ -238,9 +242,20 @@ def follow_load(
             )
         if time is None and 2 * len(windows) >= most and _is_known(system, windows):
             break
+    _refuse_acceleration(system, windows, length)
     span, (first, *others) = _of_starts(system, windows)
     motion = _rising_motion(first, system, span, residual)
     return replace(motion, time=length * len(windows), span=span.time, other_start=others[0] if others else None)
+
+
+def _refuse_acceleration(system: OneSidedSystem, windows: list[Span], length: float) -> None:
+    """Refuse a motion whose mean velocity rises on, as of contacts that slide on and on."""
+    quarters = _parts(system, windows[FADE_WINDOWS:] or windows)[0, 3:, 0]
+    if np.all(np.diff(quarters) > 0) and quarters[-1] > ACCELERATION_RATIO * quarters[0]:
+        raise NotFollowedError(
+            f"there is no constant drift: the load accelerates particles whose contacts slide on, from a mean velocity "
+            f"of {quarters[0]:.3g} to one of {quarters[-1]:.3g} over the rate within t = {length * len(windows):.4g}"
+        )
 
 
 def _rising_motion(moves: DriftAndVibration, system: OneSidedSystem, span: Span, residual: float) -> RisingMotion:

@@ -5,10 +5,10 @@ explain a difference.
 """
 
 from .granular_commands import MOBILE, WALLS, NotLinearisedError, without_suffix
-from .look_in_a_copy import DRAG, INSERTS, PER_STEP
+from .look_in_a_copy import DRAG_STYLES, INSERTS, PER_STEP
 
 PASSIVE = (
-    *WALLS, *PER_STEP, *DRAG, *INSERTS, *MOBILE, "gravity", "enforce2d", "slip/history", "low/parts",
+    *WALLS, *PER_STEP, *DRAG_STYLES, *INSERTS, *MOBILE, "gravity", "enforce2d", "slip/history", "low/parts",
     "dashpot/velocities", "keep/histories", "store", "property/atom",
 )  # fmt: skip
 """Fixes, by the beginnings of their styles, whose action is in K, or constant, or none; so are those that LAMMPS makes
@@ -48,7 +48,7 @@ def acting_fixes(styles: dict[str, str]) -> dict[str, str]:
 
 def drag_remarks(styles: dict[str, str]) -> tuple[str, ...]:
     """A sentence on each fix, by ID, that takes energy away, and has no part in K and C."""
-    drags = ((name, style) for name, style in styles.items() if without_suffix(style).startswith(DRAG))
+    drags = ((name, style) for name, style in styles.items() if without_suffix(style).startswith(DRAG_STYLES))
     return tuple(f"drag of fix {name} ({style}) is left out" for name, style in drags)
 
 

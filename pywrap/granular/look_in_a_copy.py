@@ -38,7 +38,7 @@ PER_STEP = ("ave/", "print", "vector", "halt", "balance", "adapt", "dt/reset", "
 INSERTS = ("pour", "deposit", "evaporate")
 """Fixes that put particles in or take them out, with which no time step may be changed."""
 
-DRAG = ("viscous", "langevin", "overdamped")
+DRAG_STYLES = ("viscous", "langevin", "overdamped")
 """Fixes that take energy away, and may shake."""
 
 
@@ -144,5 +144,5 @@ def quieten(lmp: Any, *, drag: bool = False) -> None:
     for name in lmp.available_ids("dump"):
         lmp.command(f"undump {name}")
     for name, style in styles_of(lmp).fixes.items():
-        if style.startswith((*PER_STEP, *INSERTS)) or (drag and style.startswith(DRAG)):
+        if style.startswith((*PER_STEP, *INSERTS)) or (drag and style.startswith(DRAG_STYLES)):
             lmp.command(f"unfix {name}")

@@ -23,7 +23,8 @@ from .validation import SceneError
 
 Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "reproduce"]
 
-EPSILON = 2.3e-16
+DOUBLE_ROUNDING = 2.3e-16
+"""Relative rounding of a double, rounded up."""
 
 FORCE_CHAINS = 10.0
 """The largest contact force, in units of F_y, for which LAMMPS's time steps are made."""
@@ -107,7 +108,7 @@ def refuse_impossible(scene: SceneKeys) -> tuple[str, str] | None:
             f"= {fy:g} presses two disks {overlap:.2g} into each other, deeper than the smallest radius {smallest:g}, "
             f"where the contact law does not hold: lower it, or raise law.kn = {law.kn:g}"
         )
-    rounding = EPSILON * packing.width * _stiffness(scene, fy) / fy
+    rounding = DOUBLE_ROUNDING * packing.width * _stiffness(scene, fy) / fy
     if not rounding < ROUNDING_LIMIT:
         return "law.kn", (
             f"= {law.kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is {rounding:.1g} of F_y, "

@@ -23,6 +23,7 @@ FLOORS = 10.0
 """Newton's own limit, in units of the rounding floor."""
 
 DIRECTIONS = 4
+"""Random directions of a derivative: each has all coordinates."""
 
 SLIP_SHARES = (0.1, -0.4, 1.0, 0.02, -0.99, 0.7, -1.0)
 """Slips at which K is examined, in units of their limits."""

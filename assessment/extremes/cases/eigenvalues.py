@@ -37,6 +37,7 @@ from .packings import bed, crystal, law, shear_packing, with_rattlers
 GROUP = "eigenvalues"
 
 SIZE, SPLIT = 60, 0.05
+"""Modes of the operator, and d of the hidden block: all other eigenvalues are far from the pair."""
 
 FX_C = 0.021833056408
 """Onset of the reference packing, by an independent code."""

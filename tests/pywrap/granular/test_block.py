@@ -1,6 +1,7 @@
 """A block, whose motion is known: on a slope it sticks and vibrates, or slides at a constant velocity; on top of a
 sphere it slides down faster and faster."""
 
+import numpy as np
 import pytest
 from granular_packings import command, of_particle
 from pushes import PUSH
@@ -76,6 +77,28 @@ def test_at_the_angle_of_repose_a_block_slides_on_ahead(block):
     verdict = stability(here, time=5.0)
     assert verdict.stable is None
     assert "has not settled" in str(verdict)
+
+
+@pytest.mark.long
+def test_a_load_that_rises_accelerates_a_block_that_slides_and_pushes_one_back_that_sticks(block):
+    """At the angle of repose: ahead nothing bears the load, which displaces the block by t^3 / (6 m); back the spring
+    of the contact does. The drift is a root mean square over three axes."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = block(1.0)
+    here = from_lammps(lmp)
+    ahead = stability(here, rise=[[1.0, 0.0, 0.0]], time=8.0)
+    assert ahead.rising is None
+    assert "there is no constant drift: the load accelerates particles whose contacts slide on" in str(ahead)
+    back = stability(here, rise=[[-1.0, 0.0, 0.0]], time=8.0)
+    assert np.sqrt(3) * back.rising["drift"] == pytest.approx(1 / 300, rel=0.02)
+    assert back.rising["vibration"] < 1e-6 * back.rising["drift"]
+    rate, time = 1e-7, 2.0
+    command(lmp, f"unfix drag\nreset_timestep 0\nvariable rise equal {rate}*step*dt\nfix rise all addforce v_rise 0 0")
+    before = float(of_particle(lmp, "x", 1)[0])
+    command(lmp, f"run {round(time / 0.001)} post no")
+    expected = rate * time**3 / (6 * float(here.mass[0]))
+    assert float(of_particle(lmp, "x", 1)[0]) - before == pytest.approx(expected, rel=0.01)
 
 
 def test_a_block_below_the_angle_of_repose_vibrates_and_rests(block):
