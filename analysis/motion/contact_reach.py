@@ -1,15 +1,15 @@
-r"""The sizes of a push, or of a rate of loading, for which one-sided motion holds.
+r"""The sizes of a push, or of a rate of loading, for which a motion to first order holds.
 
-One-sided motion has no size of its own; real motion has. A large motion takes other contacts to Coulomb's bound, opens
-contacts, or closes others. A small motion moves the particles no farther than residual forces do, and leaves contacts
-that count as at the bound short of the bound: each lacks a force :math:`m_c`, up to the tolerance of the bound, and
-slides where
+Motion to first order has no size of its own. Real motion has. A large motion takes other contacts to Coulomb's bound,
+opens contacts, or closes others. A small motion leaves contacts that count as at the bound short of the bound: contact
+c lacks a force :math:`m_c`, and slides by
 
 .. math:: p_c(t) = \max_{t' \le t} \left(Y_c q + Z_c \dot q - m_c\right)_+ .
 
-A motion of s times the size is the motion with :math:`m_c / s`. The lacking force acts along the contact. Where sliding
-contacts make a packing grow, a small motion may therefore turn back before it begins to grow. So this motion is
-followed for larger and larger s, until it agrees with the motion of contacts at the bound.
+A motion s times as large is the motion with :math:`m_c / s`. Where sliding contacts make motion grow, the missing
+forces may turn a small motion back before it has begun to grow. `ContactReach` follows the motion with missing forces
+for larger and larger s, until it is the motion of contacts at the bound. The residual forces of a packing move the
+particles, too. The motion counts if it goes much farther than they do.
 """
 
 from collections.abc import Callable
@@ -31,8 +31,8 @@ PUSH_OVER_RESIDUAL = 10.0
 and to a hundredth where the two displacements have nothing in common."""
 
 COMPARED_STEPS = 300
-"""Steps in which motions of two sizes are compared: three periods of a slow mode. A motion that turns back does so at
-once, and a motion that has fallen behind when it grows stays behind."""
+"""Of these looks, those in which motions of two sizes are compared: three periods of a slow mode. A motion that turns
+back does so at once."""
 
 COMPARED_LOOKS = 10
 """Looks at which two motions are compared; those of the second half count."""
@@ -40,11 +40,11 @@ COMPARED_LOOKS = 10
 SAME_WAY = 0.1
 """Relative difference of two displacements that are the same: D then is right to a fifth."""
 
-MOST_SIZES = 8
+SIZES = 8
 """Sizes that are tried, each ten times the one before."""
 
-COMPARED_COORDINATES = 6000
-"""Coordinates up to which the motion of another size is followed: each size takes as long as these steps."""
+COMPARED_UP_TO = 6000
+"""Coordinates of packings whose motion at another size is followed: each size takes as long as the close looks."""
 
 
 @dataclass(eq=False)
@@ -60,10 +60,10 @@ class ContactReach:
     farthest : ndarray, shape (R, P), or None
         Largest products of the system's margins with displacements.
     reaching : float
-        The multiple of the motion from which on contacts that count as at Coulomb's bound reach the bound so soon that
-        the motion is the same.
+        Multiple of the motion from which on contacts that count as at Coulomb's bound reach the bound so soon that the
+        motion is the same.
     by_residual : ContactReach or None
-        Reach of the motion by the residual forces, which nothing pushes.
+        The reach of the motion by the residual forces, which nothing pushes.
     """
 
     system: OneSidedSystem
@@ -117,8 +117,8 @@ class ContactReach:
 
     @property
     def least_scale(self) -> float:
-        """The multiple from which on neither the forces that sliders lack to the bound nor residual forces count;
-        infinite if residual forces alone take another contact to the bound, open one or close one."""
+        """The multiple from which on neither missing forces nor residual forces count; infinite if residual forces
+        alone take another contact to the bound, open one or close one."""
         if self.by_residual is not None and self.by_residual.largest_scale < 1:
             return np.inf
         return max(self.reaching, PUSH_OVER_RESIDUAL * self.residual_scale)
@@ -169,7 +169,9 @@ def _follow(
 def _reaching_scale(
     system: OneSidedSystem, start: OneSidedState, seen: list[OneSidedState], step: float, load: Floats | None
 ) -> float:
-    """The multiple of a motion from which on the forces that sliders lack to Coulomb's bound do not change the motion.
+    """The multiple of a motion from which on forces missing to Coulomb's bound do not change the motion.
+
+    The largest multiple that is tried stands for all above.
 
     Parameters
     ----------
@@ -185,17 +187,17 @@ def _reaching_scale(
         Mass-weighted forces that rise, per time.
     """
     size = next((scale for each in seen if (scale := reaching_scale(system, each.p))), 0.0)
-    if not size or system.motion.configuration.coordinates > COMPARED_COORDINATES:
+    if not size or system.motion.configuration.coordinates > COMPARED_UP_TO:
         return size
     count = round((seen[-1].time - start.time) / step)
-    for _ in range(MOST_SIZES):
+    for _ in range(SIZES):
         state = start.copy()
         state.missing = system.missing_forces / size
         other = _follow(system, state, step, count, load)
         if all(_agree(*pair) for pair in zip(seen[COMPARED_LOOKS // 2 :], other[COMPARED_LOOKS // 2 :], strict=True)):
             return size
         size *= 10
-    return np.inf
+    return size
 
 
 def _agree(one: OneSidedState, other: OneSidedState) -> bool:

@@ -6,8 +6,8 @@ force of contact c becomes :math:`\mathbf f_t + x\, \mathbf g_c` in the plane of
 
 .. math:: |\mathbf f_t + x\, \mathbf g_c| = \mu f_n + x\, h_c ,
 
-and opens where the overlap is zero. Particles that do not touch yet, and are nearer than the largest overlap, close
-where their gap is zero. New contacts of other particles are not foreseen.
+and opens where the overlap is zero. Particles that are nearer than the largest overlap, and do not touch yet, close
+where their gap is zero. Contacts of particles farther apart are not foreseen.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ REACHES, OPENS, CLOSES = "reaches Coulomb's bound", "opens", "closes"
 
 
 def next_change(system: OneSidedSystem, velocity: Floats, paths: Floats) -> tuple[float | None, str | None]:
-    """At which increase of the load a contact changes first, and whether it reaches the bound or opens.
+    """At which increase of the load a contact changes first, and whether it reaches the bound, opens or closes.
 
     None twice if no contact is known that changes.
 

@@ -98,8 +98,8 @@ class Rates:
 
     @property
     def growth_rate(self) -> float:
-        """Of D, 1 / time: the largest 2 Re s; zero if that is zero but for rounding, or if no eigenvalue is known, as
-        none was found to grow."""
+        """Of D, 1 / time: the largest 2 Re s; zero if this number is zero but for rounding, or if no eigenvalue is
+        known, as none was found to grow."""
         largest = float(self.values.real.max(initial=-np.inf)) if len(self.values) else 0.0
         return 2 * largest if self.grows.any() or abs(largest) > self.uncertainty else 0.0
 
@@ -166,7 +166,7 @@ def _undamped_rates(motion: Motion) -> Rates:
     found = _StiffnessModes.of(motion)
     grows, kept = found.grows, found.values.imag >= 0
     s = 1j * np.sqrt(np.where(grows, found.values, np.abs(found.values.real)).astype(complex))
-    s = np.where(s.real < 0, -s, s)  # one root of each pair: the one that grows
+    s = np.where(s.real < 0, -s, s)  # of a pair of roots the one that grows
     order = np.flatnonzero(kept & ~found.free)
     order = order[np.argsort(-s[order].real, kind="stable")]
     return Rates(s[order], grows[order], int(found.free.sum()))

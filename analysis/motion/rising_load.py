@@ -20,9 +20,9 @@ ways, one from each start.
 
 **Range.** While the load rises the drift takes sticking contacts to Coulomb's bound and opens others
 (:mod:`~faultgouge.analysis.motion.next_change`). From then on the packing is another one. A contact that counts as at
-the bound may lack a little force, and slides once the load has risen enough. Residual forces move the packing as well,
-and count until the load has moved the packing ten times as far. If another contact changes before, there is no motion
-of this kind.
+the bound may lack a little force, and slides once the load has risen enough. The residual forces move the packing, too,
+and count until the load has moved the packing ten times as far. If another contact reaches the bound or opens before,
+there is no motion of this kind.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,14 +32,13 @@ from itertools import count, islice
 import numpy as np
 
 from ..arrays import Floats
-from ..counted import counted
 from ..fields_by_name import FieldsByName
 from ..progress import report_progress
 from .contact_reach import PUSH_OVER_RESIDUAL, reaching_scale
 from .next_change import next_change
 from .one_sided import OneSidedSystem
 from .one_sided_outcome import window_and_most
-from .steady_drift import NotFollowedError, steady_velocity
+from .steady_drift import NotFollowedError, refuse_flight, steady_velocity
 
 SAMPLES_OF_WINDOW = 400
 """Velocities that a window of a load that rises has."""
@@ -137,7 +136,7 @@ class RisingMotion(DriftAndVibration):
         The motion from another start, if one was followed.
     least_rise : float
         Increase of the load from which on contacts that count as at Coulomb's bound have reached the bound, and the
-        load moves the packing ten times as far as the residual forces do.
+        load has moved the packing ten times as far as the residual forces do.
     next_change : float or None
         Increase of the load, to first order, at which the first other contact reaches the bound or opens.
     next_event : str or None
@@ -221,7 +220,7 @@ def motion_under_load(
     NotFollowedError
         If the load accelerates a motion that no force opposes, or particles that touch nothing.
     """
-    _refuse_flight(system, direction)
+    refuse_flight(system, direction)
     velocity = steady_velocity(system, direction, free) if decays else None
     if velocity is None:
         return follow_load(system, direction, time, residual)
@@ -229,18 +228,6 @@ def motion_under_load(
     still = Span(1.0, velocity, paths, system.displacement(velocity) ** 2, np.zeros((0, 1)))
     drift = float(still.drift_and_vibration(system)[0, 0])
     return _rising_motion(DriftAndVibration(drift, 0.0, 0.0, 0.0, True), system, still, residual)
-
-
-def _refuse_flight(system: OneSidedSystem, direction: Floats) -> None:
-    """Refuse a load on particles that touch nothing, which accelerate for ever."""
-    motion = system.motion
-    loaded = motion.configuration.coordinate_free & (direction[:, 0] != 0)
-    loaded[motion.active] = False
-    flying = np.unique(np.flatnonzero(loaded) % len(motion.configuration))
-    if len(flying):
-        raise NotFollowedError(
-            f"the load accelerates {counted(len(flying), 'particle')} that nothing touches: give no forces on these"
-        )
 
 
 def follow_load(
@@ -296,14 +283,14 @@ def _rising_motion(moves: DriftAndVibration, system: OneSidedSystem, span: Span,
     """
     velocity, paths, slid = (each[:, :1] / span.time for each in (span.displacement, span.paths, span.slid))
     reached, (change, event) = reaching_scale(system, slid), next_change(system, velocity, paths)
-    speed = float(np.sqrt(system.mean_square_displacement(velocity)[0]))
-    moved = PUSH_OVER_RESIDUAL * residual / speed if speed else 0.0
+    drift = float(np.sqrt(system.mean_square_displacement(velocity)[0]))
+    moved = PUSH_OVER_RESIDUAL * residual / drift if drift else 0.0
     least = max(reached, moved)
     if change is not None and least >= change:
         what = "contacts that count as at Coulomb's bound reach it" if reached > moved else "residual forces count less"
         raise NotFollowedError(
-            f"{what} once the load has risen by {least:.1g}, and another contact {event} before, at "
-            f"{change:.1g}: bring the packing to rest more closely"
+            f"{what} once the load has risen by {least:.1g}, and another contact {event} before, at {change:.1g}: "
+            "bring the packing to rest more closely"
         )
     return RisingMotion(**moves, least_rise=least, next_change=change, next_event=event)
 

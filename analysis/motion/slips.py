@@ -120,9 +120,16 @@ class SlipDetector:
         )
 
     @property
-    def largest(self) -> float:
-        """Time of the largest force in the rows from which a slip may begin; of the slip under way, its beginning."""
-        return (self._begin or self._largest()).time
+    def undecided(self) -> set[float]:
+        """Times of the rows at which a slip may yet be found to begin, or the slip under way to end."""
+        if self._begin is not None:
+            return {self._end.time} if self._end else set()
+        found, highest, lowest = {row.time for row in list(self._past)[-1:]}, 0.0, 0.0
+        for row in reversed(self._past):  # no later force in the same direction is as large
+            if not lowest <= row.force <= highest:
+                found.add(row.time)
+                highest, lowest = max(highest, row.force), min(lowest, row.force)
+        return found
 
     def add(self, time: float, force: float, displacement: float, kinetic_energy: float) -> Slip | None:
         """Take the next row of a series, and give the slip that it ends, if any."""

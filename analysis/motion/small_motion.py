@@ -50,8 +50,8 @@ class LinearRates:
     def of(cls, configuration: Configuration, known: Spectrum | None, large: bool) -> "LinearRates":
         """Compute the rates; K's spectrum may be known.
 
-        K's spectrum decides without dissipation. With dissipation it is a remark, and where it takes longer than all
-        else, the fastest motion without dissipation stands for it.
+        This spectrum decides without dissipation. With dissipation the spectrum is a remark, and where it takes longer
+        than all else, the fastest motion without dissipation stands for it.
         """
         wanted = configuration.coordinates <= SLICED if configuration.damped else not large
         found = spectrum(configuration) if known is None and wanted else known
@@ -79,8 +79,7 @@ class SmallMotion:
     """The fate of small motion under a load that is held; `grows` is None if it is unknown.
 
     `residual_displacement` is the root of the largest D to which the residual forces move the packing, length; most of
-    the other attributes are those of :class:`~faultgouge.analysis.motion.verdict.Stability`.
-    """
+    the others are those of :class:`~faultgouge.analysis.motion.verdict.Stability`."""
 
     grows: bool | None
     growth_rate: float
@@ -179,7 +178,7 @@ def _after_pushes(sticks: SmallMotion, found: OneSidedOutcome, reach: ContactRea
         sticks.beside_residual_forces(reach),
         grows=found.grows,
         at_least=sticks.at_least and not found.grows,
-        growth_rate=sticks.growth_rate if found.growth_rate is None else found.growth_rate,
+        growth_rate=sticks.growth_rate if not found.grows or found.growth_rate is None else found.growth_rate,
         reasons=reasons,
         one_sided=found,
     )

@@ -9,7 +9,7 @@ there is no drift.
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array, eye_array
+from scipy.sparse import csc_array, csr_array, diags_array, eye_array
 
 from ..arrays import Floats
 from ..counted import counted
@@ -60,7 +60,7 @@ def steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Flo
     rates, forces, _ = system.rescaled
     way = np.zeros(rates.shape[0])
     for _ in range(WAY_CHANGES):
-        stiffness = motion.stiffness - forces @ diags_array(way) @ rates if len(way) else motion.stiffness
+        stiffness = csr_array(motion.stiffness - forces @ diags_array(way) @ rates) if len(way) else motion.stiffness
         velocity = _solution(replace(motion, stiffness=stiffness), load, free)
         before, way = way, np.sign(rates @ velocity)[:, 0]
         if np.array_equal(before, way):
@@ -72,6 +72,24 @@ def steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Flo
         if found.searched or found.grows.any():
             return None
     return velocity
+
+
+def refuse_flight(system: OneSidedSystem, direction: Floats) -> None:
+    """Refuse a load on particles that touch nothing, which accelerate for ever.
+
+    Raises
+    ------
+    NotFollowedError
+        If there are such particles.
+    """
+    motion = system.motion
+    loaded = motion.configuration.coordinate_free & (direction[:, 0] != 0)
+    loaded[motion.active] = False
+    flying = np.unique(np.flatnonzero(loaded) % len(motion.configuration))
+    if len(flying):
+        raise NotFollowedError(
+            f"the load accelerates {counted(len(flying), 'particle')} that nothing touches: give no forces on these"
+        )
 
 
 def _solution(motion: Motion, load: Floats, free: int) -> Floats:

@@ -290,8 +290,11 @@ class Stability:
             says = f"{self.rising}, and from another start {other}" if differs else str(self.rising)
             slide = "all contacts at the bound have reached it and " if self.one_sided is not None else ""
             since = f"; from a rise of {least:.1g} on, where {slide}residual forces do not count" if least else ""
-            event = f" (a contact {self.rising.next_event})"
-            until = "" if change is None else f"; until the load has risen by {change:.2g}{event}"
+            until = (
+                ""
+                if change is None
+                else f"; until the load has risen by {change:.2g} (a contact {self.rising.next_event})"
+            )
             yield f"under a load that rises at the rate 1: {says}{since}{until}"
 
     def as_dict(self) -> dict[str, Any]:

@@ -78,10 +78,27 @@ def restless_fix(commands: Commands) -> str:
     return ""
 
 
+def creeping_law(commands: Commands) -> str:
+    """What is said of friction that bears no force at rest; empty if there is none."""
+    lines = [*commands.pair, *(line for line in commands.fixes.values() if "wall/gran" in line)]
+    words = {without_suffix(word) for line in lines for word in line.split()}
+    styles: list[str] = [style for style in ("linear_nohistory", "gran/hooke") if style in words]
+    if "wall/gran" in words and "hooke" in words and not words & {"granular", "linear_nohistory"}:
+        styles.append("wall/gran hooke")
+    if not styles:
+        return ""
+    return (
+        f"the friction of {styles[0]} opposes velocities alone and bears no force at rest, so that slopes and heaps "
+        "creep without end: take linear_history, or hooke/history"
+    )
+
+
 def known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
     """Why forces are out of balance though the packing may be at rest; empty if no cause is known."""
     if says := restless_fix(commands):
         return f"{says}, and run on"
+    if says := creeping_law(commands):
+        return says
     if touch_twice(contacts.i[~contacts.wall], contacts.j[~contacts.wall]):
         return TWICE
     if commands.after_run.startswith("rerun"):

@@ -18,7 +18,7 @@ from ...analysis import BadInputError, Configuration, NoEquilibriumError, stable
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
 from .acting_fixes import acting_fixes
-from .balance import check_balance, force_scale, restless_fix
+from .balance import check_balance, creeping_law, force_scale, restless_fix
 from .configuration_by_differences import still_particles
 from .from_lammps import take_configuration
 from .granular_commands import NotTakenError, read_commands
@@ -96,8 +96,12 @@ def relax(
     try:
         found, _ = bring_to_rest(lmp, look, still.configuration, balance, steps, DRAG_RATE, "", far=FARTHEST_DRIFT)
     except NoEquilibriumError as error:
-        says = restless_fix(still.commands) or " and ".join(
-            f"fix {name} {still.fixes[name]} may drive the packing" for name in acting_fixes(still.fixes)
+        says = (
+            restless_fix(still.commands)
+            or creeping_law(still.commands)
+            or " and ".join(
+                f"fix {name} {still.fixes[name]} may drive the packing" for name in acting_fixes(still.fixes)
+            )
         )
         if says:
             raise NoEquilibriumError(f"{str(error).rstrip('.')}; {says}.") from error

@@ -243,6 +243,11 @@ def standard(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return found | {"at_bound": sorted(at_bound)}
 
 
+def _ends_as(kind: str) -> Callable[[dict[str, Any]], bool]:
+    """Whether a run ends as this kind."""
+    return lambda run: bool(run["ends"] == kind)
+
+
 def _of_standard(rows: list[dict[str, Any]], load: float, loss: float) -> dict[str, Any]:
     """One of the "runs" of `standard`."""
     each = [[run for run in row["dynamic"] if (run["share"], run["restitution"]) == (load, loss)] for row in rows]
@@ -260,7 +265,7 @@ def _of_standard(rows: list[dict[str, Any]], load: float, loss: float) -> dict[s
         "packings": len(each),
         "grows": sum(draws[0]["rate"] > ROUNDED_RATE for draws in each),
         "grown": in_all_and_any(lambda run: run["largest_D"] > SEEN_GROWTH),
-        **{kind: in_all_and_any(lambda run, kind=kind: run["ends"] == kind) for kind in UNREST},
+        **{kind: in_all_and_any(_ends_as(kind)) for kind in UNREST},
         "elsewhere": in_all_and_any(lambda run: run.get("D", 0.0) > ELSEWHERE),
         "slip": float(np.median(slips)) if slips else None,
         "largest": float(np.median([run["largest_D"] for run in runs])) if runs else None,

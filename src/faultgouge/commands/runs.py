@@ -121,7 +121,7 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
 
 @app.command(epilog="Example: faultgouge perturb paper.toml -o run.h5")
 def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson = False) -> None:
-    """Run the undamped dynamics from the equilibrium at perturb.fx, and record D(t).
+    """Run the dynamics from the equilibrium at perturb.fx, and record D(t).
 
     Without perturb.fx the load is just beyond the onset, which is found first; with
     [friction] it is between the onsets of the weakened and of the static friction.

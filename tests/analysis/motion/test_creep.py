@@ -27,6 +27,7 @@ def wearing(reference_packing):
     return make
 
 
+@pytest.mark.long
 def test_strong_dashpots_end_it(wearing):
     """It settles, and a longer time adds next to nothing."""
     here = wearing(0.5, 600.0)

@@ -100,7 +100,7 @@ def test_the_search_ends_with_the_first_window():
     assert {f for f in asked if f > 1.0} == {2.0, 3.0}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_pair_that_cannot_be_followed_is_not_lost_silently():
     """A pair whose planes are never good enough: the parts of the increment that its window touches are named."""
     window, doubtful = searched(crossing(0.47, -0.04), [0.0, 1.0], Limits(residual_factor=0.0))

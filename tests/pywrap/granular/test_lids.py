@@ -65,7 +65,12 @@ LIDS = {
 }
 
 
-@pytest.mark.parametrize("lid", LIDS)
+OFTEN = ("aveforce, sideways held", "rigid, pushed by a later fix")
+
+
+@pytest.mark.parametrize(
+    "lid", [each if each in OFTEN else pytest.param(each, marks=pytest.mark.long) for each in LIDS]
+)
 def test_a_lid_moves_as_one(cell, tmp_path, lid):
     from faultgouge import relax
     from faultgouge.pywrap import compare_motion, from_lammps
