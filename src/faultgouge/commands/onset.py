@@ -74,7 +74,6 @@ def onset(
     to the end of the ramp. Of several friction coefficients those without an onset
     are named; the exit code is 1 if none has one.
     """
-    from faultgouge.analysis import NoEquilibriumError, OnsetError
     from faultgouge.analysis.progress import show_progress
     from faultgouge.pywrap.settling.settle import shared_bed
 
@@ -90,23 +89,13 @@ def onset(
     tell = say if as_json else print_line
     with status("settling") as show, show_progress(show, "settling: "):
         bed = shared_bed(wanted)
-    found: list[dict[str, Any]] = []
-    failed: Exception | None = None
-    for mu in wanted.law.mus:
-        try:
-            if wanted.damping is not None:
-                found.append(_damped_onset(wanted, mu, bed, not every, tell, output, folder, found))
-            else:
-                found.append(_undamped_onset(part, folder, wanted, mu, bed, not every, tell))
-        except (OnsetError, NoEquilibriumError) as error:
-            found.append({"mu": mu, "fx_c": None, "no_onset": str(error)} | _only_undamped(mu, error, tell))
-            failed = error
-            if len(wanted.law.mus) > 1:
-                tell(f"mu = {mu:g}: no onset: {error}")
-    if any(each["fx_c"] is not None for each in found):
-        failed = None
-    elif failed is not None and len(wanted.law.mus) > 1:
-        failed = OnsetError(f"None of the {len(wanted.law.mus)} friction coefficients has an onset on this ramp.")
+
+    def solve(mu: float, before: list[dict[str, Any]]) -> dict[str, Any]:
+        if wanted.damping is not None:
+            return _damped_onset(wanted, mu, bed, not every, tell, output, folder, before)
+        return _undamped_onset(part, folder, wanted, mu, bed, not every, tell)
+
+    found, failed = _each_onset(wanted.law.mus, solve, tell)
     if failed is not None and not any("undamped" in each for each in found):
         raise failed
     tell(f'law of friction: {wanted.law.in_words} (history = "{wanted.law.history}")')
@@ -117,6 +106,32 @@ def onset(
         print_json(result)
     if failed is not None:
         raise failed
+
+
+def _each_onset(
+    mus: Sequence[float], solve: Callable[[float, list[dict[str, Any]]], dict[str, Any]], tell: Tell
+) -> tuple[list[dict[str, Any]], Exception | None]:
+    """The JSON of each friction coefficient, and the error if none has an onset.
+
+    `solve` gives the JSON of one, beside the JSON of those before.
+    """
+    from faultgouge.analysis import NoEquilibriumError, OnsetError
+
+    found: list[dict[str, Any]] = []
+    failed: Exception | None = None
+    for mu in mus:
+        try:
+            found.append(solve(mu, found))
+        except (OnsetError, NoEquilibriumError) as error:
+            found.append({"mu": mu, "fx_c": None, "no_onset": str(error)} | _only_undamped(mu, error, tell))
+            failed = error
+            if len(mus) > 1:
+                tell(f"mu = {mu:g}: no onset: {error}")
+    if any(each["fx_c"] is not None for each in found):
+        return found, None
+    if failed is not None and len(mus) > 1:
+        failed = OnsetError(f"None of the {len(mus)} friction coefficients has an onset on this ramp.")
+    return found, failed
 
 
 def _only_undamped(mu: float, error: Exception, tell: Tell) -> dict[str, Any]:
