@@ -46,7 +46,7 @@ print(*(later - sooner for sooner, later in zip(ends, ends[1:])))
 
 
 def run(folder: Path, *words: object) -> tuple[str, float]:
-    """What a Python prints in a folder, and its seconds."""
+    """The output of a Python in a folder, and its seconds."""
     begin = time.time()
     done = subprocess.run(
         [sys.executable, *map(str, words)], cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=True

@@ -41,7 +41,7 @@ BENCHMARKS = {
 
 @dataclass(frozen=True)
 class Table:
-    """What a benchmark has printed.
+    """The output of a benchmark.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ class Moment:
         return self.rows[-1].time
 
     def go_on(self, scene: Scene, start: Packing) -> Iterator[DriveStep]:
-        """What follows in another scene, whose run is the same to the bit up to here."""
+        """The run of another scene from here on, which is the same to the bit up to here."""
         return drive(scene, start, self.rows, self.checkpoint, communicator=MPI.COMM_SELF)
 
 

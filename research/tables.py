@@ -46,7 +46,7 @@ def write_json(path: Path, value: object) -> None:
 def add_seeds(
     table: Path, seeds: Iterable[int], rows_of: Callable[[int], Iterable[dict[str, Any]]], watch: Any = print
 ) -> None:
-    """Add the rows of the seeds that a table lacks, in their order; what is written is of whole seeds."""
+    """Add the rows of the seeds that a table lacks, in their order, whole seeds at a time."""
     known = {row["seed"] for row in known_rows(table)}
     for seed in seeds:
         if seed not in known:

@@ -116,7 +116,7 @@ def where(kind: str, slip: int | None, time: float, force: float, slips: list[Sl
 
 
 def sizes_of(slip: Slip) -> dict[str, float]:
-    """What is kept of a slip."""
+    """The numbers of a slip that a row has."""
     columns = ("begins", "ends", "force_before", "force_after", "slip", "kinetic_energy")
     return {name: getattr(slip, name) for name in columns}
 

@@ -67,7 +67,7 @@ def sizes(rows: Sequence[Row]) -> list[Row]:
 
 
 def verdicts(rows: Sequence[Row], springs: Sequence[float]) -> list[Row]:
-    """What the states of some springs do at rest, by their place in the wait."""
+    """Verdicts on the states of some springs at rest, by their place in the wait."""
     found = []
     for kind in SHARES:
         states = [
@@ -180,7 +180,8 @@ def numbers(folder: Path = HERE) -> Row:
 
 
 def check() -> list[str]:
-    """What differs from both tables in the first run of a spring and the first twelfth of the pulses, done again."""
+    """Differences from both tables, with the first run of a spring and the first twelfth of the pulses computed
+    again."""
     springs_known, clock_known = (read_rows(HERE / "tables" / name) for name in (SPRINGS_TABLE, CLOCK_TABLE))
     run = springs_known[0]
     again = row_of(run["seed"], run["law"], run["spring"])

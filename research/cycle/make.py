@@ -226,7 +226,7 @@ def write_page(folder: Path = HERE) -> Path:
 
 
 def check() -> list[str]:
-    """What differs from the table in the first run computed again."""
+    """Differences from the table, with the first run computed again."""
     known = read_rows(HERE / "tables" / TABLE)[0]
     with TemporaryDirectory() as folder:
         again = Path(folder) / TABLE

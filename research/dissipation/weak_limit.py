@@ -42,7 +42,7 @@ DIGITS = 1e-12
 
 @dataclass(frozen=True)
 class WeakLimit:
-    """What weak damping of a given ratio does to a pair that coalesces.
+    """A pair that coalesces, with weak damping of a given ratio.
 
     Attributes
     ----------

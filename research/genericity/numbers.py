@@ -95,7 +95,7 @@ def compare_friction(onsets: Table, strong: float, weak: float) -> dict[str, Any
 
 
 def kinds(onsets: Table) -> dict[str, Any]:
-    """What begins the first window, of packings with one friction coefficient."""
+    """Shares of the kinds of the first edge, and of contacts that change before, with one friction coefficient."""
     words = onsets.where_known("kind").column("kind")
     counts = {"sliding": onsets.numbers("sliding"), "changed": onsets.numbers("opened") + onsets.numbers("closed")}
     return {"coalescence": share(words.count("coalescence"), len(words))} | {

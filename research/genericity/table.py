@@ -76,7 +76,7 @@ class Table:
 
 
 def _cell(text: str) -> Any:
-    """What a cell holds: JSON, else a word."""
+    """The content of a cell: JSON, else a word."""
     try:
         return json.loads(text) if text else None
     except ValueError:

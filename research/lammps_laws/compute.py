@@ -51,7 +51,7 @@ class Law:
     model: str = ""
 
     def lines(self, mu: float = MU, gamma: float = GAMMA, kn: float = KN) -> tuple[str, str]:
-        """Pair style with coefficients, and what fix wall/gran has of it."""
+        """Pair style with coefficients, and the same words for fix wall/gran."""
         hertz = "hertz" in self.style
         kn, kt = (kn, kn / KN * KT) if hertz else (HOOKE * kn, HOOKE * kn / KN * KT)
         if not self.model:
@@ -173,7 +173,7 @@ def rows(
 
 
 def describe(found: Configuration) -> dict[str, Any]:
-    """What the spectrum says of a packing."""
+    """The numbers of a packing's spectrum."""
     s, c = spectrum(found), found.contacts
     size = np.linalg.norm(c.tangential_force, axis=1) / c.friction
     return {

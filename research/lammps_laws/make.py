@@ -59,7 +59,7 @@ GROWTH_BOUND = TO / 10
 
 
 def cell(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """What some packings say of one law at one tilt, with intervals that hold 95 %."""
+    """Counts of some packings of one law at one tilt, with intervals of 95 %."""
     good = [row for row in rows if row["rests"]]
     least = [row["least_q"] for row in good if row["least_q"] is not None]
     return {
@@ -74,7 +74,7 @@ def cell(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def by_tilt(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """What each law has at each tilt, in both dimensions."""
+    """Counts of each law at each tilt, in both dimensions."""
     return [
         {"law": law, "d": d, "tilt": tilt}
         | cell([row for row in rows if (row["law"], row["d"], row["tilt"]) == (law, d, tilt)])
@@ -267,7 +267,7 @@ def three(value: list[float]) -> str:
 
 
 def format_signed(value: float) -> str:
-    """A number with its sign; what is zero to eight digits has none."""
+    """A number with its sign; a number that is zero to eight digits has none."""
     return "0" if abs(value) < 1e-8 else f"{value:+.4g}"
 
 

@@ -77,7 +77,7 @@ def both_laws(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
 
 
 def at_loads(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[str, Any]]) -> dict[str, Any]:
-    """What there is to see at the loads of [modes], which are loads of the ramp, too.
+    """Numbers at the loads of [modes], which are loads of the ramp, too.
 
     Where Newton's branch ends the layer goes on by other ways, overdamped dynamics the last of them, as in `faultgouge
     ramp`: `moved` says how many of its increments up to a load did. It ends where nothing leads on, or where an
@@ -114,7 +114,7 @@ def as_slider(packing: Packing) -> Packing:
 
 
 def motion(packing: Packing, strengths: dict[float, float]) -> dict[str, Any]:
-    """What grows about an equilibrium, undamped and with loss; rates in 1 / time."""
+    """Motion that grows about an equilibrium, undamped and with loss; rates in 1 / time."""
     found = count_pairs(packing)
     squares, told = found.omega**2, found.as_dict()
     drag = squares.imag / np.sqrt(np.maximum(squares.real, np.finfo(float).tiny))

@@ -77,7 +77,7 @@ def grow(packing: Packing, draw: int) -> dict[str, Any]:
 
 
 def growth_of_course(times: list[float], squares: list[float]) -> dict[str, Any]:
-    """What a run shows of D, length^2, at its looks: the last over the first, and the rate if D came to `TO`."""
+    """Growth of D, length^2, in a run: the last look over the first, and the rate if D came to `TO`."""
     course = np.array(squares)
     row: dict[str, Any] = {"last_over_first": float(course[-1] / course[0]), "time": times[-1], "rate": None}
     if course[-1] >= TO:

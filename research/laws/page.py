@@ -66,7 +66,7 @@ def across(at: dict[str, Any], name: str, told: Callable[[Any], str] = str, rest
 
 
 def numbers(tables: dict[str, list[Row]]) -> dict[str, Any]:
-    """What the page says: sets of equilibria by name and load, runs by state and restitution, first windows by law.
+    """Numbers of the page: sets of equilibria by name and load, runs by state and restitution, first windows by law.
 
     "exceptions" are the sets and loads in which motion grows with the standard law, own ramp, in spite of `LOSS`.
     """

@@ -47,7 +47,7 @@ SHARP = 0.02
 
 
 def loss(scene: Scene, rest: Equilibrium) -> dict[str, Any]:
-    """What stops the complex pairs at the loads of [modes], as a row of a sweep: the task "loss"."""
+    """The loss that stops the complex pairs at the loads of [modes], as a row of a sweep: the task "loss"."""
     velocity = impact_velocity(scene)
     kn = scene.law.kn
     dashpots = {each: dashpot(kn, each, 1.0, velocity) for each in RESTITUTIONS}

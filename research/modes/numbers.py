@@ -92,7 +92,7 @@ def to_the_end(table: Table) -> dict[str, Any]:
 
 
 def losses(table: Table) -> dict[str, Any]:
-    """What stops the pairs: critical losses, and the share of packings in which motion grows for each restitution."""
+    """Critical losses, which stop the pairs, and the share of packings in which motion grows for each restitution."""
     found = medians_over_load(table, ("critical_restitution", "least_q", "drag_rate", "growth_rate"))
     if all("slowest" in load for row in table.rows for load in row["loads"]):
         found |= {name: medians_over_load(table, (name,))[name] for name in ("omega", "slowest")}

@@ -68,7 +68,7 @@ def write_page(tables: Path, folder: Path) -> Path:
 
 
 def describe_loss(found: dict[str, Any]) -> dict[str, Any]:
-    """What the page says of loss in words: whether growth comes back, and how near LAMMPS is to the pencil."""
+    """Loss in words: whether growth comes back, and how near LAMMPS is to the pencil."""
     runs = [run for each in found["runs"].values() for run in each if run["measured"] is not None]
     off = {
         kind: [run["measured"] / run["predicted"] - 1 for run in runs if (run["ct_over_cn"] == 0) == (kind == "still")]

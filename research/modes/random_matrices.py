@@ -43,7 +43,7 @@ def weak_share(coupling: Floats, spacing: Floats) -> Floats:
 
 
 def predict_shares(packing: Packing) -> dict[str, Any]:
-    """What the levels and couplings of a packing make expect.
+    """Shares expected from the levels and couplings of a packing.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def of_kind(rows: Sequence[Row], kind: str, **key: float) -> dict[int, Row]:
 
 
 def steps(rows: Sequence[Row]) -> list[Row]:
-    """What each velocity step does to friction, beside the control, in each bin of displacement."""
+    """Change of friction by each velocity step, beside the control, in each bin of displacement."""
     control = of_kind(rows, "control")
     found = []
     for factor in FACTORS:

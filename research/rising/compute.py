@@ -119,7 +119,7 @@ def layers(seed: int, cells: Sequence[tuple[float, float]]) -> Iterator[dict[str
 
 
 def compute_layers(table: Path, watch: Any = print) -> None:
-    """Add the layers that a table lacks, in the order of the rule; what is written is of whole seeds."""
+    """Add the layers that a table lacks, in the order of the rule, whole seeds at a time."""
     others = [cell for cell in product(LOADS, RESTITUTIONS) if cell != COMPARED]
     for cells in ([COMPARED], others):
         known = {row["seed"] for row in known_rows(table) if (row.get("fx_over_fy"), row.get("restitution")) in cells}
@@ -131,7 +131,7 @@ def compute_layers(table: Path, watch: Any = print) -> None:
 
 
 def verdict(found: Stability, configuration: Configuration) -> dict[str, Any]:
-    """What is kept of a verdict."""
+    """The numbers of a verdict that a row has."""
     told = found.as_dict()
     kept = {
         name: told[name]

@@ -266,7 +266,7 @@ def figure_of_starts(rows: list[Row]) -> Figure:
 
 
 def key_of(row: Row) -> tuple[Any, ...]:
-    """What a row of the layers is of."""
+    """Seed, law, load and restitution of a row of the layers."""
     return tuple(row.get(name) for name in ("seed", "law", "fx_over_fy", "restitution"))
 
 
