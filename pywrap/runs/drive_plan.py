@@ -24,7 +24,7 @@ SAMPLES_A_PERIOD, SAMPLES_A_PART = 20, 10
 MOST_STEPS = 2**53
 """Time steps of a run at the most: as many are counted exactly by its time, a double."""
 
-LONGEST_RUN = 2**31 - 1
+MOST_STEPS_OF_RUN = 2**31 - 1
 """Time steps of one command `run` of LAMMPS at the most."""
 
 
@@ -57,7 +57,7 @@ class Plan:
         between = settings.states or _between_states(settings, start)
         part = math.ceil(min(between / dt, MOST_STEPS))
         period = layer_period(settings, start)
-        most = max(1, min(part // SAMPLES_A_PART, LONGEST_RUN))
+        most = max(1, min(part // SAMPLES_A_PART, MOST_STEPS_OF_RUN))
         every = most if period is None else min(most, max(1, int(period / SAMPLES_A_PERIOD / dt)))
         return cls(dt, part, every, math.ceil(steps))
 

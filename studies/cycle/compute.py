@@ -29,8 +29,8 @@ from scipy.linalg import eigvals, lu_factor, lu_solve
 
 from ...analysis import Configuration, Packing
 from ...analysis.arrays import Complexes, Floats, derive_frozen
-from ...analysis.configuration import HasConfiguration
-from ...analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, unit_rounding, zero_uncertainty
+from ...analysis.has_configuration import HasConfiguration
+from ...analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, unit_rounding, zero_uncertainties
 from ...analysis.motion.modes import Modes, participation_ratio
 from ...analysis.motion.motion import Motion
 from ...analysis.motion.rates import DENSE_DAMPED, FREE_SHARE, rates_of
@@ -111,7 +111,7 @@ def linear_state(configuration: Configuration, sliding: bool) -> LinearState:
     motion = Motion.of(configuration, sliding=sliding)
     modes = Modes.of_matrix(motion.stiffness)
     rounding = unit_rounding(motion.stiffness.data)
-    zero = zero_uncertainty(configuration, rounding)
+    zero = zero_uncertainties(configuration, rounding, motion.particle, modes.left, modes.right)
     values = modes.values
     complex_, negative = growing_undamped(values, modes.overlap, rounding, zero)
     shared = _disks(motion, modes.right) >= LONE_PARTICIPATION

@@ -386,7 +386,7 @@ def test_clock_advance_is_the_time_between_comparable_slips(scene, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scale", [0.0, 1e-11])
+@pytest.mark.parametrize("scale", [pytest.param(0.0, marks=pytest.mark.long), 1e-11])
 def test_signal_that_does_nothing_has_no_clock_advance_beyond_its_error(faultgouge_here, tmp_path, scale):
     """The layer of seed 1 with the standard law, shortly before its first slip; without a force runs are the same."""
     text = f"""[packing]

@@ -1,4 +1,4 @@
-"""A spring draws the upper layer, which sticks and slips: drive."""
+"""The command drive: a spring draws the upper layer, which sticks and slips."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def _advance_in_words(result: dict[str, Any]) -> str:
 
 
 def _result(path: Path, scene: Scene) -> dict[str, Any]:
-    """What a drive.h5 says, for JSON."""
+    """The content of a drive.h5 for JSON."""
     import numpy as np
 
     from faultgouge.analysis import RunFile
