@@ -2,7 +2,7 @@
 
 python -m research.cycle.make compute RUNS SEEDS   the runs of the seeds 1 to SEEDS that the table lacks; their files
                                                    go to the folder RUNS; half a minute a run
-python -m research.cycle.make many RUNS SEEDS      the same of 400 disks; three minutes a run
+python -m research.cycle.make many RUNS SEEDS      the same of 400 disks; two minutes a run
 python -m research.cycle.make springs SEEDS        what the table of three springs lacks; four minutes a seed
 python -m research.cycle.make clock SEEDS          what the table of clock advances lacks; a minute a seed
 python -m research.cycle.make page                 README.md and further.md from the tables

@@ -62,9 +62,9 @@ def test_drive_is_a_table_of_slips_pictures_a_film_and_spectra(faultgouge_here, 
     assert [float(number) for number in row[:6]] == list(slip.values())[:6]
     with RunFile(tmp_path / "drive.h5") as file:
         times = file.observable("time")
-        assert times[slip["frame_before"]] <= slip["begins"]
-        assert times[slip["frame_after"]] >= slip["ends"]
-        assert file.packing(slip["frame_before"]).fx == pytest.approx(slip["force_before"], rel=0.05)
+        for end, frame, force in (("begins", "before", "force_before"), ("ends", "after", "force_after")):
+            number = slip[f"frame_{frame}"]
+            assert (times[number], file.fx[number]) == (slip[end], slip[force])
     again = faultgouge_here("drive", "scene.toml", "-o", "drive.h5")
     assert "1 slip up to t = " in again.stdout
     drawn = faultgouge_here("draw", "drive.h5", "-o", "force.png")
@@ -77,6 +77,9 @@ def test_drive_is_a_table_of_slips_pictures_a_film_and_spectra(faultgouge_here, 
     with Image.open(tmp_path / "film.gif") as gif:
         assert gif.n_frames == 5
     assert "eigenvalues" in faultgouge_here("spectrum", "drive.h5", "--frame", slip["frame_before"]).stdout
+    backwards = faultgouge_here("movie", "drive.h5", "--span", "9", "1", "-o", "film.gif", code=2).stderr
+    assert f"has 0 of its {len(times)} states between t = 9 and 1" in backwards
+    assert "is the table of the slips" in faultgouge_here("drive", "scene.toml", "-o", "drive.csv", code=1).stderr
 
 
 @pytest.mark.slow

@@ -75,3 +75,5 @@ def test_the_other_page_says_what_the_table_says():
         before, control = found["before"][law]["sliding"], found["control"][law]["sliding"]
         assert f"{before['count']} of {before['of']} slips" in said
         assert f"{control['count']} of {control['of']} control states" in said
+    folds = [found[kind]["coulomb"]["fold"]["count"] for kind in ("before", "control")]
+    assert f"a fold before {folds[0]}, and in {folds[1]}." in said

@@ -41,10 +41,13 @@ def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = Fa
     intervals and at both ends of each slip, which spectrum and draw take by --frame.
     The slips are also written as a table beside the file, with the suffix .csv.
     """
+    from faultgouge.analysis import OutputError
     from faultgouge.pywrap.scenes.validation import require_section
 
     wanted = read_scene(scene, "drive", "settle")
     table = output.with_suffix(".csv")
+    if table == output:
+        raise OutputError(f"{output} is the table of the slips: give the run another name, {output.stem}.h5")
     check_output(output, scene, *stored_files(wanted))
     check_output(table, scene, output)
     settings = require_section(wanted.drive, "drive")

@@ -299,6 +299,11 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
         first, last = span or (-inf, inf)
         shown = [k for k, time in enumerate(times) if first <= time <= last]
         packings = [packings[k] for k in shown]
+        if len(shown) < 2:
+            raise PackingFileError(
+                f"{file} has {len(shown)} of its {len(times)} states between t = {first:g} and {last:g}, and a film "
+                "shows two or more: give a longer --span"
+            )
         course = course_of(*driven, [times[k] for k in shown], first, last)
     if motion is not None:
         return RunFilm(motion if span is None else motion.between(*span), count, dots=dots)

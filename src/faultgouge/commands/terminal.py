@@ -12,6 +12,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
+from math import isfinite
 from pathlib import Path
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -152,6 +153,8 @@ def frame_at(file: Path, frame: int, time: float | None) -> int:
     from faultgouge.analysis import BadInputError, RunFile
     from faultgouge.pywrap.runs.drive_recorder import drive_of
 
+    if not isfinite(time):
+        raise BadInputError(f"--time {time:g} is no time: give a number")
     if file.suffix != ".disks":
         with RunFile(file) as run:
             if drive_of(run) is not None:
