@@ -18,7 +18,7 @@ from scipy.sparse import csc_array, eye_array
 from ..configuration import HasConfiguration
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
 from ..packing.packing import Floats
-from .eigenvalues import SAFETY, is_negative, operator_rounding, zero_uncertainty
+from .eigenvalues import is_negative, operator_rounding, zero_uncertainty
 from .nearest_modes import nearest_modes
 from .spectrum import DENSE_LARGEST, dynamical_matrix, spectrum
 
@@ -62,9 +62,7 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
         if count == size - 2 or np.abs(found.values + 0.5 * bound).max() > 0.5 * bound:
             break
         count *= 2
-    # Arnoldi's real eigenvalues may carry an imaginary part of their own rounding
-    values = np.where(np.abs(found.values.imag) * found.overlap > SAFETY * rounding, found.values, found.values.real)
-    return np.sort(values[is_negative(values, found.overlap, uncertainty)].real)
+    return np.sort(found.values[is_negative(found.values, found.overlap, rounding, uncertainty)].real)
 
 
 def _is_positive(symmetric: csc_array, shift: float) -> bool:

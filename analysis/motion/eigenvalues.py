@@ -71,9 +71,10 @@ def zero_uncertainty(packing: HasConfiguration, rounding: float) -> float:
     return SAFETY * rounding + imbalance
 
 
-def is_negative(values: Complexes, overlap: Floats, uncertainty: float) -> NDArray[np.bool_]:
-    """Which eigenvalues are real and below zero by more than kappa times the uncertainty of one of zero."""
-    return (values.imag == 0) & (-values.real * overlap > uncertainty)
+def is_negative(values: Complexes, overlap: Floats, rounding: float, uncertainty: float) -> NDArray[np.bool_]:
+    """Which eigenvalues are real but for rounding, which makes pairs of equal ones, and below zero by more than kappa
+    times the uncertainty of one of zero."""
+    return (np.abs(values.imag) * overlap <= SAFETY * rounding) & (-values.real * overlap > uncertainty)
 
 
 def exceeds_rounding(eigenvalue: complex, overlap: float | np.floating, rounding: float) -> bool:
@@ -121,4 +122,4 @@ def growing_undamped(
         u |A|_F, and the uncertainty of an eigenvalue of zero, 1 / time^2.
     """
     oscillates = np.array([exceeds_rounding(v, o, rounding) for v, o in zip(values, overlap, strict=True)], dtype=bool)
-    return oscillates, is_negative(values, overlap, zero)
+    return oscillates, is_negative(values, overlap, rounding, zero)

@@ -316,7 +316,8 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     uncertainty = zero_uncertainty(packing, rounding)
     values, marked, remark = _values_and_vectors(matrix, uncertainty)
     overlap = marked.overlap
-    negative = np.sort(marked.values[is_negative(marked.values, overlap, uncertainty)].real)
+    below = is_negative(marked.values, overlap, rounding, uncertainty) & (marked.values.imag >= 0)
+    negative = np.sort(np.repeat(marked.values[below].real, np.where(marked.values[below].imag > 0, 2, 1)))
     pairs: list[Mode] = []
     noise = 0
     for k in np.flatnonzero(marked.values.imag > 0):
