@@ -106,7 +106,9 @@ def test_the_space_of_slow_motions_is_invariant(damped):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damped", [STRONG, pytest.param(WEAKER, marks=pytest.mark.long), WITH_DRAG], indirect=True)
+@pytest.mark.parametrize(
+    "damped", [STRONG, *(pytest.param(each, marks=pytest.mark.long) for each in (WEAKER, WITH_DRAG))], indirect=True
+)
 def test_rates_of_a_packing_beyond_lapack_have_its_slowest_decay(damped, monkeypatch):
     expected = rates_of(Motion.of(damped))
     assert not expected.grows.any()
@@ -122,7 +124,7 @@ def test_rates_of_a_packing_beyond_lapack_have_its_slowest_decay(damped, monkeyp
     assert found.searched == 0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_dashpots_too_weak_for_the_time_leave_a_rate_below_which_growth_may_hide(reference_packing, monkeypatch):
     monkeypatch.setattr(module, "DENSE_DAMPED", 100)
     monkeypatch.setattr(decay_module, "WORK_OF_DECAY", 1e8)
