@@ -40,8 +40,8 @@ BEDS = {
 }
 """Law, slope and dashpots of the fifty spheres."""
 
-POURED = ("gran/hertz/history", 0.0, 4.0)
-"""Those of a bed that is poured as a whole: on a slope one or the other of thousands of spheres rolls on for ever."""
+POURED = ("gran/hertz/history", 0.0, (40.0, 4.0))
+"""Those of beds that are poured as a whole: on a slope one or the other of thousands of spheres rolls on for ever."""
 
 
 DEEP = """
@@ -167,8 +167,9 @@ def main() -> None:
         show(f"fifty, one that {name}", cell)
         show("copies of these", tiled(cell, *options.copies))
     for count in options.poured:
-        law, slope, dashpot = POURED
-        show("poured", bed(law, count, slope, dashpot))
+        law, slope, dashpots = POURED
+        for dashpot in dashpots:
+            show(f"poured, dashpots {dashpot:g}", bed(law, count, slope, dashpot))
     if options.deep:
         cell = deep_bed()
         show("a thousand, ten deep", cell)
