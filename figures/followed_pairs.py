@@ -202,7 +202,7 @@ def _spectrum_of(packing: HasConfiguration, modes: SystemModes) -> Spectrum:
     return Spectrum(
         eigenvalues=modes.values,
         pairs=tuple(sorted(pairs, key=lambda pair: -pair.growth_rate)),
-        negative=np.sort(modes.values[is_negative(modes.values, found.overlap, zero)].real),
+        negative=np.sort(modes.values[is_negative(modes.values, found.overlap, rounding, zero)].real),
         noise_pairs=0,  # they have lost their imaginary parts
         rattlers=packing.rattlers,
         rounding=rounding,

@@ -220,14 +220,20 @@ class _SlicedSpectrum:
         )
 
     def mend(self, slices: list[SpectrumSlice], block: int, first: int) -> None:
-        """Find suspects again, with larger blocks from other shifts, until nothing is wrong."""
+        """Find suspects again, with larger blocks from other shifts, until nothing is wrong.
+
+        A slice that is found again stays as it was if fewer of all eigenvalues are found with the new one.
+        """
         for k in self.suspects(slices):
+            before, missing = slices[k], self.missing(slices)
             try:
                 slices[k], _ = self.slice(k, first, block)
             except SpectrumError:
                 continue
             if not self.what_is_wrong(slices):
                 return
+            if self.missing(slices) > missing:
+                slices[k] = before
 
     def ends(self, slices: list[SpectrumSlice]) -> Floats:
         """Real parts up to which each slice has its own, as far as possible from all eigenvalues."""
@@ -260,6 +266,10 @@ class _SlicedSpectrum:
             if not _agree(one, other, np.sqrt(self.sizes.accuracy) * self.spacing):
                 return f"the slices about {one.shift:.6g} and {other.shift:.6g} disagree"
         return ""
+
+    def missing(self, slices: list[SpectrumSlice]) -> int:
+        """How many eigenvalues are missing, or too many."""
+        return abs(self.matrix.shape[0] - sum(len(own) for own in self.values(slices)))
 
     def suspects(self, slices: list[SpectrumSlice]) -> NDArray[np.int64]:
         """The slices, those first that have the fewest eigenvalues beside the symmetric part."""

@@ -36,6 +36,12 @@ DEPENDENT = 1e-10
 """Length of a new vector, beside the longest of its block, below which its direction is rounding."""
 
 
+PASSES, SHORTENED = 3, 0.1
+"""How often a block is made orthogonal to the whole space at the most, and the share of its length that has to be left
+for this to have been the last time: rounding is then ten times that of a unit vector at the most (Daniel, Gragg,
+Kaufman and Stewart, Math. Comput. 30, 772 (1976))."""
+
+
 class SpectrumError(FaultgougeError):
     """Eigenvalues were not found: one sentence."""
 
@@ -43,8 +49,10 @@ class SpectrumError(FaultgougeError):
 class Krylov:
     """An orthonormal basis Q of the block Krylov space of an operator, and H = Q^T F Q of the operator F.
 
-    Each block is made orthogonal to all before it twice: once is not enough. The vectors are rows, so that the products
-    of many with a few take half of the time.
+    A block is made orthogonal to all before it until that no longer shortens it much: once is not enough. Images by a
+    nearly symmetric operator have most of what they share with the space in the last two blocks, which come first, so
+    that the whole space is gone through once, or little more. The vectors are rows, so that the products of many with a
+    few take half of the time.
 
     Parameters
     ----------
@@ -74,10 +82,7 @@ class Krylov:
         while self.used < max(wanted, 1) and not self.full:
             last, known = slice(self.used, self.used + self.block), self.used + self.block
             image = np.ascontiguousarray(self.operator(self.basis[last].T).T)
-            for _ in range(2):
-                part = image @ self.basis[:known].T
-                image -= part @ self.basis[:known]
-                self.projection[:known, last] += part.T
+            self._leave_space(image, known)
             vectors, rest = qr(image.T, mode="economic", overwrite_a=True, check_finite=False)
             if np.abs(np.diag(rest)).min() < DEPENDENT * np.abs(np.diag(rest)).max(initial=1e-300):
                 # a direction that rounding has chosen: any serves that is orthogonal to all before
@@ -89,6 +94,22 @@ class Krylov:
             self.basis[known : known + self.block] = vectors.T
             self.projection[known : known + self.block, last] = rest
             self.used = known
+
+    def _leave_space(self, image: Floats, known: int) -> None:
+        """Make the images of the last block orthogonal to all vectors so far; H gets what they had of these."""
+        images = slice(self.used, known)
+
+        def leave(first: int) -> Floats:
+            part = image @ self.basis[first:known].T
+            np.subtract(image, part @ self.basis[first:known], out=image)
+            self.projection[first:known, images] += part.T
+            return np.asarray(np.linalg.norm(image, axis=1))
+
+        length = leave(max(0, known - 2 * self.block))
+        for _ in range(PASSES):
+            before, length = length, leave(0)
+            if np.all(length > SHORTENED * before):
+                return
 
     @property
     def square(self) -> Floats:

@@ -62,10 +62,8 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
         if count == size - 2 or np.abs(found.values + 0.5 * bound).max() > 0.5 * bound:
             break
         count *= 2
-    # Arnoldi's real eigenvalues may carry an imaginary part of their own rounding
-    values = np.where(np.abs(found.values.imag) * found.overlap > SAFETY * rounding, found.values, found.values.real)
     zero = zero_uncertainties(packing, rounding, particle, found.left[active], found.right[active])
-    return np.sort(values[is_negative(values, found.overlap, zero)].real)
+    return np.sort(found.values[is_negative(found.values, found.overlap, rounding, zero)].real)
 
 
 def _is_positive(symmetric: csc_array, shift: Floats | float) -> bool:

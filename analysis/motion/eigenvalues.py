@@ -94,9 +94,10 @@ def zero_uncertainties(
     return np.asarray(SAFETY * rounding + imbalance(packing)[particle] @ (np.abs(left) * np.abs(right)))
 
 
-def is_negative(values: Complexes, overlap: Floats, uncertainty: Floats | float) -> NDArray[np.bool_]:
-    """Which eigenvalues are real and below zero by more than kappa times the uncertainty of one of zero."""
-    return (values.imag == 0) & (-values.real * overlap > uncertainty)
+def is_negative(values: Complexes, overlap: Floats, rounding: float, uncertainty: Floats | float) -> NDArray[np.bool_]:
+    """Which eigenvalues are real but for rounding, which makes pairs of equal ones, and below zero by more than kappa
+    times the uncertainty of one of zero."""
+    return (np.abs(values.imag) * overlap <= SAFETY * rounding) & (-values.real * overlap > uncertainty)
 
 
 def exceeds_rounding(eigenvalue: complex, overlap: float | np.floating, rounding: float) -> bool:
@@ -146,4 +147,4 @@ def growing_undamped(
         The uncertainty of an eigenvalue of zero, of all modes alike or of each, 1 / time^2.
     """
     oscillates = np.array([exceeds_rounding(v, o, rounding) for v, o in zip(values, overlap, strict=True)], dtype=bool)
-    return oscillates, is_negative(values, overlap, zero)
+    return oscillates, is_negative(values, overlap, rounding, zero)

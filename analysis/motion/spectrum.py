@@ -325,7 +325,8 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     values, marked, remark = _values_and_vectors(matrix, SAFETY * rounding)
     overlap, particle = marked.overlap, active % len(packing.configuration)
     zero = zero_uncertainties(packing, rounding, particle, marked.left, marked.right)
-    negative = np.sort(marked.values[is_negative(marked.values, overlap, zero)].real)
+    below = is_negative(marked.values, overlap, rounding, zero) & (marked.values.imag >= 0)
+    negative = np.sort(np.repeat(marked.values[below].real, np.where(marked.values[below].imag > 0, 2, 1)))
     pairs: list[Mode] = []
     noise = 0
     for k in np.flatnonzero(marked.values.imag > 0):

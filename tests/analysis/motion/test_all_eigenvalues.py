@@ -12,7 +12,8 @@ from scipy.linalg import eig
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse import block_diag, csr_array
 
-from faultgouge.analysis import spectrum
+from faultgouge.analysis import Configuration, LinearisedContacts, spectrum
+from faultgouge.analysis.contacts import BOOLEAN, PER_CONTACT
 from faultgouge.analysis.motion import spectrum as spectrum_module
 from faultgouge.analysis.motion.all_eigenvalues import SliceSizes, all_eigenvalues
 from faultgouge.analysis.motion.block_arnoldi import ShiftedDisc, SpectrumError
@@ -97,6 +98,38 @@ def test_identical_cells_that_do_not_touch_have_each_their_eigenvalues(copies):
     assert len(marked) == 2 * copies
     np.testing.assert_allclose(whole @ marked.right, marked.right * marked.values, atol=1e-9)
     np.testing.assert_allclose(whole.T @ marked.left.conj(), marked.left.conj() * marked.values, atol=1e-9)
+
+
+def of_stiffness(matrix):
+    """A configuration of unit masses with this K, whose contacts are not known."""
+    count = matrix.shape[0] // 3
+    each, none = np.ones(count), {name: bool if name in BOOLEAN else int for name in PER_CONTACT}
+    return Configuration(
+        dimension=2, position=np.zeros((count, 2)), radius=each, mass=each, inertia=each,
+        contacts=LinearisedContacts(**{name: np.zeros((0, *PER_CONTACT[name]), kind) for name, kind in none.items()}),
+        box=np.eye(3), origin=np.zeros(3), periodic=np.zeros(3, bool), load=np.zeros((count, 2, 3)),
+        stiffness=matrix, damping=csr_array(matrix.shape),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("coupled", "sliced"),
+    [(False, False), (True, False), (False, True), pytest.param(True, True, marks=pytest.mark.slow)],
+)
+def test_forty_equal_pairs_and_forty_equal_negative_ones_are_counted(coupled, sliced, monkeypatch):
+    """As of forty copies of a packing side by side: rounding makes pairs of some of the negative ones, too."""
+    rng = np.random.default_rng(1)
+    cells = [block for _ in range(40) for block in (complex_block(7.0, 0.5), np.array([[-0.5]]))]
+    others = [np.array([[value]]) for value in rng.uniform(1, 50, 120)]
+    whole = turned([*cells, *others], rng) if coupled else csr_array(block_diag([*cells, turned(others, rng)]))
+    if sliced:
+        sizes = SliceSizes(own=24, least=30)
+        monkeypatch.setattr(spectrum_module, "SLICED", 0)
+        monkeypatch.setattr(spectrum_module, "all_eigenvalues", lambda matrix: all_eigenvalues(matrix, sizes))
+    found = spectrum(of_stiffness(whole))
+    assert len(found.pairs) == 40
+    assert [pair.eigenvalue for pair in found.pairs] == pytest.approx([7 + 0.5j] * 40, rel=1e-9)
+    assert found.negative == pytest.approx([-0.5] * 40, rel=1e-9)
 
 
 @pytest.fixture
