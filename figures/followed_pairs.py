@@ -20,9 +20,9 @@ from faultgouge.analysis import (
     closest_to_meeting,
     stability,
 )
-from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.counted import counted
-from faultgouge.analysis.motion.eigenvalues import is_negative, zero_uncertainty
+from faultgouge.analysis.has_configuration import HasConfiguration
+from faultgouge.analysis.motion.eigenvalues import is_negative, zero_uncertainties, zero_uncertainty
 from faultgouge.analysis.windows import Space, System, SystemModes, force_bearing
 
 from .mode import Complexes, displacement
@@ -195,7 +195,8 @@ def _spectrum_of(packing: HasConfiguration, modes: SystemModes) -> Spectrum:
     """The spectrum of a packing whose modes are known, fastest growing pair first."""
     found = Modes(modes.values, modes.right, modes.left, packing.axes)
     rounding = modes.system.rounding
-    zero = zero_uncertainty(packing, rounding)
+    particle = np.arange(len(modes.right)) % len(packing.configuration)
+    zero = zero_uncertainties(packing, rounding, particle, modes.left, modes.right)
     numbers = zip(modes.values, found.overlap, found.participation, found.rotation, strict=True)
     pairs = [Mode(complex(value), *map(float, rest)) for value, *rest in numbers if value.imag > 0]
     return Spectrum(
@@ -205,7 +206,7 @@ def _spectrum_of(packing: HasConfiguration, modes: SystemModes) -> Spectrum:
         noise_pairs=0,  # they have lost their imaginary parts
         rattlers=packing.rattlers,
         rounding=rounding,
-        uncertainty=zero,
+        uncertainty=zero_uncertainty(packing, rounding),
         packing=packing,
     )
 

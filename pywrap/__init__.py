@@ -26,7 +26,9 @@ if TYPE_CHECKING:  # what `OFFERS` imports when it is used
     from .lammps.instance import EngineError, lammps_instance
     from .load_path import LoadPath
     from .onset import onset_run
-    from .runs.drive import DriveSample, DriveStep, drive, settle_for_drive
+    from .runs.drive import drive
+    from .runs.drive_setup import settle_for_drive
+    from .runs.drive_states import DriveCheckpoint, DriveSample, DriveStep
     from .runs.ramp import ramp, reach
     from .runs.ramp_loads import ramp_loads
     from .runs.run_recorder import Record
@@ -48,8 +50,9 @@ OFFERS = {
     "lammps_path": ".granular.lammps_path",
     "in_a_copy": ".granular.look_in_a_copy", "relax": ".granular.relax", "Dynamics": ".lammps.dynamics",
     "Engine": ".lammps.engine", "EngineError": ".lammps.instance", "lammps_instance": ".lammps.instance",
-    "LoadPath": ".load_path", "onset_run": ".onset", "DriveSample": ".runs.drive", "DriveStep": ".runs.drive",
-    "drive": ".runs.drive", "settle_for_drive": ".runs.drive", "ramp": ".runs.ramp", "reach": ".runs.ramp",
+    "LoadPath": ".load_path", "onset_run": ".onset", "DriveCheckpoint": ".runs.drive_states",
+    "DriveSample": ".runs.drive_states", "DriveStep": ".runs.drive_states", "drive": ".runs.drive",
+    "settle_for_drive": ".runs.drive_setup", "ramp": ".runs.ramp", "reach": ".runs.ramp",
     "ramp_loads": ".runs.ramp_loads", "Record": ".runs.run_recorder", "scene_path": ".runs.scene_path",
     "Checkpoint": ".runs.undamped", "Sample": ".runs.undamped", "perturb": ".runs.undamped",
     "time_step": ".runs.undamped", "Scene": ".scenes.scene", "dashpot": ".scenes.units",
@@ -59,8 +62,8 @@ OFFERS = {
 """Names of this package, and the modules that have them."""
 
 __all__ = [
-    "Checkpoint", "DriveSample", "DriveStep", "Dynamics", "Engine", "EngineError", "Equilibrium", "LoadPath",
-    "MotionComparison", "NoEquilibriumError", "NotTakenError", "Record", "Sample", "Scene", "SceneError",
+    "Checkpoint", "DriveCheckpoint", "DriveSample", "DriveStep", "Dynamics", "Engine", "EngineError", "Equilibrium",
+    "LoadPath", "MotionComparison", "NoEquilibriumError", "NotTakenError", "Record", "Sample", "Scene", "SceneError",
     "SnapshotError", "bring_to_rest", "compare_motion", "dashpot", "drive", "equilibrate", "from_lammps", "in_a_copy",
     "lammps_instance", "lammps_path", "onset_run", "perturb", "ramp", "ramp_loads", "reach", "real_units", "relax",
     "restitution", "scene_path", "settle", "settle_for_drive", "time_step",

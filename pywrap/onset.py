@@ -28,10 +28,10 @@ from .scenes.scene import Scene, scene_of
 from .scenes.validation import SceneError, require_section
 from .settling.settle import settle
 
-Known = Callable[[Onset, float], None]
+OnsetSoFar = Callable[[Onset, float], None]
 """Takes what is known, without the errors of the path, and the load up to which that is all."""
 
-AROUND_ONSET = np.concatenate(
+ONSET_DISTANCES = np.concatenate(
     [
         -np.geomspace(3e-2, 1e-3, 7)[:-1],
         -np.geomspace(1e-3, 1e-7, 13),
@@ -83,7 +83,7 @@ def onset_run(
     modes: tuple[int, int] | None = None,
     reached: Callable[[Equilibrium], None] | None = None,
     near_onset: Floats | None = None,
-    known: Known = lambda found, fx: None,
+    known: OnsetSoFar = lambda found, fx: None,
     bed: Packing | None = None,
     watch: Watch | None = None,
     folder: Path | None = None,

@@ -4,25 +4,24 @@ A real :math:`\lambda < 0` makes :math:`\omega` imaginary: disks leave the equil
 as :math:`e^{2 \sqrt{-\lambda}\, t}`. With dissipation such an eigenvalue still has a real :math:`s > 0`. Along a branch
 of equilibria :math:`\lambda` passes through zero at a turning point. Newton's method may step across a turning point.
 
-Most packings have no negative eigenvalue, and this is proved without computing any eigenvalue: every eigenvalue of A
-has
+Most packings have no negative eigenvalue, and the proof computes none. Every eigenvalue of A has
 :math:`\mathrm{Re}\,\lambda \ge \min \lambda(S)` with :math:`S = (A + A^T)/2` (Bendixson, Acta Math. 25, 359
-(1902)), and factors :math:`L D L^T` of S with positive pivots show that S is positive definite (Sylvester's law of
-inertia). Otherwise the factors of :math:`S + c` give a bound :math:`-c` below all real parts, and all real negative
+(1902)), and S is positive definite if its factors :math:`L D L^T` have positive pivots (Sylvester's law of inertia).
+Otherwise the factors of :math:`S + c` give a bound :math:`-c` below all real parts, and all real negative
 eigenvalues lie within c/2 of -c/2, where Arnoldi's iteration with that shift finds every eigenvalue.
 """
 
 import numpy as np
-from scipy.sparse import csc_array, eye_array
+from scipy.sparse import csc_array, diags_array
 
-from ..configuration import HasConfiguration
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
+from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats
-from .eigenvalues import SAFETY, is_negative, operator_rounding, zero_uncertainty
+from .eigenvalues import SAFETY, imbalance, is_negative, operator_rounding, zero_uncertainties
 from .nearest_modes import nearest_modes
 from .spectrum import DENSE_LARGEST, dynamical_matrix, spectrum
 
-SPREAD = 4.0
+BOUND_FACTOR = 4.0
 """Factor from one bound that is tried to the next: each costs factors, and a loose one more eigenvalues."""
 
 FIRST_COUNT = 16
@@ -44,17 +43,18 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
     ndarray, shape (B,)
         The most negative first, 1 / time^2. Empty if the packing does not buckle. Complex pairs are not included.
     """
-    matrix, _ = dynamical_matrix(packing)
+    matrix, active = dynamical_matrix(packing)
     size, rounding = matrix.shape[0], operator_rounding(packing, matrix.data)
+    particle = active % len(packing.configuration)
     symmetric = csc_array(0.5 * (matrix + matrix.T))
-    bound = uncertainty = zero_uncertainty(packing, rounding)
-    if _is_positive(symmetric, bound):
+    shifts = SAFETY * rounding + imbalance(packing)[particle]
+    if _is_positive(symmetric, shifts):
         return np.zeros(0)
     if size <= DENSE_LARGEST:
         return spectrum(packing).negative
-    bound = max(bound, np.finfo(float).eps ** 0.5 * float(np.abs(matrix.data).max()))
+    bound = max(float(shifts.max()), np.finfo(float).eps ** 0.5 * float(np.abs(matrix.data).max()))
     while not _is_positive(symmetric, bound):
-        bound *= SPREAD
+        bound *= BOUND_FACTOR
     count = FIRST_COUNT
     while True:
         count = min(count, size - 2)
@@ -64,15 +64,18 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
         count *= 2
     # Arnoldi's real eigenvalues may carry an imaginary part of their own rounding
     values = np.where(np.abs(found.values.imag) * found.overlap > SAFETY * rounding, found.values, found.values.real)
-    return np.sort(values[is_negative(values, found.overlap, uncertainty)].real)
+    zero = zero_uncertainties(packing, rounding, particle, found.left[active], found.right[active])
+    return np.sort(values[is_negative(values, found.overlap, zero)].real)
 
 
-def _is_positive(symmetric: csc_array, shift: float) -> bool:
-    """Whether S + shift has positive pivots alone."""
+def _is_positive(symmetric: csc_array, shift: Floats | float) -> bool:
+    """Whether S + shift has positive pivots alone; shift is a number, or the entries of a diagonal."""
     size = symmetric.shape[0]
     if size == 0:
         return True
     try:
-        return symmetric_lu(csc_array(symmetric + shift * eye_array(size)), symmetric=True).negative == 0
+        return (
+            symmetric_lu(csc_array(symmetric + diags_array(np.broadcast_to(shift, size))), symmetric=True).negative == 0
+        )
     except SingularMatrixError:
         return False

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ..arrays import Complexes, Floats, Indices
-from ..configuration import HasConfiguration
+from ..has_configuration import HasConfiguration
 
 SAFETY = 50.0
 """Imaginary parts count from this many times their rounding uncertainty.
@@ -52,26 +52,49 @@ def operator_rounding(packing: HasConfiguration, matrix: Floats | Complexes) -> 
 
 
 def in_balance(packing: HasConfiguration) -> bool:
-    """Whether what is left of the forces on a particle is rounding, of a dump's digits at most."""
+    """Whether the net force on each particle is rounding, at most that of a dump's digits."""
     force = packing.configuration.largest_force
     if not force and packing.configuration.stiffness is not None:
         return True  # no force is known to compare with; whoever measured K has looked
     return packing.residual <= IN_BALANCE * force
 
 
-def zero_uncertainty(packing: HasConfiguration, rounding: float) -> float:
-    """Uncertainty of an eigenvalue of zero that is perfectly conditioned, 1 / time^2.
+def imbalance(packing: HasConfiguration) -> Floats:
+    """What forces that are out of balance leave of an eigenvalue of zero, by particle, shape (N,), 1 / time^2.
 
     A motion that stretches no contact has the eigenvalue zero as the forces F of the contacts cancel, whose parts in A
-    are F / (R m). Forces that are out of balance by r leave r / (R m). Of a packing that moves, A counts as it is.
+    are F / (R m). Forces on a particle that are out of balance by r leave r / (R m) of these in the rows of this
+    particle. Of a packing that moves, A counts as it is: zeros.
     """
-    imbalance = (
-        packing.residual / float(np.min(packing.radius * packing.mass, initial=np.inf)) if in_balance(packing) else 0.0
-    )
-    return SAFETY * rounding + imbalance
+    c = packing.configuration
+    return c.particle_residual / (c.radius * c.mass) if in_balance(packing) else np.zeros(len(c))
 
 
-def is_negative(values: Complexes, overlap: Floats, uncertainty: float) -> NDArray[np.bool_]:
+def zero_uncertainty(packing: HasConfiguration, rounding: float) -> float:
+    """Uncertainty of an eigenvalue of zero that is perfectly conditioned, 1 / time^2, of whatever particles move."""
+    return SAFETY * rounding + float(imbalance(packing).max(initial=0.0))
+
+
+def zero_uncertainties(
+    packing: HasConfiguration, rounding: float, particle: Indices, left: Complexes, right: Complexes
+) -> Floats:
+    """The same of modes that are known, shape (k,): forces on particles that take no part do not count.
+
+    Parameters
+    ----------
+    packing : Configuration or Packing
+        In equilibrium.
+    rounding : float
+        u |A|_F, 1 / time^2.
+    particle : ndarray of int, shape (n,)
+        Whose coordinates the rows of the vectors are.
+    left, right : ndarray of complex, shape (n, k)
+        Unit vectors y and x of the modes: to first order an eigenvalue changes by y^H dA x / y^H x.
+    """
+    return np.asarray(SAFETY * rounding + imbalance(packing)[particle] @ (np.abs(left) * np.abs(right)))
+
+
+def is_negative(values: Complexes, overlap: Floats, uncertainty: Floats | float) -> NDArray[np.bool_]:
     """Which eigenvalues are real and below zero by more than kappa times the uncertainty of one of zero."""
     return (values.imag == 0) & (-values.real * overlap > uncertainty)
 
@@ -107,7 +130,7 @@ def growing(rate: Complexes | complex, overlap: Floats | float, rounding: float)
 
 
 def growing_undamped(
-    values: Complexes, overlap: Floats, rounding: float, zero: float
+    values: Complexes, overlap: Floats, rounding: float, zero: Floats | float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which eigenvalues of A grow with oscillation, as complex pairs, and which without, as negative ones.
 
@@ -117,8 +140,10 @@ def growing_undamped(
         Eigenvalues, 1 / time^2.
     overlap : ndarray
         |y^H x| of their unit vectors.
-    rounding, zero : float
-        u |A|_F, and the uncertainty of an eigenvalue of zero, 1 / time^2.
+    rounding : float
+        u |A|_F, 1 / time^2.
+    zero : float or ndarray
+        The uncertainty of an eigenvalue of zero, of all modes alike or of each, 1 / time^2.
     """
     oscillates = np.array([exceeds_rounding(v, o, rounding) for v, o in zip(values, overlap, strict=True)], dtype=bool)
     return oscillates, is_negative(values, overlap, zero)

@@ -14,19 +14,21 @@ and r are those of laws with two derivatives, one while a contact closes and one
 (:func:`~faultgouge.analysis.operators.linearised_contacts.rescaling_operators`). Each contact at the bound is a play
 operator; nothing else remembers.
 
-The motion is positively homogeneous of degree one: the motion of a times the push (or of a times the rate of loading)
-is a times the motion, for a > 0. No amplitude enters, and no matrix describes the motion: it may grow where the packing
-with sticking contacts is stable, and rest where the packing with sliding contacts is not. The equations of a slider
+The motion is positively homogeneous of degree one: a times the push (or a times the rate of loading) gives a times the
+motion, for a > 0. No amplitude enters. No matrix describes the motion: it may grow where the packing with sticking
+contacts is stable, and rest where the packing with sliding contacts is unstable. The equations of a slider
 with a load that rises slowly are those of rate-independent plasticity; self-sustained vibration of sliding contacts is
 known as flutter (Bigoni and Noselli, J. Mech. Phys. Solids 59, 2208, 2011).
 
-The steps are those of velocity Verlet, with dashpots at the velocity of the half step, as LAMMPS takes them. Without a
-contact that remembers, the motion is linear, and is that of the exponential function of the first-order matrix.
+The motion is followed in steps of velocity Verlet, with dashpots at the velocity of the half step, as in LAMMPS.
+Without a contact that remembers the motion is linear, and the exponential function of the first-order matrix gives the
+motion to rounding.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,7 +37,8 @@ from scipy.sparse import block_array, bsr_array, csr_array, eye_array
 from scipy.sparse.linalg import expm_multiply
 
 from ..arrays import Floats, Indices, floats
-from ..configuration import Configuration, HasConfiguration
+from ..configuration import Configuration
+from ..has_configuration import HasConfiguration
 from ..operators.linearised_contacts import rescaling_operators
 from ..operators.sliders import margins, sliders_of
 from .motion import Motion
@@ -45,136 +48,33 @@ MOTION_STEP = 0.05
 """Time step, as a share of the largest stable one. Beside LAMMPS D is right to some per cent after growth by twelve
 decades; with twice the step, to some 8 per cent."""
 
+LOOK_STEP = 0.3
+"""Time between two looks at contacts as a share of the largest stable time step: ten looks in the fastest period."""
 
-SLIPS = 0.1
-"""Slip of a contact as a share of the largest, from which on it counts that the contact reaches the bound."""
+DENSE_ENTRIES = 150**2
+"""Entries up to which a product with the dense matrix is as fast: ten times as fast for 60 coordinates and fewer."""
 
-CLOSE_STEP = 0.3
-"""Time between two close looks at contacts, as a share of the largest stable time step: ten of the fastest period."""
-
-CLOSE_LOOKS = 1000
-"""Close looks, over some ten periods of a slow mode. Contacts go farthest at the beginning."""
-
-LEFT_ALONE = 10.0
-"""Displacement by a push over that by the residual forces, from which on the push counts: D then is right to a fifth,
-and to a hundredth where the two displacements have nothing in common."""
-
-
-@dataclass(frozen=True, eq=False)
-class OneSidedMotion:
-    """Displacements of the particles from the equilibrium, for the push or the rate of loading as it was given.
-
-    Attributes
-    ----------
-    times : ndarray, shape (T,)
-        Times.
-    displacement, velocity : ndarray, shape (T, N, d)
-        Length, and length / time.
-    slid : ndarray, shape (T, B)
-        p of each contact at the bound: the tangential force that its slider has taken away, force.
-    scales : tuple of float
-        Between which multiples of the push, or of the rate, the motion holds, as it was seen in `CLOSE_LOOKS` at its
-        beginning and at these times: with smaller ones contacts that count as at the bound do not reach it, or the
-        residual forces move the packing as well, and with larger ones other contacts reach the bound, or open.
-    """
-
-    times: Floats
-    displacement: Floats
-    velocity: Floats
-    slid: Floats
-    scales: tuple[float, float]
-
-    @property
-    def mean_square_displacement(self) -> Floats:
-        """D: mean over the particles of |displacement|^2, length^2, shape (T,)."""
-        return np.asarray(np.sum(self.displacement**2, axis=2).mean(axis=1))
+Matrix: TypeAlias = csr_array | Floats
+"""A matrix for products with columns."""
 
 
 @dataclass
 class OneSidedState:
     """Several motions at one time, in columns: mass-weighted displacement z and velocity v, shape (E, P), and what
-    contacts remember: p of sliders, shape (B, P), and r, shape (R, P), of contacts with two derivatives."""
+    contacts remember: p of sliders, shape (B, P), and r, shape (R, P), of contacts with two derivatives. Sliders may
+    lack some force to the bound, which is `missing`, shape (B, P)."""
 
     time: float
     z: Floats
     v: Floats
     p: Floats
     r: Floats
+    missing: Floats | float = 0.0
 
-
-@dataclass(eq=False)
-class ContactReach:
-    """How far a motion goes, and takes contacts: the largest D, shape (P,), and products of margins with displacements,
-    shape (R, P), that were seen, and p of sliders, shape (B, P).
-
-    `alone` is that of the motion of the residual forces, which nothing pushes."""
-
-    system: "OneSidedSystem"
-    size: Floats | None = None
-    farthest: Floats | None = None
-    slid: Floats | None = None
-    alone: "ContactReach | None" = None
-
-    def look(self, state: OneSidedState) -> None:
-        """Look at the motion once more."""
-        size, now = self.system.mean_square_displacement(state.z), self.system.margins[0] @ state.z
-        self.size = size if self.size is None else np.maximum(self.size, size)
-        self.farthest = now if self.farthest is None else np.maximum(self.farthest, now)
-        self.slid = state.p.copy()
-
-    def look_closely(self, start: OneSidedState, time: float = np.inf, rise: Floats | None = None) -> None:
-        """Look at the beginning of a motion up to a time, step by step, and at that of the residual forces; the state
-        stays as it is."""
-        system, self.alone = self.system, ContactReach(self.system)
-        step = CLOSE_STEP / system.step_share * system.time_step
-        count = int(min(CLOSE_LOOKS, np.ceil((time - start.time) / step)))
-        state = OneSidedState(start.time, *(each.copy() for each in (start.z, start.v, start.p, start.r)))
-        system.take_steps(state, step, count, rise=None if rise is None else system.on_active(rise), look=self.look)
-        still = system.start(np.zeros((system.motion.configuration.coordinates, 1)))
-        system.take_steps(still, step, count, constant=system.residual_force, look=self.alone.look)
-
-    @property
-    def residual_scale(self) -> float:
-        """The multiple of the motion that goes as far as the residual forces move the packing."""
-        if self.size is None or self.alone is None or self.alone.size is None:
-            return 0.0
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return float(np.nan_to_num(np.sqrt(self.alone.size / self.size), nan=0.0).max(initial=0.0))
-
-    @property
-    def least_scale(self) -> float:
-        """The multiple from which on sliders have slipped by more than was missing to the bound, and residual forces
-        do not count; infinite if these alone take another contact to the bound, or open one."""
-        if self.alone is not None and self.alone.largest_scale < 1:
-            return np.inf
-        missing = 0.0 if self.slid is None else reaching_scale(self.system, self.slid)
-        return max(missing, LEFT_ALONE * self.residual_scale)
-
-    @property
-    def largest_scale(self) -> float:
-        """The multiple up to which no contact that is not at the bound reaches the bound or opens."""
-        if self.farthest is None:
-            return np.inf
-        with np.errstate(divide="ignore", invalid="ignore"):
-            limit = self.system.margins[1][:, None] / self.farthest
-        return float(limit[self.farthest > 0].min(initial=np.inf))
-
-
-def reaching_scale(system: "OneSidedSystem", slid: Floats) -> float:
-    """The multiple of a motion from which on contacts that count as at Coulomb's bound reach it.
-
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of the configuration.
-    slid : ndarray, shape (B, P)
-        p of each contact at the bound; of contacts that hardly slip it does not matter what is missing.
-    """
-    c = system.motion.configuration.contacts
-    missing = np.maximum(c.friction - np.linalg.norm(c.tangential_force, axis=1), 0.0)[c.one_sided, None]
-    missing = np.broadcast_to(missing, slid.shape)
-    counts = slid > SLIPS * slid.max(axis=0, initial=0.0)
-    return float((missing[counts] / slid[counts]).max(initial=0.0))
+    def copy(self) -> "OneSidedState":
+        """The same state, which changes by itself."""
+        z, v, p, r = (each.copy() for each in (self.z, self.v, self.p, self.r))
+        return OneSidedState(self.time, z, v, p, r, self.missing)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,13 +111,17 @@ class OneSidedSystem:
         return csr_array((1 / m.root_mass, (m.active, np.arange(len(m.active)))), shape=shape)
 
     @cached_property
+    def _weight_transposed(self) -> csr_array:
+        return csr_array(self._weight.T)
+
+    @cached_property
     def residual_force(self) -> Floats:
         """Mass-weighted forces that are left where the packing is said to rest, shape (E, 1)."""
         return self.on_active(self.motion.configuration.coordinate_force[:, None])
 
     def on_active(self, forces: Floats) -> Floats:
         """Mass-weighted forces, shape (E, P), of forces on all coordinates, shape (coordinates, P)."""
-        return np.asarray(self._weight.T @ forces)
+        return np.asarray(self._weight_transposed @ forces)
 
     def of_particles(self, z: Floats) -> Floats:
         """The values of all coordinates, shape (coordinates,), of one mass-weighted displacement, shape (E, 1)."""
@@ -236,22 +140,29 @@ class OneSidedSystem:
         return np.flatnonzero(self.motion.configuration.contacts.two_derivatives)
 
     @cached_property
-    def sliders(self) -> tuple[csr_array, csr_array, csr_array, Floats, NDArray[np.bool_]]:
+    def sliders(self) -> tuple[Matrix, Matrix, Matrix, Floats, NDArray[np.bool_]]:
         """G, shape (E, B), Y and Z, shape (B, E), h, and which p remembers dashpots, shape (B, 1)."""
         s = sliders_of(self.motion.configuration)
         if not self.motion.dissipative:
             s.viscous_excess.data[:] = 0.0
-        grip, excess, viscous = self._weight.T @ s.force, s.excess @ self._weight, s.viscous_excess @ self._weight
-        return csr_array(grip), csr_array(excess), csr_array(viscous), s.rectified[:, None], s.viscous[:, None]
+        grip = _for_products(self._weight_transposed @ s.force)
+        excess, viscous = (_for_products(rows @ self._weight) for rows in (s.excess, s.viscous_excess))
+        return grip, excess, viscous, s.rectified[:, None], s.viscous[:, None]
 
     @cached_property
-    def margins(self) -> tuple[csr_array, Floats]:
+    def missing_forces(self) -> Floats:
+        """What contacts that count as at Coulomb's bound lack to the bound, shape (B, 1), force."""
+        c = self.motion.configuration.contacts
+        return np.maximum(c.friction - np.linalg.norm(c.tangential_force, axis=1), 0.0)[c.one_sided, None]
+
+    @cached_property
+    def margins(self) -> tuple[Matrix, Floats]:
         """Rows, shape (R, E), and limits, shape (R,), see :func:`~faultgouge.analysis.operators.sliders.margins`."""
         rows, limits = margins(self.motion.configuration)
-        return csr_array(rows @ self._weight), limits
+        return _for_products(rows @ self._weight), limits
 
     @cached_property
-    def rescaled(self) -> tuple[csr_array, csr_array, csr_array]:
+    def rescaled(self) -> tuple[Matrix, Matrix, Matrix]:
         """N, shape (R, E), and B, shape (E, R), of the R contacts with two derivatives; h selects, shape (B, R)."""
         rates, forces = rescaling_operators(self.motion.configuration)
         contacts = self.motion.configuration.contacts
@@ -259,13 +170,16 @@ class OneSidedSystem:
         bound = np.flatnonzero(contacts.one_sided)
         here, place = np.isin(bound, two), np.searchsorted(two, bound)
         select = csr_array((np.ones(here.sum()), (np.flatnonzero(here), place[here])), shape=(len(bound), len(two)))
-        return csr_array(rates[two] @ self._weight), csr_array(self._weight.T @ forces[:, two]), select
+        rows, columns = rates[two] @ self._weight, self._weight_transposed @ forces[:, two]
+        return _for_products(rows), _for_products(columns), _for_products(select)
 
     @cached_property
-    def _operators(self) -> tuple[bsr_array, bsr_array | None]:
-        """A and, if there is dissipation, G, for products with one vector after the other."""
+    def _operators(self) -> tuple[Matrix | bsr_array, Matrix | bsr_array | None]:
+        """A and, if there is dissipation, G."""
         m = self.motion
-        return m.in_blocks(m.stiffness), m.in_blocks(m.damping) if m.dissipative else None
+        in_blocks = m.configuration.dimension == 3 and len(m.active) ** 2 > DENSE_ENTRIES
+        form = m.in_blocks if in_blocks else _for_products
+        return form(m.stiffness), form(m.damping) if m.dissipative else None
 
     def start(self, velocity: Floats) -> OneSidedState:
         """At rest in the equilibrium, but for velocities of all coordinates, shape (coordinates, P)."""
@@ -358,9 +272,9 @@ class OneSidedSystem:
     def _force(self, state: OneSidedState, velocity: Floats, load: Floats | None) -> Floats:
         """Mass-weighted forces; sliders give way."""
         stiffness, damping = self._operators
-        force = -_by_column(stiffness, state.z)
+        force = -_product(stiffness, state.z)
         if damping is not None:
-            force -= _by_column(damping, velocity)
+            force -= _product(damping, velocity)
         if load is not None:
             force += state.time * load
         if len(state.r):
@@ -370,6 +284,7 @@ class OneSidedSystem:
             springs = excess @ state.z
             if len(state.r):
                 springs += rectified * (self.rescaled[2] @ state.r)
+            springs = springs - state.missing
             whole = springs if damping is None else springs + viscous_excess @ velocity
             np.maximum(state.p, np.where(viscous, whole, springs), out=state.p)
             force -= grip @ np.maximum(state.p, whole)
@@ -399,73 +314,35 @@ class OneSidedSystem:
         gain = np.zeros_like(velocity) if rise is None else rise / c.coordinate_mass[:, None]
         return np.array([np.where(flies[:, None], v * velocity + g * gain, 0.0) for _, v, _, g in of_both])
 
-    def displacement(self, z: Floats, flight: Floats | float = 0.0) -> Floats:
+    @cached_property
+    def _translations(self) -> Matrix:
+        """Displacements of the particles along the axes, shape (d N, E), by mass-weighted coordinates."""
+        c = self.motion.configuration
+        whole = self._weight if c.constraint is None else c.constraint @ self._weight
+        return _for_products(csr_array(whole)[: c.dimension * len(c)])
+
+    def displacement(self, z: Floats, flight: Floats | None = None) -> Floats:
         """Displacements of the particles, shape (N, d, P), of mass-weighted coordinates, and of `free_flight`."""
         c = self.motion.configuration
-        q = self._weight @ z + flight
-        q = (q if c.constraint is None else c.constraint @ q).reshape(c.axes, len(c), -1)[: c.dimension]
-        return np.asarray(np.moveaxis(q, 0, 1))
+        q = self._translations @ z
+        if flight is not None:
+            q += (flight if c.constraint is None else c.constraint @ flight)[: len(q)]
+        return np.asarray(q.reshape(c.dimension, len(c), -1).transpose(1, 0, 2))
 
 
-def _by_column(matrix: bsr_array, columns: Floats) -> Floats:
-    """Products in a time that is less than half of that of all columns at once."""
+def _for_products(matrix: csr_array) -> Matrix:
+    """A sparse matrix in the form that is faster for products with a few columns."""
+    return matrix.toarray() if np.prod(matrix.shape) <= DENSE_ENTRIES else csr_array(matrix)
+
+
+def _product(matrix: Matrix | bsr_array, columns: Floats) -> Floats:
+    """Products with columns: of blocks one by one, which takes less than half of the time of all at once."""
+    if not isinstance(matrix, bsr_array):
+        return np.asarray(matrix @ columns)
     made = np.empty(columns.shape, order="F")
     for k in range(columns.shape[1]):
         made[:, k] = matrix @ columns[:, k]
     return made
-
-
-def one_sided_motion(
-    packing: HasConfiguration,
-    velocity: ArrayLike | None = None,
-    rise: str | ArrayLike | None = None,
-    times: ArrayLike = (0.0,),
-) -> OneSidedMotion:
-    """Small motion of a configuration after a push, or under a load that rises, contacts at the bound as they are.
-
-    Parameters
-    ----------
-    packing : Configuration or Packing
-        The equilibrium, with its dashpots and drag.
-    velocity : array_like, shape (N, d), optional
-        Velocities at t = 0, length / time; none by default. The motion is homogeneous, so that numbers of order one do.
-    rise : "fx" or array_like, shape (N, d), optional
-        Forces per unit of time that are added to the load, or a unit force on each particle of the upper layer along x;
-        none by default.
-    times : array_like, shape (T,)
-        When to look, increasing, not negative.
-
-    Returns
-    -------
-    OneSidedMotion
-        Particles that touch nothing fly on, with their drag.
-
-    Raises
-    ------
-    ValueError
-        If a shape does not fit, times are not finite and increasing, or rise is "fx" without an upper layer.
-    """
-    configuration = packing.configuration
-    time = np.atleast_1d(np.asarray(times, dtype=np.float64))
-    if time.ndim != 1 or not np.all(np.isfinite(time)) or np.any(np.diff(time, prepend=0.0) < 0):
-        raise ValueError("The times of a motion are finite, not negative, and in increasing order.")
-    system = OneSidedSystem.of(configuration)
-    push = _of_all_coordinates(configuration, "velocity", velocity)
-    state = system.start(push)
-    load = None if rise is None else forces_on_coordinates(configuration, rise)
-    seen, reach = [], ContactReach(system)
-    reach.look_closely(state, float(time[-1]), load)
-    advance = system.advance_exactly if system.remembers_nothing else system.advance
-    for each in time:
-        advance(state, float(each), load)
-        reach.look(state)
-        flight = system.free_flight(push, load, float(each))
-        moved, speed = (
-            system.displacement(z, free)[..., 0] for z, free in zip((state.z, state.v), flight, strict=True)
-        )
-        seen.append((moved, speed, state.p[:, 0].copy()))
-    displacement, speed, slid = (np.array(each) for each in zip(*seen, strict=True))
-    return OneSidedMotion(time, displacement, speed, slid, (reach.least_scale, reach.largest_scale))
 
 
 def forces_on_coordinates(configuration: Configuration, rise: str | ArrayLike) -> Floats:
@@ -482,12 +359,12 @@ def forces_on_coordinates(configuration: Configuration, rise: str | ArrayLike) -
         if rise != "fx" or not configuration.top.any():
             raise ValueError('rise is "fx" of a packing with an upper layer, or an array of forces, shape (N, d).')
         rise = np.outer(configuration.top, np.eye(configuration.dimension)[0])
-    whole = _of_all_coordinates(configuration, "rise", rise)
+    whole = on_all_coordinates(configuration, "rise", rise)
     return whole if configuration.constraint is None else np.asarray((configuration.constraint != 0).T @ whole)
 
 
-def _of_all_coordinates(configuration: Configuration, name: str, values: ArrayLike | None) -> Floats:
-    """Vectors of the particles as numbers of all coordinates, shape (coordinates, 1); without rotations."""
+def on_all_coordinates(configuration: Configuration, name: str, values: ArrayLike | None) -> Floats:
+    """Vectors of the particles, shape (N, d), on all coordinates, shape (coordinates, 1); zero by default."""
     whole = np.zeros((configuration.axes, len(configuration)))
     if values is not None:
         whole[: configuration.dimension] = floats(name, values, (len(configuration), configuration.dimension)).T

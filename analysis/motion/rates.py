@@ -2,7 +2,7 @@ r"""The eigenvalues s of small motion: all, by LAPACK, or of large systems what 
 
 **What grows** beyond rounding is said by :mod:`~faultgouge.analysis.motion.eigenvalues`, of A without dissipation, and
 of the first-order matrix Z in coordinates of the energy (:mod:`~faultgouge.analysis.motion.energy_norm`) with it. A
-motion that no force opposes has s = 0 twice, in one block of Jordan's: rounding turns that into a pair of either sign.
+motion that no force opposes has s = 0 twice, in one Jordan block, which rounding turns into a pair of either sign.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,14 @@ from scipy.linalg import eig, eigvals
 
 from ..arrays import Complexes, Floats
 from .decay import Decay, follow_decay
-from .eigenvalues import SAFETY, growing, growing_undamped, operator_rounding, zero_uncertainty
+from .eigenvalues import (
+    SAFETY,
+    growing,
+    growing_undamped,
+    operator_rounding,
+    zero_uncertainties,
+    zero_uncertainty,
+)
 from .fastest_growing import fastest_growing
 from .modes import Modes
 from .motion import Motion
@@ -36,17 +43,24 @@ PERIODS_OF_LARGE = 2e6
 vector. It takes three seconds without dissipation, fourteen with it, and 35 where many motions grow alike and none
 converges."""
 
-LONGEST_SEARCH = 300.0
-"""Periods of the fastest motion at the most."""
+STRONG = 4.0
+"""Loss of dashpots over the fastest frequency beyond which no fast growth is sought: the search takes short steps, and
+strong dashpots leave slow growth alone. Both are bounds, by sums of rows."""
+
+FIRST_SEARCH, LONGEST_SEARCH = 30.0, 300.0
+"""Periods of the fastest motion at first, which show fast growth in a tenth of the time, and at the most."""
 
 FREE_SHARE = 1e-6
-"""Eigenvalues s below this share of the largest are those of motions that no force opposes: rounding leaves sqrt(u) of
-a double zero."""
+"""Eigenvalues s below this share of the largest may be those of motions that no force opposes: rounding leaves sqrt(u)
+of a double zero. Motions that strong dashpots hold up are as slow."""
+
+RESISTS = 10.0
+"""Safety of the estimate that a slow eigenvalue is none of a motion that a force opposes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """The eigenvalues s of small motion, those with Im s >= 0; each is uncertain by `uncertainty`.
+    """The eigenvalues s of small motion, those with Im s >= 0.
 
     Attributes
     ----------
@@ -63,6 +77,8 @@ class Rates:
         What became of a random state, where not all eigenvalues are known.
     at_least : bool
         Whether Re s is only known to be no less, as the search for the fastest motion did not converge.
+    uncertainty : float
+        Of Re s that is perfectly conditioned, 1 / time; 0 where eigenvalues have errors of their own.
     """
 
     values: Complexes
@@ -71,6 +87,7 @@ class Rates:
     searched: float = 0.0
     decay: Decay | None = None
     at_least: bool = False
+    uncertainty: float = 0.0
 
     def decided(self, decay: Decay) -> "Rates":
         """Where no motion was found to grow: with what has become of a random state, and of slow motions."""
@@ -81,8 +98,10 @@ class Rates:
 
     @property
     def growth_rate(self) -> float:
-        """Of D, 1 / time: the largest 2 Re s; zero where no eigenvalue is known, as none was found to grow."""
-        return 2 * float(self.values.real.max(initial=-np.inf)) if len(self.values) else 0.0
+        """Of D, 1 / time: the largest 2 Re s; zero if this number is zero but for rounding, or if no eigenvalue is
+        known, as none was found to grow."""
+        largest = float(self.values.real.max(initial=-np.inf)) if len(self.values) else 0.0
+        return 2 * largest if self.grows.any() or abs(largest) > self.uncertainty else 0.0
 
 
 def rates_of(motion: Motion) -> Rates:
@@ -92,17 +111,26 @@ def rates_of(motion: Motion) -> Rates:
         return Rates(np.zeros(0, complex), np.zeros(0, bool), 0)
     if size <= (DENSE_DAMPED if motion.dissipative else SLICED):
         return _damped_rates(motion) if motion.dissipative else _undamped_rates(motion)
-    found = _fastest(motion)
-    decides = motion.dissipative and size <= DECAY_UP_TO and not found.grows.any()
-    return found.decided(follow_decay(motion)) if decides else found
+    longest = min(LONGEST_SEARCH, PERIODS_OF_LARGE / size)
+    if not motion.dissipative or size > DECAY_UP_TO:
+        return _fastest(motion, min(FIRST_SEARCH, longest), longest)
+    found = _fastest(motion, FIRST_SEARCH, FIRST_SEARCH)
+    if found.grows.any() and not found.at_least:
+        return found
+    # that all motion decays is more than a search says, and takes less time than a long one
+    decay = None if found.grows.any() else follow_decay(motion)
+    if decay is None or decay.grows is not False:
+        found = _fastest(motion, FIRST_SEARCH, longest)
+    return found if decay is None or found.grows.any() else found.decided(decay)
 
 
-def _fastest(motion: Motion) -> Rates:
-    """Of motions that surely grow; the others are not known."""
+def _fastest(motion: Motion, first: float, longest: float) -> Rates:
+    """Of motions that surely grow, looked for in so many periods; the others are not known."""
+    fastest, loss = (float(abs(each).sum(axis=1).max(initial=0.0)) for each in (motion.stiffness, motion.damping))
+    if loss > STRONG * np.sqrt(fastest):  # nothing grows faster than K alone would have it
+        return Rates(np.zeros(0, complex), np.zeros(0, bool), 0, 2 * float(np.sqrt(fastest)))
     damping = motion.in_blocks(motion.damping) if motion.dissipative else None
-    length = min(LONGEST_SEARCH, PERIODS_OF_LARGE / len(motion.active))
-    periods = min(30.0, length), length
-    found = fastest_growing(motion.in_blocks(motion.stiffness), damping, count=1, periods=periods)
+    found = fastest_growing(motion.in_blocks(motion.stiffness), damping, count=1, periods=(first, longest))
     values = found.values if motion.dissipative else 1j * np.sqrt(found.values.astype(complex))
     values = np.where(values.real < 0, -values, values)
     if not found.converged:
@@ -110,19 +138,38 @@ def _fastest(motion: Motion) -> Rates:
     return Rates(values, np.ones(len(values), bool), 0, found.limit, at_least=not found.converged)
 
 
+@dataclass(frozen=True)
+class _StiffnessModes:
+    """The eigenvalues of A: which grow without dissipation, and which belong to motions that no force opposes."""
+
+    values: Complexes
+    grows: NDArray[np.bool_]
+    free: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, motion: Motion) -> "_StiffnessModes":
+        modes, packing = Modes.of_matrix(motion.stiffness), motion.configuration
+        rounding = operator_rounding(packing, motion.stiffness.data)
+        zero = zero_uncertainties(packing, rounding, motion.particle, modes.left, modes.right)
+        oscillates, buckles = growing_undamped(modes.values, modes.overlap, rounding, zero)
+        grows, alike = oscillates | buckles, zero_uncertainty(packing, rounding)
+        free = ~grows & (np.abs(modes.values) <= alike) & (np.abs(modes.values) * modes.overlap <= zero)
+        return cls(modes.values, grows, free)
+
+    @property
+    def softest(self) -> float:
+        """The smallest |lambda| of a motion that a force opposes, 1 / time^2."""
+        return float(np.abs(self.values[~self.free]).min(initial=np.inf))
+
+
 def _undamped_rates(motion: Motion) -> Rates:
-    modes = Modes.of_matrix(motion.stiffness)
-    values, overlap = modes.values, modes.overlap
-    rounding = operator_rounding(motion.configuration, motion.stiffness.data)
-    zero = zero_uncertainty(motion.configuration, rounding)
-    oscillates, buckles = growing_undamped(values, overlap, rounding, zero)
-    grows, kept = oscillates | buckles, values.imag >= 0
-    free = ~grows & (np.abs(values) <= zero)
-    s = 1j * np.sqrt(np.where(grows, values, np.abs(values.real)).astype(complex))
+    found = _StiffnessModes.of(motion)
+    grows, kept = found.grows, found.values.imag >= 0
+    s = 1j * np.sqrt(np.where(grows, found.values, np.abs(found.values.real)).astype(complex))
     s = np.where(s.real < 0, -s, s)  # of a pair of roots the one that grows
-    order = np.flatnonzero(kept & ~free)
+    order = np.flatnonzero(kept & ~found.free)
     order = order[np.argsort(-s[order].real, kind="stable")]
-    return Rates(s[order], grows[order], int(free.sum()))
+    return Rates(s[order], grows[order], int(found.free.sum()))
 
 
 def _damped_rates(motion: Motion) -> Rates:
@@ -130,29 +177,51 @@ def _damped_rates(motion: Motion) -> Rates:
     values, rounding = eigvals(z, check_finite=False), operator_rounding(motion.configuration, z)
     largest = np.abs(values).max()
     grows = values.real > np.sqrt(SAFETY * rounding * largest)  # no double eigenvalue is as uncertain
-    if np.any(~grows & (values.real > 0) & (np.abs(values) > FREE_SHARE * largest)):
+    slow = np.abs(values) <= FREE_SHARE * largest
+    zero = zero_uncertainty(motion.configuration, operator_rounding(motion.configuration, motion.stiffness.data))
+    drifts = grows & (np.abs(values) ** 2 <= zero)
+    stiffness = _StiffnessModes.of(motion) if np.any(slow | drifts) else None
+    free = slow & ~grows
+    doubtful = np.any(~grows & (values.real > 0) & ~slow) or drifts.any()
+    if doubtful or (stiffness is not None and _may_resist(motion, np.abs(values[slow]), stiffness.softest)):
         # vectors take three times as long as eigenvalues
         values, left, right = eig(z, left=True, check_finite=False)
         grows = growing(values, np.abs(np.sum(left.conj() * right, axis=0)), rounding)
-    drifts = _drifts(motion, z, values, grows)
-    grows &= ~drifts
-    free = drifts | (~grows & (np.abs(values) <= FREE_SHARE * largest))
+        slow = np.abs(values) <= FREE_SHARE * largest
+        free = (slow | (np.abs(values) ** 2 <= zero)) & _feels_no_force(motion, rounding, left, right)
+        grows &= ~free
     order = np.flatnonzero((values.imag >= 0) & ~free)
     order = order[np.argsort(-values[order].real, kind="stable")]
-    return Rates(values[order], grows[order], int(free.sum()) // 2)
+    free_motions = 0 if stiffness is None else int(stiffness.free.sum())
+    return Rates(values[order], grows[order], free_motions, uncertainty=SAFETY * rounding)
 
 
-def _drifts(motion: Motion, z: Floats, values: Complexes, grows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which s that seem to grow are those of motions that no force opposes, as forces are not in balance.
+def _may_resist(motion: Motion, slow: Floats, softest: float) -> bool:
+    """Whether a slow eigenvalue may be that of a motion which a force opposes, and strong dashpots hold up.
 
-    The imbalance leaves such a motion an eigenvalue -s (s + g) of A, with the damping g that the motion feels.
+    Such a motion has s (s + g) = -lambda, with the damping g that the motion feels.
     """
-    zero = zero_uncertainty(motion.configuration, operator_rounding(motion.configuration, motion.stiffness.data))
-    drifts = grows & (np.abs(values) ** 2 <= zero)
-    if drifts.any():
-        vectors = eig(z, check_finite=False)
-        for k in np.flatnonzero(drifts):
-            velocity = vectors[1][len(motion.active) :, np.argmin(np.abs(vectors[0] - values[k]))]
-            loss = np.vdot(velocity, motion.damping @ velocity) / np.vdot(velocity, velocity)
-            drifts[k] = abs(values[k] * (values[k] + loss)) <= zero
-    return np.asarray(drifts)
+    largest_damping = float(abs(motion.damping).sum(axis=1).max(initial=0.0))
+    size = float(slow.max(initial=0.0))
+    return RESISTS * size * (size + largest_damping) >= softest
+
+
+def _feels_no_force(motion: Motion, rounding: float, left: Complexes, right: Complexes) -> NDArray[np.bool_]:
+    """Of which eigenvectors of Z the motion z has y^H A z = 0 but for rounding and for forces that are out of balance.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of E coordinates.
+    rounding : float
+        u |Z|_F, 1 / time.
+    left, right : ndarray of complex, shape (2E, k)
+        Vectors of Z in coordinates of the energy.
+    """
+    size, a = len(motion.active), motion.stiffness
+    places, sides = motion.energy_norm.unweight @ right[:size], left[size:]
+    x, y = (each / np.linalg.norm(each, axis=0) for each in (places, sides))
+    rounding_of_a = operator_rounding(motion.configuration, a.data)
+    zero = zero_uncertainties(motion.configuration, rounding_of_a, motion.particle, y, x)
+    zero += SAFETY * rounding * np.sqrt(np.linalg.norm(a.data))
+    return np.asarray(np.abs(np.sum(y.conj() * (a @ x), axis=0)) <= zero)

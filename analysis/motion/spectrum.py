@@ -44,9 +44,9 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
-from ..configuration import HasConfiguration
 from ..counted import counted
 from ..errors import BadInputError
+from ..has_configuration import HasConfiguration
 from ..operators.stiffness import stiffness_matrix
 from ..packing.disk_operators import Form
 from ..packing.packing import Floats, Indices
@@ -55,12 +55,14 @@ from ..table_display import TableDisplay
 from .all_eigenvalues import all_eigenvalues
 from .block_arnoldi import SpectrumError
 from .eigenvalues import (
+    SAFETY,
     Complexes,
     active_coordinates,
     exceeds_rounding,
     is_negative,
     mass_weighted,
     operator_rounding,
+    zero_uncertainties,
     zero_uncertainty,
 )
 from .growth_in_words import exponential
@@ -155,6 +157,8 @@ class Spectrum(TableDisplay):
         if damped is None:
             return "no motion grows" if self.is_stable else f"unstable, D as exp({self.growth_rate():.6g} t): {counts}"
         verdict = "every motion decays" if self.is_stable else "unstable"
+        if self.is_stable and damped.growth_rate == 0:
+            return f"no motion grows with the packing's dissipation; {alone}"
         rate = exponential(damped.growth_rate, 6, damped.at_least)
         return f"{verdict} with the packing's dissipation, {rate}; {alone}"
 
@@ -202,8 +206,12 @@ class Spectrum(TableDisplay):
 
     @property
     def free(self) -> int:
-        """Number of eigenvalues that are zero within `uncertainty`: no force opposes such a motion, which drifts."""
-        return int(np.count_nonzero(np.abs(self.eigenvalues) <= self.uncertainty))
+        """Number of eigenvalues that are zero within `uncertainty`, and not negative: no force opposes such a motion,
+        which drifts."""
+        zero, negative = (
+            int(np.count_nonzero(np.abs(each) <= self.uncertainty)) for each in (self.eigenvalues, self.negative)
+        )
+        return zero - negative
 
     @property
     def least_q(self) -> float:
@@ -314,9 +322,10 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     if not np.isfinite(rounding):
         raise BadInputError("Stiffnesses overflow, and nothing can be said: take units in which numbers are smaller.")
     uncertainty = zero_uncertainty(packing, rounding)
-    values, marked, remark = _values_and_vectors(matrix, uncertainty)
-    overlap = marked.overlap
-    negative = np.sort(marked.values[is_negative(marked.values, overlap, uncertainty)].real)
+    values, marked, remark = _values_and_vectors(matrix, SAFETY * rounding)
+    overlap, particle = marked.overlap, active % len(packing.configuration)
+    zero = zero_uncertainties(packing, rounding, particle, marked.left, marked.right)
+    negative = np.sort(marked.values[is_negative(marked.values, overlap, zero)].real)
     pairs: list[Mode] = []
     noise = 0
     for k in np.flatnonzero(marked.values.imag > 0):

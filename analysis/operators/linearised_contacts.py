@@ -6,12 +6,13 @@ Symbols are those of :mod:`~faultgouge.analysis.assembly`.
 import numpy as np
 from scipy.sparse import csr_array
 
-from ..arrays import Floats
+from ..arrays import Floats, Indices
 from ..configuration import Configuration
 
 
 def rescaling_operators(configuration: Configuration) -> tuple[csr_array, csr_array]:
-    r"""What K of the mean derivative lacks where a contact closes with another derivative than it parts with.
+    r"""The part of the force that K of the mean derivative lacks, of contacts whose derivative differs between closing
+    and parting.
 
     With :math:`\dot\delta = N \dot q` the forces change by :math:`-K \dot q + B\, |N \dot q|`.
 
@@ -38,7 +39,7 @@ def unit_forces(configuration: Configuration, force: Floats) -> csr_array:
         np.hstack([sign * force, -(c.lever_arm[:, p] / configuration.radius[partner])[:, None] * turn])
         for p, (partner, sign) in enumerate(((c.i, 1.0), (c.j, -1.0)))
     ]
-    on_particles = _rows_of_particles(configuration, np.array(rows))
+    on_particles = _rows_of_particles(configuration, (c.i, c.j), np.array(rows))
     if configuration.constraint is None:
         return on_particles
     return csr_array(on_particles @ (configuration.constraint != 0).astype(np.float64))
@@ -52,17 +53,22 @@ def contact_rows(configuration: Configuration, rows: Floats) -> csr_array:
     rows : ndarray, shape (2, C, 6)
         Numbers of the partner i, and of the partner j. Those of walls and of fixed particles are left out.
     """
-    by_particles = _rows_of_particles(configuration, rows)
+    return particle_rows(configuration, (configuration.contacts.i, configuration.contacts.j), rows)
+
+
+def particle_rows(configuration: Configuration, partners: tuple[Indices, Indices], rows: Floats) -> csr_array:
+    """The same of other pairs of particles, whose second partner is -1 where it is none."""
+    by_particles = _rows_of_particles(configuration, partners, rows)
     return by_particles if configuration.constraint is None else csr_array(by_particles @ configuration.constraint)
 
 
-def _rows_of_particles(configuration: Configuration, rows: Floats) -> csr_array:
+def _rows_of_particles(configuration: Configuration, partners: tuple[Indices, Indices], rows: Floats) -> csr_array:
     """The same by the particles' own coordinates."""
-    c, count = configuration.contacts, len(configuration)
+    pairs, count = len(partners[0]), len(configuration)
     in_plane = np.arange(6) if configuration.dimension == 3 else np.array([0, 1, 5])
-    contact = np.tile(np.arange(len(c)), len(in_plane))
-    matrix = csr_array((len(c), configuration.coordinates))
-    for numbers, partner in zip(rows, (c.i, c.j), strict=True):
+    contact = np.tile(np.arange(pairs), len(in_plane))
+    matrix = csr_array((pairs, configuration.coordinates))
+    for numbers, partner in zip(rows, partners, strict=True):
         moves = (partner >= 0) & configuration.free[partner]
         coordinate = (np.arange(len(in_plane))[:, None] * count + np.where(moves, partner, 0)).ravel()
         values = (numbers * moves[:, None]).T[in_plane].ravel()

@@ -35,6 +35,7 @@ from scipy.sparse import csr_array, vstack
 
 from ..arrays import Floats, Indices, derive_frozen
 from ..configuration import Configuration
+from .gaps import gaps_of
 from .linearised_contacts import contact_rows, unit_forces
 
 
@@ -68,7 +69,7 @@ class Sliders:
 
 
 def with_sticking_contacts(configuration: Configuration) -> Configuration:
-    """The configuration whose one-sided contacts all stick, whatever is chosen for them."""
+    """The configuration with all of its one-sided contacts sticking."""
     contacts = configuration.contacts
     slides = contacts.sliding & ~contacts.one_sided
     if np.array_equal(slides, contacts.sliding):
@@ -94,7 +95,8 @@ def sliders_of(configuration: Configuration) -> Sliders:
 
 def margins(configuration: Configuration) -> tuple[csr_array, Floats]:
     """How far contacts are from another state: rows, shape (R, coordinates), whose products with a displacement reach
-    the limits, shape (R,), where a contact that is not at Coulomb's bound reaches the bound, or where one opens.
+    the limits, shape (R,), where a contact that is not at Coulomb's bound reaches the bound, where one opens, or where
+    two particles, or a particle and a plane, begin to touch.
 
     To first order, springs alone. A contact whose tangential force points nowhere is far from the bound.
     """
@@ -106,8 +108,9 @@ def margins(configuration: Configuration) -> tuple[csr_array, Floats]:
     here = derive_frozen(configuration, contacts=c.chosen(touching))
     parting = np.hstack([here.contacts.normal, np.zeros((len(touching), 3))])
     opens = contact_rows(here, np.array([parting, -parting]))
-    limits = np.concatenate([c.friction[below] - size[below], c.overlap[touching]])
-    return csr_array(vstack([excess, opens])), limits
+    gaps = gaps_of(configuration)
+    limits = np.concatenate([c.friction[below] - size[below], c.overlap[touching], gaps.gap])
+    return csr_array(vstack([excess, opens, gaps.rates(configuration)])), limits
 
 
 def _springs(configuration: Configuration, which: Indices) -> tuple[Configuration, Floats, csr_array]:

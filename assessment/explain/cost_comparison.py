@@ -1,8 +1,8 @@
 """The cost of one way to do the same work beside another way, and its line in the table.
 
-The ratio is taken within a turn. Work of one thread is timed by the processor time of this process, which leaves out
-the pauses that others make it take; work of several by the clock on the wall. Of the turns, medians and quartiles are
-kept: a mean would tell of the slowest.
+The ratio is that of two runs in one turn. The time of one thread is the processor time of this process, which does not
+count pauses for other processes; the time of several threads is wall time. Medians and quartiles over the turns are
+kept: the slowest turns would dominate a mean.
 """
 
 from collections.abc import Callable

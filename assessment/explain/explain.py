@@ -1,12 +1,14 @@
 """What a scene includes, what it leaves out, why, and, if wanted, what each part costs.
 
 The features of a run are switched one at a time, in LAMMPS: an undamped run of the scene's packing is set up with a
-feature and without it (`switches`). What the feature brings is the difference of what the two instances hold, read
-from them: deck parts from the log, fixes, computes, dumps and per-atom arrays from LAMMPS. What it costs is the ratio
-of their times per step, the two running in turns. And both must agree to the bit in what both compute: forces on all
-disks that the feature does not act on, or, where it leaves the motion as it is, positions and velocities at the end. A
-feature is in the scene if the scene's own run holds what the feature brings. Dumps, trajectories, ranks and threads are
-measured on the work that they belong to.
+feature and without it (`switches`).
+
+- *Content*: the deck parts in the log, and the fixes, computes, dumps and per-atom arrays of LAMMPS, that only the
+  instance with the feature has. A feature is in the scene if the scene's own run has this content.
+- *Cost*: the ratio of the times per step of both instances, which run in turns. The costs of dumps, trajectories, ranks
+  and threads are measured on the work that they belong to.
+- *Check*: both instances agree to the bit in the forces on all disks that the feature does not act on; if the feature
+  does not change the motion, in positions and velocities at the end.
 """
 
 from __future__ import annotations
@@ -286,7 +288,7 @@ def _steps(dynamics: Dynamics) -> int:
 
 
 def _defaults(scene: Scene) -> dict[str, Any]:
-    """Keys that the scene's sections leave to a default that is a value of its own."""
+    """Keys that the scene leaves out, whose default is a value and not none."""
     resolved = scene.resolved()
     unused = {"relax"} if scene.ramp is None or scene.ramp.method == "newton" else set()
     return {

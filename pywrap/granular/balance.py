@@ -1,4 +1,4 @@
-"""Is a packing at rest? What is out of balance, and why forces may be though nothing moves."""
+"""Is a packing at rest? Forces that are out of balance, and the reasons if nothing moves all the same."""
 
 import numpy as np
 
@@ -7,8 +7,8 @@ from ...analysis.arrays import Indices
 from .granular_commands import OWN, Commands, NotTakenError, without_suffix
 
 BALANCE = 1e-4
-"""Share of the mean contact force that may be out of balance: then the motion is that of a packing which comes to rest
-elsewhere, and K says nothing of it."""
+"""Share of the mean contact force that may be out of balance. Beyond, the packing moves to another place of rest, and K
+says nothing of this motion."""
 
 
 def check_balance(balance: float) -> None:
@@ -65,7 +65,7 @@ def touch_twice(i: Indices, j: Indices) -> bool:
 
 
 def restless_fix(commands: Commands) -> str:
-    """What is said of a fix that keeps particles from resting; empty if there is none."""
+    """The sentence on a fix that keeps particles from resting; empty if there is none."""
     for name, line in commands.fixes.items():
         words = line.split()
         style = without_suffix(words[3])

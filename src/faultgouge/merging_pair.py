@@ -6,7 +6,7 @@ from pathlib import Path
 
 from .figures import PairCurve
 from .pywrap import Scene
-from .pywrap.onset import AROUND_ONSET, onset_run
+from .pywrap.onset import ONSET_DISTANCES, onset_run
 from .pywrap.scenes.scene import scene_of
 from .pywrap.scenes.validation import require_section
 
@@ -33,6 +33,6 @@ def pair(scene: Scene | str | Path, mu: float | None = None) -> PairCurve:
         As of :func:`faultgouge.onset`.
     """
     scene = scene_of(scene, "pair")
-    near = AROUND_ONSET * require_section(scene.ramp, "ramp").first
+    near = ONSET_DISTANCES * require_section(scene.ramp, "ramp").first
     friction = scene.law.mus[0] if mu is None else mu
     return PairCurve.of_onset(onset_run(scene, friction, reached=lambda _: None, near_onset=near, first=True))

@@ -17,10 +17,10 @@ import numpy as np
 from ...analysis import Growth, Onset, Packing, RunFile, Spectrum, fit_growth, solid_fraction, spectrum
 from ...analysis.counted import counted
 from ...analysis.motion.growth import growing_range
-from ...analysis.motion.growth_of_run import BELOW_TOP
+from ...analysis.motion.growth_of_run import PLATEAU_SHARE
 from ...analysis.packing.packing import Floats
 from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
-from ...pywrap.onset import AROUND_ONSET, onset_run
+from ...pywrap.onset import ONSET_DISTANCES, onset_run
 from ...pywrap.runs.undamped import perturb, time_step
 from ...pywrap.scenes.sections import Perturb
 from ...pywrap.scenes.validation import require_section
@@ -77,7 +77,7 @@ def triggering_run(scene: Scene, runs: list[Onset], path: Path) -> Triggering | 
             f"F_x = {fx:g} is below the onset {weakened[0].fx_c:g} of the weakened friction, too: no "
             "window between the two, and nothing to erupt."
         )
-    *_, start = reach(scene, fx)  # to the bit the one of `perturb`, and so is v_0
+    *_, start = reach(scene, fx)  # to the bit the equilibrium of `perturb`, with its v_0
     modes = spectrum(start.packing)
     if modes.is_stable is False:
         what = f"{counted(len(modes.pairs), 'complex pair')} and {counted(len(modes.negative), 'negative eigenvalue')}"
@@ -90,7 +90,7 @@ def triggering_run(scene: Scene, runs: list[Onset], path: Path) -> Triggering | 
 def recorded_ramp(scene: Scene, mu: float, path: Path, bed: Packing | None = None) -> Onset:
     """Ramp and onset for one friction coefficient, from a settled bed; every equilibrium goes to the file."""
     one = scene.model_copy(update={"law": scene.law.model_copy(update={"mu": mu})})
-    near = AROUND_ONSET * require_section(scene.ramp, "ramp").first
+    near = ONSET_DISTANCES * require_section(scene.ramp, "ramp").first
     path.unlink(missing_ok=True)
     with Record(path, one) as record:
         run = onset_run(one, mu, reached=record.append, near_onset=near, bed=bed)
@@ -127,7 +127,7 @@ def growth_run(scene: Scene, run: Onset, path: Path) -> GrowthRun:
         file.append_series("undamped", **series)
     time, msd = series["time"], series["msd"]
     try:
-        measured = fit_growth(time, msd, *growing_range(time, msd, min(ceiling, BELOW_TOP * float(msd.max()))))
+        measured = fit_growth(time, msd, *growing_range(time, msd, min(ceiling, PLATEAU_SHARE * float(msd.max()))))
     except ValueError:
         measured = None
     return GrowthRun(start, time, msd, modes, dt, predicted, measured)

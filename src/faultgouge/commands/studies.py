@@ -1,4 +1,4 @@
-"""Commands that write studies and reports: explain, reproduce, report, extremes, trigger, eruptions."""
+"""The commands explain, reproduce, report, extremes, trigger and eruptions, which write studies and reports."""
 
 from __future__ import annotations
 

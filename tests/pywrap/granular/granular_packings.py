@@ -122,6 +122,12 @@ def with_law(lmp, law: str, d: int, g: str, w: str, e: tuple[str, str], mu: str 
         lmp.command(f"fix floor all wall/gran {wall.format(w=w, e=e[1])} {plane} 0 NULL contacts")
 
 
+def of_particle(lmp, name: str, number: int) -> np.ndarray:
+    """The row of an array that belongs to the particle with this ID, which can be changed."""
+    row = int(np.flatnonzero(lmp.numpy.extract_atom("id")[: lmp.extract_setting("nlocal")] == number)[0])
+    return lmp.numpy.extract_atom(name)[row]
+
+
 def state(lmp, world=None) -> np.ndarray:
     """All that moves, in the order of the IDs, of one rank or of all."""
     count = lmp.extract_setting("nlocal")

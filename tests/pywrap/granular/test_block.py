@@ -1,0 +1,177 @@
+"""A block, whose motion is known: on a slope it sticks and vibrates, or slides at a constant velocity; on top of a
+sphere it slides down faster and faster."""
+
+import numpy as np
+import pytest
+from granular_packings import command, of_particle
+from pushes import PUSH
+
+from faultgouge.analysis import one_sided_motion, stability
+
+FRICTION = 0.5
+LAW = f"hooke 1e3 5 tangential linear_history 300 1.0 {FRICTION} damping velocity"
+BLOCK = f"""
+units lj
+atom_style sphere
+boundary p p f
+newton off
+comm_modify vel yes
+region box block -2 2 -2 2 0 4 units box
+create_box 1 box
+create_atoms 1 single 0 0 0.4995 units box
+set group all diameter 1.0
+set group all density 1.0
+pair_style granular
+pair_coeff * * {LAW}
+fix floor all wall/gran granular {LAW} zplane 0 NULL contacts
+fix load all gravity 1.0 vector 0 0 -1
+variable pull equal mass(all)*v_slope
+fix pull all addforce v_pull 0 0
+fix drag all viscous 5.0
+fix move all nve/limit 0.1
+timestep 0.001
+thermo 1000000
+run 5000
+"""
+"""A sphere that does not turn."""
+
+
+@pytest.fixture
+def block(lammps_with):
+    """Makes a block at rest on a slope, by a share of the angle of repose, to first order in the share."""
+
+    def make(share: float):
+        lmp = lammps_with(f"variable slope equal {share * FRICTION:.17g}")
+        command(lmp, BLOCK)
+        return lmp
+
+    return make
+
+
+def moved(lmp, velocity: float, steps: int, which: int = 1) -> float:
+    """By how much a block moves ahead in some steps of 0.001 without drag, over the velocity of the push."""
+    from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy, quieten
+
+    def follow():
+        quieten(lmp, drag=True)
+        before = float(of_particle(lmp, "x", which)[0])
+        of_particle(lmp, "v", which)[0] = velocity
+        lmp.command(f"run {steps} post no")
+        return (float(of_particle(lmp, "x", which)[0]) - before) / abs(velocity)
+
+    return in_a_copy(follow)
+
+
+def test_at_the_angle_of_repose_a_block_slides_on_ahead(block):
+    from faultgouge.pywrap import from_lammps
+
+    lmp = block(1.0)
+    here = from_lammps(lmp)
+    assert here.contacts.at_bound.all()
+    assert here.free.all()
+    ahead, back = (one_sided_motion(here, [[v, 0, 0]], times=[5.0]).displacement[0, 0, 0] for v in (1.0, -1.0))
+    assert ahead == pytest.approx(5.0, rel=1e-9)
+    assert moved(lmp, PUSH, 5000) == pytest.approx(ahead, rel=1e-6)
+    # a push back is turned round, and loses energy: 2 % is what steps of one-sided motion change
+    assert 0 < moved(lmp, -PUSH, 5000) == pytest.approx(back, rel=0.02)
+    verdict = stability(here, time=5.0)
+    assert verdict.stable is None
+    assert "has not settled" in str(verdict)
+
+
+@pytest.mark.long
+def test_a_load_that_rises_accelerates_a_block_that_slides_and_pushes_one_back_that_sticks(block):
+    """At the angle of repose: ahead nothing bears the load, which displaces the block by t^3 / (6 m); back the spring
+    of the contact does. The drift is a root mean square over three axes."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = block(1.0)
+    here = from_lammps(lmp)
+    ahead = stability(here, rise=[[1.0, 0.0, 0.0]], time=8.0)
+    assert ahead.rising is None
+    assert "there is no constant drift: the load accelerates particles whose contacts slide on" in str(ahead)
+    back = stability(here, rise=[[-1.0, 0.0, 0.0]], time=8.0)
+    assert np.sqrt(3) * back.rising["drift"] == pytest.approx(1 / 300, rel=0.02)
+    assert back.rising["vibration"] < 1e-6 * back.rising["drift"]
+    rate, time = 1e-7, 2.0
+    command(lmp, f"unfix drag\nreset_timestep 0\nvariable rise equal {rate}*step*dt\nfix rise all addforce v_rise 0 0")
+    before = float(of_particle(lmp, "x", 1)[0])
+    command(lmp, f"run {round(time / 0.001)} post no")
+    expected = rate * time**3 / (6 * float(here.mass[0]))
+    assert float(of_particle(lmp, "x", 1)[0]) - before == pytest.approx(expected, rel=0.01)
+
+
+def test_a_block_below_the_angle_of_repose_vibrates_and_rests(block):
+    from faultgouge.pywrap import from_lammps
+
+    lmp = block(0.9)
+    here = from_lammps(lmp)
+    verdict = stability(here)
+    assert verdict.stable is True
+    assert verdict.free == 0
+    assert abs(moved(lmp, PUSH, 5000)) < 1e-6
+
+
+def test_of_a_block_that_slides_the_load_alone_is_not_accused(block):
+    """The slope is 4e-6 beyond the angle of repose: less is out of balance than is allowed, but nothing stops it."""
+    from faultgouge.pywrap import from_lammps
+    from faultgouge.pywrap.granular.granular_commands import NotTakenError
+
+    with pytest.raises(NotTakenError, match="1 contact at Coulomb's bound or just below may slide while"):
+        from_lammps(block(1.0 + 4e-6))
+
+
+HILL = f"""
+units lj
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -3 6 -3 3 0 6 units box
+create_box 2 box
+create_atoms 1 single 0 0 0.5 units box
+create_atoms 2 single 0 0 1.4995 units box
+set group all diameter 1.0
+set group all density 1.0
+pair_style granular
+pair_coeff * * {LAW}
+group block type 2
+fix load block gravity 1.0 vector 0 0 -1
+variable pull equal mass(block)*v_slope*(1-exp(-0.5*step*dt))
+fix pull block addforce v_pull 0 0
+fix drag block viscous 10.0
+fix move block nve
+timestep 0.001
+thermo 1000000
+run 20000
+unfix pull
+fix pull block addforce $(mass(block)*v_slope) 0 0
+run 5000
+"""
+"""A sphere that does not turn, on top of another one, and pulled sideways until it nearly slides."""
+
+REPOSE = 0.9978189798742391 * FRICTION
+"""The pull over the weight at which the contact lacks 9e-8 of Coulomb's bound: the pull moves the block, and turns the
+contact."""
+
+
+def test_a_block_on_top_of_a_sphere_slides_down_from_the_push_on_that_is_said(lammps_with):
+    """Ahead it slides with s^2 = (1 + mu^2) g / r for the distance r of the centres, or not at all.
+
+    The torque does not turn it. The weight is g, and the pull mu g: as the contact turns by a, the force along it grows
+    by (1 + mu^2) g a."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = lammps_with(f"variable slope equal {REPOSE:.17g}")
+    command(lmp, HILL)
+    here = from_lammps(lmp)
+    verdict = stability(here)
+    assert verdict.at_bound == 1
+    assert verdict.stable is False
+    assert verdict.growth_rate == pytest.approx(2 * (1 + FRICTION**2) ** 0.5, rel=1e-3)  # r is shorter by the overlap
+    least, most = one_sided_motion(here, [[0, 0, 0], [1, 0, 0]], times=[6.0]).scales
+    assert 1e-7 < least < 1e-5 < most
+    assert f"after pushes from {verdict.one_sided['scales'][0]:.1g} on" in str(verdict)
+    expected = one_sided_motion(here, [[0, 0, 0], [1, 0, 0]], times=[6.0]).displacement[0, 1, 0]
+    assert moved(lmp, least, 6000, which=2) == pytest.approx(expected, rel=0.1)
+    assert abs(moved(lmp, 0.01 * least, 6000, which=2)) < 1e-3 * expected

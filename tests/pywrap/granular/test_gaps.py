@@ -1,0 +1,93 @@
+"""Particles that nearly touch others, or a wall: up to which push, and up to which load, their contacts stay open."""
+
+import numpy as np
+import pytest
+from granular_packings import command, of_particle
+
+from faultgouge.analysis import one_sided_motion, stability
+from faultgouge.analysis.operators.gaps import gaps_of
+
+GAP = 1e-6
+LAW = "hooke 1e3 5 tangential linear_history 300 1.0 0.5 damping velocity"
+ROW = f"""
+units lj
+dimension 2
+atom_style sphere
+boundary p f p
+newton off
+comm_modify vel yes
+region box prism -1 {2 + 3 * GAP:.17g} 0 6 -0.5 0.5 0.7 0 0 units box
+create_box 1 box
+create_atoms 1 single -0.5 0.4995 0 units box
+create_atoms 1 single {0.5 + GAP:.17g} 0.4995 0 units box
+create_atoms 1 single {1.5 + 2.5 * GAP:.17g} 0.4995 0 units box
+set group all diameter 1.0
+set group all density 1.0
+pair_style granular
+pair_coeff * * {LAW}
+fix floor all wall/gran granular {LAW} yplane 0 NULL contacts
+fix load all gravity 1.0 vector 0 -1 0
+fix drag all viscous 3.0
+fix move all nve
+timestep 0.001
+thermo 1000000
+run 5000
+unfix drag
+"""
+"""Three disks that do not turn, side by side, the last beside the first: gaps of 1, 1.5 and 0.5."""
+
+
+@pytest.fixture
+def row(lammps_with):
+    from faultgouge.pywrap import from_lammps
+
+    lmp = lammps_with()
+    command(lmp, ROW)
+    return lmp, from_lammps(lmp)
+
+
+def test_gaps_are_those_of_the_row(row):
+    _, here = row
+    found = gaps_of(here)
+    pairs = {frozenset((int(i), int(j))): gap for i, j, gap in zip(found.i, found.j, found.gap, strict=True)}
+    assert pairs == {
+        frozenset((0, 1)): pytest.approx(GAP, rel=1e-6),
+        frozenset((1, 2)): pytest.approx(1.5 * GAP, rel=1e-6),
+        frozenset((2, 0)): pytest.approx(0.5 * GAP, rel=1e-6),
+    }
+    closing = found.rates(here)
+    assert closing.shape == (3, here.coordinates)
+    moved = 1e-8 * np.random.default_rng(0).standard_normal(here.coordinates)
+    after = gaps_of(displaced(here, moved))
+    np.testing.assert_allclose(found.gap - after.gap, closing @ moved, atol=1e-14)
+
+
+def displaced(here, moved):
+    """The configuration with the first coordinates moved."""
+    from faultgouge.analysis.arrays import derive_frozen
+
+    return derive_frozen(here, position=here.position + moved.reshape(3, -1)[:2].T)
+
+
+def test_a_push_that_closes_a_gap_is_too_large(row):
+    """LAMMPS's second disk stays where it is after half of the largest push, and is hit after twice that push."""
+    lmp, here = row
+    velocity = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
+    times = np.linspace(0.01, 0.5, 50)
+    motion = one_sided_motion(here, velocity, times=times)
+    most = motion.scales[1]
+    # close looks take steps of 0.3 of the stable one
+    assert most == pytest.approx(GAP / motion.displacement[:, 0, 0].max(), rel=0.1)
+    verdict = stability(here)
+    assert verdict.largest_push < 100 * GAP
+    assert "above, contacts open, close or slide" in str(verdict)
+    rise = stability(here, rise=velocity).rising
+    assert rise["next_event"] == "closes"
+    assert rise["next_change"] == pytest.approx(300 * GAP, rel=1e-3)  # of the spring of the floor
+    for size, hit in ((0.5, False), (2.0, True)):
+        command(lmp, "velocity all set 0 0 0")
+        before = of_particle(lmp, "x", 2)[0]
+        of_particle(lmp, "v", 1)[0] = size * most
+        command(lmp, "run 200 post no")
+        assert bool(abs(of_particle(lmp, "x", 2)[0] - before) > 0.01 * GAP) is hit
+        command(lmp, "run 5000 post no")

@@ -1,0 +1,158 @@
+"""Growth that is slow beside what dashpots do, or beside what residual forces leave open, as LAMMPS has it."""
+
+import numpy as np
+import pytest
+from granular_packings import command, of_particle
+
+from faultgouge.analysis import spectrum, stability
+from faultgouge.analysis.motion import rates
+
+SPRING, HALF_SPAN = 1e3, 0.95
+MASS = np.pi / 6
+ARCH = """
+units lj
+dimension 2
+atom_style sphere
+boundary f f p
+newton off
+comm_modify vel yes
+region box block -4 4 -4 4 -0.5 0.5 units box
+create_box 2 box
+create_atoms 1 single -{span} 0 0 units box
+create_atoms 1 single {span} 0 0 units box
+create_atoms 2 single 0 {height} 0 units box
+set group all diameter 1.0
+set group all density 1.0
+pair_style granular
+pair_coeff * * hooke {spring} {dashpot} tangential linear_history 300 1.0 0.0 damping velocity
+group middle type 2
+fix load middle gravity {gravity:.17g} vector 0 -1 0
+fix move middle nve/sphere
+timestep {step}
+thermo 1000000
+run 0
+"""
+LINEAR = "hooke 500 1 tangential linear_history 200 1.0 0.5 damping velocity"
+STACK = """
+units lj
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -4 4 -4 4 0 8 units box
+create_box 3 box
+create_atoms 1 single 0 0 0.5 units box
+create_atoms 2 single 0 0 {top:.17g} units box
+create_atoms 3 single 2 0 {low:.17g} units box
+set type 1*2 diameter 1.0
+set type 3 diameter 0.1
+set group all density 1.0
+pair_style granular
+pair_coeff * * {law}
+fix floor all wall/gran granular {law} zplane 0 NULL contacts
+group small type 3
+group moving type 2 3
+fix load moving gravity 1.0 vector 0 0 -1
+fix move moving nve/sphere
+fix rolls small addforce {residual} 0 0
+timestep 5e-4
+thermo 1000000
+run 0
+"""
+
+
+@pytest.mark.parametrize(("height", "dashpot", "large"), [(0.1, 1e6, False), (0.2, 1e5, False), (0.1, 1e4, True)])
+def test_strong_dashpots_hold_slow_motion_up_and_do_not_hide_it(lammps_with, monkeypatch, height, dashpot, large):
+    """A shallow arch of three disks: the middle one snaps through, or rests, at one rate s of two that is small.
+
+    Displaced by y, the middle disk has the velocity s y as soon as the dashpots hold its weight.
+    """
+    length = np.hypot(HALF_SPAN, height)
+    force = SPRING * (1 - length)
+    stiffness = 2 * SPRING * (1 / length**3 * height**2 + 1 - 1 / length)  # -d F_y / dy
+    damping = 2 * dashpot * (height / length) ** 2
+    expected = max(np.roots([MASS, damping, stiffness]).real)
+    step = 0.2 * MASS / damping
+    lmp = lammps_with(
+        ARCH.format(
+            span=HALF_SPAN, height=height, spring=SPRING, dashpot=dashpot, step=step,
+            gravity=2 * force * height / length / MASS,
+        )
+    )  # fmt: skip
+    from faultgouge.pywrap import from_lammps
+
+    if large:  # as if not all eigenvalues were known
+        monkeypatch.setattr(rates, "DENSE_DAMPED", 0)
+    verdict = stability(from_lammps(lmp))
+    assert verdict.stable is bool(expected < 0)
+    assert verdict.growth_rate == pytest.approx(2 * expected, rel=1e-6)
+    assert verdict.free == 0
+    command(lmp, "displace_atoms middle move 0 1e-6 0 units box\nrun 200 post no")
+    displacement = of_particle(lmp, "x", 3)[1] - height
+    assert of_particle(lmp, "v", 3)[1] == pytest.approx(displacement * expected, rel=1e-3)
+
+
+def test_a_small_sphere_that_rolls_hides_no_growth_of_others(lammps_with):
+    """A sphere on top of another one rolls down. Beside them a sphere of a tenth of their size feels a force that is
+    left, 0.9e-4 of the mean contact force, which would be an eigenvalue of 1 of its own."""
+    small = MASS * 1e-3
+    lmp = lammps_with(STACK.format(law=LINEAR, top=1.5 - MASS / 500, low=0.05 - small / 500, residual=2.3e-5))
+    from faultgouge.pywrap import from_lammps
+
+    here = from_lammps(lmp)
+    verdict = stability(here)
+    assert verdict.stable is False
+    assert len(spectrum(here).negative) == 2
+    of_particle(lmp, "v", 2)[0] = 1e-7
+    places = []
+    for _ in range(2):
+        lmp.command("run 8000 post no")
+        places.append(of_particle(lmp, "x", 2)[0])
+    assert 2 * np.log(places[1] / places[0]) / 4 == pytest.approx(verdict.growth_rate, rel=0.01)
+
+
+APART = """
+units lj
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -4 4 -4 4 0 8 units box
+create_box 2 box
+create_atoms 1 single 0 0 {height:.17g} units box
+create_atoms 2 single 2 0 {height:.17g} units box
+set group all diameter 1.0
+set group all density 1.0
+pair_style granular
+pair_coeff * * {law}
+group bounces type 1
+group lossy type 2
+fix spring bounces wall/gran granular hooke 500 0 tangential linear_history 200 0.0 0.5 damping velocity zplane 0 NULL
+fix dashpot lossy wall/gran granular {law} zplane 0 NULL
+fix load all gravity 1.0 vector 0 0 -1
+fix move all nve/sphere
+timestep 1e-3
+thermo 1000000
+run 0
+"""
+
+
+def test_a_sphere_without_dashpots_bounces_on_beside_one_that_has_them(lammps_with):
+    """Its Re s is zero but for rounding, of either sign."""
+    lmp = lammps_with(APART.format(law=LINEAR, height=0.5 - MASS / 500))
+    from faultgouge.pywrap import from_lammps
+
+    here = from_lammps(lmp)
+    verdict = stability(here)
+    assert verdict.stable is True
+    assert verdict.growth_rate == 0
+    assert str(verdict).startswith("stable: no motion grows, except for ")
+    assert "no motion grows with the packing's dissipation" in repr(spectrum(here))
+    of_particle(lmp, "v", 1)[:] = [1e-5, 0, 1e-5]
+    of_particle(lmp, "v", 2)[:] = [1e-5, 0, 1e-5]
+    lmp.command("run 20000 post no")  # a hundred oscillations
+    speeds = []
+    for _ in range(200):
+        lmp.command("run 2 post no")
+        speeds.append([of_particle(lmp, "v", k)[2] for k in (1, 2)])
+    assert np.abs(speeds).max(axis=0) == pytest.approx([1e-5, 0.0], rel=0.01, abs=1e-10)
