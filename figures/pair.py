@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from faultgouge.analysis import Onset, pair_eigenvalues
 from faultgouge.analysis.arrays import Floats
 
 from .style import INK, styled
@@ -84,7 +85,9 @@ def _with_loads_between(
     mean_at = PchipInterpolator(load, mean)
     if coalescence is not None and load[0] < coalescence < load[-1]:
         k = int(np.searchsorted(load, coalescence))
-        if square[k - 1] * square[k] < 0:
+        if load[k] == coalescence:
+            square = np.where(load == coalescence, 0.0, square)
+        elif square[k - 1] * square[k] < 0:
             load, square = np.insert(load, k, coalescence), np.insert(square, k, 0.0)
     square_at = PchipInterpolator(load, square)
     roots = np.array([root for root in square_at.roots(extrapolate=False) if np.isfinite(root)])
@@ -118,6 +121,23 @@ class PairCurve:
     fx: Floats
     eigenvalues: NDArray[np.complex128]
     fx_c: float | None
+
+    @classmethod
+    def of_onset(cls, run: Onset) -> "PairCurve":
+        """The pair of a scene's onset up to the end of its window, or to twice the onset if the window has no end.
+
+        Parameters
+        ----------
+        run : Onset
+            With the equilibria of the ramp, and those near the onset: `equilibria` and `between`.
+        """
+        first = run.windows[0]
+        packings = {each.fx: each.packing for each in run.equilibria} | run.between
+        last = 2.0 * first.fx_onset if first.fx_end is None else first.fx_end
+        fx = np.array(sorted(load for load in packings if load <= last))
+        below, beyond = fx[fx <= first.fx_onset][::-1], fx[fx > first.fx_onset]
+        values = [pair_eigenvalues([packings[load] for load in side], first.eigenvalue) for side in (below, beyond)]
+        return cls(run.mu, fx, np.concatenate([values[0][::-1], values[1]]), first.fx_onset)
 
     @property
     def real(self) -> Floats:

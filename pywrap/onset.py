@@ -31,6 +31,18 @@ from .settling.settle import settle
 OnsetSoFar = Callable[[Onset, float], None]
 """Takes what is known, without the errors of the path, and the load up to which that is all."""
 
+ONSET_DISTANCES = np.concatenate(
+    [
+        -np.geomspace(3e-2, 1e-3, 7)[:-1],
+        -np.geomspace(1e-3, 1e-7, 13),
+        [0.0],
+        np.geomspace(1e-6, 1e-3, 9),
+        np.linspace(0.0, 0.3, 76)[1:],
+    ]
+)
+"""Distances from an onset at which the pair that merges there shows its curve, in units of the ramp's last F_x. Beyond
+the onset the pair turns sharply within one increment."""
+
 
 def onset(scene: Scene | str | Path, mu: float | None = None, *, every: bool = False) -> Onset:
     """Find the onset of a scene; the ramp and the search end there.

@@ -48,7 +48,7 @@ def test_driver_imports_what_is_used():
     assert done.stdout == "[]\n"
 
 
-@pytest.mark.parametrize("name", ["onset", "settle", "ramp", "perturb", "drive"])
+@pytest.mark.parametrize("name", ["onset", "pair", "settle", "ramp", "perturb", "drive"])
 def test_a_scene_may_be_the_path_of_its_file(tmp_path, name):
     with pytest.raises(BadInputError, match="the scene cannot be read"):
         getattr(faultgouge, name)(tmp_path / "scene.toml")
@@ -122,6 +122,22 @@ def test_onset_of_a_scene_prints_as_the_command_does(tmp_path):
     found = faultgouge.onset(scene)
     assert found.fx_c == pytest.approx(0.01500983227, abs=3e-11)
     assert re.fullmatch(r"F_x\^c = 0\.0150098322\d*\(\d+\)", str(found))
+
+
+def test_pair_of_a_scene_is_a_curve_through_its_onset():
+    """Loads crowd at the onset, where both branches meet as a square root."""
+    layer = {"packing": {"disks": 3, "radii": [0.5], "top": 1, "width": 2.8}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+    curve = faultgouge.pair(faultgouge.Scene.from_mapping(layer | {"ramp": {"step": 0.1, "until": 2.4}}))
+    assert curve.fx_c == pytest.approx(1.935965486783, abs=1e-11)
+    assert np.abs(curve.fx - curve.fx_c).min() < 1e-6
+    half = (curve.eigenvalues[:, 1] - curve.eigenvalues[:, 0]) / 2
+    below, beyond = half[curve.fx < curve.fx_c - 1e-9], half[curve.fx > curve.fx_c + 1e-9]
+    assert (below.imag == 0).all()
+    assert (beyond.real == 0).all()
+    distance = curve.fx_c - curve.fx
+    near = (distance > 1e-6) & (distance < 2e-3)
+    slope = np.polyfit(np.log(distance[near]), np.log(np.abs(half[near])), 1)[0]
+    assert slope == pytest.approx(0.5, abs=0.01)
 
 
 def test_load_takes_files_of_all_kinds(tmp_path, cluster_file):

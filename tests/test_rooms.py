@@ -26,7 +26,7 @@ FLOORS = {
         ("figures", "pywrap"),
         ("assessment", "studies"),
         ("signal_guard", "notebook", "stored_files"),
-        ("browser_view", "drawing"),
+        ("browser_view", "drawing", "merging_pair"),
         ("commands", "exit_status"),
         ("cli",),
         ("__main__",),

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # what `OFFERS` imports when it is used
     from .browser_view import view
     from .drawing import draw
+    from .merging_pair import pair
     from .pywrap import Scene, from_lammps, perturb, ramp, relax, settle
     from .pywrap.onset import onset
     from .pywrap.runs.drive import drive
@@ -30,13 +31,13 @@ OFFERS = {
     "Scene": "pywrap", "settle": "pywrap", "ramp": "pywrap", "perturb": "pywrap", "drive": "pywrap.runs.drive",
     "onset": "pywrap.onset", "from_lammps": "pywrap", "relax": "pywrap", "load": "stored_files",
     "stability": "stored_files", "spectrum": "stored_files", "draw": "drawing", "view": "browser_view",
-    "sweep": "studies.sweep.run_sweep",
+    "pair": "merging_pair", "sweep": "studies.sweep.run_sweep",
 }  # fmt: skip
 """Names of this package, and the modules that have them."""
 
 __all__ = [
-    "Scene", "__version__", "draw", "drive", "from_lammps", "load", "onset", "perturb", "ramp", "relax", "settle",
-    "spectrum", "stability", "sweep", "view",
+    "Scene", "__version__", "draw", "drive", "from_lammps", "load", "onset", "pair", "perturb", "ramp", "relax",
+    "settle", "spectrum", "stability", "sweep", "view",
 ]  # fmt: skip
 
 

@@ -19,10 +19,8 @@ from ...analysis.counted import counted
 from ...analysis.motion.growth import growing_range
 from ...analysis.motion.growth_of_run import PLATEAU_SHARE
 from ...analysis.packing.packing import Floats
-from ...analysis.windows.pair_over_load import pair_eigenvalues
-from ...figures.pair import PairCurve
 from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
-from ...pywrap.onset import onset_run
+from ...pywrap.onset import ONSET_DISTANCES, onset_run
 from ...pywrap.runs.undamped import perturb, time_step
 from ...pywrap.scenes.sections import Perturb
 from ...pywrap.scenes.validation import require_section
@@ -33,18 +31,6 @@ EFOLDS = 48.0
 
 MOST_RUN_STEPS = 3_000_000
 """Steps of the undamped run, at the most: about 20 s for 100 disks."""
-
-DISTANCES = np.concatenate(
-    [
-        -np.geomspace(3e-2, 1e-3, 7)[:-1],
-        -np.geomspace(1e-3, 1e-7, 13),
-        [0.0],
-        np.geomspace(1e-6, 1e-3, 9),
-        np.linspace(0.0, 0.3, 76)[1:],
-    ]
-)
-"""Distances from the onset at which there are further equilibria, in units of the ramp's last F_x: for figure 3, and
-below the onset for the response over the distance. Beyond it the pair turns sharply within one increment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +90,7 @@ def triggering_run(scene: Scene, runs: list[Onset], path: Path) -> Triggering | 
 def recorded_ramp(scene: Scene, mu: float, path: Path, bed: Packing | None = None) -> Onset:
     """Ramp and onset for one friction coefficient, from a settled bed; every equilibrium goes to the file."""
     one = scene.model_copy(update={"law": scene.law.model_copy(update={"mu": mu})})
-    near = DISTANCES * require_section(scene.ramp, "ramp").first
+    near = ONSET_DISTANCES * require_section(scene.ramp, "ramp").first
     path.unlink(missing_ok=True)
     with Record(path, one) as record:
         run = onset_run(one, mu, reached=record.append, near_onset=near, bed=bed)
@@ -182,14 +168,3 @@ def summary_of(scene: Scene, runs: list[Onset], growth: GrowthRun) -> dict[str, 
             "deviation": growth.measured.rate / growth.predicted - 1 if growth.measured else None,
         },
     }
-
-
-def pair_curve(run: Onset) -> PairCurve:
-    """The pair of the first onset up to the end of its window, at the loads of the ramp and at those near the onset."""
-    first = run.windows[0]
-    packings = {each.fx: each.packing for each in run.equilibria} | run.between
-    last = 2.0 * first.fx_onset if first.fx_end is None else first.fx_end
-    fx = np.array(sorted(load for load in packings if load <= last))
-    below, beyond = fx[fx <= first.fx_onset][::-1], fx[fx > first.fx_onset]
-    values = [pair_eigenvalues([packings[load] for load in side], first.eigenvalue) for side in (below, beyond)]
-    return PairCurve(run.mu, fx, np.concatenate([values[0][::-1], values[1]]), first.fx_onset)

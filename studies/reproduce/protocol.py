@@ -7,6 +7,7 @@ from typing import Any
 
 from ...analysis import Onset, OnsetError
 from ...analysis.files.atomic_write import make_folder, write_json, write_text
+from ...figures import PairCurve
 from ...pywrap import Scene, SceneError
 from ...pywrap.onset import load_at_onset
 from ...pywrap.scenes.validation import require_section
@@ -16,7 +17,7 @@ from ..study import draw_all
 from ..triggering.compute import Triggering
 from ..triggering.compute import summary as triggering_summary
 from ..triggering.draw import figures as triggering_figures
-from .compute import growth_run, pair_curve, recorded_ramp, summary_of, triggering_run
+from .compute import growth_run, recorded_ramp, summary_of, triggering_run
 from .draw import figures
 from .page import report
 
@@ -49,7 +50,7 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     say(f"growth rate of D: {rate} measured, {growth.predicted:.6g} predicted")
     summary = summary_of(scene, runs, growth)
     write_json(output / "summary.json", summary)  # what follows may fail
-    draw_all(figures([pair_curve(run) for run in runs], growth), output, say)
+    draw_all(figures([PairCurve.of_onset(run) for run in runs], growth), output, say)
     shaken, found, another = triggered or scene, None, None
     if shaken.perturb is not None and shaken.friction is not None:
         path = output / ("run.h5" if triggered is None else "triggered.h5")
