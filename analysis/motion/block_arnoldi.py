@@ -121,6 +121,15 @@ class Krylov:
         rest = self.projection[self.used : self.used + self.block, self.used - self.block : self.used]
         return np.asarray(np.linalg.norm(rest @ vectors[self.used - self.block :], axis=0))
 
+    def vector(self, wanted: complex) -> Complexes:
+        """The vector of the space that belongs to one eigenvalue of H, by inverse iteration."""
+        shifted = self.square - wanted * (1 + np.finfo(float).eps) * np.eye(self.used)
+        found = np.ones(self.used, complex)
+        for _ in range(2):
+            found = np.linalg.solve(shifted, found)
+            found /= np.linalg.norm(found)
+        return np.asarray(self.basis[: self.used].T @ found)
+
     def subspace(self, wanted: Complexes) -> Floats:
         """An orthonormal basis of the invariant subspace of some eigenvalues of H, closed under conjugation."""
         from scipy.optimize import linear_sum_assignment

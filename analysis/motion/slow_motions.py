@@ -56,6 +56,12 @@ FREE_OF_SLOW = 1e-5
 """Eigenvalues below this share of the largest frequency are those of motions that no force opposes: zero is double, and
 rounding of 1e-10 leaves its root."""
 
+HOLDS_UP = 10.0
+"""Damping over the largest frequency, by sums of rows, from which on a slow motion may have a force against it."""
+
+UNOPPOSED = 1e-4
+"""Force along a vector of the space over the largest of A that is none: vectors of a double zero have five digits."""
+
 FREE_ROW = 1e-10
 """Force along a vector of one particle, as a share of the largest entry of A, and of G, that is no force."""
 
@@ -150,6 +156,8 @@ def slow_motions(
         return without(alone, np.concatenate([a, (place + shift * a) / reference]))
 
     alone = motions_of_one(matrix, damping, particle)
+    # strong dashpots hold up motions that a force opposes, which are then as slow as those that none does
+    held = matrix if float(abs(damping).sum(axis=1).max()) > HOLDS_UP * largest else None
     start = without(alone, np.random.default_rng(0).standard_normal((2 * size, BLOCK_OF_SLOW))).T
     krylov = Krylov(inverse, start, int(min(MOST_SLOW, BYTES_OF_SPACE / (16 * size), 2 * (size - alone.shape[1]))))
     entries, wanted = matrix.nnz + damping.nnz + factors.lu.nnz, FIRST_SLOW
@@ -160,7 +168,7 @@ def slow_motions(
 
     while True:
         krylov.extend(wanted)
-        found = replace(_inside(krylov, shift, largest, reference, alone), entries=int(factors.lu.nnz))
+        found = replace(_inside(krylov, shift, largest, reference, alone, held), entries=int(factors.lu.nnz))
         report_progress(
             f"slow motions: {len(found.values)} up to {found.radius / largest:.2%} of the largest frequency"
         )
@@ -195,10 +203,17 @@ def without(alone: csr_array, states: Floats) -> Floats:
     return np.concatenate([part - alone @ (alone.T @ part) for part in parts]).reshape(states.shape)
 
 
-def _inside(krylov: Krylov, shift: float, largest: float, reference: float, alone: csr_array) -> SlowMotions:
-    """The eigenvalues up to the first one that has not converged."""
+def _inside(
+    krylov: Krylov, shift: float, largest: float, reference: float, alone: csr_array, held: csr_array | None
+) -> SlowMotions:
+    """The eigenvalues up to the first one that has not converged; `held` is A where dashpots hold slow motions up."""
     values, overlap, errors = ritz_values(krylov, shift)
     is_free = np.abs(values) < FREE_OF_SLOW * largest
+    if held is not None:
+        for k in np.flatnonzero(is_free):
+            place = krylov.vector(1 / (values[k] - shift))[: held.shape[0]]
+            force = abs(np.vdot(place, held @ place)) / np.vdot(place, place).real
+            is_free[k] = force <= UNOPPOSED * largest**2
     failed = np.flatnonzero((errors > SLOW_ACCURACY * largest * overlap) & ~is_free)
     count = int(failed[0]) if len(failed) else len(values)
     while count:

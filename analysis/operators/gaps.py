@@ -64,20 +64,19 @@ def _touch(configuration: Configuration, i: Indices, j: Indices) -> np.ndarray:
 
 
 def _between_particles(c: Configuration, place: Floats, largest: float) -> tuple[Indices, Indices, Floats, Floats]:
-    far, tree = 2 * float(c.radius.max()) + largest, cKDTree(place)
-    low, high = place.min(axis=0) - far, place.max(axis=0) + far
+    """Pairs of particles, through the sides of the box, too: the larger of two, or the later one, finds the other."""
+    tree, far = cKDTree(place), 2 * c.radius + largest
+    low, high = place.min(axis=0) - far.max(), place.max(axis=0) + far.max()
     found = [(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)))]
     for image in product(*((-1, 0, 1) if each else (0,) for each in c.periodic)):
-        if image < (0, 0, 0):
-            continue  # the same pairs as of the opposite image
         shifted = place + np.array(image) @ c.box
         inside = np.flatnonzero(np.all((shifted >= low) & (shifted <= high), axis=1))
         if not len(inside):
             continue
-        near = cKDTree(shifted[inside]).query_ball_tree(tree, far)
+        near = tree.query_ball_point(shifted[inside], far[inside])
         j = np.repeat(inside, [len(each) for each in near])
         i = np.concatenate([np.zeros(0, int), *(np.array(each, int) for each in near)])
-        once = i < j if image == (0, 0, 0) else i != j
+        once = (c.radius[i] < c.radius[j]) | ((c.radius[i] == c.radius[j]) & (i < j))
         found.append((i[once], j[once], (place[i] - shifted[j])[once]))
     i, j, branch = (np.concatenate(each) for each in zip(*found, strict=True))
     distance = np.linalg.norm(branch, axis=1)

@@ -61,7 +61,9 @@ run 0
 """
 
 
-@pytest.mark.parametrize(("height", "dashpot", "large"), [(0.1, 1e6, False), (0.2, 1e5, False), (0.1, 1e4, True)])
+@pytest.mark.parametrize(
+    ("height", "dashpot", "large"), [(0.1, 1e6, False), (0.2, 1e5, False), (0.1, 1e4, True), (0.1, 1e7, True)]
+)
 def test_strong_dashpots_hold_slow_motion_up_and_do_not_hide_it(lammps_with, monkeypatch, height, dashpot, large):
     """A shallow arch of three disks: the middle one snaps through, or rests, at one rate s of two that is small.
 
