@@ -34,6 +34,8 @@ BENCHMARKS = {
     "spectra_3000": "python benchmarks/spectra.py --disks 3000 --spheres --lapack 9000",
     "verdict": "python benchmarks/verdict.py",
     "verdict_deep": "python benchmarks/verdict.py --deep 10",
+    "verdict_poured": "python benchmarks/verdict.py --copies 0 0 --poured 200",
+    "bloch": "python benchmarks/bloch.py",
     "look": "python benchmarks/look.py --turns 7",
 }
 """Commands by the names of their tables. A table that is not here was measured by hand, and says so."""
