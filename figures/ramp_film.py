@@ -2,8 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from matplotlib.colors import LinearSegmentedColormap, to_rgba_array
+from numpy.typing import NDArray
 
 from faultgouge.analysis import Packing, nearest_image
 from faultgouge.analysis.arrays import Floats
@@ -15,6 +18,9 @@ from .disk_view import View
 from .film import DOTS, LARGEST_SHOWN, Film, packing_and_curve
 from .packing_artist import PackingArtist
 from .style import BULK, styled
+
+WAY_COLOURS = LinearSegmentedColormap.from_list("way", [BULK, "#4fb286"])
+"""Colours of disks by the way that they have gone: those of the force chains stand out from all of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +67,8 @@ class RampFilm(Film):
         As of :func:`~faultgouge.figures.draw_packing`.
     course : Course, optional
         The curve beside the packings, and their places on it; F_x over the displacement by default.
+    by_way : bool
+        Whether the colours of disks show how far they have moved since the first packing, in place of the layers.
     """
 
     @styled
@@ -71,13 +79,18 @@ class RampFilm(Film):
         color: str = "mobilised",
         dots: int | None = DOTS,
         course: Course | None = None,
+        by_way: bool = False,
     ) -> None:
         self._packings, self._color = packings, color
         self._which = np.linspace(0, len(packings) - 1, frames).round().astype(int)
         first = packings[0]
         shifts = np.array([nearest_image(each.position - first.position, first.box_length) for each in packings])
         self._displacement = shifts
-        largest = np.linalg.norm(shifts, axis=2).max()
+        ways = np.linalg.norm(shifts, axis=2)
+        largest = ways.max()
+        # single disks, which are squeezed out or roll, move farther than all others
+        most = max(float(np.quantile(way, 0.9)) for way in ways)
+        self._shares = np.minimum(ways / (most or 1.0), 1.0) if by_way else None
         shown = LARGEST_SHOWN * first.radius.min()
         self._factor = max(1.0, 10.0 ** np.floor(np.log10(shown / largest))) if largest > 0 else 1.0
         figure, axes, beside, points = packing_and_curve(first, scale=color != "none")
@@ -93,6 +106,9 @@ class RampFilm(Film):
         factor = rf"$\times\,10^{{{round(np.log10(self._factor))}}}$" if self._factor > 1 else "to scale"
         self._words = f"displacements {factor}"
         self._says = axes.text(0.5, 1.01, "", transform=axes.transAxes, ha="center", va="bottom", fontsize=8)
+        if by_way:
+            key = "the greener, the farther moved"
+            axes.text(0.5, -0.02, key, transform=axes.transAxes, ha="center", va="top", fontsize=7)
         self._course = course or Course.of_ramp(packings)
         beside.plot(self._course.x, self._course.y, color=BULK, linewidth=1.2)
         (self._line,) = beside.plot([], [], color="C1", linewidth=1.0)
@@ -111,7 +127,7 @@ class RampFilm(Film):
         artist.disks.set_widths(2 * packing.radius[disk])
         artist.disks.set_heights(2 * packing.radius[disk])
         artist.disks.set_angles(np.zeros(len(disk)))  # as many as images, which disks gain and lose at the edges
-        artist.disks.set_facecolor([str(face) for face in artist.faces(packing)[disk]])
+        artist.disks.set_facecolor([tuple(face) for face in self._faces(k)[disk]])
         artist.chains.set_linewidth(artist.widest * packing.normal_force[contact] / self._widest)
         if artist.chains.get_array() is not None:
             artist.chains.set_array(COLOURS[self._color][1](packing)[contact])
@@ -120,3 +136,12 @@ class RampFilm(Film):
         self._says.set_text(f"{course.words[k]}, {self._words}")
         self._line.set_data(course.x[: here + 1], course.y[: here + 1])
         self._dot.set_data([course.x[here]], [course.y[here]])
+
+    def _faces(self, k: int) -> NDArray[Any]:
+        """Colours of the disks, shape (N, 4)."""
+        packing = self._packings[k]
+        faces = to_rgba_array(self._artist.faces(packing))
+        if self._shares is not None:
+            touching = np.setdiff1d(np.arange(len(packing)), packing.rattlers)
+            faces[touching] = WAY_COLOURS(self._shares[k][touching])
+        return faces

@@ -95,6 +95,18 @@ def test_a_run_and_a_ramp_show_what_moves(motion, packing):
         np.testing.assert_array_equal(film.frame(same), first)
 
 
+def test_disks_of_a_drive_are_greener_the_farther_they_have_moved(packing):
+    """Half of the disks move; their faces alone change their colours."""
+    far = np.zeros_like(packing.position)
+    far[: len(far) // 2] = 0.01
+    film = RampFilm([packing, replace(packing, position=packing.position + far)], 2, dots=60, by_way=True)
+    before, after = film._faces(0), film._faces(1)
+    bed = np.setdiff1d(np.arange(len(packing)), packing.rattlers)
+    np.testing.assert_array_equal(before[bed], np.broadcast_to(before[bed[0]], before[bed].shape))
+    greener = (after @ [-1, 1, 0, 0]) > (before @ [-1, 1, 0, 0])
+    np.testing.assert_array_equal(greener[bed], bed < len(far) // 2)
+
+
 @pytest.mark.slow
 def test_mp4_plays(tmp_path, motion):
     ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="the extra `movie` is not installed")

@@ -312,7 +312,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
             f"{file} has one equilibrium and no trajectory: ask for a mode with --mode, or run `faultgouge perturb` "
             "with trajectory = true under [output]"
         )
-    return RampFilm(packings, count, color, dots=dots, course=course)
+    return RampFilm(packings, count, color, dots=dots, course=course, by_way=driven is not None)
 
 
 def modes_of(packing: HasConfiguration, which: str) -> tuple[list[ModeShape], str]:
