@@ -3,7 +3,8 @@
 Functions take a :class:`Packing`, the disks of this package's law, or a :class:`Configuration`, the particles of any
 code with their contacts to first order. The physics is in the docstrings of the modules:
 
-- `contacts`, `assembly` and `configuration`: contacts to first order, and the stability operator of these;
+- `particles`, `contacts`, `assembly` and `configuration`: particles with contacts to first order, and their stability
+  operator;
 - `packing`: the contact law, geometry and forces of disks;
 - `operators`: stiffness and damping matrix, sliders at Coulomb's bound;
 - `factors`: factors of sparse and banded matrices;
@@ -27,9 +28,11 @@ from .motion.growth_of_run import growth_of_run
 from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_modes
 from .motion.motion import Motion
 from .motion.nearest_modes import nearest_modes
+from .motion.one_sided_outcome import OneSidedOutcome
 from .motion.power_law import PowerLaw, fit_power_law
 from .motion.pushed_motion import OneSidedMotion, one_sided_motion
 from .motion.response import layer_force, linear_response
+from .motion.rising_load import RisingMotion
 from .motion.signals import Signal
 from .motion.slips import Slip
 from .motion.spectrum import (
@@ -76,12 +79,14 @@ __all__ = [
     "NoEquilibriumError",
     "NoGainError",
     "OneSidedMotion",
+    "OneSidedOutcome",
     "Onset",
     "OnsetError",
     "OutputError",
     "Packing",
     "PackingFileError",
     "PowerLaw",
+    "RisingMotion",
     "RunFile",
     "Signal",
     "Slip",

@@ -20,10 +20,10 @@ AT_COULOMBS_BOUND = 1 - 1e-6
 """Share of mu f_n from which on a contact counts as one at the bound. A packing at rest has a residual of 1e-6 of its
 forces or less, and a dashpot has carried that much of the tangential force."""
 
-UNIT = 1e-6
+UNIT_ERROR = 1e-6
 """Error of a unit vector, and of a direction in the plane, that text of seven digits has."""
 
-PERPENDICULAR = 1e-2
+NORMAL_SHARE = 1e-2
 """Share of a tangential force that may be along the normal: LAMMPS turns histories a step behind their contacts."""
 
 PER_CONTACT = {
@@ -179,10 +179,10 @@ def _check_contacts(values: dict[str, NDArray]) -> None:
     """Refuse values that no contact can have; a ValueError names the first contact that has one."""
     normal, tangential, force = values["normal"], values["tangential_force"], values["normal_force"]
     along = np.abs(np.einsum("ca,ca->c", normal, tangential))
-    tilted = along > PERPENDICULAR * np.linalg.norm(tangential, axis=1) + UNIT * np.abs(force)
+    tilted = along > NORMAL_SHARE * np.linalg.norm(tangential, axis=1) + UNIT_ERROR * np.abs(force)
     refuse_first(values["i"] < 0, "i = {} is no particle", values["i"])
     refuse_first(values["j"] < WALL, "j = {} is no particle; -1 is a wall", values["j"])
-    refuse_first(np.abs(np.linalg.norm(normal, axis=1) - 1) > UNIT, "the normal {} is no unit vector", normal)
+    refuse_first(np.abs(np.linalg.norm(normal, axis=1) - 1) > UNIT_ERROR, "the normal {} is no unit vector", normal)
     refuse_first(tilted, "the tangential force {} has a part along the normal", tangential)
     refuse_first(values["distance"] <= 0, "the distance {} is not positive", values["distance"])
     refuse_first(values["friction"] < 0, "friction = {} is negative", values["friction"])

@@ -30,7 +30,7 @@ PARTS = """
 import sys, time
 from pathlib import Path
 import scipy.optimize, scipy.spatial
-import faultgouge.commands.eigenvalues
+import faultgouge.commands.onset
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.onset import onset_run
 from faultgouge.pywrap.settling.settle import settle_bed

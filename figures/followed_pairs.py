@@ -1,13 +1,14 @@
 """The pairs of eigenvalues of a ramp, each followed through the loads, and the verdict at each load.
 
 A pair is followed from the load at which it is complex first. Its image at another load is the pair of modes that lies
-closest to its planes (:meth:`~faultgouge.analysis.windows.SystemModes.nearest`). If the planes of the image are not
+closest to its planes (:meth:`~faultgouge.analysis.windows.SystemModes.images`). If the planes of the image are not
 those of the pair, the pair is unknown at that load, and it may be found again at a later one. If no pair of the ramp is
 complex, the two real modes of the last load that are closest to merging are followed.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -19,8 +20,8 @@ from faultgouge.analysis import (
     closest_to_meeting,
     stability,
 )
-from faultgouge.analysis.configuration import HasConfiguration
 from faultgouge.analysis.counted import counted
+from faultgouge.analysis.has_configuration import HasConfiguration
 from faultgouge.analysis.motion.eigenvalues import is_negative, zero_uncertainties, zero_uncertainty
 from faultgouge.analysis.windows import Space, System, SystemModes, force_bearing
 
@@ -44,12 +45,28 @@ class FollowedPair:
     eigenvalues : ndarray of complex, shape (S, 2)
         Both members, 1 / time^2: the one with the positive imaginary part, or the lower one, first; nan where the pair
         is unknown.
-    modes : ndarray of complex, shape (S, 2, axes, N)
-        Their displacements, see :func:`~faultgouge.figures.mode.displacement`; zero where the pair is unknown.
+    planes : mapping of int to Space
+        The two modes at each load at which the pair is known.
+    packings : sequence of Packing or Configuration
+        The equilibria.
     """
 
     eigenvalues: Complexes
-    modes: Complexes
+    planes: Mapping[int, Space]
+    packings: Sequence[HasConfiguration]
+
+    @cached_property
+    def modes(self) -> Complexes:
+        """Displacements of both members, see :func:`~faultgouge.figures.mode.displacement`, shape (S, 2, axes, N).
+
+        They are zero where the pair is unknown.
+        """
+        last = self.packings[-1]
+        modes = np.zeros((len(self.packings), 2, last.axes, len(last)), dtype=np.complex128)
+        for k, pair in self.planes.items():
+            vectors = pair.right @ _members_of(pair)[1]
+            modes[k] = [displacement(self.packings[k], vector) for vector in vectors.T]
+        return modes
 
     @property
     def growth(self) -> np.ndarray:
@@ -121,8 +138,7 @@ class _Followed:
         if size * (len(self._modes) + 1) <= MEMORY:
             self._modes[k] = modes
         self._last, taken = modes, set()
-        for known in self.pairs:
-            members = self._members(known, k, modes)
+        for known, members in zip(self.pairs, self._members(k, modes), strict=True):
             if members is not None and members not in taken:
                 known[k] = modes.space(members)
                 if modes.conjugate(members):
@@ -133,27 +149,35 @@ class _Followed:
         """Follow all pairs back, to loads at which they are not yet known."""
         if not self.pairs and self._last is not None:
             self.pairs = [{len(self.packings) - 1: pair} for pair in _about_to_meet(self._last)]
-        for known in self.pairs:
-            for k in range(max(known) - 1, -1, -1):
-                if k not in known and (image := self._image(known[min(n for n in known if n > k)], k)) is not None:
+        for k in range(len(self.packings) - 2, -1, -1):
+            unknown = [known for known in self.pairs if k not in known and max(known) > k]
+            later = [known[min(n for n in known if n > k)] for known in unknown]
+            for known, image in zip(unknown, self._images(later, k), strict=True):
+                if image is not None:
                     known[k] = image
 
-    def _members(self, known: dict[int, Space], k: int, modes: SystemModes) -> tuple[int, int] | None:
-        """The members of a pair at this load, followed from its last load, or from its closest load."""
-        closest = min(known, key=lambda n: abs(self.packings[n].fx - self.packings[k].fx))
-        for pair in (known[max(known)], known[closest]):
-            members = modes.nearest(pair)
-            if modes.space(members).like(pair):
-                return members
-        return None
+    def _members(self, k: int, modes: SystemModes) -> list[tuple[int, int] | None]:
+        """The members of each pair at this load, followed from its last load, or else from its closest load."""
+        last = [max(known) for known in self.pairs]
+        found = modes.images([known[n] for known, n in zip(self.pairs, last, strict=True)])
+        fx = self.packings[k].fx
+        closest = [min(known, key=lambda n: abs(self.packings[n].fx - fx)) for known in self.pairs]
+        lost = [each for each, members in enumerate(found) if members is None and closest[each] != last[each]]
+        again = modes.images([self.pairs[each][closest[each]] for each in lost])
+        for each, members in zip(lost, again, strict=True):
+            found[each] = members
+        return found
 
-    def _image(self, pair: Space, k: int) -> Space | None:
+    def _images(self, pairs: Sequence[Space], k: int) -> list[Space | None]:
+        """Each of some pairs at a load, None where the pair is unknown there."""
         if k in self._modes:
             modes = self._modes[k]
-            image: Space | None = modes.space(modes.nearest(pair))
-        else:
-            image = pair.at(System.of(self.packings[k]))
-        return image if image is not None and image.like(pair) else None
+            return [None if members is None else modes.space(members) for members in modes.images(pairs)]
+        system = System.of(self.packings[k])
+        images = [pair.at(system) for pair in pairs]
+        return [
+            image if image is not None and image.like(pair) else None for image, pair in zip(images, pairs, strict=True)
+        ]
 
 
 def _verdict_on(packing: HasConfiguration, modes: SystemModes, alone: bool) -> Stability:
@@ -197,13 +221,15 @@ def _about_to_meet(modes: SystemModes) -> list[Space]:
 
 
 def _along(packings: Sequence[HasConfiguration], known: dict[int, Space]) -> FollowedPair:
-    """Eigenvalues and displacements of a pair."""
+    """A pair with its eigenvalues."""
     found = np.full((len(packings), 2), complex(np.nan, np.nan))
-    modes = np.zeros((len(packings), 2, packings[0].axes, len(packings[0])), dtype=np.complex128)
     for k, pair in known.items():
-        own, vectors = np.linalg.eig(pair.block)
-        order = np.lexsort((-own.imag, own.real))
-        found[k] = own[order]
-        for member, number in enumerate(order):
-            modes[k, member] = displacement(packings[k], pair.right @ vectors[:, number])
-    return FollowedPair(found, modes)
+        found[k] = _members_of(pair)[0]
+    return FollowedPair(found, known, packings)
+
+
+def _members_of(pair: Space) -> tuple[Complexes, Complexes]:
+    """Eigenvalues of both members, and their eigenvectors on the plane in columns."""
+    own, vectors = np.linalg.eig(pair.block)
+    order = np.lexsort((-own.imag, own.real))
+    return own[order], vectors[:, order]

@@ -1,4 +1,4 @@
-"""What a page draws of a packing in two or three dimensions: images of particles and contacts, walls and the box."""
+"""A packing on a page, in two or three dimensions: images of particles and contacts, walls and the box."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ import numpy as np
 
 from faultgouge.analysis import Configuration
 from faultgouge.analysis.arrays import Floats, Indices
-from faultgouge.analysis.configuration import HasConfiguration
+from faultgouge.analysis.has_configuration import HasConfiguration
 
 from .disk_view import View
 from .surroundings import Wall, cell_of, walls_of, within_cell

@@ -13,7 +13,6 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from faultgouge.analysis import (
     BadInputError,
@@ -23,15 +22,14 @@ from faultgouge.analysis import (
     normal_modes,
     spectrum,
 )
-from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.configuration import HasConfiguration
+from faultgouge.analysis.arrays import Complexes, Floats
+from faultgouge.analysis.has_configuration import HasConfiguration
 
 from .disk_view import View
-from .packing import PACKING_WIDTH, PackingArtist
+from .packing import PACKING_WIDTH
+from .packing_artist import PackingArtist
 from .spheres import add_scale_of_turns, draw_turns, new_figure
 from .style import EDGE, INK, styled
-
-Complexes = NDArray[np.complex128]
 
 TYPICAL_ARROW, LONGEST_ARROW = 1.2, 4.0
 """Length that three quarters of the arrows do not exceed, and length of the longest arrow at most, in units of the mean

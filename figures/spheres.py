@@ -45,7 +45,7 @@ ROOM_AROUND = 0.25
 """Room around the spheres, in units of the largest radius, for bars that leave a periodic box."""
 
 
-Frame = tuple[float, float, float, float]
+AxesLimits = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +81,7 @@ def corners_of(configuration: Configuration) -> tuple[Floats, Floats]:
     return low, high
 
 
-def frame_of(configuration: Configuration, eye: Eye) -> Frame:
+def frame_of(configuration: Configuration, eye: Eye) -> AxesLimits:
     """Edges of the picture: left, right, bottom, top."""
     corners = eye.flat(np.array(list(product(*zip(*corners_of(configuration), strict=True)))))
     place, reach = eye.flat(configuration.position), configuration.radius[:, None]
@@ -91,7 +91,7 @@ def frame_of(configuration: Configuration, eye: Eye) -> Frame:
     return float(left), float(right), float(bottom), float(top)
 
 
-def shade_spheres(eye: Eye, place: Floats, radius: Floats, colour: Floats, frame: Frame) -> Floats:
+def shade_spheres(eye: Eye, place: Floats, radius: Floats, colour: Floats, frame: AxesLimits) -> Floats:
     """Colours and opacity of every dot, shape (height, width, 4); `frame` is left, right, bottom, top."""
     left, right, bottom, top = frame
     size = (right - left) / DOTS_ACROSS

@@ -16,11 +16,11 @@ from .film import Film
 COLOURS = 64
 """Colours of a GIF: a packing or a mode has some dozens, and shades of lines take the rest."""
 
-UNSEEN = 18
+COLOUR_DIFFERENCE = 18
 """A dot stays as it was while each of its three colours is off by no more than this, of 255. Without this a film of 20
 units of time is twice as large; with twice as much contacts that moved leave gaps in others."""
 
-NEVER_SEEN = [1, 255, 1]
+TRANSPARENT_COLOUR = [1, 255, 1]
 """The colour whose place in the palette stands for a dot that stays as it was: no figure has this green."""
 
 Progress = Callable[[Iterable[int], int], Iterable[int]]
@@ -84,7 +84,7 @@ def _gif(film: Film, path: Path, rate: float, progress: Progress) -> None:
     palette = Image.fromarray(samples).quantize(COLOURS - 1, method=Image.Quantize.MAXCOVERAGE, kmeans=3)
     colours = np.reshape((palette.getpalette() or [])[: 3 * (COLOURS - 1)], (-1, 3))
     colours[colours.min(axis=1) > 247] = 255  # the ground is white, as that of the page
-    colours = np.concatenate([colours, [NEVER_SEEN] * (COLOURS - len(colours))])
+    colours = np.concatenate([colours, [TRANSPARENT_COLOUR] * (COLOURS - len(colours))])
     palette.putpalette(colours.ravel().tolist())
 
     timing: dict[str, Any] = {"duration": round(1000 / rate), "disposal": 1}
@@ -100,7 +100,7 @@ def _gif(film: Film, path: Path, rate: float, progress: Progress) -> None:
                 shown = now.copy()
             else:
                 # what stays as it was is transparent, which compresses well; one dot at least keeps the time
-                changed = np.abs(frame - colours[shown]).max(axis=2) > UNSEEN
+                changed = np.abs(frame - colours[shown]).max(axis=2) > COLOUR_DIFFERENCE
                 box = Image.fromarray(changed).getbbox() or (0, 0, 1, 1)
                 picture.paste(COLOURS - 1, mask=Image.fromarray(~changed))
                 file.writelines(getdata(picture.crop(box), box[:2], transparency=COLOURS - 1, **timing))

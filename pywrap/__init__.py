@@ -4,78 +4,78 @@
 equilibrium along F_x, and `runs` perturbs it. `runs.run_recorder` stores all results in run.h5 and continues an
 interrupted run. `lammps.engine` is a LAMMPS instance with one packing. `load_path` has equilibria as a function of a
 load: `scene_path` makes that of a scene, `lammps_path` that of any LAMMPS. To write a ramp of your own, loop over
-`equilibrate`.
+`equilibrate`. The names of this package are imported when they are used.
 """
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from .lammps.two_mpi_libraries import load_own_mpi
 
+if TYPE_CHECKING:  # what `OFFERS` imports when it is used
+    from ..analysis import NoEquilibriumError
+    from .equilibria.quasistatic import Equilibrium, equilibrate
+    from .granular.compare_motion import MotionComparison, compare_motion
+    from .granular.from_lammps import from_lammps
+    from .granular.granular_commands import NotTakenError, SnapshotError
+    from .granular.lammps_path import lammps_path
+    from .granular.look_in_a_copy import in_a_copy
+    from .granular.relax import relax
+    from .lammps.dynamics import Dynamics
+    from .lammps.engine import Engine
+    from .lammps.instance import EngineError, lammps_instance
+    from .load_path import LoadPath
+    from .onset import onset_run
+    from .runs.drive import drive
+    from .runs.drive_setup import settle_for_drive
+    from .runs.drive_states import DriveCheckpoint, DriveSample, DriveStep
+    from .runs.ramp import ramp, reach
+    from .runs.ramp_loads import ramp_loads
+    from .runs.run_recorder import Record
+    from .runs.scene_path import scene_path
+    from .runs.undamped import Checkpoint, Sample, perturb, time_step
+    from .scenes.scene import Scene
+    from .scenes.units import dashpot, real_units, restitution
+    from .scenes.validation import SceneError
+    from .settling.relax import bring_to_rest
+    from .settling.settle import settle
+
 load_own_mpi()  # before mpi4py.MPI is imported
 
-# ruff: noqa: E402 - the imports below need it
-from ..analysis import NoEquilibriumError
-from .equilibria.quasistatic import Equilibrium, equilibrate
-from .granular.compare_motion import MotionComparison, compare_motion
-from .granular.from_lammps import from_lammps
-from .granular.granular_commands import NotTakenError
-from .granular.lammps_path import lammps_path
-from .granular.look_in_a_copy import in_a_copy
-from .granular.relax import relax
-from .lammps.dynamics import Dynamics
-from .lammps.engine import Engine
-from .lammps.instance import EngineError, lammps_instance
-from .load_path import LoadPath
-from .onset import onset_run
-from .runs.drive import DriveSample, DriveStep, drive, settle_for_drive
-from .runs.ramp import ramp, reach
-from .runs.ramp_loads import ramp_loads
-from .runs.run_recorder import Record
-from .runs.scene_path import scene_path
-from .runs.undamped import Checkpoint, Sample, perturb, time_step
-from .scenes.scene import Scene
-from .scenes.units import dashpot, real_units, restitution
-from .scenes.validation import SceneError
-from .settling.relax import bring_to_rest
-from .settling.settle import settle
-
-SnapshotError = NotTakenError
-"""The name of `NotTakenError` in earlier states of this version, for scripts that catch it."""
+OFFERS = {
+    "NoEquilibriumError": "..analysis", "Equilibrium": ".equilibria.quasistatic",
+    "equilibrate": ".equilibria.quasistatic", "MotionComparison": ".granular.compare_motion",
+    "compare_motion": ".granular.compare_motion", "from_lammps": ".granular.from_lammps",
+    "NotTakenError": ".granular.granular_commands", "SnapshotError": ".granular.granular_commands",
+    "lammps_path": ".granular.lammps_path",
+    "in_a_copy": ".granular.look_in_a_copy", "relax": ".granular.relax", "Dynamics": ".lammps.dynamics",
+    "Engine": ".lammps.engine", "EngineError": ".lammps.instance", "lammps_instance": ".lammps.instance",
+    "LoadPath": ".load_path", "onset_run": ".onset", "DriveCheckpoint": ".runs.drive_states",
+    "DriveSample": ".runs.drive_states", "DriveStep": ".runs.drive_states", "drive": ".runs.drive",
+    "settle_for_drive": ".runs.drive_setup", "ramp": ".runs.ramp", "reach": ".runs.ramp",
+    "ramp_loads": ".runs.ramp_loads", "Record": ".runs.run_recorder", "scene_path": ".runs.scene_path",
+    "Checkpoint": ".runs.undamped", "Sample": ".runs.undamped", "perturb": ".runs.undamped",
+    "time_step": ".runs.undamped", "Scene": ".scenes.scene", "dashpot": ".scenes.units",
+    "real_units": ".scenes.units", "restitution": ".scenes.units", "SceneError": ".scenes.validation",
+    "bring_to_rest": ".settling.relax", "settle": ".settling.settle",
+}  # fmt: skip
+"""Names of this package, and the modules that have them."""
 
 __all__ = [
-    "Checkpoint",
-    "DriveSample",
-    "DriveStep",
-    "Dynamics",
-    "Engine",
-    "EngineError",
-    "Equilibrium",
-    "LoadPath",
-    "MotionComparison",
-    "NoEquilibriumError",
-    "NotTakenError",
-    "Record",
-    "Sample",
-    "Scene",
-    "SceneError",
-    "SnapshotError",
-    "bring_to_rest",
-    "compare_motion",
-    "dashpot",
-    "drive",
-    "equilibrate",
-    "from_lammps",
-    "in_a_copy",
-    "lammps_instance",
-    "lammps_path",
-    "onset_run",
-    "perturb",
-    "ramp",
-    "ramp_loads",
-    "reach",
-    "real_units",
-    "relax",
-    "restitution",
-    "scene_path",
-    "settle",
-    "settle_for_drive",
-    "time_step",
-]
+    "Checkpoint", "DriveCheckpoint", "DriveSample", "DriveStep", "Dynamics", "Engine", "EngineError", "Equilibrium",
+    "LoadPath", "MotionComparison", "NoEquilibriumError", "NotTakenError", "Record", "Sample", "Scene", "SceneError",
+    "SnapshotError", "bring_to_rest", "compare_motion", "dashpot", "drive", "equilibrate", "from_lammps", "in_a_copy",
+    "lammps_instance", "lammps_path", "onset_run", "perturb", "ramp", "ramp_loads", "reach", "real_units", "relax",
+    "restitution", "scene_path", "settle", "settle_for_drive", "time_step",
+]  # fmt: skip
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        if name in OFFERS:
+            return getattr(import_module(OFFERS[name], __name__), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *OFFERS})

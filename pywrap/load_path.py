@@ -1,8 +1,8 @@
 """A loading path: equilibria as a function of a load, computed when they are asked for.
 
 Equilibria with friction depend on how they were reached. An equilibrium beyond the largest load so far follows from
-the last one, and is kept. Between two loads an equilibrium follows from the kept one just below, and is not kept: what
-is asked for in between does not change the path.
+the last one, and is kept. An equilibrium at a smaller load follows from the kept one just below, and is not kept, so
+that it does not change the path.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class EquilibriumSolver(Protocol[S]):
         """
 
     def close(self) -> None:
-        """End whatever the solver alone uses."""
+        """End the processes and files of the solver."""
 
 
 class LoadPath(Generic[E]):
@@ -79,7 +79,7 @@ class LoadPath(Generic[E]):
         if below is not None and below.fx == load:
             return below.packing
         if not kept or load > kept[-1].fx:
-            # from the kept ones alone, so that it does not depend on what is asked for in between
+            # from kept equilibria alone, so that the result does not depend on other loads that were asked for
             found = self.solver.solve(load, below, kept[-2] if len(kept) > 1 else None, ahead=self._onward)
             kept.append(found)
             return found.packing

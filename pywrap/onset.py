@@ -28,7 +28,7 @@ from .scenes.scene import Scene, scene_of
 from .scenes.validation import SceneError, require_section
 from .settling.settle import settle
 
-Known = Callable[[Onset, float], None]
+OnsetSoFar = Callable[[Onset, float], None]
 """Takes what is known, without the errors of the path, and the load up to which that is all."""
 
 
@@ -71,7 +71,7 @@ def onset_run(
     modes: tuple[int, int] | None = None,
     reached: Callable[[Equilibrium], None] | None = None,
     near_onset: Floats | None = None,
-    known: Known = lambda found, fx: None,
+    known: OnsetSoFar = lambda found, fx: None,
     bed: Packing | None = None,
     watch: Watch | None = None,
     folder: Path | None = None,

@@ -18,8 +18,8 @@ from faultgouge.assessment.work_precision.coverage.stated_errors import (
     REFINEMENT,
     TABLE,
     CoverageCase,
+    Dissipation,
     FirstOnset,
-    Kind,
     draw_scene,
     read,
     restate_case,
@@ -40,7 +40,7 @@ def compute_cases(number: int) -> list[CoverageCase]:
         CoverageCase(
             kind, number, getattr(scene.packing, "disks", 100), scene.law.mus[0], scene.precision, step, fresh=True
         )
-        for kind in get_args(Kind)
+        for kind in get_args(Dissipation)
     )
     try:
         start = settle(bare)
@@ -72,7 +72,7 @@ def _compare_case(onset: FirstOnset, case: CoverageCase) -> CoverageCase:
 def cases(path: Path, scenes: int) -> Iterator[CoverageCase]:
     """Yield cases until enough scenes of either kind count: first those of the file, then new ones, which it adds."""
     known = read(path)
-    counts = dict.fromkeys(get_args(Kind), 0)
+    counts = dict.fromkeys(get_args(Dissipation), 0)
     number = 0
     while min(counts.values()) < scenes:
         found = [case for case in known if case.number == number]

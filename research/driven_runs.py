@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from mpi4py import MPI
 
 from faultgouge.analysis import Packing, Slip
-from faultgouge.pywrap import Checkpoint, DriveSample, DriveStep, Scene, drive, settle_for_drive
+from faultgouge.pywrap import DriveCheckpoint, DriveSample, DriveStep, Scene, drive, settle_for_drive
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Moment:
     """The end of a part of a run: the rows of the series up to there, and the state of LAMMPS."""
 
     rows: list[DriveSample]
-    checkpoint: Checkpoint
+    checkpoint: DriveCheckpoint
 
     @property
     def time(self) -> float:
@@ -42,7 +42,7 @@ class DrivenRun:
         start = settle_for_drive(scene, MPI.COMM_SELF)
         rows, moments, found = list[DriveSample](), list[Moment](), list[Slip]()
 
-        def keep(reached: Checkpoint) -> None:
+        def keep(reached: DriveCheckpoint) -> None:
             moments.append(Moment(rows.copy(), reached))
 
         for step in drive(scene, start, keep=keep, communicator=MPI.COMM_SELF):

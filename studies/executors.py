@@ -28,7 +28,7 @@ MapRows = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 
 
 class Processes(Executor):
-    """So many processes of this machine, each with an interpreter of its own; all of them end with this process."""
+    """Processes of this machine, each with its own interpreter; all of them end with this process."""
 
     def __init__(self, number: int) -> None:
         self._number = number

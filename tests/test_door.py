@@ -3,31 +3,49 @@
 import ast
 import importlib
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import faultgouge
+from faultgouge import pywrap
 from faultgouge.analysis import BadInputError, FaultgougeError, MindlinLaw, Packing, PackingFileError, RunFile
 from faultgouge.pywrap import Equilibrium, settle_for_drive
 
 
-def test_every_name_that_is_offered_is_there():
-    for name, module in faultgouge.OFFERS.items():
-        assert getattr(faultgouge, name) is getattr(importlib.import_module(f"faultgouge.{module}"), name)
-        assert name in dir(faultgouge)
+@pytest.mark.parametrize("package", [faultgouge, pywrap])
+def test_every_name_that_is_offered_is_there(package):
+    for name, module in package.OFFERS.items():
+        place = importlib.import_module(f".{module.lstrip('.')}", _package_of(package, module))
+        assert getattr(package, name) is getattr(place, name)
+        assert name in dir(package)
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        _ = faultgouge.nothing
+        _ = package.nothing
 
 
-def test_type_checkers_and_a_star_see_what_is_offered():
+def _package_of(package, module):
+    return "faultgouge" if module.startswith("..") else package.__name__
+
+
+@pytest.mark.parametrize("package", [faultgouge, pywrap])
+def test_type_checkers_and_a_star_see_what_is_offered(package):
     """A type checker runs no `__getattr__`: what it imports instead is from the same modules."""
-    text = ast.parse(Path(faultgouge.__file__).read_text())
+    text = ast.parse(Path(package.__file__).read_text())
     [block] = [each for each in text.body if isinstance(each, ast.If) and ast.unparse(each.test) == "TYPE_CHECKING"]
     imports = [each for each in block.body if isinstance(each, ast.ImportFrom)]
-    assert {alias.name: each.module for each in imports for alias in each.names} == faultgouge.OFFERS
-    assert set(faultgouge.__all__) == {*faultgouge.OFFERS, "__version__"}
+    places = {name.lstrip("."): name for name in package.OFFERS.values()}
+    assert {alias.name: places[each.module] for each in imports for alias in each.names} == package.OFFERS
+    assert set(package.__all__) - {"__version__"} == set(package.OFFERS)
+
+
+def test_driver_imports_what_is_used():
+    """The onset of a scene does without the packings of a live LAMMPS."""
+    code = "import sys; import faultgouge.pywrap.onset; print([name for name in sys.modules if '.granular' in name])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
 
 
 @pytest.mark.parametrize("name", ["onset", "settle", "ramp", "perturb", "drive"])

@@ -34,8 +34,9 @@ from .sparse_lu import Factors, SingularMatrixError, minimum_degree, symmetric_l
 Booleans = NDArray[np.bool_]
 
 RESIDUAL_SHARE = 1e-2
-"""Residual of the iterative solution, as a share of the force. Where contacts open or close a Newton iteration gains a
-factor of five, where none does a thousand: a tenth of it is lost at the end, and half of the work saved before."""
+"""Residual of the iterative solution, as a share of the force. A Newton iteration gains a factor of five where contacts
+open or close, and a thousand where none does. The residual costs a tenth of the last gain, and saves half of the work
+before."""
 
 GMRES_ITERATIONS = 30
 """Iterations of GMRES that are worth while: a factorisation takes as long as fifty."""

@@ -180,6 +180,17 @@ class RunFile(SealedFile):
         with self.change():
             self._put_frame(packing, frame, count)
 
+    def cut(self, count: int) -> None:
+        """Remove the frames from a number on; of a file without a trajectory."""
+        observables = self._file["observables"]
+        with self.change():
+            for data in [observables[name]["value"] for name in self.observables]:
+                data.resize(count, axis=0)
+            disks = self._file["particles/disks"]
+            for name in ("position/value", "position/time", "position/step", "box/edges/value"):
+                if name in disks:
+                    disks[name].resize(count, axis=0)
+
     def _put_frame(self, packing: Packing, frame: Mapping[str, ArrayLike], count: int) -> None:
         for name, value in frame.items():
             self._put(f"observables/{name}", np.asarray(value), count)

@@ -26,7 +26,7 @@ BYTES_OF_A_CHUNK = 1 << 20
 """Bytes that are read at a time, or one chunk, where that is larger: a chunk is unpacked as a whole."""
 
 LARGEST_CHUNK = 1 << 30
-"""Bytes of a chunk, unpacked: a frame of ten million disks has a quarter of it."""
+"""Bytes of a chunk, unpacked: a frame of ten million disks has a quarter of these."""
 
 
 class _UnsoundError(Exception):

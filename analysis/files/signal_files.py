@@ -14,7 +14,7 @@ import numpy as np
 from ..motion.signals import Signal, SignalError
 from .plain_file import open_plain, read_plain_text
 
-TEXT = 4096
+BEGINNING_BYTES = 4096
 """Bytes at the beginning of a file that tell a table of numbers from a record."""
 
 
@@ -40,7 +40,7 @@ def read_signal(path: str | Path, channel: str | None = None) -> Signal:
     path = Path(path)
     try:
         with open_plain(path) as stream:
-            head = stream.read(TEXT)
+            head = stream.read(BEGINNING_BYTES)
     except OSError as error:
         raise SignalError(f"{path} cannot be read ({error.strerror}): correct its name") from None
     try:
@@ -62,7 +62,7 @@ def _is_table(head: bytes) -> bool:
     """Whether the first line that is no comment begins with a number."""
     try:
         # the last line may be cut off, also within a letter
-        lines = head.decode("ascii", "strict" if len(head) < TEXT else "ignore").splitlines()
+        lines = head.decode("ascii", "strict" if len(head) < BEGINNING_BYTES else "ignore").splitlines()
         words = next((words for line in lines if (words := line.split("#")[0].replace(",", " ").split())), [])
         float(words[0])
     except (UnicodeDecodeError, ValueError, IndexError):

@@ -1,11 +1,15 @@
 """Small motion about an equilibrium: eigenvalues, what grows, responses to forces, growth in a run.
 
-`modes` and `nearest_modes` have modes of the stability operator, `spectrum` its eigenvalues and what grows, `buckling`
-the negative ones; of large packings
-`all_eigenvalues` finds all, with `block_arnoldi`, and `fastest_growing` the ones that matter most. `normal_form` has
-how two modes coalesce, `response` and `forcing` the motion under forces, `transient` its largest amplitude, `growth`
-its growth in a LAMMPS run, `stable_timestep` the time step. `matrix_functions`, `oscillator`, `propagator` and
-`energy_norm` contain the mathematics.
+- `motion`: the matrices of small motion; `rates`: its eigenvalues s, with dissipation;
+- `spectrum`, `modes`, `nearest_modes`, `buckling`: eigenvalues of K and their vectors, which of them grow, and the
+  negative ones; `all_eigenvalues`, `block_arnoldi`, `fastest_growing`, `slow_motions`: those of large packings;
+- `stability`, `verdict`: does a packing at rest move? `one_sided`, `one_sided_outcome`, `contact_reach`,
+  `pushed_motion`: motion with contacts at Coulomb's bound; `creep`, `decay`: other motion that eigenvalues do not
+  decide; `rising_load`, `steady_drift`, `next_change`: motion under a load that rises;
+- `normal_form`: two modes that coalesce; `response`, `forcing`: motion under forces; `transient`, `propagator`: its
+  largest amplitude; `growth`, `growth_of_run`: growth in a run of LAMMPS; `slips`: a layer that a spring draws;
+  `stable_timestep`: the time step;
+- `matrix_functions`, `oscillator`, `energy_norm`: the mathematics.
 
 May import: `configuration`, `packing`, `operators`, `factors`.
 """

@@ -4,25 +4,24 @@ A real :math:`\lambda < 0` makes :math:`\omega` imaginary: disks leave the equil
 as :math:`e^{2 \sqrt{-\lambda}\, t}`. With dissipation such an eigenvalue still has a real :math:`s > 0`. Along a branch
 of equilibria :math:`\lambda` passes through zero at a turning point. Newton's method may step across a turning point.
 
-Most packings have no negative eigenvalue, and this is proved without computing any eigenvalue: every eigenvalue of A
-has
+Most packings have no negative eigenvalue, and the proof computes none. Every eigenvalue of A has
 :math:`\mathrm{Re}\,\lambda \ge \min \lambda(S)` with :math:`S = (A + A^T)/2` (Bendixson, Acta Math. 25, 359
-(1902)), and factors :math:`L D L^T` of S with positive pivots show that S is positive definite (Sylvester's law of
-inertia). Otherwise the factors of :math:`S + c` give a bound :math:`-c` below all real parts, and all real negative
+(1902)), and S is positive definite if its factors :math:`L D L^T` have positive pivots (Sylvester's law of inertia).
+Otherwise the factors of :math:`S + c` give a bound :math:`-c` below all real parts, and all real negative
 eigenvalues lie within c/2 of -c/2, where Arnoldi's iteration with that shift finds every eigenvalue.
 """
 
 import numpy as np
 from scipy.sparse import csc_array, diags_array
 
-from ..configuration import HasConfiguration
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
+from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats
 from .eigenvalues import SAFETY, imbalance, is_negative, operator_rounding, zero_uncertainties
 from .nearest_modes import nearest_modes
 from .spectrum import DENSE_LARGEST, dynamical_matrix, spectrum
 
-SPREAD = 4.0
+BOUND_FACTOR = 4.0
 """Factor from one bound that is tried to the next: each costs factors, and a loose one more eigenvalues."""
 
 FIRST_COUNT = 16
@@ -55,7 +54,7 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
         return spectrum(packing).negative
     bound = max(float(shifts.max()), np.finfo(float).eps ** 0.5 * float(np.abs(matrix.data).max()))
     while not _is_positive(symmetric, bound):
-        bound *= SPREAD
+        bound *= BOUND_FACTOR
     count = FIRST_COUNT
     while True:
         count = min(count, size - 2)

@@ -1,15 +1,15 @@
-r"""How small and how large a motion may be that one-sided equations describe.
+r"""The sizes of a push, or of a rate of loading, for which a motion to first order holds.
 
-A motion that is too large takes other contacts to Coulomb's bound, opens contacts, or closes others. One that is too
-small is not that of contacts at the bound: each lacks some force :math:`m_c`, up to the tolerance of that, and slides
-where
+Motion to first order has no size of its own. Real motion has. A large motion takes other contacts to Coulomb's bound,
+opens contacts, or closes others. A small motion leaves contacts that count as at the bound short of the bound: contact
+c lacks a force :math:`m_c`, and slides by
 
 .. math:: p_c(t) = \max_{t' \le t} \left(Y_c q + Z_c \dot q - m_c\right)_+ .
 
-A motion of s times the size is that of :math:`m_c / s`. What is lacking acts as a force along the contact, and where
-sliding contacts make a packing that grows, the motion may turn back before it has begun to grow. So this motion is
-followed, for larger and larger s, until it is that of contacts at the bound. The forces that are left in a packing at
-rest move the packing, too; the motion counts if it goes much farther.
+A motion s times as large is the motion with :math:`m_c / s`. Where sliding contacts make motion grow, the missing
+forces may turn a small motion back before it has begun to grow. `ContactReach` follows the motion with missing forces
+for larger and larger s, until it is the motion of contacts at the bound. The residual forces of a packing move the
+particles, too. The motion counts if it goes much farther than they do.
 """
 
 from collections.abc import Callable
@@ -18,21 +18,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats
-from .one_sided import CLOSE_STEP, OneSidedState, OneSidedSystem
+from .one_sided import LOOK_STEP, OneSidedState, OneSidedSystem
 
-SLIPS = 0.1
-"""Slip of a contact as a share of the largest, from which on it counts that the contact reaches the bound."""
+SLIP_SHARE = 0.1
+"""Slip of a contact, as a share of the largest, from which on it matters whether the contact has reached the bound."""
 
-CLOSE_LOOKS = 1000
-"""Close looks, over some ten periods of a slow mode. Contacts go farthest at the beginning."""
+FIRST_LOOKS = 1000
+"""Looks in steps of `LOOK_STEP`, over some ten periods of a slow mode. Contacts go farthest at the beginning."""
 
-LEFT_ALONE = 10.0
+PUSH_OVER_RESIDUAL = 10.0
 """Displacement by a push over that by the residual forces, from which on the push counts: D then is right to a fifth,
 and to a hundredth where the two displacements have nothing in common."""
 
 COMPARED_STEPS = 300
-"""Close looks in which motions of two sizes are compared: three periods of a slow mode. A motion that is to turn back
-does so at once, and what it lacks when it grows it lacks for ever."""
+"""Of these looks, those in which motions of two sizes are compared: three periods of a slow mode. A motion that turns
+back does so at once."""
 
 COMPARED_LOOKS = 10
 """Looks at which two motions are compared; those of the second half count."""
@@ -49,17 +49,28 @@ COMPARED_UP_TO = 6000
 
 @dataclass(eq=False)
 class ContactReach:
-    """How far a motion goes, and takes contacts: the largest D, shape (P,), and products of margins with displacements,
-    shape (R, P), that were seen.
+    """How far a motion goes, and takes contacts.
 
-    `reaching` is the multiple of the motion from which on contacts that count as at Coulomb's bound reach it so soon
-    that the motion is the same; `alone` is the reach of the motion of the residual forces, which nothing pushes."""
+    Attributes
+    ----------
+    system : OneSidedSystem
+        Of the configuration.
+    size : ndarray, shape (P,), or None
+        Largest D that was seen.
+    farthest : ndarray, shape (R, P), or None
+        Largest products of the system's margins with displacements.
+    reaching : float
+        Multiple of the motion from which on contacts that count as at Coulomb's bound reach the bound so soon that the
+        motion is the same.
+    by_residual : ContactReach or None
+        The reach of the motion by the residual forces, which nothing pushes.
+    """
 
     system: OneSidedSystem
     size: Floats | None = None
     farthest: Floats | None = None
     reaching: float = 0.0
-    alone: "ContactReach | None" = None
+    by_residual: "ContactReach | None" = None
 
     def look(self, state: OneSidedState) -> None:
         """Look at the motion once more."""
@@ -68,40 +79,49 @@ class ContactReach:
         self.farthest = now if self.farthest is None else np.maximum(self.farthest, now)
 
     def look_closely(self, start: OneSidedState, time: float = np.inf, rise: Floats | None = None) -> None:
-        """Look at the beginning of a motion up to a time, step by step, and at that of the residual forces; the state
-        stays as it is."""
-        system, self.alone = self.system, ContactReach(self.system)
-        step = CLOSE_STEP / system.step_share * system.time_step
-        count = int(min(CLOSE_LOOKS, np.ceil((time - start.time) / step)))
+        """Look at the beginning of a motion step by step, and at the motion by the residual forces.
+
+        Parameters
+        ----------
+        start : OneSidedState
+            Stays as it is.
+        time : float
+            When the motion ends.
+        rise : ndarray, shape (coordinates, P), optional
+            Forces that rise, per time.
+        """
+        system, self.by_residual = self.system, ContactReach(self.system)
+        step = LOOK_STEP / system.step_share * system.time_step
+        count = int(min(FIRST_LOOKS, np.ceil((time - start.time) / step)))
         load = None if rise is None else system.on_active(rise)
         state, compared = start.copy(), min(count, COMPARED_STEPS)
         seen = _follow(system, state, step, compared, load, look=self.look)
         self.reaching = _reaching_scale(system, start, seen, step, load)
         system.take_steps(state, step, count - compared, rise=load, look=self.look)
         still = system.start(np.zeros((system.motion.configuration.coordinates, 1)))
-        system.take_steps(still, step, count, constant=system.residual_force, look=self.alone.look)
+        system.take_steps(still, step, count, constant=system.residual_force, look=self.by_residual.look)
 
     @property
     def residual_displacement(self) -> float:
         """The root of the largest D to which the residual forces alone move the packing, length."""
-        seen = None if self.alone is None else self.alone.size
+        seen = None if self.by_residual is None else self.by_residual.size
         return 0.0 if seen is None else float(np.sqrt(seen.max(initial=0.0)))
 
     @property
     def residual_scale(self) -> float:
         """The multiple of the motion that goes as far as the residual forces move the packing."""
-        if self.size is None or self.alone is None or self.alone.size is None:
+        if self.size is None or self.by_residual is None or self.by_residual.size is None:
             return 0.0
         with np.errstate(divide="ignore", invalid="ignore"):
-            return float(np.nan_to_num(np.sqrt(self.alone.size / self.size), nan=0.0).max(initial=0.0))
+            return float(np.nan_to_num(np.sqrt(self.by_residual.size / self.size), nan=0.0).max(initial=0.0))
 
     @property
     def least_scale(self) -> float:
-        """The multiple from which on it does not count what sliders lacked to the bound, nor residual forces do;
-        infinite if these alone take another contact to the bound, open one or close one."""
-        if self.alone is not None and self.alone.largest_scale < 1:
+        """The multiple from which on neither missing forces nor residual forces count; infinite if residual forces
+        alone take another contact to the bound, open one or close one."""
+        if self.by_residual is not None and self.by_residual.largest_scale < 1:
             return np.inf
-        return max(self.reaching, LEFT_ALONE * self.residual_scale)
+        return max(self.reaching, PUSH_OVER_RESIDUAL * self.residual_scale)
 
     @property
     def largest_scale(self) -> float:
@@ -114,7 +134,7 @@ class ContactReach:
 
 
 def reaching_scale(system: OneSidedSystem, slid: Floats) -> float:
-    """The multiple of a motion from which on contacts that count as at Coulomb's bound reach it.
+    """The multiple of a motion from which on contacts that count as at Coulomb's bound reach the bound.
 
     Parameters
     ----------
@@ -124,7 +144,7 @@ def reaching_scale(system: OneSidedSystem, slid: Floats) -> float:
         p of each contact at the bound; of contacts that hardly slip it does not matter what is missing.
     """
     missing = np.broadcast_to(system.missing_forces, slid.shape)
-    counts = slid > SLIPS * slid.max(axis=0, initial=0.0)
+    counts = slid > SLIP_SHARE * slid.max(axis=0, initial=0.0)
     return float((missing[counts] / slid[counts]).max(initial=0.0))
 
 
@@ -149,7 +169,9 @@ def _follow(
 def _reaching_scale(
     system: OneSidedSystem, start: OneSidedState, seen: list[OneSidedState], step: float, load: Floats | None
 ) -> float:
-    """The multiple of a motion from which on what sliders lack to Coulomb's bound does not change it.
+    """The multiple of a motion from which on forces missing to Coulomb's bound do not change the motion.
+
+    The largest multiple that is tried stands for all above.
 
     Parameters
     ----------
@@ -175,7 +197,7 @@ def _reaching_scale(
         if all(_agree(*pair) for pair in zip(seen[COMPARED_LOOKS // 2 :], other[COMPARED_LOOKS // 2 :], strict=True)):
             return size
         size *= 10
-    return np.inf
+    return size
 
 
 def _agree(one: OneSidedState, other: OneSidedState) -> bool:

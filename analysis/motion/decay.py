@@ -6,22 +6,24 @@ the unit left vector of an eigenvalue s of Z. Then
 .. math:: |u(t)| \ge |l^H u(t)| = |l^H u(0)|\, e^{\mathrm{Re}\, s\, t} .
 
 If the 2 E numbers of u(0) are independent, normal and of variance one, :math:`|l^H u(0)|` is less than :math:`\delta`
-with a probability below :math:`\delta`. So once :math:`|u(t)|` has fallen below :math:`\delta`, nothing grows, and
-nothing stays, but for that probability; it does not matter how oblique eigenvectors are. Before, D may grow unseen as
-exp(g t) with
+with a probability below :math:`\delta`. So once :math:`|u(t)|` has fallen below :math:`\delta`, no motion grows or
+persists, except with this probability. The argument holds for eigenvectors as oblique as they may be. Until then D may
+grow unseen as exp(g t) with
 
 .. math:: g = \frac2t \ln\frac{|u(t)|}\delta .
 
-This holds for every :math:`\omega_0`; a low one makes :math:`|u|` fall soonest, since slow motions are the last.
+This holds for every :math:`\omega_0`. With a low :math:`\omega_0` :math:`|u|` falls soonest, since slow motions decay
+last.
 
-**Slow motions** decay last, as dashpots take little from them, and motion that no force opposes never decays. They are
-found one by one before (:mod:`~faultgouge.analysis.motion.slow_motions`), and what is followed is orthogonal to their
-space, so that all other eigenvalues decide how it decays. Where a packing is too large for sparse factors, nothing is
-found before; the common motion of all particles along an axis that no force opposes, as in a periodic box, is then left
-out of u(0), and other motion of this kind leaves the answer open.
+**Slow motions** decay last, because dashpots take little energy from them, and motion that no force opposes never
+decays. Both are first found one by one (:mod:`~faultgouge.analysis.motion.slow_motions`). The state is then followed
+orthogonally to their space, so that all other eigenvalues decide how fast the state decays. For packings too large for
+sparse factors the slow motions are not found. Then u(0) has no common motion of all particles along an axis on which no
+force opposes this motion, as in a periodic box; any other motion that no force opposes leaves the answer open.
 
-Small steps and long ones follow it (:mod:`~faultgouge.analysis.motion.decay_steps`): which ones depends on what they
-cost until it has decayed. If :math:`|u|` passes its least and grows, the rate is that of what is left, with its error.
+**Steps.** The state is followed in small explicit or in long implicit steps
+(:mod:`~faultgouge.analysis.motion.decay_steps`), whichever cost less until the state has decayed. If :math:`|u|` passes
+a minimum and grows, the growth rate of the state is given with its error.
 """
 
 from dataclasses import dataclass, field, replace
@@ -167,8 +169,8 @@ def _work(motion: Motion, slow: SlowMotions, limit: float) -> tuple[float, float
 
 
 def _steps(motion: Motion, reference: float, slow: SlowMotions | None, limit: float) -> ExplicitSteps | ImplicitSteps:
-    """Implicit steps where these come to an end, and before explicit ones do: what grows unseen in the time that is
-    left is known for explicit steps alone, whatever its frequency."""
+    """Implicit steps if these come to an end, and do so before explicit ones. If neither do, explicit steps: only they
+    bound the growth that may be unseen at every frequency."""
     if slow is not None:
         explicit, implicit = _work(motion, slow, limit)
         if implicit < min(explicit, WORK_OF_DECAY):

@@ -1,8 +1,8 @@
 r"""Steps in which the motion of a random state is followed, with what each costs.
 
-**Explicit steps** are those of velocity Verlet with dashpots at the velocity of the half step, in which motion without
-loss neither grows nor decays; in longer steps what grows in spite of dashpots grows faster. A step takes one product
-with A and one with G, so that time and memory are proportional to the number of coordinates.
+**Explicit steps** are those of velocity Verlet with dashpots at the velocity of the half step. Motion without loss
+neither grows nor decays in these steps; motion that grows in spite of dashpots grows faster in longer steps. A step
+takes one product with A and one with G, so that time and memory are proportional to the number of coordinates.
 
 **Implicit steps** are those of the midpoint rule, with one solution of a sparse system each,
 
@@ -11,8 +11,8 @@ with A and one with G, so that time and memory are proportional to the number of
 An eigenvalue s becomes :math:`r = (\sigma + s)/(\sigma - s)`: |r| > 1 if, and only if, Re s > 0, however long the step
 h is (Cayley's transform). A motion of the frequency :math:`\omega` decays, or grows, by
 :math:`\ln |r| = \mathrm{Re}\, s\, h / (1 + (\omega h/2)^2)` in a step. So :math:`\sigma` is the frequency of the
-slowest motions that are left: if these decay as :math:`\omega^2`, all others decay at least as fast, in a step that is
-hundreds of times as long as an explicit one.
+slowest motions that are left. If these decay as :math:`\omega^2`, all others decay at least as fast. An implicit step
+is hundreds of times as long as an explicit one.
 """
 
 from dataclasses import dataclass
@@ -42,8 +42,8 @@ STEP_OVERHEAD = 2e4
 FINER_STEP = 4
 """Share of the explicit steps in which growth is measured once more."""
 
-FOLDS = 4.0
-"""For how many e-folds of |u|^2 this is done."""
+E_FOLDS = 4.0
+"""E-folds of |u|^2 for which growth is measured once more."""
 
 FREE_FORCE = 1e-12
 """Force on a common displacement, as a share of the largest entry of A, that is no force."""
@@ -122,10 +122,11 @@ class ExplicitSteps:
             self.z, self.v = state[: len(self.z)] / self.reference, state[len(self.z) :].copy()
 
     def growth(self, logs: list[float]) -> tuple[float, float]:
-        """2 Re s of what grows, and its error: by the rate so far, and by that of shorter steps, from where it is."""
+        """2 Re s of the motion that grows, and its error: by the rate so far, and by shorter steps from the present
+        state."""
         coarse = slope(logs[int(np.argmin(logs)) :], self.time_of_look)
         short = self.time_of_look / FINER_STEP
-        count = int(np.ceil(FOLDS / max(coarse, 1 / (self.time_of_look * len(logs))) / short)) + 1
+        count = int(np.ceil(E_FOLDS / max(coarse, 1 / (self.time_of_look * len(logs))) / short)) + 1
         fine = slope([self.look(1 / FINER_STEP) for _ in range(2 * count)], short)
         error = (fine - coarse) / (FINER_STEP**2 - 1)
         return fine + error, abs(error)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ..arrays import Complexes, Floats, Indices
-from ..configuration import HasConfiguration
+from ..has_configuration import HasConfiguration
 
 SAFETY = 50.0
 """Imaginary parts count from this many times their rounding uncertainty.
@@ -52,7 +52,7 @@ def operator_rounding(packing: HasConfiguration, matrix: Floats | Complexes) -> 
 
 
 def in_balance(packing: HasConfiguration) -> bool:
-    """Whether what is left of the forces on a particle is rounding, of a dump's digits at most."""
+    """Whether the net force on each particle is rounding, at most that of a dump's digits."""
     force = packing.configuration.largest_force
     if not force and packing.configuration.stiffness is not None:
         return True  # no force is known to compare with; whoever measured K has looked

@@ -15,8 +15,8 @@ eigenvectors Q and the eigenvalues :math:`\Lambda`, and put :math:`p = W z`, :ma
 the kinetic energy and the energy of the symmetric part :math:`K_s` of K, where :math:`K_s` is positive. If K is
 symmetric and there is no dissipation, Z is antisymmetric: every eigenvalue is perfectly conditioned, and no state grows
 in the norm of the energy. Any other part of Z comes from the antisymmetric part of K, or from dissipation. An
-eigenvalue s of Z is an eigenvalue of
-:math:`s^2 M + s C + K`, and the upper half of its eigenvector belongs to the displacement.
+eigenvalue s of Z is an eigenvalue of :math:`s^2 M + s C + K`, and the upper half of its eigenvector belongs to the
+displacement.
 """
 
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ from scipy.sparse import csr_array
 from ..arrays import Floats, Indices
 from .eigenvalues import active_coordinates
 
-SOFTEST = 1e-6
+SOFTEST_SHARE = 1e-6
 """Eigenvalues of the symmetric part below this share of the largest weigh as much: a mode without a restoring force has
 no energy of its own."""
 
@@ -58,7 +58,7 @@ class EnergyNorm:
         active = active_coordinates(stiffness)
         a = stiffness[active][:, active].toarray()
         values, vectors = eigh(0.5 * (a + a.T)) if len(active) else (np.zeros(0), a)
-        least = SOFTEST * np.abs(values).max(initial=0.0)
+        least = SOFTEST_SHARE * np.abs(values).max(initial=0.0)
         size = np.sqrt(np.maximum(np.abs(values), least))
         return cls(active, size[:, None] * vectors.T, vectors / size, bool(np.all(values > least)))
 

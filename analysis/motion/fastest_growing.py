@@ -11,20 +11,21 @@ gives one of modulus :math:`\sinh g t` or more. With dissipation the state (:mat
 :math:`P_{k+1} = 2 Z P_k / \sqrt L + P_{k-1}`: a motion gives :math:`e^{s t}`, of modulus 1 at the most unless it grows.
 Dissipation makes the terms larger than the sum, so that :math:`\tau` is short where dissipation is strong.
 
-A block Krylov space of f has the eigenvalues of the largest modulus first, so the fastest growing motions. Eigenvalues
-of A, or of Z, are those of its projection on their invariant subspace, and the residuals are those of A or Z itself.
-The time is tripled as long as nothing has grown enough to be seen. Time and memory are proportional to the number of
-coordinates, and the time to that of products.
+A block Krylov space of f has the eigenvalues of the largest modulus first: the fastest growing motions. The eigenvalues
+of A, or of Z, are those of the projection on their invariant subspace, with the residuals of A or Z itself. The time is
+tripled as long as nothing has grown enough to be seen. Memory is proportional to the number of coordinates, and the
+computing time to the number of coordinates and of products.
 
-**Where the search ends before it has converged**, as many motions grow nearly alike, only that they grow is certain:
-eigenvalues of a mixture of motions may be wrong by a factor of two. The mixture is then followed for some times t more.
-That it grows nearly at the rate of its fastest motion, from below, is the rate which is told, as the least.
+**Without convergence.** If many motions grow nearly alike, the search may end before it has converged. That motion
+grows is then certain, but the eigenvalues of a mixture of motions may be wrong by a factor of two. So the mixture is
+followed for some more times t. The mixture grows nearly as fast as its fastest motion, and never faster: its rate is a
+lower bound.
 
 **What is left out.** After j blocks a motion whose share in the random start is not below :math:`\delta / \sqrt n`
 appears with an error of 1 % where :math:`T_j(|f|)`, or :math:`|f|^j` with dissipation, is
 :math:`200 \sqrt n / \delta`. With :math:`\delta = 10^{-3}` and some twenty blocks, nothing else grows at a rate of more
 than about 3/t, in the square of the amplitude. This counts every motion as well conditioned; and a start may be unlucky
-with the probability :math:`\delta`. It is not a proof.
+with the probability :math:`\delta`. So this is no proof.
 """
 
 from collections.abc import Callable

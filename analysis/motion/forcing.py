@@ -41,13 +41,13 @@ from .signals import Signal
 KNOTS = 4
 """Steps, at the least, between two rows of a signal: its corners are then cut by less than 1/32 of their height."""
 
-A_PERIOD = 20
+LOOKS_A_PERIOD = 20
 """Times a period of the fastest motion at which the largest velocity is looked for; it is refined between them."""
 
 EXPONENTIALS_AT_ONCE = 2000
 """Times whose exponentials are kept at once."""
 
-RESONANT = 1e-9
+RESONANCE_WIDTH = 1e-9
 """Relative distance of a frequency from that of a motion below which the quotient of differences would lose all its
 digits. Such a frequency is moved by twice as much: a part in a million of the response after t = 1e3/omega."""
 
@@ -95,7 +95,7 @@ class ImpulseResponse:
         """
         omegas = self._off_resonance(omega)
         fastest = max(np.abs(self.rate.imag).max(), omegas.max())
-        count = int(np.ceil(duration * fastest / (2 * np.pi) * A_PERIOD)) + 1
+        count = int(np.ceil(duration * fastest / (2 * np.pi) * LOOKS_A_PERIOD)) + 1
         step = duration / (count - 1)
         part = (self.weight / (1j * omegas[:, None] - self.rate)).T
         stationary = part.sum(axis=0)
@@ -116,9 +116,9 @@ class ImpulseResponse:
         return largest, where
 
     def _off_resonance(self, omega: ArrayLike) -> Floats:
-        """The frequencies, each moved by a few `RESONANT` if it is that of a motion."""
+        """The frequencies, each moved by a few `RESONANCE_WIDTH` if it is that of a motion."""
         omegas = np.array(omega, dtype=np.float64)
-        least = RESONANT * np.abs(self.rate)
+        least = RESONANCE_WIDTH * np.abs(self.rate)
         hit = np.abs(1j * omegas[..., None] - self.rate) < least
         return omegas + 2 * np.max(np.where(hit, least, 0.0), axis=-1)
 
@@ -206,6 +206,6 @@ def sampled_response(
 
 
 def floor_force(packing: Packing) -> Floats:
-    """The force -m along x on every disk, (x.., y.., R theta..): that of a unit acceleration of the floor, seen from
-    the floor; shape (3N,)."""
+    """The force -m along x on every disk, (x.., y.., R theta..), shape (3N,): in the frame of a floor with a unit
+    acceleration."""
     return np.concatenate([-packing.mass, np.zeros(2 * len(packing))])

@@ -25,15 +25,15 @@ from .rates import rates_of
 from .spectrum import spectrum
 
 NOISE_SHARE = 0.1
-"""Of the fastest motion in the noise, in units of that of a mean mode: 1/1800 of 300 modes was measured, since a pair
-near its coalescence is excited less than others are."""
+"""Share of the fastest motion in the noise, in units of the share of a mean mode. A pair near its coalescence is
+excited less than others: 1/1800 was measured with 300 modes."""
 
-BELOW_TOP = 1e-3
+PLATEAU_SHARE = 1e-3
 """Share of the largest D up to which D has not levelled off."""
 
-LINEAR = 0.1
-"""Root of D, in units of the smallest overlap, up to which the motion may be linear: of eight runs that were made
-before the rule, D stopped at 0.7 to 31 times the square of that."""
+LINEAR_RANGE = 0.1
+"""Root of D, in units of the smallest overlap, up to which the motion may be linear. In eight runs made before this
+rule D stopped at 0.7 to 31 times the square of this limit."""
 
 JUMP_SHARE = 0.05
 """Share of the run with mu(v) that shows the jump, from the moment on at which friction weakens: 10 of 200 time units,
@@ -223,11 +223,11 @@ def _bounds(packing: Packing, time: Floats, msd: Floats, rate: float | None, jum
     if jumped:
         window = time <= time[0] + JUMP_SHARE * (time[-1] - time[0])
         return 10 * float(msd[window].max()), 0.1 * top
-    ceiling = (LINEAR * packing.smallest_overlap) ** 2
+    ceiling = (LINEAR_RANGE * packing.smallest_overlap) ** 2
     # while it still grows in the end, it has not levelled off: the last decade is reached within the last e-foldings
     late = time[int(np.argmax(msd >= 0.1 * top))]
     grows_on = rate is not None and (time[-1] - late) * rate < 2 * np.log(10)
-    return growing_range(time, msd, min(ceiling, np.nextafter(top, np.inf) if grows_on else BELOW_TOP * top))
+    return growing_range(time, msd, min(ceiling, np.nextafter(top, np.inf) if grows_on else PLATEAU_SHARE * top))
 
 
 def unstable_rates(packing: Packing) -> Complexes:

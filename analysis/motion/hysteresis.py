@@ -80,7 +80,8 @@ def turning_points(fx: Floats) -> list[int]:
 
 
 def hysteresis(packings: Sequence[Packing]) -> Hysteresis | None:
-    """What is left when F_x comes back; None if the last F_x has not been met before a turning point.
+    """The displacement and the work that remain when F_x returns; None if F_x did not have its last value before a
+    turning point.
 
     Parameters
     ----------

@@ -24,32 +24,32 @@ from scipy.linalg import eig, schur, solve_sylvester
 from ..packing.packing import Floats, Indices
 from .eigenvalues import Complexes
 
-WELL_CONDITIONED = 0.1
+LONE_COSINE = 0.1
 """Eigenvalues with a smaller |y^H x| are kept together with their partner; eigenvalues with a larger |y^H x| lose at
 most one digit."""
 
-TOLERABLE = 1e-3
+LEAST_COSINE = 1e-3
 """Where no plane of two eigenvectors can be set apart, as among the modes of overdamped motions, which are oblique
 without being close to each other, eigenvectors serve that lose no more digits than this |y^H x|."""
 
-TOGETHER = 0.1
+CIRCLE_SHARE = 0.1
 """Half the distance of two eigenvalues, in units of the circle's radius, up to which Cauchy's integral is used.
-The quotient of differences loses a digit there, and the integral over `NODES` points has an error of
-TOGETHER^NODES."""
+The quotient of differences loses a digit there, and the integral over `CIRCLE_POINTS` points has an error of
+CIRCLE_SHARE^CIRCLE_POINTS."""
 
-NODES = 16
+CIRCLE_POINTS = 16
 """Points on the circle."""
 
 Function = Callable[[Complexes, Floats], Sequence[Complexes]]
 """(eigenvalues, times) -> some arrays, entire in the eigenvalue."""
 
-Reach = Callable[[complex, Floats], Floats]
+CircleRadius = Callable[[complex, Floats], Floats]
 """(eigenvalue, times) -> how far the eigenvalue may move while its motion grows by no more than a factor e."""
 
 
 def second_order(middle: complex, time: Floats) -> Floats:
     """The reach of an eigenvalue lambda of x'' = -lambda x."""
-    inverse = 1 / np.where(time > 0, time, 1.0)  # frequencies on this circle differ by 1/t from that of its centre
+    inverse = 1 / np.where(time > 0, time, 1.0)  # frequencies on this circle are 1/t from the centre's
     return np.asarray(inverse * (2 * np.sqrt(abs(middle)) + inverse))
 
 
@@ -78,10 +78,10 @@ class BlockDiagonal:
     inverse: Complexes
     values: Complexes
     blocks: dict[int, Complexes]
-    reach: Reach = second_order
+    reach: CircleRadius = second_order
 
     @classmethod
-    def of(cls, matrix: ArrayLike, reach: Reach = second_order) -> "BlockDiagonal":
+    def of(cls, matrix: ArrayLike, reach: CircleRadius = second_order) -> "BlockDiagonal":
         """Decompose a square matrix.
 
         Parameters
@@ -111,9 +111,9 @@ class BlockDiagonal:
             parallel = np.abs(right[:, worst].conj() @ right)
             parallel[worst] = 0.0
             pair = [worst, int(np.argmax(parallel))]
-            parts = _split_off_pair(rest, found, pair) if overlap[worst] < WELL_CONDITIONED else None
+            parts = _split_off_pair(rest, found, pair) if overlap[worst] < LONE_COSINE else None
             if parts is None:
-                if overlap[worst] < TOLERABLE:
+                if overlap[worst] < LEAST_COSINE:
                     raise np.linalg.LinAlgError(f"more than two eigenvalues coalesce near {found[worst]:.6g}")
                 basis[:, done:] = basis[:, done:] @ right
                 inverse[done:] = np.linalg.solve(right, inverse[done:])
@@ -241,7 +241,7 @@ def _split_off_pair(
     if len(rest) > 2:
         coupling = solve_sylvester(triangle[:2, :2], -triangle[2:, 2:], -triangle[:2, 2:])
         # Two planes that are nearly parallel: no better than the vectors that were to be avoided.
-        if count != 2 or not np.linalg.norm(coupling) < WELL_CONDITIONED**-2:
+        if count != 2 or not np.linalg.norm(coupling) < LONE_COSINE**-2:
             return None
         turn[:2, 2:], back[:2, 2:] = coupling, -coupling
     return triangle[:2, :2], triangle[2:, 2:], unitary @ turn, back @ unitary.conj().T
@@ -252,8 +252,8 @@ def _divided_difference(
 ) -> list[Complexes]:
     """f[first, second] of all that the function returns, at every time; with the radius of Cauchy's circle."""
     middle, half = 0.5 * (first + second), 0.5 * abs(first - second)
-    offset = radius[:, None] * np.exp(2j * np.pi * np.arange(NODES) / NODES)
-    near = half <= TOGETHER * radius
+    offset = radius[:, None] * np.exp(2j * np.pi * np.arange(CIRCLE_POINTS) / CIRCLE_POINTS)
+    near = half <= CIRCLE_SHARE * radius
     safe = first - second if first != second else 1.0
     with np.errstate(divide="ignore", invalid="ignore"):  # a point may hit an eigenvalue where it is not needed
         weight = offset / ((middle + offset - first) * (middle + offset - second))

@@ -17,14 +17,14 @@ from scipy.linalg import eig
 from scipy.sparse import csr_array
 
 from ..arrays import Complexes, Floats, Indices
-from ..configuration import HasConfiguration
+from ..has_configuration import HasConfiguration
 from ..operators.stiffness import stiffness_matrix
 from .eigenvalues import SAFETY, active_coordinates, mass_weighted, unit_rounding
 
 
 @dataclass(frozen=True)
 class Mode:
-    """One mode of a packing; of a complex pair the one with the positive imaginary part stands for both.
+    """One mode of a packing. A complex pair has one Mode, with the positive imaginary part.
 
     Attributes
     ----------

@@ -18,7 +18,8 @@ import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
 from ..arrays import Floats, Indices
-from ..configuration import Configuration, HasConfiguration
+from ..configuration import Configuration
+from ..has_configuration import HasConfiguration
 from ..operators.sliders import sliders_of, with_sticking_contacts
 from ..operators.stiffness import stiffness_matrix
 from .eigenvalues import active_coordinates, mass_weighted

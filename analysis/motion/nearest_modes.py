@@ -4,8 +4,8 @@ import numpy as np
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from ..configuration import HasConfiguration
 from ..factors.sparse_lu import general_lu
+from ..has_configuration import HasConfiguration
 from .eigenvalues import Complexes
 from .modes import Modes
 from .spectrum import dynamical_matrix

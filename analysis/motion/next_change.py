@@ -7,10 +7,8 @@ force of contact c becomes :math:`\mathbf f_t + x\, \mathbf g_c` in the plane of
 .. math:: |\mathbf f_t + x\, \mathbf g_c| = \mu f_n + x\, h_c ,
 
 and opens where the overlap is zero. Particles that are nearer than the largest overlap, and do not touch yet, close
-where their gap is zero; contacts that others make come besides.
+where their gap is zero. Contacts of particles farther apart are not foreseen.
 """
-
-from typing import Any
 
 import numpy as np
 
@@ -22,8 +20,10 @@ from .one_sided import OneSidedSystem
 REACHES, OPENS, CLOSES = "reaches Coulomb's bound", "opens", "closes"
 
 
-def next_change(system: OneSidedSystem, velocity: Floats, paths: Floats) -> dict[str, Any]:
-    """The first change of a contact under a load that rises: its `Stability.rising` `next_change` and `next_event`.
+def next_change(system: OneSidedSystem, velocity: Floats, paths: Floats) -> tuple[float | None, str | None]:
+    """At which increase of the load a contact changes first, and whether it reaches the bound, opens or closes.
+
+    None twice if no contact is known that changes.
 
     Parameters
     ----------
@@ -36,13 +36,13 @@ def next_change(system: OneSidedSystem, velocity: Floats, paths: Floats) -> dict
     """
     configuration = system.motion.configuration
     if configuration.stiffness is not None or not len(configuration.contacts):
-        return {"next_change": None, "next_event": None}
+        return None, None
     slides, opens = _increases(configuration, system.of_particles(velocity), system.of_contacts(paths))
     gaps = gaps_of(configuration)
     rates = gaps.rates(configuration) @ system.of_particles(velocity)
     closes = np.where(rates > 0, gaps.gap / np.where(rates > 0, rates, 1.0), np.inf).min(initial=np.inf)
     first, event = min((float(slides.min()), REACHES), (float(opens.min()), OPENS), (float(closes), CLOSES))
-    return {"next_change": first, "next_event": event} if first < np.inf else {"next_change": None, "next_event": None}
+    return (first, event) if first < np.inf else (None, None)
 
 
 def _increases(configuration: Configuration, velocity: Floats, paths: Floats) -> tuple[Floats, Floats]:

@@ -55,7 +55,7 @@ ORTHOGONAL = np.array([1.0, -1.0]) / np.sqrt(2)
 it."""
 
 LEAST_CROSSOVER = 4.0
-"""Undamped amplitude from which on damping may take half of it: of a smaller one the start itself would be half."""
+"""Undamped amplitude from which on damping may halve the amplitude: half of a smaller one would be the start itself."""
 
 PERIODS_ABOUT_MAXIMUM = 3
 """Periods of the fast oscillation on either side of the envelope's maximum among which the largest is looked for: the

@@ -14,19 +14,21 @@ and r are those of laws with two derivatives, one while a contact closes and one
 (:func:`~faultgouge.analysis.operators.linearised_contacts.rescaling_operators`). Each contact at the bound is a play
 operator; nothing else remembers.
 
-The motion is positively homogeneous of degree one: the motion of a times the push (or of a times the rate of loading)
-is a times the motion, for a > 0. No amplitude enters, and no matrix describes the motion: it may grow where the packing
-with sticking contacts is stable, and rest where the packing with sliding contacts is not. The equations of a slider
+The motion is positively homogeneous of degree one: a times the push (or a times the rate of loading) gives a times the
+motion, for a > 0. No amplitude enters. No matrix describes the motion: it may grow where the packing with sticking
+contacts is stable, and rest where the packing with sliding contacts is unstable. The equations of a slider
 with a load that rises slowly are those of rate-independent plasticity; self-sustained vibration of sliding contacts is
 known as flutter (Bigoni and Noselli, J. Mech. Phys. Solids 59, 2208, 2011).
 
-The steps are those of velocity Verlet, with dashpots at the velocity of the half step, as LAMMPS takes them. Without a
-contact that remembers, the motion is linear, and is that of the exponential function of the first-order matrix.
+The motion is followed in steps of velocity Verlet, with dashpots at the velocity of the half step, as in LAMMPS.
+Without a contact that remembers the motion is linear, and the exponential function of the first-order matrix gives the
+motion to rounding.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,7 +37,8 @@ from scipy.sparse import block_array, bsr_array, csr_array, eye_array
 from scipy.sparse.linalg import expm_multiply
 
 from ..arrays import Floats, Indices, floats
-from ..configuration import Configuration, HasConfiguration
+from ..configuration import Configuration
+from ..has_configuration import HasConfiguration
 from ..operators.linearised_contacts import rescaling_operators
 from ..operators.sliders import margins, sliders_of
 from .motion import Motion
@@ -45,9 +48,14 @@ MOTION_STEP = 0.05
 """Time step, as a share of the largest stable one. Beside LAMMPS D is right to some per cent after growth by twelve
 decades; with twice the step, to some 8 per cent."""
 
-CLOSE_STEP = 0.3
-"""Time step of motion whose contacts are looked at after each step, as a share of the largest stable one: ten of the
-fastest period."""
+LOOK_STEP = 0.3
+"""Time between two looks at contacts as a share of the largest stable time step: ten looks in the fastest period."""
+
+DENSE_ENTRIES = 150**2
+"""Entries up to which a product with the dense matrix is as fast: ten times as fast for 60 coordinates and fewer."""
+
+Matrix: TypeAlias = csr_array | Floats
+"""A matrix for products with columns."""
 
 
 @dataclass
@@ -103,13 +111,17 @@ class OneSidedSystem:
         return csr_array((1 / m.root_mass, (m.active, np.arange(len(m.active)))), shape=shape)
 
     @cached_property
+    def _weight_transposed(self) -> csr_array:
+        return csr_array(self._weight.T)
+
+    @cached_property
     def residual_force(self) -> Floats:
         """Mass-weighted forces that are left where the packing is said to rest, shape (E, 1)."""
         return self.on_active(self.motion.configuration.coordinate_force[:, None])
 
     def on_active(self, forces: Floats) -> Floats:
         """Mass-weighted forces, shape (E, P), of forces on all coordinates, shape (coordinates, P)."""
-        return np.asarray(self._weight.T @ forces)
+        return np.asarray(self._weight_transposed @ forces)
 
     def of_particles(self, z: Floats) -> Floats:
         """The values of all coordinates, shape (coordinates,), of one mass-weighted displacement, shape (E, 1)."""
@@ -128,28 +140,29 @@ class OneSidedSystem:
         return np.flatnonzero(self.motion.configuration.contacts.two_derivatives)
 
     @cached_property
-    def sliders(self) -> tuple[csr_array, csr_array, csr_array, Floats, NDArray[np.bool_]]:
+    def sliders(self) -> tuple[Matrix, Matrix, Matrix, Floats, NDArray[np.bool_]]:
         """G, shape (E, B), Y and Z, shape (B, E), h, and which p remembers dashpots, shape (B, 1)."""
         s = sliders_of(self.motion.configuration)
         if not self.motion.dissipative:
             s.viscous_excess.data[:] = 0.0
-        grip, excess, viscous = self._weight.T @ s.force, s.excess @ self._weight, s.viscous_excess @ self._weight
-        return csr_array(grip), csr_array(excess), csr_array(viscous), s.rectified[:, None], s.viscous[:, None]
+        grip = _for_products(self._weight_transposed @ s.force)
+        excess, viscous = (_for_products(rows @ self._weight) for rows in (s.excess, s.viscous_excess))
+        return grip, excess, viscous, s.rectified[:, None], s.viscous[:, None]
 
     @cached_property
     def missing_forces(self) -> Floats:
-        """What contacts that count as at Coulomb's bound lack to it, shape (B, 1), force."""
+        """What contacts that count as at Coulomb's bound lack to the bound, shape (B, 1), force."""
         c = self.motion.configuration.contacts
         return np.maximum(c.friction - np.linalg.norm(c.tangential_force, axis=1), 0.0)[c.one_sided, None]
 
     @cached_property
-    def margins(self) -> tuple[csr_array, Floats]:
+    def margins(self) -> tuple[Matrix, Floats]:
         """Rows, shape (R, E), and limits, shape (R,), see :func:`~faultgouge.analysis.operators.sliders.margins`."""
         rows, limits = margins(self.motion.configuration)
-        return csr_array(rows @ self._weight), limits
+        return _for_products(rows @ self._weight), limits
 
     @cached_property
-    def rescaled(self) -> tuple[csr_array, csr_array, csr_array]:
+    def rescaled(self) -> tuple[Matrix, Matrix, Matrix]:
         """N, shape (R, E), and B, shape (E, R), of the R contacts with two derivatives; h selects, shape (B, R)."""
         rates, forces = rescaling_operators(self.motion.configuration)
         contacts = self.motion.configuration.contacts
@@ -157,13 +170,16 @@ class OneSidedSystem:
         bound = np.flatnonzero(contacts.one_sided)
         here, place = np.isin(bound, two), np.searchsorted(two, bound)
         select = csr_array((np.ones(here.sum()), (np.flatnonzero(here), place[here])), shape=(len(bound), len(two)))
-        return csr_array(rates[two] @ self._weight), csr_array(self._weight.T @ forces[:, two]), select
+        rows, columns = rates[two] @ self._weight, self._weight_transposed @ forces[:, two]
+        return _for_products(rows), _for_products(columns), _for_products(select)
 
     @cached_property
-    def _operators(self) -> tuple[bsr_array, bsr_array | None]:
-        """A and, if there is dissipation, G, for products with one vector after the other."""
+    def _operators(self) -> tuple[Matrix | bsr_array, Matrix | bsr_array | None]:
+        """A and, if there is dissipation, G."""
         m = self.motion
-        return m.in_blocks(m.stiffness), m.in_blocks(m.damping) if m.dissipative else None
+        in_blocks = m.configuration.dimension == 3 and len(m.active) ** 2 > DENSE_ENTRIES
+        form = m.in_blocks if in_blocks else _for_products
+        return form(m.stiffness), form(m.damping) if m.dissipative else None
 
     def start(self, velocity: Floats) -> OneSidedState:
         """At rest in the equilibrium, but for velocities of all coordinates, shape (coordinates, P)."""
@@ -256,9 +272,9 @@ class OneSidedSystem:
     def _force(self, state: OneSidedState, velocity: Floats, load: Floats | None) -> Floats:
         """Mass-weighted forces; sliders give way."""
         stiffness, damping = self._operators
-        force = -_by_column(stiffness, state.z)
+        force = -_product(stiffness, state.z)
         if damping is not None:
-            force -= _by_column(damping, velocity)
+            force -= _product(damping, velocity)
         if load is not None:
             force += state.time * load
         if len(state.r):
@@ -298,16 +314,31 @@ class OneSidedSystem:
         gain = np.zeros_like(velocity) if rise is None else rise / c.coordinate_mass[:, None]
         return np.array([np.where(flies[:, None], v * velocity + g * gain, 0.0) for _, v, _, g in of_both])
 
-    def displacement(self, z: Floats, flight: Floats | float = 0.0) -> Floats:
+    @cached_property
+    def _translations(self) -> Matrix:
+        """Displacements of the particles along the axes, shape (d N, E), by mass-weighted coordinates."""
+        c = self.motion.configuration
+        whole = self._weight if c.constraint is None else c.constraint @ self._weight
+        return _for_products(csr_array(whole)[: c.dimension * len(c)])
+
+    def displacement(self, z: Floats, flight: Floats | None = None) -> Floats:
         """Displacements of the particles, shape (N, d, P), of mass-weighted coordinates, and of `free_flight`."""
         c = self.motion.configuration
-        q = self._weight @ z + flight
-        q = (q if c.constraint is None else c.constraint @ q).reshape(c.axes, len(c), -1)[: c.dimension]
-        return np.asarray(np.moveaxis(q, 0, 1))
+        q = self._translations @ z
+        if flight is not None:
+            q += (flight if c.constraint is None else c.constraint @ flight)[: len(q)]
+        return np.asarray(q.reshape(c.dimension, len(c), -1).transpose(1, 0, 2))
 
 
-def _by_column(matrix: bsr_array, columns: Floats) -> Floats:
-    """Products in a time that is less than half of that of all columns at once."""
+def _for_products(matrix: csr_array) -> Matrix:
+    """A sparse matrix in the form that is faster for products with a few columns."""
+    return matrix.toarray() if np.prod(matrix.shape) <= DENSE_ENTRIES else csr_array(matrix)
+
+
+def _product(matrix: Matrix | bsr_array, columns: Floats) -> Floats:
+    """Products with columns: of blocks one by one, which takes less than half of the time of all at once."""
+    if not isinstance(matrix, bsr_array):
+        return np.asarray(matrix @ columns)
     made = np.empty(columns.shape, order="F")
     for k in range(columns.shape[1]):
         made[:, k] = matrix @ columns[:, k]
@@ -333,7 +364,7 @@ def forces_on_coordinates(configuration: Configuration, rise: str | ArrayLike) -
 
 
 def on_all_coordinates(configuration: Configuration, name: str, values: ArrayLike | None) -> Floats:
-    """Vectors of the particles as numbers of all coordinates, shape (coordinates, 1); without rotations."""
+    """Vectors of the particles, shape (N, d), on all coordinates, shape (coordinates, 1); zero by default."""
     whole = np.zeros((configuration.axes, len(configuration)))
     if values is not None:
         whole[: configuration.dimension] = floats(name, values, (len(configuration), configuration.dimension)).T

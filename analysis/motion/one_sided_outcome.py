@@ -1,28 +1,33 @@
 r"""What becomes of one-sided motion: it grows, rests or has not settled.
 
-Motions begin with random pushes of all particles alike, and with their opposites, since one-sided motion is not odd. A
-motion *grows* if D has gained `DECADES` and still gains at a steady rate; it *rests* if the sliders have come to rest
-and the packing with sticking contacts does not grow, since then the motion is linear and decays for ever. Where the
-slowest vibration decays slowly, contacts slip on with it: the motion rests, too, if the slips of four spans of time
-each fall about as fast as this vibration, and what is left is little. Otherwise the motion has not settled. The time is
-`STEPS_OF_CHUNK` stable time steps as often as needed, up to `WORK` multiplications.
+Motions begin with random pushes of all particles, and with the opposites of these pushes, since one-sided motion is not
+odd. A motion
 
-Sliders that have come to rest may slide again under a law of two derivatives: vibration wears tangential forces down
-(:mod:`~faultgouge.analysis.motion.creep`), at a rate that falls with the vibration. Such a motion, followed on after
-its sliders have rested, rests as long as D does not gain at a steady rate.
+- *grows* if D has gained `DECADES` and still gains at a steady rate;
+- *rests* if the sliders have come to rest and the packing with sticking contacts does not grow: from then on the motion
+  is linear and decays. A slow vibration lets contacts slip for as long as it lasts. Such a motion rests, too, if the
+  slips in four spans of time fall about as fast as this vibration, and little slip is still to come;
+- *has not settled* otherwise.
+
+A motion is followed in chunks of `STEPS_OF_CHUNK` stable time steps, up to `WORK` multiplications.
+
+Under a law of two derivatives vibration wears tangential forces down (:mod:`~faultgouge.analysis.motion.creep`), at a
+rate that falls with the vibration, so that sliders may slide again after they have come to rest. Such a motion rests as
+long as D does not gain at a steady rate afterwards.
 """
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..configuration import Configuration
+from ..fields_by_name import FieldsByName
 from ..progress import report_progress
 from .contact_reach import ContactReach
-from .one_sided import OneSidedSystem
+from .one_sided import OneSidedState, OneSidedSystem
 
 PUSHES = 2
 """Random pushes; the opposite of each is followed, too, since one-sided motion is not odd."""
@@ -31,8 +36,8 @@ VERDICT_STEP = 0.1
 """Time step of one-sided motion as a share of the largest stable one: rates of growth are right to some per cent."""
 
 STEP_OF_LARGE = 0.3
-"""The same of large packings. With 0.4, beside steps of a sixteenth, rates of growth of four packings of 50 spheres are
-3 to 5 % too large."""
+"""Time step for large packings, as a share of the largest stable one. With 0.4 rates of growth of four packings of 50
+spheres are 3 to 5 % larger than with steps of a sixteenth."""
 
 STEPS_OF_CHUNK = 300
 """Stable time steps between two looks at whether a motion has settled: some ten periods of a slow mode."""
@@ -71,10 +76,82 @@ SLIP_SPANS = 8
 """Spans of the time, over the last four of which slips are to fall with the slowest vibration."""
 
 DECAY_SHARE = 0.5
-"""Least rate at which slips fall, as a share of that of the slowest vibration: their sums of spans are uneven."""
+"""Least rate at which slips fall, as a share of the rate of the slowest vibration: the sums over spans are uneven."""
 
 SLIP_LEFT_SHARE = 0.05
 """Slip that may be left, as a share of all slip; D then changes by less than a tenth."""
+
+
+@dataclass(frozen=True)
+class OneSidedOutcome(FieldsByName):
+    """What became of one-sided motion after some pushes.
+
+    Attributes and items are the same: `outcome.grows` is `outcome["grows"]`.
+
+    Attributes
+    ----------
+    grows : bool or None
+        None if the motion has not settled.
+    growth_rate : float or None
+        Of D, 1 / time: of the motion that grows, or with sticking contacts if it rests; None if it has not settled.
+    error : float or None
+        Error of the growth rate of a motion that grows.
+    searched : float
+        Growth rate of D, 1 / time, below which growth would not have been seen; 0 where `grows` is known.
+    amplification : float
+        Largest D, while contacts slid, over the mean square velocity of the push along an axis, time^2: motion that
+        goes on may take D further.
+    slip_left : float or None
+        How much of their slip contacts may have still to come, as a share; 0 if they have stopped, None if that is not
+        known.
+    wears : bool
+        Whether vibration wears contacts down, so that they may slide again.
+    time : float
+        How long the motion was followed.
+    pushes : int
+        How many pushes, the opposite of each among them.
+    scales : tuple of float
+        Between which velocities of the push along an axis this holds. Below, contacts that count as at the bound do not
+        reach it, or the residual forces move the packing as well; above, other contacts reach the bound, or open. The
+        first is infinite if the residual forces alone take another contact so far.
+    """
+
+    grows: bool | None
+    growth_rate: float | None
+    error: float | None
+    searched: float
+    amplification: float
+    slip_left: float | None
+    wears: bool
+    time: float
+    pushes: int
+    scales: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class _Looks:
+    """Looks at P motions: times; D, shape (P,) each; and p of sliders, shape (B, P) each, from the start on."""
+
+    times: list[float]
+    sizes: list[Floats]
+    slid: list[Floats]
+    wears: bool
+
+    def look(self, system: OneSidedSystem, state: OneSidedState) -> None:
+        """Look at the motions once more."""
+        self.times.append(state.time)
+        self.sizes.append(system.mean_square_displacement(state.z))
+        self.slid.append(state.p.copy())
+
+    @property
+    def time(self) -> Floats:
+        """Times, shape (T,)."""
+        return np.array(self.times)
+
+    @property
+    def size(self) -> Floats:
+        """D, shape (T, P)."""
+        return np.array(self.sizes)
 
 
 def window_and_most(system: OneSidedSystem, columns: int, time: float | None) -> tuple[float, int]:
@@ -88,7 +165,7 @@ def window_and_most(system: OneSidedSystem, columns: int, time: float | None) ->
 
 def follow_pushes(
     system: OneSidedSystem, sticking: float, sticking_grows: bool, time: float | None = None, pushes: int = PUSHES
-) -> tuple[dict[str, Any], ContactReach]:
+) -> tuple[OneSidedOutcome, ContactReach]:
     """Whether one-sided motion grows from some pushes: `Stability.one_sided`, and how far the motion took contacts.
 
     Parameters
@@ -107,43 +184,32 @@ def follow_pushes(
     if time is not None:  # whoever gives more time sees what a shorter run sees, too
         most = max(WINDOWS_OF_TIME, int(np.ceil(time / chunk)))
         chunk = time / most
-    times, sizes, slid, reach = [], [], [state.p.copy()], ContactReach(system)
+    reach = ContactReach(system)
     reach.look_closely(state)
-    grows: bool | None = None
-    rested = False
+    seen = _Looks([], [], [state.p.copy()], wears=bool(len(state.r)))
+    grows, left = None, np.inf
     for number in range(most):
         for look in range(LOOKS_PER_CHUNK):
             system.advance(state, chunk * (number + (look + 1) / LOOKS_PER_CHUNK))
-            times.append(state.time)
-            sizes.append(system.mean_square_displacement(state.z))
-            slid.append(state.p.copy())
+            seen.look(system, state)
             reach.look(state)
-        seen = np.array(times), np.array(sizes)
-        report_progress(f"one-sided motion: t = {state.time:.4g}, D = {seen[1][-1].max():.3g} push^2")
-        grows, left = _outcome(*seen, slid, sticking_grows), 0.0
-        if grows is None and sticking < 0 and not sticking_grows:
-            left = _slip_left(slid, float(np.exp(0.5 * sticking * state.time / SLIP_SPANS)))
-            creeps = rested and bool(len(state.r)) and not _still_grows(seen[0], _gained(seen[1]))
-            grows = False if left < SLIP_LEFT_SHARE or creeps else None
-        rested = grows is False
-        if time is None and grows is not None:
+        report_progress(f"one-sided motion: t = {state.time:.4g}, D = {seen.size[-1].max():.3g} push^2")
+        grows, left = _outcome_and_slip_left(seen, sticking, sticking_grows, rested=grows is False)
+        if (time is None and grows is not None) or not np.all(np.isfinite(seen.size[-1])):
             break
-        if not np.all(np.isfinite(seen[1][-1])):
-            break
-    t, d = seen
-    rate, error = _rate(t, d)
-    found = {
-        "grows": grows,
-        "growth_rate": rate if grows else sticking if grows is False else None,
-        "error": error if grows else None,
-        "searched": float(DECADES * np.log(10) / t[-1]) if grows is None else 0.0,
-        "amplification": float(d.max()),
-        "slip_left": left if grows is False and np.isfinite(left) else None,
-        "wears": bool(len(state.r)),
-        "time": float(t[-1]),
-        "pushes": 2 * pushes,
-        "scales": (reach.least_scale, reach.largest_scale),
-    }
+    rate, error = _rate(seen.time, seen.size) if grows else (sticking if grows is False else None, None)
+    found = OneSidedOutcome(
+        grows=grows,
+        growth_rate=rate,
+        error=error,
+        searched=float(DECADES * np.log(10) / seen.time[-1]) if grows is None else 0.0,
+        amplification=float(seen.size.max()),
+        slip_left=left if grows is False and np.isfinite(left) else None,
+        wears=seen.wears,
+        time=float(seen.time[-1]),
+        pushes=2 * pushes,
+        scales=(reach.least_scale, reach.largest_scale),
+    )
     return found, reach
 
 
@@ -156,14 +222,36 @@ def random_pushes(configuration: Configuration, pushes: int) -> Floats:
     return np.hstack([push, -push])
 
 
-def _outcome(time: Floats, size: Floats, slid: list[Floats], sticking_grows: bool) -> bool | None:
+def _outcome_and_slip_left(
+    seen: _Looks, sticking: float, sticking_grows: bool, rested: bool
+) -> tuple[bool | None, float]:
+    """Whether the motion grows, rests (False) or has not settled; and the share of slip that is still to come.
+
+    Parameters
+    ----------
+    seen : _Looks
+        All looks at the motion.
+    sticking, sticking_grows : float, bool
+        Growth rate with sticking contacts, 1 / time, and whether they are known to grow.
+    rested : bool
+        Whether the motion was at rest one chunk before.
+    """
+    grows = _outcome(seen, sticking_grows)
+    if grows is not None or sticking >= 0 or sticking_grows:
+        return grows, 0.0
+    left = _slip_left(seen.slid, float(np.exp(0.5 * sticking * seen.time[-1] / SLIP_SPANS)))
+    creeps = rested and seen.wears and not _still_grows(seen.time, _gained(seen.size))
+    return (False if left < SLIP_LEFT_SHARE or creeps else None), left
+
+
+def _outcome(seen: _Looks, sticking_grows: bool) -> bool | None:
     """Whether the motion grows, rests (False), or has not settled.
 
     Sliders rest if they moved little in the third quarter of the time, and less by half, or not at all, in the fourth:
     each of them, or late all of them together, as of thousands one or the other slips a last time.
     """
-    gained = _gained(size)
-    if gained[-1] > MOST_DECADES or (gained[-1] > DECADES and _still_grows(time, gained)):
+    gained, slid = _gained(seen.size), seen.slid
+    if gained[-1] > MOST_DECADES or (gained[-1] > DECADES and _still_grows(seen.time, gained)):
         return True
     if sticking_grows or len(slid) <= 2 * LOOKS_PER_CHUNK:
         return None
@@ -181,14 +269,14 @@ def _gained(size: Floats) -> Floats:
 
 
 def _slip_dies(half: Floats, three: Floats, end: Floats, over: Callable[..., Floats]) -> NDArray[np.bool_]:
-    """Whether the largest slip of a contact, or that of all contacts, dies away, of each push; p at three times."""
+    """Whether the largest slip of a contact, or the sum of all slips, dies away, for each push; p at three times."""
     whole, before, after = (over(np.abs(slip), axis=0) for slip in (end, three - half, end - three))
     falls = (after <= 0.5 * before) | (after <= np.finfo(float).eps * whole)
     return np.asarray(falls & (before <= SLIP_CHANGE * whole))
 
 
 def _slip_left(slid: list[Floats], decay: float) -> float:
-    """Slip that is still to come, as a share of all slip, at most; infinite if slips do not fall with vibration.
+    """Bound of the slip that is still to come, as a share of all slip; infinite if slips do not fall with vibration.
 
     Parameters
     ----------

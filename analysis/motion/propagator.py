@@ -7,11 +7,11 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse.linalg import svds
 
-from ..configuration import HasConfiguration
 from ..errors import FaultgougeError
+from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats, Indices
 from .eigenvalues import Complexes
-from .matrix_functions import WELL_CONDITIONED, BlockDiagonal, Function, second_order
+from .matrix_functions import LONE_COSINE, BlockDiagonal, Function, second_order
 from .motion import Motion
 from .oscillator import Oscillator, released_motion
 from .rates import rates_of
@@ -19,13 +19,13 @@ from .response import LinearMotion
 
 Norm = Literal["displacement", "energy"]
 
-OBLIQUE = 1.1
+LEAST_OBLIQUITY = 1.1
 """Modes with a larger |x| |l| have a part in the sampling: 1 is what a mode of a symmetric matrix has."""
 
-COUNTED_SHARE = 0.05
-"""And of these the ones with this share of the largest."""
+OBLIQUITY_SHARE = 0.05
+"""Modes whose |x| |l| is at least this share of the largest have a part in the sampling."""
 
-LEAST, MOST = 4, 16
+FEWEST_MODES, MOST_MODES = 4, 16
 """The fewest and the most modes that are sampled; with dissipation a motion is two of them."""
 
 LONE_PERIODS = 100
@@ -41,9 +41,9 @@ the window ends where the bound, which falls with the slowest mode, leaves no ga
 MOST_PERIODS = 20_000
 """The window of more than 1.5 beats has no more periods of the most oblique mode than these."""
 
-NOISE = 1e-7
+RATE_NOISE = 1e-7
 """Growth rates and differences of frequencies below this share of the largest frequency are rounding where two modes
-are about to coalesce: the root of that of a well-conditioned eigenvalue."""
+are about to coalesce: the root of the rounding of a well-conditioned eigenvalue."""
 
 NORM_ACCURACY = 1e-9
 """Relative error of the largest singular value."""
@@ -69,7 +69,7 @@ def stable_motion(packing: HasConfiguration) -> LinearMotion:
 
 @dataclass(frozen=True, eq=False)
 class Propagator:
-    """P(t) = O f(t) I of modes: from starts, by I, to amplitudes, and by O to what is measured."""
+    """P(t) = O f(t) I of modes: I takes starts to amplitudes, and O takes amplitudes to the measured quantities."""
 
     modes: BlockDiagonal
     outward: Complexes
@@ -112,9 +112,9 @@ class Propagator:
         for column in self.modes.blocks:
             weight[[column, column + 1]] = np.inf
         finite = weight[np.isfinite(weight)].max(initial=1.0)
-        least = max(OBLIQUE, COUNTED_SHARE * (finite if np.all(np.isfinite(weight)) else WELL_CONDITIONED**-1))
-        order = np.argsort(-weight, kind="stable")[:MOST]
-        return np.sort(order[(weight[order] > least) | (np.arange(len(order)) < LEAST)])
+        least = max(LEAST_OBLIQUITY, OBLIQUITY_SHARE * (finite if np.all(np.isfinite(weight)) else LONE_COSINE**-1))
+        order = np.argsort(-weight, kind="stable")[:MOST_MODES]
+        return np.sort(order[(weight[order] > least) | (np.arange(len(order)) < FEWEST_MODES)])
 
     def window(self, columns: Indices) -> float:
         """Some beats of the most oblique pair, time."""
@@ -126,7 +126,7 @@ class Propagator:
             # a block has a basis that is not oblique: its two modes are nearly parallel
             place = int(np.searchsorted(columns, column))
             parallel[place, place + 1] = 1 + frequency.max() / max(gap[place, place + 1], 1e-300)
-        parallel[gap <= NOISE * frequency.max(initial=0.0)] = 0.0  # itself, and its mirror image
+        parallel[gap <= RATE_NOISE * frequency.max(initial=0.0)] = 0.0  # itself, and its mirror image
         a, b = np.unravel_index(np.argmax(parallel), parallel.shape)
         if parallel[a, b] == 0.0:
             return float(LONE_PERIODS * 2 * np.pi / frequency[a]) if frequency[a] else 1.0
@@ -180,7 +180,7 @@ class Propagator:
         return replace(self, outward=left.T @ self.outward, inward=self.inward @ right)
 
     def bound(self) -> float:
-        """No P(t) has a larger norm squared: that of the modes with balanced sizes."""
+        """Bound of the norm squared of every P(t): that of the modes with balanced sizes."""
         outward, inward = self.outward.copy(), self.inward.copy()
         for column, block in self.modes.blocks.items():
             pair = [column, column + 1]

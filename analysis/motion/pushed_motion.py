@@ -1,6 +1,6 @@
-"""Small motion of a configuration after a push, or under a load that rises, looked at when one wants to.
+"""Displacements of particles after a push, or under a load that rises, with contacts at Coulomb's bound as they are.
 
-The equations are those of :mod:`~faultgouge.analysis.motion.one_sided`.
+The equations and the steps are those of :mod:`~faultgouge.analysis.motion.one_sided`.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats
-from ..configuration import HasConfiguration
+from ..has_configuration import HasConfiguration
 from .contact_reach import ContactReach
 from .one_sided import OneSidedSystem, forces_on_coordinates, on_all_coordinates
 
@@ -27,7 +27,7 @@ class OneSidedMotion:
     slid : ndarray, shape (T, B)
         p of each contact at the bound: the tangential force that its slider has taken away, force.
     scales : tuple of float
-        Between which multiples of the push, or of the rate, the motion holds, as it was seen in `CLOSE_LOOKS` at its
+        Between which multiples of the push, or of the rate, the motion holds, as it was seen in `FIRST_LOOKS` at its
         beginning and at these times: with smaller ones contacts that count as at the bound do not reach it, or the
         residual forces move the packing as well, and with larger ones other contacts reach the bound, open or close.
     """

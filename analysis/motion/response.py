@@ -25,8 +25,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..configuration import HasConfiguration
 from ..errors import BadInputError
+from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats
 from .matrix_functions import BlockDiagonal, first_order
 from .motion import Motion

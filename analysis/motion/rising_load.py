@@ -1,65 +1,57 @@
-r"""Motion under a load that rises at a constant rate: drift, vibration, and how far this motion goes on.
+"""Motion under a load that rises at a constant rate: drift, vibration, and how far this motion goes on.
 
 The motion is proportional to the rate. Over a span of time its *drift* is the mean velocity of each particle, and its
 *vibration* what is left of the velocities: root mean squares over particles and axes.
 
-**Without contacts at Coulomb's bound** the drift u that lasts has :math:`K \dot u = \mathbf g`, with the load
-:math:`t\, \mathbf g`. Where a law has two derivatives, one while a contact closes and one while it parts, K has those
-of the way that each contact goes. The packing does not vibrate unless motion about the drift grows. One solution of a
-sparse system says the drift, if no force is left over: a load that a free motion does not bear accelerates the packing
-for ever.
+**Without contacts at Coulomb's bound** one solution of a sparse system says the drift
+(:mod:`~faultgouge.analysis.motion.steady_drift`). The packing does not vibrate unless motion about the drift grows.
 
-**With contacts at the bound** the motion is followed in windows. A load that begins to rise makes a packing vibrate
-that would follow a load which always rose, for as long as its dashpots need. So a drag takes this vibration away at
-first, and fades out; what vibrates later sustains itself. Contacts may stick and slide in turn in a cycle of several
-windows, so that the numbers are those of a span of many windows: all after the drag, or else the last half of them. The
-motion is steady if the two halves of this span agree. The error of a number is that of the mean of the quarters of the
-span, and at least what longer steps change.
+**With contacts at the bound** the motion is followed in windows of time. The beginning of the rise alone makes a
+packing vibrate until its dashpots have taken the energy. A drag in the first windows takes this vibration away, and
+fades out: a vibration that is left sustains itself. Contacts may stick and slide in a cycle of several windows. So
+drift and vibration are means over a span of many windows: over all windows after the drag or, if these differ too much,
+over the last half of them. The motion is steady if the two halves of this span agree. The error of a number is the
+error of the mean of the four quarters of the span, and at least the error of the time steps.
 
-Vibration may grow slowly from next to nothing, so that no packing is said to follow the load before the whole time is
-over. A vibration was seen to be steady for ten windows and then to grow to another one; so half of the time at least is
-followed, and from two starts, which differ in whether the drag acts on rotations. One packing may vibrate in two ways,
-by its start.
+Vibration may grow slowly from almost nothing. A packing is therefore said to follow the load only after the whole time.
+One vibration was steady for ten windows and then grew to another one. So at least half of the time is followed, from
+two starts: with a drag on all coordinates, and with a drag that leaves rotations alone. A packing may vibrate in two
+ways, one from each start.
 
-**How far.** While the load rises slowly the mean motion takes sticking contacts to the bound and opens others, as
-:mod:`~faultgouge.analysis.motion.next_change` says from the drift. From there on the packing is another one. A contact
-that counts as at the bound lacks some force, up to the tolerance of that, and slides once the load has risen enough.
-The residual forces move the packing, too, and count until the load has moved the packing ten times as far. A load that
-changes another contact before has no motion of this kind.
+**Range.** While the load rises the drift takes sticking contacts to Coulomb's bound and opens others
+(:mod:`~faultgouge.analysis.motion.next_change`). From then on the packing is another one. A contact that counts as at
+the bound may lack a little force, and slides once the load has risen enough. The residual forces move the packing, too,
+and count until the load has moved the packing ten times as far. If another contact reaches the bound or opens before,
+there is no motion of this kind.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count, islice
-from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array, eye_array
 
 from ..arrays import Floats
-from ..counted import counted
-from ..errors import FaultgougeError
-from ..factors.sparse_lu import general_lu
+from ..fields_by_name import FieldsByName
 from ..progress import report_progress
-from .contact_reach import LEFT_ALONE, reaching_scale
-from .eigenvalues import operator_rounding, zero_uncertainty
+from .contact_reach import PUSH_OVER_RESIDUAL, reaching_scale
 from .next_change import next_change
 from .one_sided import OneSidedSystem
 from .one_sided_outcome import WINDOWS_OF_TIME, window_and_most
-from .rates import rates_of
+from .steady_drift import NotFollowedError, refuse_flight, steady_velocity
 
 SAMPLES_OF_WINDOW = 400
 """Velocities that a window of a load that rises has."""
 
-WINDOWS = 0.2
-"""Relative difference of the vibrations of two halves of a span below which a motion is steady."""
+HALVES_DIFFERENCE = 0.2
+"""Relative difference of the vibrations of two halves of the last half of the time, below which a motion is steady."""
+
+TREND = 0.1
+"""Relative difference of the vibrations of two halves of the whole time after the drag, below which all of this time
+counts, and not the last half alone: in a packing whose vibration grew slowly for a third of the time it is 0.18."""
 
 ERROR_OF_STEPS = 0.02
 """Relative error of drift and vibration by time steps of a tenth of the stable one."""
-
-TREND = 0.1
-"""The same of the whole time after the drag, so that all of it counts, and not the last half alone: in a packing whose
-vibration grew slowly for a third of the time it is 0.18."""
 
 VIBRATION_ERROR = 0.1
 """Relative error of the vibration from which on a motion is not followed any longer."""
@@ -68,7 +60,7 @@ FADE_WINDOWS = 4
 """Windows in which the drag fades out."""
 
 DRAG = 20.0
-"""That drag at first, 1/tau in units of 1/window: it leaves exp(-DRAG FADE_WINDOWS/6) = 2e-6 of a mode's amplitude."""
+"""The drag at first, 1/tau in units of 1/window: it leaves exp(-DRAG FADE_WINDOWS/6) = 2e-6 of a mode's amplitude."""
 
 ONE_START = 6000
 """Coordinates beyond which one start stands for two: each takes a minute or more."""
@@ -79,28 +71,80 @@ VIBRATION_SHARE = 1e-2
 LEAST_WINDOWS = 8
 """Windows of a span whose halves and quarters can be compared."""
 
-ACCELERATES = 3.0
+ACCELERATION_RATIO = 3.0
 """Ratio of the mean velocities of the last and the first quarter of the time from which on a motion has no constant
-drift: that of a velocity which rises as the time, after the drag has faded, is 4, and as its square 17."""
+drift: 4 for a velocity that rises as the time after the drag has faded, and 17 for one that rises as its square."""
 
 LARGEST_GROWTH = 1e12
 """Growth of the vibration of a motion that has no drift."""
 
-DIAGONAL_SHIFT = 1e-11
-"""What is added to the diagonal of K, as a share of the largest entry, so that free motions do not divide by zero."""
 
-REFINEMENTS = 3
-"""Steps of iterative refinement, each of which takes this shift out once more."""
+@dataclass(frozen=True)
+class DriftAndVibration(FieldsByName):
+    """Motion from one start, over the rate of loading; attributes and items are the same.
 
-UNBORNE_SHARE = 1e-6
-"""Share of the load that may be left over where K bears the load."""
+    Attributes
+    ----------
+    drift, vibration : float
+        Root mean squares over particles and axes of the mean velocity, and of what is left of the velocities.
+    drift_error, vibration_error : float or None
+        Their errors; None if too few windows were followed.
+    steady : bool
+        Whether the motion goes on as it is.
+    """
 
-WAY_CHANGES = 60
-"""How often the ways that contacts go may be changed: a few times are enough where the solution is unique."""
+    drift: float
+    drift_error: float | None
+    vibration: float
+    vibration_error: float | None
+    steady: bool
+
+    def vibrates_like(self, other: "DriftAndVibration") -> bool:
+        """Whether the motion from another start is steady as well, or neither is, and vibrates as much."""
+        least, most = sorted((self.vibration, other.vibration))
+        alike = most - least <= HALVES_DIFFERENCE * most or most <= VIBRATION_SHARE * self.drift
+        return self.steady is other.steady and alike
+
+    def __str__(self) -> str:
+        drift, vibration = (
+            f"{name} {size:.3g}" + (f" \u00b1 {error:.1g}" if error else "")
+            for name, size, error in (
+                ("drift", self.drift, self.drift_error),
+                ("vibration", self.vibration, self.vibration_error),
+            )
+        )
+        return f"{drift}, {vibration}{'' if self.steady else ', not steady yet'}"
 
 
-class NotFollowedError(FaultgougeError):
-    """The motion under a load that rises has no constant drift and no vibration about it."""
+@dataclass(frozen=True)
+class RisingMotion(DriftAndVibration):
+    """Motion under a load that rises, over the rate of loading; attributes and items are the same.
+
+    Attributes
+    ----------
+    drift, vibration, drift_error, vibration_error, steady
+        As `DriftAndVibration` has them.
+    time : float or None
+        How long the motion was followed; None if it was solved for.
+    span : float or None
+        The last part of this time, of which drift and vibration are.
+    other_start : DriftAndVibration or None
+        The motion from another start, if one was followed.
+    least_rise : float
+        Increase of the load from which on contacts that count as at Coulomb's bound have reached the bound, and the
+        load has moved the packing ten times as far as the residual forces do.
+    next_change : float or None
+        Increase of the load, to first order, at which the first other contact reaches the bound or opens.
+    next_event : str or None
+        Which of the two.
+    """
+
+    time: float | None = None
+    span: float | None = None
+    other_start: DriftAndVibration | None = None
+    least_rise: float = 0.0
+    next_change: float | None = None
+    next_event: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +193,7 @@ def motion_under_load(
     free: int = 0,
     decays: bool = True,
     residual: float = 0.0,
-) -> dict[str, Any]:
+) -> RisingMotion:
     """Drift and vibration under a load that rises at the rate 1: `Stability.rising`.
 
     Parameters
@@ -172,77 +216,19 @@ def motion_under_load(
     NotFollowedError
         If the load accelerates a motion that no force opposes, or particles that touch nothing.
     """
-    _refuse_flight(system, direction)
+    refuse_flight(system, direction)
     velocity = steady_velocity(system, direction, free) if decays else None
     if velocity is None:
         return follow_load(system, direction, time, residual)
     paths = np.abs(system.rescaled[0] @ velocity)
     still = Span(1.0, velocity, paths, system.displacement(velocity) ** 2, np.zeros((0, 1)))
     drift = float(still.drift_and_vibration(system)[0, 0])
-    alone: dict[str, Any] = {"drift": drift, "drift_error": 0.0, "vibration": 0.0, "vibration_error": 0.0}
-    return alone | {"steady": True, "time": None, "span": None, "other_start": None} | _range(system, still, residual)
-
-
-def _refuse_flight(system: OneSidedSystem, direction: Floats) -> None:
-    """Refuse a load on particles that touch nothing, which accelerate for ever."""
-    motion = system.motion
-    loaded = motion.configuration.coordinate_free & (direction[:, 0] != 0)
-    loaded[motion.active] = False
-    flying = np.unique(np.flatnonzero(loaded) % len(motion.configuration))
-    if len(flying):
-        raise NotFollowedError(
-            f"the load accelerates {counted(len(flying), 'particle')} that nothing touches: give no forces on these"
-        )
-
-
-def steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Floats | None:
-    """The drift without contacts at the bound, mass-weighted, shape (E, 1); None if motion is to be followed.
-
-    Raises
-    ------
-    NotFollowedError
-        If the load accelerates a motion that no force opposes.
-    """
-    if system.sliders[1].shape[0]:
-        return None
-    motion, load = system.motion, system.on_active(direction)
-    rates, forces, _ = system.rescaled
-    way = np.zeros(rates.shape[0])
-    for _ in range(WAY_CHANGES):
-        stiffness = motion.stiffness - forces @ diags_array(way) @ rates if len(way) else motion.stiffness
-        velocity = _solution(replace(motion, stiffness=stiffness), load, free)
-        before, way = way, np.sign(rates @ velocity)[:, 0]
-        if np.array_equal(before, way):
-            break
-    else:
-        return None
-    if len(way):
-        found = rates_of(replace(motion, stiffness=stiffness))
-        if found.searched or found.grows.any():
-            return None
-    return velocity
-
-
-def _solution(motion: Any, load: Floats, free: int) -> Floats:
-    """v of A v = load, without the motions that no force opposes."""
-    matrix = motion.stiffness
-    shift = DIAGONAL_SHIFT * float(np.abs(matrix.data).max(initial=0.0))
-    if free:
-        rounding = operator_rounding(motion.configuration, matrix.data)
-        shift = max(shift, 10 * zero_uncertainty(motion.configuration, rounding))
-    factors = general_lu(csc_array(matrix + shift * eye_array(matrix.shape[0])))
-    velocity = np.zeros_like(load)
-    for _ in range(1 + REFINEMENTS):
-        velocity += factors.solve(load - matrix @ velocity)
-    if np.linalg.norm(load - matrix @ velocity) > UNBORNE_SHARE * np.linalg.norm(load):
-        moves = f"{counted(free, 'motion')} that no force opposes" if free else "a motion that next to no force opposes"
-        raise NotFollowedError(f"the load accelerates {moves}")
-    return velocity
+    return _rising_motion(DriftAndVibration(drift, 0.0, 0.0, 0.0, True), system, still, residual)
 
 
 def follow_load(
     system: OneSidedSystem, direction: Floats, time: float | None = None, residual: float = 0.0
-) -> dict[str, Any]:
+) -> RisingMotion:
     """Drift and vibration of a motion that is followed, as of `motion_under_load`; `residual` as there."""
     length, most = window_and_most(system, 1, time)
     windows: list[Span] = []
@@ -257,27 +243,25 @@ def follow_load(
         if time is None and 2 * len(windows) >= most and _is_known(system, windows):
             break
     _refuse_acceleration(system, windows, length)
-    span, found = _of_starts(system, windows)
-    first, *others = found
-    time = length * len(windows)
-    whole = {**first, "time": time, "span": span.time, "other_start": others[0] if others else None}
-    return whole | _range(system, span, residual)
+    span, (first, *others) = _of_starts(system, windows)
+    motion = _rising_motion(first, system, span, residual)
+    return replace(motion, time=length * len(windows), span=span.time, other_start=others[0] if others else None)
 
 
 def _refuse_acceleration(system: OneSidedSystem, windows: list[Span], length: float) -> None:
-    """Refuse a motion whose mean velocity rises on, as that of contacts which slide on and on."""
+    """Refuse a motion whose mean velocity rises on, as of contacts that slide on and on."""
     quarters, time = _parts(system, windows[FADE_WINDOWS:] or windows)[0, 3:, 0], length * len(windows)
     if time < WINDOWS_OF_TIME * window_and_most(system, 1, None)[0]:
         return  # a slow vibration begins like that
-    if np.all(np.diff(quarters) > 0) and quarters[-1] > ACCELERATES * quarters[0]:
+    if np.all(np.diff(quarters) > 0) and quarters[-1] > ACCELERATION_RATIO * quarters[0]:
         raise NotFollowedError(
             f"no constant drift is seen: the mean velocity over the rate rises from {quarters[0]:.3g} to "
             f"{quarters[-1]:.3g} within t = {time:.4g}, as where the load accelerates particles whose contacts slide on"
         )
 
 
-def _range(system: OneSidedSystem, span: Span, residual: float) -> dict[str, Any]:
-    """Between which increases of the load the motion of a span holds: `least_rise`, `next_change` and `next_event`.
+def _rising_motion(moves: DriftAndVibration, system: OneSidedSystem, span: Span, residual: float) -> RisingMotion:
+    """A motion with the increases of the load between which the motion of a span holds.
 
     Parameters
     ----------
@@ -291,20 +275,20 @@ def _range(system: OneSidedSystem, span: Span, residual: float) -> dict[str, Any
     Raises
     ------
     NotFollowedError
-        If there is none.
+        If there are none.
     """
     velocity, paths, slid = (each[:, :1] / span.time for each in (span.displacement, span.paths, span.slid))
-    reached, change = reaching_scale(system, slid), next_change(system, velocity, paths)
-    moves = float(np.sqrt(system.mean_square_displacement(velocity)[0]))
-    moved = LEFT_ALONE * residual / moves if moves else 0.0
-    least, most = max(reached, moved), change["next_change"]
-    if most is not None and least >= most:
+    reached, (change, event) = reaching_scale(system, slid), next_change(system, velocity, paths)
+    drift = float(np.sqrt(system.mean_square_displacement(velocity)[0]))
+    moved = PUSH_OVER_RESIDUAL * residual / drift if drift else 0.0
+    least = max(reached, moved)
+    if change is not None and least >= change:
         what = "contacts that count as at Coulomb's bound reach it" if reached > moved else "residual forces count less"
         raise NotFollowedError(
-            f"{what} once the load has risen by {least:.1g}, and another contact {change['next_event']} before, at "
-            f"{most:.1g}: bring the packing to rest more closely"
+            f"{what} once the load has risen by {least:.1g}, and another contact {event} before, at {change:.1g}: "
+            "bring the packing to rest more closely"
         )
-    return {"least_rise": least, **change}
+    return RisingMotion(**moves, least_rise=least, next_change=change, next_event=event)
 
 
 def windows_under_load(system: OneSidedSystem, direction: Floats, length: float) -> Iterator[Span]:
@@ -350,19 +334,20 @@ def _drag_of_starts(system: OneSidedSystem) -> Floats:
 def _is_known(system: OneSidedSystem, windows: list[Span]) -> bool:
     """Whether every start vibrates steadily, with a vibration that is known precisely enough."""
     return all(
-        each["steady"]
-        and each["vibration"] > VIBRATION_SHARE * each["drift"]
-        and each["vibration_error"] <= VIBRATION_ERROR * each["vibration"]
+        each.steady
+        and each.vibration > VIBRATION_SHARE * each.drift
+        and each.vibration_error is not None
+        and each.vibration_error <= VIBRATION_ERROR * each.vibration
         for each in _of_starts(system, windows)[1]
     )
 
 
-def _of_starts(system: OneSidedSystem, windows: list[Span]) -> tuple[Span, list[dict[str, Any]]]:
+def _of_starts(system: OneSidedSystem, windows: list[Span]) -> tuple[Span, list[DriftAndVibration]]:
     """The longest span that is steady from every start, or the last half; and what each start does in this span."""
     after = windows[FADE_WINDOWS:] or windows[-1:]
-    for span, differs in ((after, TREND), (after[len(after) // 2 :], WINDOWS)):
-        found = [_outcome(each, differs) for each in _parts(system, span)]
-        if all(each["steady"] for each in found):
+    for span, differs in ((after, TREND), (after[len(after) // 2 :], HALVES_DIFFERENCE)):
+        found = [_of_parts(each, differs) for each in _parts(system, span)]
+        if all(each.steady for each in found):
             break
     return Span.joined(span), found
 
@@ -378,8 +363,9 @@ def _parts(system: OneSidedSystem, span: list[Span]) -> Floats:
     return np.array(parts).transpose(2, 0, 1)
 
 
-def _outcome(parts: Floats, differs: float) -> dict[str, Any]:
-    """What the drift and the vibration of a span and of its parts say, shape (7, 2), whose halves may differ so far."""
+def _of_parts(parts: Floats, differs: float) -> DriftAndVibration:
+    """The motion of a span, from drift and vibration of the span and of its parts, shape (7, 2); halves that differ by
+    no more than `differs` are steady."""
     (drift, vibration), before, after = parts[:3]
     alike = abs(after[1] - before[1]) <= differs * after[1] and after[1] > VIBRATION_SHARE * after[0]
     vanishes = (
@@ -392,17 +378,4 @@ def _outcome(parts: Floats, differs: float) -> dict[str, Any]:
         # of the mean of four, doubled, since quarters of a slow cycle are not independent
         spread = parts[3:].std(axis=0, ddof=1)
         errors = np.hypot(spread, ERROR_OF_STEPS * parts[0]).tolist()
-    return {
-        "drift": float(drift),
-        "drift_error": errors[0],
-        "vibration": float(vibration),
-        "vibration_error": errors[1],
-        "steady": bool(alike or vanishes),
-    }
-
-
-def vibrate_otherwise(first: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Whether the motions under a rising load from two starts differ: one is not steady, or vibrates more."""
-    least, most = sorted((first["vibration"], other["vibration"]))
-    alike = most - least <= WINDOWS * most or most <= VIBRATION_SHARE * first["drift"]
-    return first["steady"] is not other["steady"] or not alike
+    return DriftAndVibration(float(drift), errors[0], float(vibration), errors[1], bool(alike or vanishes))

@@ -3,16 +3,16 @@ r"""Slips of a layer that a spring draws: beginning, end, force drop, slip, ener
 A spring of stiffness k whose far end moves at V draws a layer. While the layer sticks, its velocity is far below V, and
 the force rises by k V a unit of time. In a slip the layer is much faster than V, and the force falls.
 
-**The rule.** The layer is fast if its mean velocity along the force, over `WINDOW` of a period, exceeds `FAST` |V|,
-with V the fastest velocity of the far end. A slip is there once the layer is fast. The slip
-begins where the force was largest in the last `LOOK_BACK` periods before: up to there the layer was slower than the far
-end. The slip ends with the last row in which the layer is fast, if the layer then is not fast for `QUIET` periods. The
-period is that of the layer on the spring,
+**The rule.** The layer is fast if its mean velocity along the force, over `VELOCITY_WINDOW` of a period, exceeds
+`SLIP_VELOCITY` |V|, with V the fastest velocity of the far end. A slip is recognised once the layer is fast. The slip
+begins where the force was largest in the last `LOOK_BACK` periods: up to there the layer was slower than the far end.
+The slip ends with the last row in which the layer is fast, if the layer then is not fast for `SLIP_END` periods. The
+period of the layer on the spring is
 
 .. math:: T_k = 2\pi \sqrt{m/k}, \qquad m \text{ the mass of a disk, } k \text{ the stiffness for each disk.}
 
-So the vibration after a slip belongs to the slip while it is fast. The rule looks back only, and a run that goes on
-finds the same slips as one looks for in its series afterwards.
+So the vibration after a slip belongs to the slip while the layer is fast. The rule needs no later row: the slips of a
+run that goes on are those that its series has in the end.
 
 Springs that draw blocks and granular layers as models of faults: J. M. Carlson, J. S. Langer, Phys. Rev. A 40, 6470
 (1989); M. Pica Ciamarra et al., Phys. Rev. Lett. 104, 238001 (2010).
@@ -26,14 +26,14 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats
 
-FAST = 6.0
+SLIP_VELOCITY = 6.0
 """Velocity of the layer from which on it slips, in units of the fastest velocity of the far end. After a slip the layer
 of 100 disks rings with 2 to 5 of these units; its slips have 8 to 40."""
 
-WINDOW = 0.25
+VELOCITY_WINDOW = 0.25
 """Periods of the layer on the spring over which its velocity is a mean: faster vibrations are no slips."""
 
-QUIET, LOOK_BACK = 2.0, 4.0
+SLIP_END, LOOK_BACK = 2.0, 4.0
 """Periods of the layer on the spring without fast motion that end a slip; and before fast motion, in which the slip
 begins."""
 
@@ -91,9 +91,9 @@ class SlipDetector:
     """
 
     def __init__(self, velocity: float, period: float) -> None:
-        self._threshold = FAST * abs(velocity)
-        self._window = WINDOW * period
-        self.quiet, self.look_back = QUIET * period, LOOK_BACK * period
+        self._threshold = SLIP_VELOCITY * abs(velocity)
+        self._window = VELOCITY_WINDOW * period
+        self.quiet, self.look_back = SLIP_END * period, LOOK_BACK * period
         self._past = deque[_Row]()
         self._begin: _Row | None = None
         self._end: _Row | None = None
@@ -120,9 +120,16 @@ class SlipDetector:
         )
 
     @property
-    def largest(self) -> float:
-        """Time of the largest force in the rows from which a slip may begin; of the slip under way, its beginning."""
-        return (self._begin or self._largest()).time
+    def undecided(self) -> set[float]:
+        """Times of the rows at which a slip may yet be found to begin, or the slip under way to end."""
+        if self._begin is not None:
+            return {self._end.time} if self._end else set()
+        found, highest, lowest = {row.time for row in list(self._past)[-1:]}, 0.0, 0.0
+        for row in reversed(self._past):  # no later force in the same direction is as large
+            if not lowest <= row.force <= highest:
+                found.add(row.time)
+                highest, lowest = max(highest, row.force), min(lowest, row.force)
+        return found
 
     def add(self, time: float, force: float, displacement: float, kinetic_energy: float) -> Slip | None:
         """Take the next row of a series, and give the slip that it ends, if any."""

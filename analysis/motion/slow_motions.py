@@ -15,11 +15,12 @@ with s = 0, are among them. The space V of their right vectors is invariant: :ma
 :math:`w = (1 - V V^T) u`, obeys :math:`\dot w = (1 - V V^T) Z w`, an equation of its own, whose eigenvalues are all
 others of Z. Left vectors are not needed.
 
-A zero of many motions at once hides from a block of few vectors. Most of these belong to one particle each: a sphere
-that rolls on a plane, or turns about the line through its two contacts. Whatever all others do, there is no force, and
-no torque, along such a vector y: the rows of the particle have :math:`y^T A = y^T G = 0`. So :math:`y^T z` and
-:math:`y^T \dot z` stay zero if they are zero at first, and all eigenvectors but those of zero have none of them. The
-motion of what then moves may involve others, too: the columns do not show it.
+**Free motions of one particle.** A block of few vectors cannot find an eigenvalue zero that many motions share. Most of
+these motions belong to one particle each: a sphere that rolls on a plane, or turns about the line through its two
+contacts. Whatever the other particles do, there is no force and no torque along such a vector y: the rows of the
+particle have :math:`y^T A = y^T G = 0`. So :math:`y^T z` and :math:`y^T \dot z` stay zero if they are zero at first,
+and every eigenvector whose eigenvalue is not zero is orthogonal to y. (The free motion itself may involve other
+particles: it belongs to the columns of A, not to its rows.)
 """
 
 from collections.abc import Callable
@@ -105,7 +106,7 @@ class SlowMotions:
 
     @property
     def rate_beyond(self) -> float:
-        """Re s of about the slowest decay of what is not known, as of the outer half of what is known."""
+        """Re s of about the slowest motion beyond the disc, estimated from the outer half of the known ones."""
         outer = self.values[np.abs(self.values) > 0.7 * self.radius]
         return float(outer.real.max(initial=-np.inf))
 

@@ -6,18 +6,17 @@ and packings whose eigenvalues are not all known are followed: each makes a new 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ..configuration import Configuration
-from .contact_reach import LEFT_ALONE, ContactReach
+from .contact_reach import PUSH_OVER_RESIDUAL, ContactReach
 from .creep import Creep, follow_creep
 from .decay import Decay, follow_decay
 from .motion import Motion
 from .one_sided import OneSidedSystem
-from .one_sided_outcome import follow_pushes, random_pushes
-from .rates import Rates, rates_of
+from .one_sided_outcome import OneSidedOutcome, follow_pushes, random_pushes
+from .rates import SLICED, Rates, rates_of
 from .spectrum import Spectrum, spectrum
 from .verdict import LinearNeighbour, WithoutDissipation
 
@@ -49,8 +48,13 @@ class LinearRates:
 
     @classmethod
     def of(cls, configuration: Configuration, known: Spectrum | None, large: bool) -> "LinearRates":
-        """Compute them; K's spectrum may be known, and that of a large packing is not computed."""
-        found = spectrum(configuration) if known is None and not large else known
+        """Compute the rates; K's spectrum may be known.
+
+        This spectrum decides without dissipation. With dissipation the spectrum is a remark, and where it takes longer
+        than all else, the fastest motion without dissipation stands for it.
+        """
+        wanted = configuration.coordinates <= SLICED if configuration.damped else not large
+        found = spectrum(configuration) if known is None and wanted else known
         undamped, sticking = _without_dissipation(configuration, found)
         if configuration.damped:
             sticking = rates_of(Motion.of(configuration))
@@ -72,7 +76,7 @@ def _without_dissipation(configuration: Configuration, found: Spectrum | None) -
 
 @dataclass(frozen=True)
 class SmallMotion:
-    """What becomes of small motion under a load that is held: `grows` is None if that is not known.
+    """The fate of small motion under a load that is held; `grows` is None if it is unknown.
 
     `residual_displacement` is the root of the largest D to which the residual forces move the packing, length; most of
     the others are those of :class:`~faultgouge.analysis.motion.verdict.Stability`."""
@@ -83,7 +87,7 @@ class SmallMotion:
     free: int
     at_least: bool = False
     reasons: Sequence[str] = ()
-    one_sided: dict[str, Any] | None = None
+    one_sided: OneSidedOutcome | None = None
     creep: Creep | None = None
     largest_push: float | None = None
     residual_push: float = 0.0
@@ -104,7 +108,7 @@ class SmallMotion:
 
 
 def follow_small_motion(system: OneSidedSystem, linear: LinearRates, time: float | None, pushes: int) -> SmallMotion:
-    """Follow what eigenvalues do not decide."""
+    """The fate of small motion, followed in time where eigenvalues do not decide."""
     outcome = SmallMotion.of_linear(linear)
     if linear.one_sided:
         found, reach = follow_pushes(system, outcome.growth_rate, bool(outcome.grows), time, pushes)
@@ -153,18 +157,18 @@ def _as_contacts_part(linear: SmallMotion, system: OneSidedSystem, time: float |
     return replace(found, creep=creep, reasons=reasons)
 
 
-def _after_pushes(sticks: SmallMotion, found: dict[str, Any], reach: ContactReach) -> SmallMotion:
+def _after_pushes(sticks: SmallMotion, found: OneSidedOutcome, reach: ContactReach) -> SmallMotion:
     """The outcome of one-sided motion; unknown, too, if it is the motion after no push of any size."""
-    reasons, (least, most), residual = [], found["scales"], reach.residual_scale
-    if found["grows"] is None:
+    reasons, (least, most), residual = [], found.scales, reach.residual_scale
+    if found.grows is None:
         reasons.append(
-            f"the motion of contacts at Coulomb's bound has not settled within t = {found['time']:.4g}, where D is "
-            f"{found['amplification']:.3g} times the mean square velocity of the push, and D that grows more slowly "
-            f"than exp({found['searched']:.2g} t) would not have been seen"
+            f"the motion of contacts at Coulomb's bound has not settled within t = {found.time:.4g}, where D is "
+            f"{found.amplification:.3g} times the mean square velocity of the push, and D that grows more slowly "
+            f"than exp({found.searched:.2g} t) would not have been seen"
         )
-    elif not found["grows"] and np.isinf(least):
+    elif not found.grows and np.isinf(least):
         reasons.append(UNSETTLED)
-    elif not found["grows"] and least >= most and least > LEFT_ALONE * residual:
+    elif not found.grows and least >= most and least > PUSH_OVER_RESIDUAL * residual:
         reasons.append(
             f"contacts that count as at Coulomb's bound reach it after pushes above {least:.1g} (velocity along an "
             f"axis) alone, and others reach it, open or close, after pushes above {most:.1g}: bring the packing to "
@@ -172,9 +176,9 @@ def _after_pushes(sticks: SmallMotion, found: dict[str, Any], reach: ContactReac
         )
     return replace(
         sticks.beside_residual_forces(reach),
-        grows=found["grows"],
-        at_least=sticks.at_least and not found["grows"],
-        growth_rate=found["growth_rate"] if found["grows"] else sticks.growth_rate,
+        grows=found.grows,
+        at_least=sticks.at_least and not found.grows,
+        growth_rate=sticks.growth_rate if not found.grows or found.growth_rate is None else found.growth_rate,
         reasons=reasons,
         one_sided=found,
     )

@@ -44,9 +44,9 @@ from scipy.linalg import eig, eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigs
 
-from ..configuration import HasConfiguration
 from ..counted import counted
 from ..errors import BadInputError
+from ..has_configuration import HasConfiguration
 from ..operators.stiffness import stiffness_matrix
 from ..packing.disk_operators import Form
 from ..packing.packing import Floats, Indices

@@ -5,37 +5,40 @@ r"""Does a packing at rest move? The verdict, with its own dissipation and its c
 dashpots and drag. Complex pairs of K alone are the answer without loss, and no verdict on a packing with dashpots.
 
 **Contacts at the bound** slide on ahead and stick on the way back, and no eigenvalue decides
-(:mod:`~faultgouge.analysis.motion.one_sided`). The one-sided motion is followed from random pushes until it grows, or
-rests, and so is the motion under a load that rises (:mod:`~faultgouge.analysis.motion.one_sided_outcome`). If it has
-not settled in the time that was followed, the verdict is unknown.
+(:mod:`~faultgouge.analysis.motion.one_sided`). The one-sided motion is followed from random pushes until it grows or
+rests (:mod:`~faultgouge.analysis.motion.one_sided_outcome`). If the motion has not settled within the time that it was
+followed, the verdict is unknown. The motion under a load that rises is followed in the same way
+(:mod:`~faultgouge.analysis.motion.rising_load`).
 
 **Laws with two derivatives**, one while a contact closes and one while it parts, let vibration carry particles on,
 without a contact at the bound, too (:mod:`~faultgouge.analysis.motion.creep`).
 
 **Large packings.** Where not all eigenvalues are known and the fastest motions do not grow, the motion from a random
 state is followed (:mod:`~faultgouge.analysis.motion.decay`). Sticking contacts are stable only if this motion has
-decayed so far that a motion that grows, however slowly, would be seen. Otherwise there is no verdict."""
+decayed so far that a motion that grows, however slowly, would be seen. Otherwise there is no verdict.
+"""
 
 from collections.abc import Sequence
-from typing import Any
 
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, number
-from ..configuration import Configuration, HasConfiguration
+from ..configuration import Configuration
+from ..has_configuration import HasConfiguration
 from ..operators.asymmetry import asymmetry
 from ..operators.sliders import with_sticking_contacts
 from .no_verdict import no_verdict
 from .one_sided import OneSidedSystem, forces_on_coordinates
 from .one_sided_outcome import PUSHES, STEP_OF_LARGE, VERDICT_STEP
-from .rising_load import NotFollowedError, motion_under_load
+from .rising_load import RisingMotion, motion_under_load
 from .small_motion import UNSETTLED, LinearRates, SmallMotion, follow_small_motion
 from .spectrum import Spectrum
+from .steady_drift import NotFollowedError
 from .verdict import LinearNeighbour, Stability
 
 LARGE = 6000
-"""Coordinates beyond which the fastest growing motions stand for all eigenvalues, and one push and its opposite for
-several, in larger steps."""
+"""Coordinates beyond which the fastest growing motions stand for all eigenvalues without dissipation, and one push and
+its opposite for several, in larger steps."""
 
 
 def stability(
@@ -92,7 +95,7 @@ def stability(
 
 def _rising(
     system: OneSidedSystem, outcome: SmallMotion, direction: Floats, limit: float | None
-) -> tuple[dict[str, Any] | None, str]:
+) -> tuple[RisingMotion | None, str]:
     """The motion under a rising load, or why it was not followed."""
     if outcome.grows:
         return None, "small motion grows"
@@ -109,7 +112,7 @@ def _stability(
     configuration: Configuration,
     linear: LinearRates,
     outcome: SmallMotion,
-    rising: dict[str, Any] | None,
+    rising: RisingMotion | None,
     not_followed: str,
 ) -> Stability:
     """The verdict on the outcome."""

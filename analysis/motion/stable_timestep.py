@@ -53,7 +53,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from ..arrays import derive_frozen
-from ..configuration import Configuration, HasConfiguration
+from ..configuration import Configuration
+from ..has_configuration import HasConfiguration
 from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats
@@ -64,7 +65,7 @@ EXACT_COORDINATES, COARSE_COORDINATES = 40, 10_000
 TIMESTEP_TOLERANCE = 1e-8
 """Relative error of mu^2 for a time step of up to COARSE_COORDINATES coordinates."""
 
-ROUGH = 0.1
+FIRST_ERROR = 0.1
 """Relative error of the first mu^2 with dashpots, from which the steps begin."""
 
 PRODUCTS = 24
@@ -74,7 +75,7 @@ products miss 0.3 % of mu^2, and 150 products miss 0.006 %. Nobody runs so near 
 TIMESTEP_CHANCE = 1e-3
 """Probability that the fastest motion of many coordinates is beyond the error."""
 
-HERTZ = 1e-3
+HERTZ_DEVIATION = 1e-3
 """Deviation of d ln f_n / d ln delta from 3/2 up to which a force is Hertz's."""
 
 SQUARINGS = 6
@@ -105,7 +106,7 @@ class StableTimestep(float):
 DashpotVelocity = Literal["half-step", "extrapolated"]
 """The velocity that dashpots feel."""
 
-WEIGHT = {"half-step": 1.0, "extrapolated": 2.0}
+DASHPOT_WEIGHT = {"half-step": 1.0, "extrapolated": 2.0}
 """c, the weight of dashpots in the limit."""
 
 
@@ -150,7 +151,7 @@ def stable_timestep(
     if damping is None and of.damped:
         damping = damping_matrix(derive_frozen(of.configuration, drag_rate=0.0))  # drag is integrated exactly
     if damping is not None:
-        damping = WEIGHT[dashpot_velocity or ("extrapolated" if ours else "half-step")] * damping
+        damping = DASHPOT_WEIGHT[dashpot_velocity or ("extrapolated" if ours else "half-step")] * damping
     scale = 1.0 / np.sqrt(coordinate_mass(of))
     found = (_of_all_eigenvalues if len(scale) <= EXACT_COORDINATES else _of_arnoldi)(scale, stiffness, damping)
     # rounding may take the limit below the bound where the two are the same
@@ -180,7 +181,7 @@ def rayleigh_timestep(configuration: Configuration) -> float | None:
     c = configuration.contacts
     if configuration.dimension == 2 or not len(c) or np.any(c.normal_force <= 0):
         return None
-    if np.any(np.abs(c.normal_stiffness * c.overlap / c.normal_force - 1.5) > HERTZ):
+    if np.any(np.abs(c.normal_stiffness * c.overlap / c.normal_force - 1.5) > HERTZ_DEVIATION):
         return None
     first, second = configuration.radius[c.i], np.where(c.wall, np.inf, configuration.radius[c.j])
     modulus = c.normal_stiffness / (2 * np.sqrt(c.overlap / (1 / first + 1 / second)))
@@ -220,7 +221,7 @@ def _of_arnoldi(scale: Floats, stiffness: csr_array, damping: csr_array | None) 
     mu = change = 0.0
     if damping is not None:
         # a rough mu of K alone is where the steps begin
-        value, moved, _ = _largest_eigenvalue(scale, stiffness, ROUGH)
+        value, moved, _ = _largest_eigenvalue(scale, stiffness, FIRST_ERROR)
         mu = _next_mu(0.0, value, moved, damping)
     for _ in range(SQUARINGS):
         matrix = stiffness if damping is None else _sum_of(stiffness, mu, damping)
@@ -241,7 +242,7 @@ def _largest_eigenvalue(scale: Floats, matrix: csr_array, tolerance: float) -> t
 
     start = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
     # one space without restart: whatever it has found is within the tolerance
-    coarse = size > COARSE_COORDINATES and tolerance < ROUGH
+    coarse = size > COARSE_COORDINATES and tolerance < FIRST_ERROR
     space = {"ncv": PRODUCTS, "tol": 1.0} if coarse else {"ncv": 12, "tol": tolerance}
     operator = LinearOperator((size, size), matvec=product, dtype=np.float64)
     (value,), vectors = eigs(operator, 1, which="LM", v0=start, **space)
@@ -262,7 +263,7 @@ def _next_mu(mu: float, value: float, moved: Floats, damping: csr_array | None) 
 
 
 def _sum_of(stiffness: csr_array, mu: float, damping: csr_array) -> csr_array:
-    """K + mu C; those of a Configuration have their numbers in the same places, and a tenth of the time is enough."""
+    """K + mu C; K and C of a Configuration have one pattern, so that the sum takes a tenth of the time."""
     if np.array_equal(stiffness.indptr, damping.indptr) and np.array_equal(stiffness.indices, damping.indices):
         data = stiffness.data + mu * damping.data
         return csr_array((data, stiffness.indices, stiffness.indptr), shape=stiffness.shape)

@@ -21,12 +21,13 @@ of K makes them larger. (For properties of such matrices that eigenvalues do not
 coalesce, :math:`|x_k| |l_k| = \kappa`: the gain is close to :math:`4\kappa^2` when their phases differ by :math:`\pi`,
 at the beat time :math:`\pi/(\omega_1 - \omega_2)`. The gain grows as the inverse of the distance from the onset; the
 amplitude and the time grow as the inverse square root of this distance. Farther from the onset several pairs
-contribute. So P is sampled on the few modes with large :math:`|x_k| |l_k|`, `propagator.SAMPLES` times a period, over a
-window of time that is stated with the result. At the best of these times Lanczos iteration finds the largest singular
-value of the whole propagator. Times are refined on the space of these vectors, where P(t) is a small matrix: the norm
-of this matrix never exceeds that of P(t), and equals it, with its slope, at each time whose vectors are in the space.
-The vectors at the maximum are added to the space until the maximum no longer changes (the subspace method of Kangal,
-Meerbergen, Mengi and Michiels, SIAM J. Matrix Anal. Appl. 39, 48, 2018). The returned start attains the returned gain.
+contribute. So P is sampled on the few modes with large :math:`|x_k| |l_k|`, `propagator.TIMES_A_PERIOD` times a period,
+over a window of time that is stated with the result. At the best of these times Lanczos iteration finds the largest
+singular value of the whole propagator. Times are refined on the space of these vectors, where P(t) is a small matrix:
+the norm of this matrix never exceeds that of P(t), and equals it, with its slope, at each time whose vectors are in the
+space. The vectors at the maximum are added to the space until the maximum no longer changes (the subspace method of
+Kangal, Meerbergen, Mengi and Michiels, SIAM J. Matrix Anal. Appl. 39, 48, 2018). The returned start attains the
+returned gain.
 
 The search in a window cannot exclude a larger gain at a later time, because the frequencies are incommensurate. But P
 is never larger than :math:`\|X S\|_2 \|S^{-1} X^{-1}\|_2` with any scaling S of the modes, since no :math:`|f_k|`
@@ -38,7 +39,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..configuration import HasConfiguration
+from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats
 from .propagator import NORM_ACCURACY, NoGainError, Norm, Propagator, stable_motion
 from .response import LinearMotion
@@ -46,13 +47,13 @@ from .response import LinearMotion
 LEAST_EXCESS = 1e-6
 """An excess of the bound below this is no gain: K is symmetric, but for rounding."""
 
-LOOSE = 1e-4
+SAMPLE_ACCURACY = 1e-4
 """Relative error of the norms at the best samples: what reaches them makes the first space."""
 
-FINE = 1e-4
+TIME_ACCURACY = 1e-4
 """Error of a refined time, in units of the time between the samples."""
 
-GRID = 9
+GRID_TIMES = 9
 """Times between two samples at which the norm on that space is looked at."""
 
 RIVAL_SHARE = 0.98
@@ -188,10 +189,9 @@ def _is_linear(packing: HasConfiguration) -> bool:
 
 def _refine_maxima(propagator: Propagator, brackets: list[tuple[float, float]]) -> tuple[float, float, Floats]:
     """Time, norm and start of the largest norm of the whole propagator about some maxima."""
-    grid = np.array([np.linspace(a, b, GRID) for a, b in brackets])
-    _, left, right = (
-        np.array(part).T for part in zip(*(propagator.largest(t[GRID // 2], LOOSE) for t in grid), strict=True)
-    )
+    grid = np.array([np.linspace(a, b, GRID_TIMES) for a, b in brackets])
+    found = (propagator.largest(t[GRID_TIMES // 2], SAMPLE_ACCURACY) for t in grid)
+    _, left, right = (np.array(part).T for part in zip(*found, strict=True))
     seen, last = np.zeros(len(grid)), grid.max()
     best = 0.0, 0.0, right[:, 0]
     for _ in range(JOINED_VECTORS):
@@ -203,11 +203,11 @@ def _refine_maxima(propagator: Propagator, brackets: list[tuple[float, float]]) 
         if tops[place] <= RIVAL_SHARE * best[1]:
             break
         top = int(np.argmax(sizes[place]))
-        time = _top(small, grid[place, max(top - 1, 0)], grid[place, min(top + 1, GRID - 1)])
+        time = _top(small, grid[place, max(top - 1, 0)], grid[place, min(top + 1, GRID_TIMES - 1)])
         size, out, start = propagator.largest(time)
         seen[place] = size
-        if top in (0, GRID - 1):  # the few modes of the samples had their maximum elsewhere: go on where it rises
-            grid[place] = np.clip(grid[place] + grid[place, top] - grid[place, GRID // 2], 0.0, last)
+        if top in (0, GRID_TIMES - 1):  # the few modes of the samples had their maximum elsewhere: go on where it rises
+            grid[place] = np.clip(grid[place] + grid[place, top] - grid[place, GRID_TIMES // 2], 0.0, last)
         best = max(best, (time, size, start), key=lambda each: each[1])
         left, right = np.column_stack([left, out]), np.column_stack([right, start])
     return best
@@ -223,6 +223,6 @@ def _top(propagator: Propagator, a: float, b: float) -> float:
         lambda t: -np.linalg.norm(propagator.at(np.array([t]))[0], 2),
         bounds=(a, b),
         method="bounded",
-        options={"xatol": FINE * (b - a)},
+        options={"xatol": TIME_ACCURACY * (b - a)},
     )
     return float(top.x)

@@ -8,15 +8,16 @@ from typing import Any
 import numpy as np
 
 from ..counted import counted
-from .contact_reach import LEFT_ALONE
+from .contact_reach import PUSH_OVER_RESIDUAL
 from .creep import Creep
 from .decay import Decay
 from .growth_in_words import exponential
+from .one_sided_outcome import OneSidedOutcome
 from .rates import Rates
-from .rising_load import vibrate_otherwise
+from .rising_load import RisingMotion
 
 WORN = "contacts bear less after they have closed and parted, so that vibration carries particles on"
-"""What contacts with two derivatives do."""
+"""The sentence on contacts with two derivatives."""
 
 
 @dataclass(frozen=True)
@@ -85,16 +86,9 @@ class Stability:
         Without dissipation.
     at_bound : int
         Contacts at Coulomb's bound.
-    one_sided : dict or None
-        grows (True, False, None); growth_rate and its error; searched (growth rate of D below which growth would not
-        have been seen; 0 where grows is known); amplification (largest D over the mean square velocity of the push
-        along an axis, time^2, while contacts slid: what moves on may take D further); slip_left (how much of their slip
-        may be still to come, as a share; 0 if they have stopped, None if that is not known); wears (whether vibration
-        wears contacts down, so that they may slide again); time (how long), pushes (how many); scales (between which
-        velocities of the push along an axis this holds: with smaller ones contacts that count as at the bound do not
-        reach it, or the residual forces move the packing as well, with larger ones others do, or open; the first is
-        infinite if the residual forces alone take another contact so far). None without contacts that slide on one
-        side.
+    one_sided : OneSidedOutcome or None
+        What became of motion after pushes; None without contacts that slide on one side. Its fields have two spellings,
+        `one_sided.grows` and `one_sided["grows"]`, as JSON has them; those of `rising` have, too.
     creep : Creep or None
         How far a push carries particles if contacts have two derivatives, and none is at the bound.
     largest_push : float or None
@@ -105,13 +99,8 @@ class Stability:
         was followed.
     decay : Decay or None
         What became of a random state with sticking contacts; None where eigenvalues decide.
-    rising : dict or None
-        drift and vibration over the rate of loading, with drift_error and vibration_error; steady; time, None if the
-        motion was not followed but solved for; span, the last part of this time, of which drift and vibration are;
-        other_start: the first five from another start, or None; least_rise, the increase of the load from which on
-        contacts that count as at the bound reach it, and the load moves the packing ten times as far as the residual
-        forces do; next_change, at which the first other contact reaches it or opens, to first order, and next_event,
-        which of the two. None unless asked, and where it was `not_followed`.
+    rising : RisingMotion or None
+        Drift and vibration over the rate of loading. None unless asked, and where the motion was `not_followed`.
     sticking, sliding : LinearNeighbour
         If all contacts at the bound stuck, and if all slid on; no bounds of what they do.
     asymmetry : dict
@@ -138,12 +127,12 @@ class Stability:
     at_least: bool
     undamped: WithoutDissipation
     at_bound: int
-    one_sided: dict[str, Any] | None
+    one_sided: OneSidedOutcome | None
     creep: Creep | None
     largest_push: float | None
     residual_push: float
     decay: Decay | None
-    rising: dict[str, Any] | None
+    rising: RisingMotion | None
     sticking: LinearNeighbour
     sliding: LinearNeighbour
     asymmetry: dict[str, float]
@@ -182,15 +171,7 @@ class Stability:
                 return f"unstable: small motion grows{how}: {self.decay}"
             return f"unstable: small motion grows{how}, {exponential(self.growth_rate, 6, self.at_least)}"
         if self.one_sided is not None:
-            names = ("pushes", "amplification", "time", "slip_left")
-            pushes, size, time, left = (self.one_sided[name] for name in names)
-            until = "until the contacts have stopped sliding" if left == 0 else "while contacts slide"
-            on = f", and they slide on by {left:.1%} at most as vibration decays" if left else ""
-            sticks = f"; with sticking contacts {self.decay}" if self.decay else ""
-            return (
-                f"stable: each of {pushes} pushes comes to rest{free}; D reaches {size:.3g} times the mean square "
-                f"velocity of the push {until} (followed for t = {time:.4g}{on}){sticks}"
-            )
+            return f"stable: {self._comes_to_rest(self.one_sided, free)}"
         if self.decay is not None:
             return f"stable: {self.decay}{free}"
         if self.dissipative and self.growth_rate < 0:
@@ -199,6 +180,16 @@ class Stability:
         if self.creep and not self.dissipative:
             return f"stable but for creep: no motion grows exponentially{free}"
         return f"stable: no motion grows{free}"
+
+    def _comes_to_rest(self, outcome: OneSidedOutcome, free: str) -> str:
+        left = outcome.slip_left
+        until = "until the contacts have stopped sliding" if left == 0 else "while contacts slide"
+        on = f", and they slide on by {left:.1%} at most as vibration decays" if left else ""
+        sticks = f"; with sticking contacts {self.decay}" if self.decay else ""
+        return (
+            f"each of {outcome.pushes} pushes comes to rest{free}; D reaches {outcome.amplification:.3g} times the "
+            f"mean square velocity of the push {until} (followed for t = {outcome.time:.4g}{on}){sticks}"
+        )
 
     @property
     def _without_loss(self) -> Iterator[str]:
@@ -231,7 +222,7 @@ class Stability:
     @property
     def _by_vibration(self) -> Iterator[str]:
         creep = self.creep
-        if self.stable and self.one_sided is not None and self.one_sided["wears"]:
+        if self.stable and self.one_sided is not None and self.one_sided.wears:
             yield WORN + ": as long as vibration lasts, contacts may slide again, and D may rise further"
         if creep is None or not self.stable:
             return
@@ -247,10 +238,10 @@ class Stability:
     def _scales(self) -> Iterator[str]:
         if self.stable and self.one_sided is None:
             yield from self._scales_of_linear_motion
-        if self.one_sided is None or self.one_sided["grows"] is None:
+        if self.one_sided is None or self.one_sided.grows is None:
             return
-        least, most = self.one_sided["scales"]
-        if self.one_sided["grows"]:
+        least, most = self.one_sided.scales
+        if self.one_sided.grows:
             if np.isfinite(least):
                 yield (
                     f"this growth is seen after pushes from {least:.1g} on (velocity along an axis): after smaller "
@@ -271,7 +262,7 @@ class Stability:
 
     @property
     def _scales_of_linear_motion(self) -> Iterator[str]:
-        least, most = LEFT_ALONE * self.residual_push, self.largest_push
+        least, most = PUSH_OVER_RESIDUAL * self.residual_push, self.largest_push
         if most is None:
             if least:
                 yield (
@@ -294,13 +285,16 @@ class Stability:
         if self.not_followed:
             yield f"under a load that rises: not followed, since {self.not_followed}"
         if self.rising is not None:
-            other = self.rising["other_start"]
-            starts = [self.rising, other] if other and vibrate_otherwise(self.rising, other) else [self.rising]
-            says = ", and from another start ".join(map(_drift_and_vibration, starts))
-            least, change, event = (self.rising[name] for name in ("least_rise", "next_change", "next_event"))
+            other, least, change = self.rising.other_start, self.rising.least_rise, self.rising.next_change
+            differs = other is not None and not self.rising.vibrates_like(other)
+            says = f"{self.rising}, and from another start {other}" if differs else str(self.rising)
             slide = "all contacts at the bound have reached it and " if self.one_sided is not None else ""
             since = f"; from a rise of {least:.1g} on, where {slide}residual forces do not count" if least else ""
-            until = "" if change is None else f"; until the load has risen by {change:.2g} (a contact {event})"
+            until = (
+                ""
+                if change is None
+                else f"; until the load has risen by {change:.2g} (a contact {self.rising.next_event})"
+            )
             yield f"under a load that rises at the rate 1: {says}{since}{until}"
 
     def as_dict(self) -> dict[str, Any]:
@@ -311,12 +305,12 @@ class Stability:
             "at_least": self.at_least,
             "undamped": vars(self.undamped),
             "at_bound": self.at_bound,
-            "one_sided": None if self.one_sided is None else _finite(self.one_sided),
+            "one_sided": None if self.one_sided is None else self.one_sided.as_dict(),
             "creep": None if self.creep is None else vars(self.creep),
             "largest_push": self.largest_push,
             "residual_push": self.residual_push,
             "decay": None if self.decay is None else self.decay.as_dict(),
-            "rising": self.rising,
+            "rising": None if self.rising is None else self.rising.as_dict(),
             "sticking": vars(self.sticking),
             "sliding": vars(self.sliding),
             "asymmetry": self.asymmetry,
@@ -326,26 +320,6 @@ class Stability:
             "not_followed": self.not_followed,
             "remarks": list(self.remarks),
         }
-
-
-def _finite(numbers: dict[str, Any]) -> dict[str, Any]:
-    """With None in place of numbers that JSON does not have, as of a scale without a bound."""
-
-    def plain(value: Any) -> Any:
-        if isinstance(value, tuple):
-            return [plain(each) for each in value]
-        return None if isinstance(value, float) and not np.isfinite(value) else value
-
-    return {name: plain(value) for name, value in numbers.items()}
-
-
-def _drift_and_vibration(rising: dict[str, Any]) -> str:
-    steady = "" if rising["steady"] else ", not steady yet"
-    numbers = (
-        f"{name} {rising[name]:.3g}" + (f" \u00b1 {error:.1g}" if (error := rising[f"{name}_error"]) else "")
-        for name in ("drift", "vibration")
-    )
-    return ", ".join(numbers) + steady
 
 
 def _later(creep: Creep) -> str:

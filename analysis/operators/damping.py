@@ -24,7 +24,7 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import eigs
 
 from ..arrays import Floats, derive_frozen
-from ..configuration import HasConfiguration
+from ..has_configuration import HasConfiguration
 
 
 def damping_matrix(packing: HasConfiguration, sliding: ArrayLike = False) -> csr_array:

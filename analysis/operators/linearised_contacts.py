@@ -11,7 +11,8 @@ from ..configuration import Configuration
 
 
 def rescaling_operators(configuration: Configuration) -> tuple[csr_array, csr_array]:
-    r"""What K of the mean derivative lacks where a contact closes with another derivative than it parts with.
+    r"""The part of the force that K of the mean derivative lacks, of contacts whose derivative differs between closing
+    and parting.
 
     With :math:`\dot\delta = N \dot q` the forces change by :math:`-K \dot q + B\, |N \dot q|`.
 

@@ -69,7 +69,7 @@ class Sliders:
 
 
 def with_sticking_contacts(configuration: Configuration) -> Configuration:
-    """The configuration whose one-sided contacts all stick, whatever is chosen for them."""
+    """The configuration with all of its one-sided contacts sticking."""
     contacts = configuration.contacts
     slides = contacts.sliding & ~contacts.one_sided
     if np.array_equal(slides, contacts.sliding):

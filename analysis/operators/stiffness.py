@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
-from ..configuration import HasConfiguration
+from ..has_configuration import HasConfiguration
 from ..packing.disk_operators import Form
 
 

@@ -97,9 +97,10 @@ Coulomb's slider has, while it sticks,
 
 and a = 0, :math:`b = p f_t/\delta` while it continues to slide. At the bound either case occurs, depending on the
 motion. The operator of small vibrations treats all contacts as sticking, with the mean :math:`b = f_t/(4\delta)` for p
-= 3/2: a contact at the bound yields in the first periods, until the vibration no longer reaches the bound (it is
-*shaken down*). The weight of :math:`b_-`, and the contacts at the bound that continue to slide, may be given. Newton's
-method treats each contact according to its displacement: contacts that reach the bound slide.
+= 3/2. A contact at the bound may yield in the first periods until the vibration no longer reaches the bound
+(*shakedown*), or slide for ever: :mod:`~faultgouge.analysis.motion.one_sided` follows the contact. The weight of
+:math:`b_-`, and the contacts at the bound that continue to slide, may be given. Newton's method treats each contact
+according to its displacement: contacts that reach the bound slide.
 
 :math:`k_n, k_t, C_N` and :math:`C_T` are constants per length\ :sup:`p-1`; no effective radius enters. :math:`\mu = 0`
 or :math:`k_t = 0` means no tangential force at all, and no history of the slip.

@@ -416,7 +416,7 @@ class Packing:
         """C = -dF/d(dq/dt); see :func:`~faultgouge.analysis.damping_matrix`."""
         along, across = self.law.dashpots(self.geometry.overlap, self.contacts.slip, sliding)
         zero = np.zeros_like(along)
-        # N N^T and T T^T are what the normal and the tangential stiffness multiply in K
+        # K has N N^T times the normal and T T^T times the tangential stiffness
         matrix = self._assembled(Derivatives(zero, zero, along, -across, zero))
         return (
             matrix if self.drag_time is None else csr_array(matrix + diags_array(self.coordinate_mass / self.drag_time))

@@ -12,8 +12,9 @@ fill the plane less well, is included. :func:`solid_fraction_below_top` also inc
 
 import numpy as np
 
-from ..configuration import Configuration, HasConfiguration
+from ..configuration import Configuration
 from ..errors import BadInputError
+from ..has_configuration import HasConfiguration
 from .packing import Packing
 
 

@@ -1,14 +1,14 @@
 r"""Two neighbouring loads with all of their modes: which is which, and where a narrow window may hide in between.
 
-**Of functions that are known at both ends** with their slopes, a cubic goes through both values and slopes, and a
-parabola through either slope and both values. The lowest point of the cubic, less the disagreement of the three, is a
-bound (`deepest_dip`). Where the bound is negative the function may be.
+**A function whose values and slopes are known at both ends** has a cubic through both values and slopes, and two
+parabolas through both values and one slope. The lowest point of the cubic, less the disagreement of the three curves,
+is a lower bound (`deepest_dip`): where the bound is negative the function may be negative.
 
-**Two modes without dissipation** have :math:`D = (\lambda_1 - \lambda_2)^2`, whose slope
-:math:`D' = 2 (\lambda_1 - \lambda_2)(\lambda_1' - \lambda_2')` is known at either end. A load at which contacts change
-bends the levels: something may hide, too, if it may as the levels go on from the increment before. Whether one of two
-modes meets a third shows in the product :math:`(\lambda_1 - \lambda)(\lambda_2 - \lambda) = (\bar\lambda - \lambda)^2 -
-D / 4`, which is smooth where the two coalesce.
+**Two modes without dissipation** have :math:`D = (\lambda_1 - \lambda_2)^2`, whose slope :math:`D' = 2 (\lambda_1 -
+\lambda_2)(\lambda_1' - \lambda_2')` is known at either end. A load at which contacts change bends the levels: a window
+may also hide where the levels, continued from the increment before, would allow for one. Whether one of two modes meets
+a third shows in the product :math:`(\lambda_1 - \lambda)(\lambda_2 - \lambda) = (\bar\lambda - \lambda)^2 - D / 4`,
+which is smooth where the two coalesce.
 
 **Two modes with dissipation** that nearly meet may begin and cease to grow between two loads at which neither grows.
 Half the sum m of two eigenvalues and :math:`D = (s_1 - s_2)^2` are smooth even where both coalesce, so that
@@ -28,10 +28,10 @@ from .space import Space
 from .system import System
 from .system_modes import Members, SystemModes, assign_modes
 
-Ends = tuple[list[Space], list[Space]]
+ModesAtEnds = tuple[list[Space], list[Space]]
 """Modes that nearly meet, at the lower and at the upper load: a pair, or two single modes."""
 
-Course = tuple[Space | None, Space | None]
+ModeAtEnds = tuple[Space | None, Space | None]
 """A motion at the lower and at the upper load, where it is known."""
 
 
@@ -41,7 +41,7 @@ class Few(NamedTuple):
     `named` is the number of motions that were looked at; `courses` has those that grow, or nearly grow, at one load.
     """
 
-    courses: Sequence[Course]
+    courses: Sequence[ModeAtEnds]
     named: int
 
 
@@ -86,11 +86,11 @@ class LoadStep:
         return not (np.array_equal(a.indptr, b.indptr) and np.array_equal(a.indices, b.indices))
 
     @property
-    def courses(self) -> list[Course]:
+    def courses(self) -> list[ModeAtEnds]:
         """The motions that grow at one end at least; without dissipation at both ends where they are recognised."""
         if self.here.system.dissipative:
             return [(None, above) for above in self.there.growing]
-        found: list[Course] = []
+        found: list[ModeAtEnds] = []
         arrived = set()
         backward = {int(image): k for k, image in enumerate(self.forward)}
         for members in self.here.complex_pairs:
@@ -113,47 +113,47 @@ class LoadStep:
         below, above = here.space(members), there.space(image)
         return (below, above) if below.like(above) else None
 
-    def hiding(self, narrowest: float) -> list[Ends] | None:
+    def hiding(self, narrowest: float) -> list[ModesAtEnds] | None:
         """Modes that may grow inside on a stretch wider than `narrowest`; None if that cannot be told."""
         return (self._modes_hiding if self.here.system.dissipative else self._pairs_hiding)(narrowest)
 
-    def _modes_hiding(self, narrowest: float) -> list[Ends]:
+    def _modes_hiding(self, narrowest: float) -> list[ModesAtEnds]:
         finite = (self.forward >= 0) & np.isfinite(self.drifts[0])
         finite[finite] &= np.isfinite(self.drifts[1][self.forward[finite]])
-        known = np.flatnonzero(finite)
-        image = self.forward[known]
+        rows = np.flatnonzero(finite)
+        image = self.forward[rows]
         a, b, slope_a, slope_b = (
-            self.here.values[known], self.there.values[image], self.drifts[0][known], self.drifts[1][image]
+            self.here.values[rows], self.there.values[image], self.drifts[0][rows], self.drifts[1][image]
         )  # fmt: skip
         p, q = neighbours(a.imag, b.imag, 2)
         width, _ = excursion(*((each[p], each[q]) for each in (a, slope_a, b, slope_b)))
         wide = np.flatnonzero(width * self.span > narrowest)
         return [
             (
-                [self.here.space((int(known[j]),)) for j in (p[k], q[k])],
+                [self.here.space((int(rows[j]),)) for j in (p[k], q[k])],
                 [self.there.space((int(image[j]),)) for j in (p[k], q[k])],
             )
             for k in wide
         ]
 
-    def _both(self, known: Indices, image: Indices) -> tuple[tuple[SystemModes, Indices], tuple[SystemModes, Indices]]:
-        return (self.here, known), (self.there, image)
+    def _both(self, rows: Indices, image: Indices) -> tuple[tuple[SystemModes, Indices], tuple[SystemModes, Indices]]:
+        return (self.here, rows), (self.there, image)
 
-    def _pairs_hiding(self, narrowest: float) -> list[Ends] | None:
+    def _pairs_hiding(self, narrowest: float) -> list[ModesAtEnds] | None:
         """Real neighbours between which a window may hide; None if one is not recognised."""
         here, there = self.here, self.there
-        known = np.flatnonzero(self.forward >= 0)
-        image = self.forward[known]
-        p, q = neighbours(here.values[known].real, there.values[image].real, 1)
-        alone = (here.partner[known] < 0) & (there.partner[image] < 0)
+        rows = np.flatnonzero(self.forward >= 0)
+        image = self.forward[rows]
+        p, q = neighbours(here.values[rows].real, there.values[image].real, 1)
+        alone = (here.partner[rows] < 0) & (there.partner[image] < 0)
         kept = alone[p] & alone[q]
         p, q = p[kept], q[kept]
         if len(p) == 0:
             return []
-        gaps = [modes.values.real[names][p] - modes.values.real[names][q] for modes, names in self._both(known, image)]
+        gaps = [modes.values.real[names][p] - modes.values.real[names][q] for modes, names in self._both(rows, image)]
 
         def wide(*drifts: Any) -> NDArray[np.bool_]:
-            rates = [drift[names].real for drift, names in zip(drifts, (known, image), strict=True)]
+            rates = [drift[names].real for drift, names in zip(drifts, (rows, image), strict=True)]
             s0, s1 = (2 * gap * (rate[p] - rate[q]) for gap, rate in zip(gaps, rates, strict=True))
             return deepest_dip(gaps[0] ** 2, s0, gaps[1] ** 2, s1, self.limits.bend)[0] * self.span > narrowest
 
@@ -163,9 +163,9 @@ class LoadStep:
         arrival = self._arrival
         if arrival is not None and np.any(wide(arrival, self.drifts[1]) & ~near):
             return None
-        found: list[Ends] = []
+        found: list[ModesAtEnds] = []
         for k in np.flatnonzero(near):
-            ends = self._recognise(*((int(each[p[k]]), int(each[q[k]])) for each in (known, image)))
+            ends = self._recognise(*((int(each[p[k]]), int(each[q[k]])) for each in (rows, image)))
             if ends is None:
                 return None
             found.append(([ends[0]], [ends[1]]))

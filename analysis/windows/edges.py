@@ -1,12 +1,15 @@
 r"""Windows of loads on which a motion grows, and their edges: where the growth goes through zero, or jumps.
 
-At an edge the growth of a motion (:mod:`~faultgouge.analysis.windows.space`) changes its sign. Without dissipation the
-discriminant D of two modes does, at a *coalescence*, where :math:`|y^H x| \to 0`; with it Re s of one mode does, at a
-*Hopf* point, or at a *steady* one if s itself is zero. If the growth goes through zero along a straight line at
-distances far below the increment, the edge is one of these. A few secant steps bracket the root; five points close to
-it then give the last digits, and say how many there are. If the growth jumps, the equilibrium itself does: a contact
-opened, closed or slid. Bisection locates the jump, and the edge is a *contact change*. A mere crossing of two levels
-touches D = 0 without a change of sign.
+At an edge the growth of a motion (:mod:`~faultgouge.analysis.windows.space`) changes its sign. The growth goes through
+zero along a straight line, at distances far below the increment, at
+
+- a *coalescence*: without dissipation, where the discriminant D of two modes changes its sign and
+  :math:`|y^H x| \to 0`;
+- a *Hopf* point: with dissipation, where Re s of one mode changes its sign; a *steady* point if s itself is zero.
+
+A few secant steps bracket the root; five points close to the root then give its last digits, and their number. The
+growth jumps at a *contact change*, where the equilibrium itself jumps: a contact opened, closed or slid. Bisection
+locates the jump. A mere crossing of two levels touches D = 0 without a change of sign.
 """
 
 from collections.abc import Callable, Sequence
@@ -98,7 +101,7 @@ class Edge:
         kind: Kind = "coalescence"
         if middle.system.dissipative:
             size = float(np.sqrt(np.abs(entries(middle.system.stiffness)).max()))
-            kind = "steady" if middle.mean.imag <= LIMITS.steady * size else "hopf"
+            kind = "steady" if middle.mean.imag <= LIMITS.steady_share * size else "hopf"
         overlap = min(each.overlap for each in spaces)
         return cls(fx, error + middle.system.balance, mean.item(), overlap, kind)
 
@@ -215,20 +218,20 @@ def sign_change(value: Callable[[float], float], below: float, above: float, lim
     if ends[0] * ends[1] >= 0:
         fx = below if abs(ends[0]) <= abs(ends[1]) else above
         return SignChange(fx, min(map(abs, ends)) / (abs(ends[1] - ends[0]) / (above - below)), [fx], smooth=True)
-    known: dict[float, float] = {}
+    values: dict[float, float] = {}
 
     def look_at(fx: float) -> float:
-        known[fx] = value(fx)
-        return known[fx]
+        values[fx] = value(fx)
+        return values[fx]
 
     root = _smooth_root(look_at, below, above, limits)
     if root is not None:
         return root
     width = _jump_width(below, above, limits)
-    left, right = next((a, b) for a, b in pairwise(sorted(known)) if known[a] * known[b] <= 0)
+    left, right = next((a, b) for a, b in pairwise(sorted(values)) if values[a] * values[b] <= 0)
     while right - left > width:
         middle = 0.5 * (left + right)
-        left, right = (middle, right) if look_at(middle) * known[left] > 0 else (left, middle)
+        left, right = (middle, right) if look_at(middle) * values[left] > 0 else (left, middle)
     return SignChange(0.5 * (left + right), 0.5 * (right - left), [left, right], smooth=False)
 
 
@@ -237,16 +240,16 @@ def _smooth_root(value: Callable[[float], float], below: float, above: float, li
     from scipy.optimize import brentq
 
     span = above - below
-    root = float(brentq(value, below, above, xtol=limits.root * span))
+    root = float(brentq(value, below, above, xtol=limits.root_width * span))
     room = min(root - below, above - root)
     # As near as the noise allows: the function should be straight, and yet stand out of the scatter.
-    distance = min(limits.points_in_room * room, limits.points * limits.root * span)
-    while 0 < distance < limits.points_farthest * room:
+    distance = min(limits.point_distance_share * room, limits.point_distance * limits.root_width * span)
+    while 0 < distance < limits.largest_point_share * room:
         loads = [float(fx) for fx in root + distance * np.arange(-2.0, 3.0)]
         found = _root_of_five(loads, np.array([value(fx) for fx in loads]), limits)
         if found is not None:
             return SignChange(*found, loads, smooth=True)
-        distance *= limits.points_farther
+        distance *= limits.point_factor
     return None
 
 
@@ -266,7 +269,7 @@ def _root_of_five(loads: list[float], values: Floats, limits: Limits) -> tuple[f
 def _jump_width(here: float, there: float, limits: Limits) -> float:
     """Width to which a jump between two loads is bracketed, force."""
     rounding = float(np.spacing(max(abs(here), abs(there))))
-    return max(limits.jump * abs(there - here), 4 * rounding)
+    return max(limits.jump_width * abs(there - here), 4 * rounding)
 
 
 SystemOfLoad = Callable[[float], System]
@@ -284,14 +287,14 @@ def follow_to(space: Space, system: System, limits: Limits = LIMITS) -> Space:
     return found
 
 
-def track(at: SystemOfLoad, known: dict[float, Space], limits: Limits = LIMITS) -> Callable[[float], Space]:
-    """A function of the load that follows a motion there from the nearest load in `known`, and adds it to `known`."""
+def track(at: SystemOfLoad, spaces: dict[float, Space], limits: Limits = LIMITS) -> Callable[[float], Space]:
+    """A function of the load that follows a motion there from the nearest load in `spaces`, and adds it to `spaces`."""
 
     def look_at(fx: float) -> Space:
-        if fx not in known:
-            near = [known[load] for load in sorted(known, key=lambda load: abs(load - fx))]
-            known[fx] = _follow_from(near, at(fx), limits)
-        return known[fx]
+        if fx not in spaces:
+            near = [spaces[load] for load in sorted(spaces, key=lambda load: abs(load - fx))]
+            spaces[fx] = _follow_from(near, at(fx), limits)
+        return spaces[fx]
 
     return look_at
 

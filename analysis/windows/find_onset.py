@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
-from ..configuration import HasConfiguration
 from ..errors import NoEquilibriumError, TurningPointError
+from ..has_configuration import HasConfiguration
 from ..motion.buckling import negative_eigenvalues
 from ..motion.spectrum import Spectrum, spectrum
 from ..packing.packing import Floats, Packing
 from ..progress import Watch, report_progress, show_progress
 from .edges import Edge, SystemOfLoad, Window
-from .find_windows import Known, check_increasing, find_windows, windows_up_to
+from .find_windows import WindowsSoFar, check_increasing, find_windows, windows_up_to
 from .limits import LIMITS, Limits
 from .onset import RAISE_LOAD, Increments, NoGrowthError, Onset, OnsetError
 from .search import Look
@@ -136,7 +136,7 @@ class _OnsetSearch:
         return System.of(packing, True, self.limits)
 
     def windows_of(
-        self, system: SystemOfLoad, look: Look = lambda below, above: (), known: Known = lambda windows, fx: None
+        self, system: SystemOfLoad, look: Look = lambda below, above: (), known: WindowsSoFar = lambda windows, fx: None
     ) -> tuple[tuple[Window, ...], Increments]:
         """The windows of a family of systems, and increments in doubt."""
         if self.takes_all:
@@ -280,7 +280,7 @@ def _complex_at_start(start: HasConfiguration, limits: Limits) -> Spectrum | Non
     None if it has none, or if the packing is too large for all eigenvalues to be asked for. Of a symmetric operator,
     as without tangential forces, nothing is computed.
     """
-    if start.coordinates > limits.lapack or _symmetric(full_operator(start, limits)):
+    if start.coordinates > limits.lapack_coordinates or _symmetric(full_operator(start, limits)):
         return None
     found = spectrum(force_bearing(start, limits))
     return found if found.pairs else None

@@ -15,7 +15,7 @@ from .screens.pairs import PairScreen
 from .search import Look, windows_along
 from .system import Operator, System, unit_of
 
-Known = Callable[[tuple[Window, ...], float], None]
+WindowsSoFar = Callable[[tuple[Window, ...], float], None]
 """Takes the windows so far, and the load up to which these are complete."""
 
 
@@ -26,7 +26,7 @@ def find_windows(
     narrowest: float | None = None,
     look: Look = lambda below, above: (),
     first: bool = False,
-    known: Known = lambda windows, fx: None,
+    known: WindowsSoFar = lambda windows, fx: None,
     limits: Limits = LIMITS,
 ) -> tuple[Window, ...]:
     """Find all windows of a one-parameter family of systems.

@@ -24,7 +24,8 @@ class Limits:
     """A contact counts from this times the packing's imbalance: a disk may rest between two contacts without force,
     whose forces cancel in part."""
     small_force: float = 1e-6
-    """And in any case from this share of the largest force, so that a packing out of balance keeps its contacts."""
+    """A contact counts in any case from this share of the largest force, so that a packing out of balance keeps its
+    contacts."""
 
     # Windows between two loads
 
@@ -34,38 +35,39 @@ class Limits:
     """Curvature that two values and slopes of D do not show, as a share of the smaller D: more than enough for
     loads between which modes are recognised at all."""
 
-    screened: int = 4
-    """How often an increment is divided before all modes are asked: they take as long as ten looks at a few."""
-    changing: int = 1
+    screen_divisions: int = 4
+    """How often an increment is divided before all modes are computed, in the time of ten looks at a few modes."""
+    change_divisions: int = 1
     """How often an increment is divided in which a pair changes."""
-    bent: int = 3
-    """As `changing`, where contacts open or close: levels then leave the straight line at unknown loads."""
-    share: float = 0.47
+    bend_divisions: int = 3
+    """As `change_divisions`, where contacts open or close: levels then leave the straight line at unknown loads."""
+    division_share: float = 0.47
     """Where an increment is divided: not in the middle, as the edges of models lie at round numbers."""
 
-    bending: float = 2.0**-4
+    bend_length: float = 2.0**-4
     """Length in increments of the step about a load at which contacts change, in which a window may still hide."""
 
     # The edge of a window
 
-    root: float = 1e-7
+    root_width: float = 1e-7
     """Width to which the root of D is bracketed, in increments."""
-    points: float = 10.0
+    point_distance: float = 10.0
     """First distance of the five points about a root from each other, in widths of its bracket."""
-    points_in_room: float = 1e-3
-    """The same at most, as a share of the distance of the root from the nearer end of the increment."""
-    points_farther: float = 30.0
-    """Factor of the next distance, where the scatter of the five points hides the slope."""
-    points_farthest: float = 0.1
-    """Largest distance, as a share of the distance of the root from the nearer end of the increment."""
+    point_distance_share: float = 1e-3
+    """Largest first distance of these points, as a share of the distance of the root from the nearer end of the
+    increment."""
+    point_factor: float = 30.0
+    """Factor from one distance of these points to the next, where their scatter hides the slope."""
+    largest_point_share: float = 0.1
+    """Largest of these distances, as a share of the distance of the root from the nearer end of the increment."""
     scatter: float = 0.1
     """Scatter of the five points about their parabola, in units of their slope, beyond which the function is not
     smooth there: a step has 1."""
-    jump: float = 1e-9
+    jump_width: float = 1e-9
     """Width to which a jump is bracketed, in increments; its place depends on the path's increment by far more."""
-    steady: float = 1e-9
+    steady_share: float = 1e-9
     """|Im s| below this share of the largest |s| counts as zero."""
-    shortest: float = 2.0**-6
+    shortest_step: float = 2.0**-6
     """Shortest steps, in shares of the straight line from one operator to another, in which pairs and modes are
     followed."""
 
@@ -73,9 +75,9 @@ class Limits:
 
     steps: int = 40
     """Iterations before a shift is given up: a solution costs a hundredth of a dense decomposition."""
-    steps_on: int = 12
+    neighbour_steps: int = 12
     """As `steps`, with the factors of a neighbour: four solutions a step, against a hundred for a factorisation."""
-    pace: int = 5
+    pace_steps: int = 5
     """Steps by which the pace is judged: the iteration slows down while farther modes go, and then keeps its
     pace."""
     offsets: tuple[float, ...] = (0.1, -0.1, 1.0, -1.0)
@@ -84,7 +86,7 @@ class Limits:
     be close."""
     shifts: int = 12
     """Shifts for a single mode, whose s is found better with each: one or two are enough."""
-    slow: float = 0.1
+    slow_share: float = 0.1
     """Share of a residual that a step may leave before the shift is renewed: a factorisation costs a few steps."""
     off_eigenvalue: float = 1e-9
     """Distance of a shift from a point that may be an eigenvalue to the last digit, as a share: an inverse should
@@ -96,7 +98,7 @@ class Limits:
     distance of these two from each other."""
     same_mode: float = 1e-8
     """Two modes of one load are one and the same if their eigenvalues agree to this share, over their condition."""
-    residual: float = 100.0
+    residual_factor: float = 100.0
     """Residual of an accepted plane, in units of u |A|_F; LAPACK's own are some 10."""
 
     # Screening by perturbation theory
@@ -104,14 +106,14 @@ class Limits:
     slack: float = 0.05
     """How far levels and couplings may leave the straight line between two loads, in units of their change. In
     packings of 100 disks and increments of 1e-3 it is 1.3e-3 in the median, and grows with the increment."""
-    few: int = 3
+    few_pairs: int = 3
     """Pairs that are examined one by one; where more are named, a decomposition costs no more."""
     core: int = 20
     """Modes that a cluster owns."""
     margin: int = 20
     """Further modes of a cluster on either side, coupled to its own in all orders. Farther ones mix by less than a
     hundredth."""
-    beyond: int = 10
+    modes_beyond: int = 10
     """Modes of a slice on either side beyond those of its clusters, in second order. What is farther away changes
     levels by less than (coupling / spacing)^2 / 30 of their spacing."""
     mixing: float = 0.1
@@ -123,7 +125,7 @@ class Limits:
     clusters: float = 5e-5
     """Clusters of an increment, for each coordinate squared, beyond which all modes take less time: four of 100
     disks. Half as many in a half, so that dividing costs no more than that at any depth."""
-    cluster: float = 1e-4
+    increment_window: float = 1e-4
     """Narrowest windows that are looked for in clusters, in increments: where they begin is known to 1e-2 or so."""
     weak_damping: float = 0.3
     """A mode of a cluster whose damping is below this share of the median is looked at with the operator, which
@@ -132,18 +134,18 @@ class Limits:
     """Share of an increment by which a cluster is followed beyond the upper load: a cluster knows to 1e-2 or so of
     an increment where modes begin to grow. What grows there is looked at with the operator, too."""
     third_order: float = 5.0
-    """Third order, in roots of its sum of squares: its terms have random signs."""
+    """Third order, in units of the root of its sum of squares: its terms have random signs."""
     spare: float = 0.1
     """Share of a mode's own damping that has to be left."""
-    mixed: float = 0.25
+    largest_mixing: float = 0.25
     """Mixing of two modes up to which the second order is trusted: what is left out is of the relative order of its
     square, 0.06."""
-    oscillating: float = 0.3
+    oscillation_damping: float = 0.3
     """Damping over frequency up to which a mode counts as oscillating."""
-    dissipated: float = 0.7
-    """Share of what dashpots take that has to exceed what the motion is fed: a cluster knows both to a few per
-    cent."""
-    apart: int = 10
+    dissipation_share: float = 0.7
+    """Share of the energy that dashpots take, which has to exceed the energy that feeds the motion: a cluster knows
+    both to a few per cent."""
+    suspect_distance: int = 10
     """Suspects that are closer belong to one cluster."""
 
     largest_cluster: int = 100
@@ -153,9 +155,9 @@ class Limits:
 
     # Slices of the spectrum
 
-    own: int = 120
+    slice_size: int = 120
     """Eigenvalues of a slice. Fewer cost more factorisations, more cost more orthogonalisation."""
-    coarse: int = 240
+    count_spacing: int = 240
     """Eigenvalues between two places at which they are counted; shifts are interpolated in between."""
     block: int = 6
     """Vectors that are solved for at a time: 0.7 ms each at 30,000 coordinates, against 2.6 ms one by one. Larger
@@ -166,27 +168,27 @@ class Limits:
     """Blocks between two looks. A look costs as much as two blocks of 30,000 coordinates, or as twenty of 3,000."""
     last_look: int = 200
     """Blocks at the most."""
-    together: int = 2
+    blocks_together: int = 2
     """Blocks that are made orthogonal to all before them at a time: three stray too far in most slices."""
     stray_limit: float = 3e-6
     """Part of a new vector along the basis, up to which the part is taken away afterwards; some 1e-7 at 29,000
-    coordinates. Its square, 1e-11, is what then remains in lengths and angles of the basis."""
-    accurate: float = 1e-2
+    coordinates. Its square, 1e-11, then remains in lengths and angles of the basis."""
+    vector_residual: float = 1e-2
     """Residual of the eigenvectors of a slice, in mean distances of eigenvalues, as of the inverse. It enters an
     eigenvalue as its square over the distance of modes outside: 4e-6 at the most was measured (29,000 coordinates).
     An eigenvalue may be off its Rayleigh quotient with S by as much."""
 
     # The search in slices
 
-    reach: float = 0.1
+    cluster_reach: float = 0.1
     """Share of an increment by which clusters are extrapolated, so that a pair that they have turn complex a little
     late is found in time. Clusters are trusted as long as they are right to twice that."""
-    finest: float = 1e-3
+    cluster_window: float = 1e-3
     """Narrowest windows of clusters that are looked for, in increments: the clusters' own error is larger."""
-    excess: float = 0.2
-    """What is added to the antisymmetric couplings of a cluster, in units of mixing^2 times the spacing of its
-    levels, so that pairs are announced early, and the operator decides. Modes beyond a slice, and the third order,
-    change the difference of both couplings by a tenth of that unit (360 disks)."""
+    coupling_excess: float = 0.2
+    """Number added to the antisymmetric couplings of a cluster, in units of mixing^2 times the spacing of its levels,
+    so that pairs are announced early, and the operator decides. Modes beyond a slice, and the third order, change the
+    difference of both couplings by a tenth of that unit (360 disks)."""
     dips: int = 12
     """Looks at the discriminant of an announced pair before its sign is in doubt; an avoided crossing takes one or
     two."""
@@ -195,40 +197,42 @@ class Limits:
     depth: int = 2
     """How often parts are divided again; the finest are a sixteenth."""
     largest_basis: float = 3e8
-    """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision."""
-    ahead: int = 2
+    """Numbers of a basis that is kept from increment to increment, 3.6 GB in double and in single precision
+    together."""
+    increments_ahead: int = 2
     """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the
     basis."""
-    lapack: int = 5000
+    lapack_coordinates: int = 5000
     """Coordinates up to which all eigenvalues at the first load are asked for: half a minute, and as their cube."""
-    axis: int = 10_000
+    axis_coordinates: int = 10_000
     """Coordinates up to which all motions that grow at a load are looked for along the imaginary axis, where
     clusters miss some: the time grows as their square."""
-    wait: float = 2.0
-    """Seconds between two looks at what other searches have found, where these have taken all that is left."""
-    chunk: int = 1024
-    """Rows of a basis that are multiplied at a time: what comes out stays in the cache."""
+    wait_seconds: float = 2.0
+    """Seconds between two looks at the results of other searches, when these have taken all slices that are left."""
+    chunk_rows: int = 1024
+    """Rows of a basis that are multiplied at a time: the product stays in the cache."""
 
     # Growth with dissipation, in slices
 
-    trusted: float = 0.5
-    """Share of what a slice bears up to which it is left out: its modes change on the way."""
-    wider: float = 1.3
-    """Where further slices have to be looked at, those that would have to at so many times larger loads are looked
-    at, too: bases that are kept are made anew."""
-    most_ahead: int = 8
+    bearing_share: float = 0.5
+    """Share of the antisymmetric part that a slice bears, up to which the slice is left out: its modes change on the
+    way."""
+    bearing_factor: float = 1.3
+    """Factor of the load: where further slices have to be looked at, slices that would have to be looked at up to this
+    factor are looked at, too, since kept bases are made anew."""
+    most_increments_ahead: int = 8
     """Increments at the most that are looked at while bases that are not kept pass by."""
     places: int = 6
     """Looks at an announced mode, for a load at which it grows."""
-    nearest: int = 12
-    """Modes about a frequency among which one that grows is looked for where a cluster does not know its shape."""
+    nearest_modes: int = 12
+    """Modes about a frequency among which a growing one is looked for if a cluster does not know its shape."""
     stride: int = 2
     """Ratio of the numbers of two loads at which all motions are looked for: a look takes as long as two passes or
     more."""
     below_onset: float = 1e-6
     """Distance below an onset at which all other motions are looked for, in units of the way from the last load
     without."""
-    settled: float = 0.02
+    place_tolerance: float = 0.02
     """Share of an increment by which the place of the largest growth may still move."""
 
     # Discs along the imaginary axis
@@ -241,21 +245,21 @@ class Limits:
     1e-4."""
     pivot: float = 0.01
     """Share of the largest entry of a column from which on the diagonal entry is the pivot: MUMPS's default."""
-    covered: float = 0.9
+    covered_share: float = 0.9
     """Share of the radius on the axis that counts as covered."""
     next_disc: float = 0.8
     """Distance of a new middle from what is covered, in units of the last disc's radius, as radii change."""
-    strayed: float = 0.05
-    """Way that a refined eigenvalue may have gone, in units of its distance from the middle: else it is another
-    one."""
-    norm: float = 1e-2
+    stray_share: float = 0.05
+    """Distance between an eigenvalue and its refined value, in units of the distance from the middle, beyond which they
+    are two eigenvalues."""
+    norm_error: float = 1e-2
     """Share to which norms are found, and by which they are taken larger."""
     smallest_disc: float = 1e-6
     """Radius, in units of the largest frequency, below which the axis cannot be covered."""
 
     def chunks(self, size: int) -> list[slice]:
         """The rows of a basis, so many at a time."""
-        return [slice(first, first + self.chunk) for first in range(0, size, self.chunk)]
+        return [slice(first, first + self.chunk_rows) for first in range(0, size, self.chunk_rows)]
 
 
 LIMITS = Limits()

@@ -1,12 +1,12 @@
 r"""The walk along a ramp: all windows of a family of systems, with dissipation or without.
 
-**From load to load.** What grows at the upper load of an increment is followed back to the lower one: it grew there
-already, and its window stays open, or its window begins in between, at an edge that is solved for
-(:mod:`~faultgouge.analysis.windows.edges`). What grows at the lower load alone is followed ahead to where its window
-ends. Modes that grow at neither may do so in between, and modes that grow at both may rest: where the bounds of
-:mod:`~faultgouge.analysis.windows.between` allow for that, the modes are looked at in between. An increment that shows
-another number of growing motions inside, or is in doubt for another reason, is divided there and walked in parts; until
-nothing wider than `Search.narrowest` is left to doubt.
+**From load to load.** A motion that grows at the upper load of an increment is followed back to the lower load. If the
+motion grows there, too, its window stays open. Otherwise its window begins in between, at an edge that is solved for
+(:mod:`~faultgouge.analysis.windows.edges`). A motion that grows at the lower load alone is followed ahead to the end of
+its window. Modes that grow at neither load may grow in between, and modes that grow at both may rest in between. Where
+the bounds of :mod:`~faultgouge.analysis.windows.between` allow for this, the modes are computed at a load in between.
+An increment with another number of growing motions there, or in doubt for another reason, is divided and walked in
+parts, until no part in doubt is wider than `Search.narrowest`.
 
 **Few motions.** On most increments nothing happens, and to know that takes no decomposition. A screen
 (:mod:`~faultgouge.analysis.windows.screens`) names the few motions that may change. Where too many are named, or the
@@ -22,7 +22,7 @@ from typing import Protocol
 
 from ..errors import NoEquilibriumError, TurningPointError
 from ..packing.packing import Floats
-from .between import Course, Ends, Few, LoadStep, stretch
+from .between import Few, LoadStep, ModeAtEnds, ModesAtEnds, stretch
 from .edges import DoubtError, Edge, LostPairError, LostTrackError, SystemOfLoad, Window, locate_edge
 from .limits import LIMITS, Limits
 from .space import Space
@@ -45,10 +45,10 @@ Sure = Callable[[Changes], bool]
 class Screen(Protocol):
     """Who names the few motions that may change between two loads."""
 
-    def __call__(self, here: System, there: System, known: Sequence[Space], depth: int) -> Few | None:
+    def __call__(self, here: System, there: System, growing: Sequence[Space], depth: int) -> Few | None:
         """The few motions that may change; None if they are too many.
 
-        `known` grow at the lower load, and the increment has been divided `depth` times. A DoubtError says where
+        `growing` grow at the lower load, and the increment has been divided `depth` times. A DoubtError says where
         another motion grows in between.
         """
 
@@ -124,7 +124,7 @@ class Search:
 
     def _steps(self, here: System, there: System) -> list[System]:
         """The steps that lead to a load; where contacts change on the way, a short step about each change."""
-        shortest = self.limits.bending * (there.fx - here.fx)
+        shortest = self.limits.bend_length * (there.fx - here.fx)
 
         def divide(below: System, above: System) -> list[System]:
             if above.fx - below.fx <= shortest or below.states == above.states:
@@ -146,7 +146,7 @@ class Search:
             self._modes = {fx: each for fx, each in self._modes.items() if fx >= there.fx}
             return
         except DoubtError as doubt:
-            share = self.limits.share
+            share = self.limits.division_share
             fx = (1 - share) * here.fx + share * there.fx if doubt.fx is None else doubt.fx
         middle = []
         if there.fx - here.fx > self.narrowest:
@@ -161,18 +161,18 @@ class Search:
 
     def _carry(self, here: System, there: System, depth: int) -> tuple[Open, list[Window]]:
         """The motions that grow at the upper load, and the windows that end before; DoubtError if that is not sure."""
-        known = [space for space, _ in self.open or []]
-        if self.screen is None or depth > self.limits.screened:
+        growing = [space for space, _ in self.open or []]
+        if self.screen is None or depth > self.limits.screen_divisions:
             return self._by_all_modes(here, there, depth)
         try:
-            few = self.screen(here, there, known, depth)
+            few = self.screen(here, there, growing, depth)
             if self.open is None:
                 self._begin(here, nothing=few is not None and few.named == 0)
             if few is not None:
                 # of a few pairs no more than one may change, as two might meet
                 return self._settle(here, there, few.courses, [], lambda changes: here.dissipative or len(changes) <= 1)
         except DoubtError:
-            if depth < self.limits.screened:
+            if depth < self.limits.screen_divisions:
                 raise
         return self._by_all_modes(here, there, depth)
 
@@ -196,13 +196,13 @@ class Search:
         def sure(changes: Changes) -> bool:
             if here.dissipative:
                 return True
-            parts = self.limits.bent if step.bent else self.limits.changing
+            parts = self.limits.bend_divisions if step.bent else self.limits.change_divisions
             return not ((changes or hiding) and depth < parts) and step.apart(changes, self.narrowest)
 
         return self._settle(here, there, step.courses, hiding, sure)
 
     def _settle(
-        self, here: System, there: System, courses: Sequence[Course], hiding: Sequence[Ends], sure: Sure
+        self, here: System, there: System, courses: Sequence[ModeAtEnds], hiding: Sequence[ModesAtEnds], sure: Sure
     ) -> tuple[Open, list[Window]]:
         """The motions that grow at the upper load, and the windows that end before.
 
@@ -216,17 +216,17 @@ class Search:
                 _require(above.follow(here, self.limits)) if below is None and above is not None else _require(below)
             )
             above = _require(below.follow(there, self.limits)) if above is None else above
-            known = next((each for each in left if each[0].equals(below)), None)
-            if known is not None:
-                left.remove(known)
-            if (known is None) == below.grows:
+            earlier = next((each for each in left if each[0].equals(below)), None)
+            if earlier is not None:
+                left.remove(earlier)
+            if (earlier is None) == below.grows:
                 raise DoubtError
-            if known is None and above.grows:
+            if earlier is None and above.grows:
                 begun.append((below, above))
-            elif known is not None and not above.grows:
-                ending.append((below, above, known[1]))
-            elif known is not None:
-                now.append((above, known[1]))
+            elif earlier is not None and not above.grows:
+                ending.append((below, above, earlier[1]))
+            elif earlier is not None:
+                now.append((above, earlier[1]))
             if below.grows == above.grows:
                 watched.append(([below], [above]))
         for space, onset in left:
@@ -261,12 +261,12 @@ class Search:
         left, now = list(self.open or []), []
         for space in self.modes(there).growing:
             origin = space.follow(here, self.limits)
-            known = None if origin is None else next((each for each in left if each[0].equals(origin)), None)
-            if known is None and len(left) >= len(self.modes(there).grows):
-                known = min(left, key=lambda each: abs(each[0].mean - space.mean))
-            if known is not None:
-                left.remove(known)
-                now.append((space, known[1]))
+            earlier = None if origin is None else next((each for each in left if each[0].equals(origin)), None)
+            if earlier is None and len(left) >= len(self.modes(there).grows):
+                earlier = min(left, key=lambda each: abs(each[0].mean - space.mean))
+            if earlier is not None:
+                left.remove(earlier)
+                now.append((space, earlier[1]))
             else:
                 now.append((space, self._edge_or_half(origin, space, here, there)))
         return now, [
@@ -290,10 +290,10 @@ class Search:
 
     def modes(self, system: System) -> SystemModes:
         """All modes of a system, kept as long as its load is not passed."""
-        known = self._modes.get(system.fx)
-        if known is None or known.system is not system:
-            known = self._modes[system.fx] = SystemModes.of(system)
-        return known
+        found = self._modes.get(system.fx)
+        if found is None or found.system is not system:
+            found = self._modes[system.fx] = SystemModes.of(system)
+        return found
 
 
 def _require(space: Space | None) -> Space:
@@ -308,15 +308,20 @@ def _growing_of(modes: Sequence[Space]) -> list[bool]:
 
 
 def other_growth(
-    at: SystemOfLoad, known: Sequence[list[Space]], narrowest: float, *, dipping: bool = False, limits: Limits = LIMITS
+    at: SystemOfLoad,
+    seen: Sequence[list[Space]],
+    narrowest: float,
+    *,
+    dipping: bool = False,
+    limits: Limits = LIMITS,
 ) -> list[Space] | None:
-    """Modes that nearly meet, at a load at which another number of them grows than at each load where they are known.
+    """Modes that nearly meet, at a load where another number of them grows than at each load of `seen`.
 
     None if there surely is no such load, but on stretches narrower than `narrowest`. A DoubtError is raised if that is
     open after `Limits.dips` looks, or if the modes cannot be followed. For a pair that has to be `dipping` it is also
     raised if the discriminant does not dip where its slopes say so: the loads are then too far apart.
     """
-    places, ends = sorted(known, key=lambda each: each[0].fx), [_growing_of(each) for each in known]
+    places, ends = sorted(seen, key=lambda each: each[0].fx), [_growing_of(each) for each in seen]
     for _ in range(limits.dips):
         dips = ((*stretch(*both, limits), both) for both in pairwise(places))
         width, fx, (lower, upper) = max(dips, key=lambda dip: dip[0])

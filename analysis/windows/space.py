@@ -226,7 +226,7 @@ class Space:
             image = moving.at(system if share == 1 else self.system.towards(system, share), limits)
             if image is not None:
                 moving, done = image, share
-            elif step > limits.shortest:
+            elif step > limits.shortest_step:
                 step *= 0.5
             else:
                 return None
@@ -240,7 +240,9 @@ def _single_mode(guess: Space, rate: complex | None, limits: Limits) -> Iterator
         inverse = guess.system.inverse(shift * (1 + limits.off_eigenvalue), limits) if np.isfinite(shift) else None
         if inverse is None:
             return
-        found, planes = _iterate(guess.system, _inverse_iteration(guess, inverse), limits.steps_on, limits, limits.slow)
+        found, planes = _iterate(
+            guess.system, _inverse_iteration(guess, inverse), limits.neighbour_steps, limits, limits.slow_share
+        )
         if found:
             yield Space(guess.system, *planes)
             return
@@ -251,7 +253,7 @@ def _two_modes(pair: Space, guess: Space, limits: Limits) -> Iterator[Space | No
     """Two modes: ways to their planes, the cheapest first."""
     system = guess.system
     if guess.inverse is not None:
-        yield _space_of(system, _inverse_iteration(guess, guess.inverse), guess.inverse, limits.steps_on, limits)
+        yield _space_of(system, _inverse_iteration(guess, guess.inverse), guess.inverse, limits.neighbour_steps, limits)
     scale = max(pair.spread, 1e3 * np.finfo(np.float64).eps * abs(pair.mean))
     for turn, offset in enumerate(limits.offsets):
         inverse = system.inverse(guess.mean + offset * scale, limits)
@@ -286,7 +288,7 @@ def _inverse_iteration(guess: Space, inverse: Inverse) -> Iterator[Planes]:
 
 
 def _complex_inverse_iteration(guess: Space, inverse: Inverse) -> Iterator[Planes]:
-    """Inverse iteration of a complex pair with its own eigenvalue: with both members of it, in real numbers."""
+    """Inverse iteration of a complex pair with its own eigenvalue as the shift, for both members, in real numbers."""
     v, u = guess.right, guess.left
     while True:
         v, u = (np.linalg.qr(inverse.solve(b, turn).imag)[0] for b, turn in ((v, False), (u, True)))
@@ -300,7 +302,7 @@ def _iterate(
 
     The iteration also ends if a step leaves more than the share `slow` of the residual.
     """
-    level, residuals = limits.residual * system.backward_error, []
+    level, residuals = limits.residual_factor * system.backward_error, []
     for planes in bases:
         residuals.append(
             max(
@@ -312,9 +314,9 @@ def _iterate(
         if len(residuals) > 1 and residuals[-1] > slow * residuals[-2]:
             break
         left = most - len(residuals)
-        if len(residuals) > min(2 * limits.pace, most // 2):
-            gain = residuals[-1] / residuals[-1 - limits.pace]
-            if left <= 0 or not residuals[-1] * gain ** (left / limits.pace) < level:
+        if len(residuals) > min(2 * limits.pace_steps, most // 2):
+            gain = residuals[-1] / residuals[-1 - limits.pace_steps]
+            if left <= 0 or not residuals[-1] * gain ** (left / limits.pace_steps) < level:
                 break
     return False, planes
 

@@ -20,8 +20,8 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse import csc_array, csr_array, eye_array
 
-from ..configuration import HasConfiguration
 from ..factors.sparse_lu import SingularMatrixError, general_lu, symmetric_lu
+from ..has_configuration import HasConfiguration
 from ..motion.eigenvalues import mass_weighted, unit_rounding
 from ..operators.damping import damping_matrix
 from ..operators.stiffness import stiffness_matrix

@@ -16,6 +16,7 @@ A load that changes A and G by dA and dG moves an eigenvalue by
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eig
@@ -29,6 +30,12 @@ from .space import Space
 from .system import Operator, System
 
 Members = tuple[int, int]  # the numbers of the two modes of a pair
+
+PAIRS_AT_A_TIME = 200
+"""Pairs that are sought among all modes in one product of matrices: 20 MB for 1,000 disks."""
+
+SHARE_IN_LIKE_PLANES = 0.4
+"""Unit vectors of a plane have at least this share in a plane like it: cos 60 degrees, with room for rounding."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -113,13 +120,49 @@ class SystemModes(Modes):
 
     def nearest(self, pair: Space) -> Members:
         """The two modes, conjugates or both real, that lie closest to the planes of a pair at a neighbouring load."""
-        weight = np.linalg.norm(pair.right.T @ self.right, axis=0) * np.linalg.norm(pair.left.T @ self.left, axis=0)
-        real = np.flatnonzero(self.partner < 0)
-        candidates = self.complex_pairs
-        if len(real) > 1:
-            first, second = real[np.argsort(weight[real])[-2:]]
-            candidates = [*candidates, (int(first), int(second))]
-        return max(candidates, key=lambda members: float(weight[list(members)].sum()))
+        return self._nearest(self._shares(pair.right, self.right)[0] * self._shares(pair.left, self.left)[0])
+
+    def images(self, pairs: Sequence[Space]) -> list[Members | None]:
+        """Of each of some pairs the `nearest` modes, or None if the planes of these are not like those of the pair."""
+        found: list[Members | None] = []
+        for begin in range(0, len(pairs), PAIRS_AT_A_TIME):
+            some = pairs[begin : begin + PAIRS_AT_A_TIME]
+            shares = [
+                self._shares(np.hstack([getattr(pair, side) for pair in some]), getattr(self, side))
+                for side in ("right", "left")
+            ]
+            for pair, *both in zip(some, *shares, strict=True):
+                members = self._nearest(both[0] * both[1])
+                near = min(share[list(members)].min() for share in both) > SHARE_IN_LIKE_PLANES
+                found.append(members if near and self.space(members).like(pair) else None)
+        return found
+
+    @staticmethod
+    def _shares(planes: Any, vectors: Complexes) -> Floats:
+        """Lengths of the shares of unit vectors in planes, whose bases stand side by side; shape (planes, E)."""
+        return np.linalg.norm((planes.T @ vectors).reshape(-1, 2, vectors.shape[1]), axis=1)
+
+    def _nearest(self, weight: Floats) -> Members:
+        """The two modes, conjugates or both real, with the largest sum of weights."""
+        first, second = self._conjugates
+        best = int(np.argmax(weight[first] + weight[second])) if len(first) else None
+        if len(self._real) > 1:
+            a, b = self._real[np.argsort(weight[self._real])[-2:]]
+            if best is None or weight[a] + weight[b] > weight[first[best]] + weight[second[best]]:
+                return int(a), int(b)
+        if best is None:
+            raise ValueError("a system of one mode has no pair")
+        return int(first[best]), int(second[best])
+
+    @cached_property
+    def _real(self) -> Indices:
+        """The real modes."""
+        return np.flatnonzero(self.partner < 0)
+
+    @cached_property
+    def _conjugates(self) -> Indices:
+        """The members of the complex pairs, shape (2, pairs)."""
+        return np.array(self.complex_pairs, dtype=np.int64).reshape(-1, 2).T
 
     def about(self, eigenvalue: float, among: Sequence[Members] = ()) -> Members:
         """The pair among some with the closest eigenvalue; without pairs, the two modes closest to a real number."""

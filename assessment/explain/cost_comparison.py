@@ -1,8 +1,8 @@
 """The cost of one way to do the same work beside another way, and its line in the table.
 
-The ratio is taken within a turn. Work of one thread is timed by the processor time of this process, which leaves out
-the pauses that others make it take; work of several by the clock on the wall. Of the turns, medians and quartiles are
-kept: a mean would tell of the slowest.
+The ratio is that of two runs in one turn. The time of one thread is the processor time of this process, which does not
+count pauses for other processes; the time of several threads is wall time. Medians and quartiles over the turns are
+kept: the slowest turns would dominate a mean.
 """
 
 from collections.abc import Callable
@@ -38,34 +38,6 @@ class Cost:
     per: str
     seconds: Floats
 
-    @classmethod
-    def of(
-        cls,
-        per: str,
-        without: Callable[[], object],
-        with_it: Callable[[], object],
-        count: int = 1,
-        turns: int = TURNS,
-        parallel: bool = False,
-    ) -> "Cost":
-        """Time the work without and with a feature in turns, after one that is not counted.
-
-        Parameters
-        ----------
-        per : str
-            What a call does `count` times.
-        without, with_it : callable
-            The work.
-        count : int
-            Times are divided by it.
-        turns : int
-            How often both are called.
-        parallel : bool
-            Whether the work is that of several threads or processes.
-        """
-        _, seconds = in_turns((without, with_it), turns + 1, perf_counter if parallel else process_time)
-        return cls(per, seconds[1:] / count)
-
     @property
     def medians(self) -> tuple[float, float]:
         """Times without and with it, s."""
@@ -85,6 +57,33 @@ class Cost:
         return {"per": self.per, "without": without, "with": with_it, "ratio": middle, "quartiles": [low, high]}
 
 
+def cost_of(
+    per: str,
+    without: Callable[[], object],
+    with_it: Callable[[], object],
+    turns: int,
+    count: int = 1,
+    parallel: bool = False,
+) -> Cost | None:
+    """Time the work without and with a feature in turns, after one that is not counted.
+
+    Parameters
+    ----------
+    per : str
+        What a call does `count` times.
+    without, with_it : callable
+        The work.
+    turns : int
+        How often both are timed. With 0 both do their work once, and there is no cost.
+    count : int
+        Times are divided by it.
+    parallel : bool
+        Whether the work is that of several threads or processes.
+    """
+    _, seconds = in_turns((without, with_it), turns + 1, perf_counter if parallel else process_time)
+    return Cost(per, seconds[1:] / count) if turns else None
+
+
 @dataclass(frozen=True)
 class Part:
     """One line of the explanation.
@@ -100,11 +99,11 @@ class Part:
     adds : tuple of str
         What it loads, or would load.
     cost : Cost or None
-        Times without and with it; None where it cannot be measured here.
+        Times without and with it; None if they were not wanted, or cannot be measured here.
     same : str
         What both compute.
     identical : bool or None
-        Whether that agrees to the bit; None where it cannot be measured here.
+        Whether that agrees to the bit; None if it was not tried.
     """
 
     name: str

@@ -1,12 +1,14 @@
-"""What a scene includes, what it leaves out, why, and what each part costs.
+"""What a scene includes, what it leaves out, why, and, if wanted, what each part costs.
 
 The features of a run are switched one at a time, in LAMMPS: an undamped run of the scene's packing is set up with a
-feature and without it (`switches`). What the feature brings is the difference of what the two instances hold, read
-from them: deck parts from the log, fixes, computes, dumps and per-atom arrays from LAMMPS. What it costs is the ratio
-of their times per step, the two running in turns. And both must agree to the bit in what both compute: forces on all
-disks that the feature does not act on, or, where it leaves the motion as it is, positions and velocities at the end. A
-feature is in the scene if the scene's own run holds what the feature brings. Dumps, trajectories, ranks and threads are
-measured on the work that they belong to.
+feature and without it (`switches`).
+
+- *Content*: the deck parts in the log, and the fixes, computes, dumps and per-atom arrays of LAMMPS, that only the
+  instance with the feature has. A feature is in the scene if the scene's own run has this content.
+- *Cost*: the ratio of the times per step of both instances, which run in turns. The costs of dumps, trajectories, ranks
+  and threads are measured on the work that they belong to.
+- *Check*: both instances agree to the bit in the forces on all disks that the feature does not act on; if the feature
+  does not change the motion, in positions and velocities at the end.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.sections import Ramp
 from ...pywrap.scenes.units import real_units
 from ...pywrap.settling.settle import settle
-from .cost_comparison import FEW_TURNS, SECONDS_A_TURN, TURNS, Cost, Part, same_motion
+from .cost_comparison import FEW_TURNS, SECONDS_A_TURN, TURNS, Part, cost_of, same_motion
 from .processors import ranks, threads
 from .switches import UNREACHABLE_VELOCITY, Feature, InstanceContents, UndampedRun, features
 
@@ -79,19 +81,30 @@ class Explanation:
     units: dict[str, float] | None
     load_average: float
 
+    @property
+    def timed(self) -> bool:
+        """Whether the parts have their costs."""
+        return any(part.cost is not None for part in self.parts)
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         parts = [part.as_dict() for part in self.parts]
         return vars(self) | {"loaded": vars(self.loaded), "parts": parts, "cores": os.cpu_count()}
 
 
-def explain(scene: Scene) -> Explanation:
-    """Set the scene's packing up, switch each feature, and measure.
+UNTIMED_STEPS = 200
+"""Steps of both runs if they are not timed: two outputs of each contact."""
+
+
+def explain(scene: Scene, timed: bool = False) -> Explanation:
+    """Set the scene's packing up, switch each feature, and compare.
 
     Parameters
     ----------
     scene : Scene
         Any.
+    timed : bool
+        Whether to measure what each part costs, and whether two ranks move as one does: several times as long.
 
     Returns
     -------
@@ -113,11 +126,11 @@ def explain(scene: Scene) -> Explanation:
         imported = tuple(package for package in HEAVY if package in sys.modules)
         bare = replace(run, motion={})
         with bare.start(MPI.COMM_SELF) as (_, dynamics):
-            steps = _steps(dynamics)
-        parts = [_run_feature(feature, loaded, steps, folder) for feature in features(run)]
-        parts += [_dumps(scene, start, folder), _contact_output(scene, bare, loaded, steps, folder)]
-        parts += [_trajectory(scene, start, bare, steps, folder)]
-        parts += [ranks(bare, steps, folder), threads(start.packing)]
+            steps = _steps(dynamics) if timed else UNTIMED_STEPS
+        parts = [_run_feature(feature, loaded, steps, folder, timed) for feature in features(run)]
+        parts += [_dumps(scene, start, folder, timed), _contact_output(scene, bare, loaded, steps, folder, timed)]
+        parts += [_trajectory(scene, start, bare, steps, folder, timed)]
+        parts += [ranks(bare, steps, folder, timed), threads(start.packing, timed)]
     return Explanation(
         disks=len(start.packing),
         remark=remark,
@@ -136,8 +149,9 @@ def _units(scene: Scene) -> dict[str, float] | None:
     return None if real is None else {"kn": scene.law.kn, "fy": scene.load.fy} | real.as_dict()
 
 
-def _run_feature(feature: Feature, scene: InstanceContents, steps: int, folder: Path) -> Part:
+def _run_feature(feature: Feature, scene: InstanceContents, steps: int, folder: Path, timed: bool) -> Part:
     """Run a scene with a feature and without it: what the feature loads, its cost, and whether both runs agree."""
+    turns = TURNS if timed else 0
     with ExitStack() as both:
         logs = folder / "without.log", folder / "with.log"
         without, plain = both.enter_context(feature.without.start(MPI.COMM_SELF, logs[0]))
@@ -147,12 +161,12 @@ def _run_feature(feature: Feature, scene: InstanceContents, steps: int, folder: 
         forces = without.net_force, with_it.net_force
         here, there = (force[: 2 * len(others)][np.tile(others, 2)] for force in forces)
         identical = np.array_equal(here, there)
-        cost = Cost.of("step", lambda: plain.advance(steps), lambda: switched.advance(steps), steps)
+        cost = cost_of("step", lambda: plain.advance(steps), lambda: switched.advance(steps), turns, steps)
         same = "forces at the start"
         if not others.all():
             same += f" on the {others.sum()} other disks"
         if not feature.moves:
-            same = f"positions and velocities after {steps * (TURNS + 1) + 1} steps"
+            same = f"positions and velocities after {steps * (turns + 1) + 1} steps"
             identical &= same_motion(plain.advance(1), switched.advance(1))
     if feature.name == "compensated coordinates" and not identical:
         same += f" differ by {np.abs(forces[1] - forces[0]).max():.1g}, which doubles round away"
@@ -162,7 +176,7 @@ def _run_feature(feature: Feature, scene: InstanceContents, steps: int, folder: 
     return Part(feature.name, included, feature.reason, adds, cost, same, bool(identical))
 
 
-def _dumps(scene: Scene, start: Equilibrium, folder: Path) -> Part:
+def _dumps(scene: Scene, start: Equilibrium, folder: Path, timed: bool) -> Part:
     """An equilibrium of the ramp, with and without its dumps."""
     wanted = scene.output is not None and scene.output.dumps
     ramp = scene.ramp or Ramp(step=step_of(scene), until=step_of(scene))
@@ -182,7 +196,7 @@ def _dumps(scene: Scene, start: Equilibrium, folder: Path) -> Part:
                 engine.dump(files / "run.1")
 
         # an equilibrium by damped dynamics takes half a second
-        cost = Cost.of("equilibrium", lambda: reach(False), lambda: reach(True), turns=FEW_TURNS)
+        cost = cost_of("equilibrium", lambda: reach(False), lambda: reach(True), FEW_TURNS if timed else 0)
         parts = InstanceContents.of(engine, log).parts
     adds = [f"part {part}" for part in parts if part == "write.in"]
     adds += [f"file {path.name}" for path in sorted(files.iterdir())]
@@ -191,16 +205,18 @@ def _dumps(scene: Scene, start: Equilibrium, folder: Path) -> Part:
     return Part("dumps", wanted, reason, tuple(adds), cost, "positions of the equilibrium", identical)
 
 
-def _contact_output(scene: Scene, run: UndampedRun, loaded: InstanceContents, steps: int, folder: Path) -> Part:
+def _contact_output(
+    scene: Scene, run: UndampedRun, loaded: InstanceContents, steps: int, folder: Path, timed: bool
+) -> Part:
     """The forces of each contact, every 100 steps."""
     wanted = scene.output is not None and scene.output.dumps
     reason = "in the dumps" if wanted else "no output.dumps"
     watched = replace(run, contacts=folder / "contacts")
-    feature = Feature("per-contact output", f"{reason}; measured every 100 steps", run, watched, moves=False)
-    return replace(_run_feature(feature, loaded, steps, folder), included=wanted)
+    feature = Feature("per-contact output", f"{reason}; tried every 100 steps", run, watched, moves=False)
+    return replace(_run_feature(feature, loaded, steps, folder, timed), included=wanted)
 
 
-def _trajectory(scene: Scene, start: Equilibrium, run: UndampedRun, steps: int, folder: Path) -> Part:
+def _trajectory(scene: Scene, start: Equilibrium, run: UndampedRun, steps: int, folder: Path, timed: bool) -> Part:
     """A sample of an undamped run, with and without its positions in run.h5."""
     wanted = scene.output is not None and bool(scene.output.trajectory)
     path = folder / "run.h5"
@@ -208,10 +224,11 @@ def _trajectory(scene: Scene, start: Equilibrium, run: UndampedRun, steps: int, 
         (_, plain), (_, watched) = (stack.enter_context(run.start(MPI.COMM_SELF)) for _ in range(2))
         record = stack.enter_context(Record(path, scene, MPI.COMM_SELF))
         record.append(start)
-        cost = Cost.of(
+        cost = cost_of(
             f"sample of {steps} steps",
             lambda: plain.advance(steps),
             lambda: record.append_motions([(0.0, watched.advance(steps))]),
+            TURNS if timed else 0,
         )
         identical = same_motion(plain.advance(1), watched.advance(1))
     with RunFile(path) as file:
@@ -271,7 +288,7 @@ def _steps(dynamics: Dynamics) -> int:
 
 
 def _defaults(scene: Scene) -> dict[str, Any]:
-    """Keys that the scene's sections leave to a default that is a value of its own."""
+    """Keys that the scene leaves out, whose default is a value and not none."""
     resolved = scene.resolved()
     unused = {"relax"} if scene.ramp is None or scene.ramp.method == "newton" else set()
     return {

@@ -11,7 +11,7 @@ from .explain import Explanation
 
 
 def in_words(explanation: Explanation) -> str:
-    """Two sentences: which parts the scene has, which it leaves out, and how much time that saves.
+    """Two sentences: which parts the scene has and which it leaves out, and how much time that saves, if it was timed.
 
     What is saved is told for parts that a step would take longer with, by more than their quartiles leave open: what
     they would cost one at a time.
@@ -24,6 +24,8 @@ def in_words(explanation: Explanation) -> str:
         if part.cost is not None and part.cost.per == "step" and part.cost.ratio[0] > 1
     }
     first = f"In: {_join_names(inside)}. Out: {_join_names([part.name for part in outside])}"
+    if not explanation.timed:
+        return f"{first}."
     if not saves:
         return f"{first}; that saves no time that can be measured."
     dearest = sorted(saves, key=lambda name: -saves[name])
@@ -48,19 +50,23 @@ def _join_names(names: list[str]) -> str:
 
 def explanation_table(explanation: Explanation) -> Group:
     """A line for each feature, and below it what the scene's run has loaded."""
-    title = f"{explanation.remark}; load average {explanation.load_average:.1f}"
+    title = explanation.remark
+    if explanation.timed:
+        title += f"; load average {explanation.load_average:.1f}"
     table = Table(title=title, title_justify="left", caption_justify="left")
     for heading in ("feature", "in", "because", "brings"):
         table.add_column(heading)
-    table.add_column("time with it : without it [quartiles]")
+    if explanation.timed:
+        table.add_column("time with it : without it [quartiles]")
     table.add_column("the same to the bit")
     for part in explanation.parts:
+        times = [Text(_cost(part.cost))] if explanation.timed else []
         table.add_row(
             part.name,
             Text("in", style="green") if part.included else Text("out"),
             Text(part.reason),
             Text(", ".join(part.adds)),
-            Text(_cost(part.cost)),
+            *times,
             Text(f"no: {part.same}", style="bold") if part.identical is False else Text(part.same),
         )
     loaded = explanation.loaded

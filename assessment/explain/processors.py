@@ -11,19 +11,23 @@ from mpi4py import MPI
 
 from ...analysis import Packing, dynamical_matrix
 from ...analysis.packing.packing import Floats
-from .cost_comparison import FEW_TURNS, Cost, Part, same_motion
+from .cost_comparison import FEW_TURNS, TURNS, Part, cost_of, same_motion
 from .switches import UndampedRun
 
 SOLVED_EQUATIONS = 400
 """Equations of the linear solve that threads are tried on, at the most."""
 
 
-def ranks(run: UndampedRun, steps: int, folder: Path) -> Part:
-    """Compare a run on one rank with the run on two ranks, in a separate process."""
+def ranks(run: UndampedRun, steps: int, folder: Path, timed: bool) -> Part:
+    """Compare a run on one rank with the run on two ranks, in a separate process, which takes seconds to begin."""
     size = MPI.COMM_WORLD.size
     reason = f"{size} rank{'s' * (size > 1)}"
     adds = ("messages between ranks",)
     same = "positions and velocities"
+    if not timed:
+        return Part(
+            "MPI", size > 1, reason if size > 1 else f"{reason}: nothing is sent", adds, None, "not tried", None
+        )
     program = Path(sys.executable).parent / "mpiexec"
     if size > 1 or not program.exists():
         return Part("MPI", size > 1, f"{reason}: not measured here", adds, None, same, None)
@@ -58,14 +62,14 @@ def time_ranks(job: str) -> None:
                 alone.advance(steps)
             world.Barrier()
 
-        cost = Cost.of("step", on_one, lambda: together.advance(steps), steps, parallel=True)
+        cost = cost_of("step", on_one, lambda: together.advance(steps), TURNS, steps, parallel=True)
         motion = together.advance(1)
         if alone is not None:
             result = cost, same_motion(alone.advance(1), motion)
             Path(f"{job}.times").write_bytes(pickle.dumps(result))
 
 
-def threads(packing: Packing) -> Part:
+def threads(packing: Packing, timed: bool) -> Part:
     """A dense solve, such as eigenvalues are made of, with one thread and with two."""
     from threadpoolctl import threadpool_info, threadpool_limits
 
@@ -80,7 +84,7 @@ def threads(packing: Packing) -> Part:
 
     # two threads that wait for one core take a third of a second
     per = f"dense solve of {len(matrix)} equations"
-    cost = Cost.of(per, lambda: solve(1), lambda: solve(2), turns=FEW_TURNS, parallel=True)
+    cost = cost_of(per, lambda: solve(1), lambda: solve(2), FEW_TURNS if timed else 0, parallel=True)
     reason = f"{here} thread{'s' * (here > 1)} in BLAS, by OPENBLAS_NUM_THREADS; the plugin has none"
     identical = np.array_equal(solutions[1], solutions[2])
     same = "the solution" if identical else "the solution differs in its last digits"

@@ -168,7 +168,7 @@ def features(run: UndampedRun) -> Iterator[Feature]:
     law = run.packing.law
     rough = bare.of(law=law if law.frictional else replace(law, kt=2 / 7 * law.kn, mu=1.0))
     yield from _of_contacts(bare, rough)
-    weakening, reason = run.motion.get("weakening"), "section [friction]; measured below its threshold"
+    weakening, reason = run.motion.get("weakening"), "section [friction]; tried below its threshold"
     if weakening is None:
         weakening, reason = (
             Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=UNREACHABLE_VELOCITY, v_ss=1.0),

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from faultgouge.analysis import spectrum
 from faultgouge.figures import draw_series
-from faultgouge.figures.film import RunFilm, RunMotion
+from faultgouge.figures.run_film import RunFilm, RunMotion
 from faultgouge.pywrap import Scene, perturb, reach
 
 scene = Scene.from_mapping(

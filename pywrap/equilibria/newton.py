@@ -47,9 +47,9 @@ PATIENCE = 200, 0.95
 carries next to nothing, or slides nearly, the residual may fall by no more than 0.7 an iteration."""
 
 FREEING_ITERATIONS = 3
-"""Iterations in which a disk that is pushed out, and yet was not moved out of the way, gets p times Newton's step:
-its force goes as delta^p, a root of that order, and the factor makes the convergence quadratic again. Later ones take
-Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
+"""Iterations in which a disk that is pushed out, and yet was not moved out of the way, takes p times Newton's step. Its
+force goes as delta^p, a root of the order p, and the factor p makes the convergence quadratic again. Later iterations
+take Newton's own step, since a rattler in a narrow cage would be thrown to and fro."""
 
 RATTLER_MOVES = 3
 """Times that a rattler is moved in an increment: what it lies against may be another one that is moved later."""
@@ -192,7 +192,7 @@ class _Course:
         if self.best is not None and residual > self._gain * self.best.residual:
             if self.best.residual < FLOORS_OF_ROUNDING * self.floor:
                 if residual < self.best.residual and self.floor < self.best.residual:
-                    self.best = trial  # below the floor the one that moved less is as good
+                    self.best = trial  # below the floor the trial that moved less is as good
                 return True
             self._worse += 1
             if self._worse > ITERATIONS_WITHOUT_GAIN:
@@ -209,7 +209,7 @@ class _Course:
         return residual < self.floor and factor * self._last < 0.1 * self.floor
 
     def may_reuse_factors(self, residual: float, disks: int) -> bool:
-        """Whether the factors of K at hand do for the next iteration."""
+        """Whether the factors of an earlier K serve for the next iteration."""
         if residual * (residual / self._last) ** REUSE_ITERATIONS < 0.1 * self.floor:
             return True
         return disks > REUSE_SIZE and residual <= REUSE_LIMIT * self._last

@@ -1,14 +1,14 @@
-"""Fixes that may act on particles as contacts do not tell: by their positions, or on their velocities.
+"""Fixes that may exert forces besides the contacts: by positions of particles, or on their velocities.
 
-Whether they do in a given packing is shown by its motion (:mod:`~faultgouge.pywrap.granular.motion_proof`). These lists
-only explain.
+The motion of a packing shows whether a fix does so (:mod:`~faultgouge.pywrap.granular.motion_proof`). These lists only
+explain a difference.
 """
 
 from .granular_commands import MOBILE, WALLS, NotLinearisedError, without_suffix
-from .look_in_a_copy import DRAG, INSERTS, PER_STEP
+from .look_in_a_copy import DRAG_STYLES, INSERTS, PER_STEP
 
 PASSIVE = (
-    *WALLS, *PER_STEP, *DRAG, *INSERTS, *MOBILE, "gravity", "enforce2d", "slip/history", "low/parts",
+    *WALLS, *PER_STEP, *DRAG_STYLES, *INSERTS, *MOBILE, "gravity", "enforce2d", "slip/history", "low/parts",
     "dashpot/velocities", "keep/histories", "store", "property/atom",
 )  # fmt: skip
 """Fixes, by the beginnings of their styles, whose action is in K, or constant, or none; so are those that LAMMPS makes
@@ -31,11 +31,11 @@ ACTING = HOLDING | {
     "recenter": "moves particles: unfix it",
     "damping/cundall": "damps as the forces on particles tell, which is not linearised here: use fix viscous",
 }
-"""What is said of fixes, by the beginnings of their styles, without which LAMMPS moves as K says."""
+"""Clauses on fixes, by the beginnings of their styles: without such a fix LAMMPS moves as K says."""
 
 
 def acting_fixes(styles: dict[str, str]) -> dict[str, str]:
-    """Fixes that may act as contacts do not tell, by ID, with a clause on each."""
+    """Fixes that may exert forces besides the contacts, by ID, with a clause on each."""
     found = {}
     for name, style in styles.items():
         plain = without_suffix(style)
@@ -48,12 +48,12 @@ def acting_fixes(styles: dict[str, str]) -> dict[str, str]:
 
 def drag_remarks(styles: dict[str, str]) -> tuple[str, ...]:
     """A sentence on each fix, by ID, that takes energy away, and has no part in K and C."""
-    drags = ((name, style) for name, style in styles.items() if without_suffix(style).startswith(DRAG))
+    drags = ((name, style) for name, style in styles.items() if without_suffix(style).startswith(DRAG_STYLES))
     return tuple(f"drag of fix {name} ({style}) is left out" for name, style in drags)
 
 
 def check_holding(styles: dict[str, str]) -> None:
-    """Refuse fixes that hold, push or pull particles, where no motion shows whether they do."""
+    """Refuse fixes that may hold, push or pull particles, where no motion can show whether they do."""
     held = {name: style for name, style in styles.items() if style.startswith(tuple(HOLDING))}
     for says in acting_fixes(held).values():
         raise NotLinearisedError(f"{says}.")

@@ -1,4 +1,4 @@
-"""Is a packing at rest? What is out of balance, and why forces may be though nothing moves."""
+"""Is a packing at rest? Forces that are out of balance, and the reasons if nothing moves all the same."""
 
 import numpy as np
 
@@ -7,8 +7,8 @@ from ...analysis.arrays import Indices
 from .granular_commands import OWN, Commands, NotTakenError, without_suffix
 
 BALANCE = 1e-4
-"""Share of the mean contact force that may be out of balance: then the motion is that of a packing which comes to rest
-elsewhere, and K says nothing of it."""
+"""Share of the mean contact force that may be out of balance. Beyond, the packing moves to another place of rest, and K
+says nothing of this motion."""
 
 
 def check_balance(balance: float) -> None:
@@ -65,7 +65,7 @@ def touch_twice(i: Indices, j: Indices) -> bool:
 
 
 def restless_fix(commands: Commands) -> str:
-    """What is said of a fix that keeps particles from resting; empty if there is none."""
+    """The sentence on a fix that keeps particles from resting; empty if there is none."""
     for name, line in commands.fixes.items():
         words = line.split()
         style = without_suffix(words[3])
@@ -78,10 +78,27 @@ def restless_fix(commands: Commands) -> str:
     return ""
 
 
+def creeping_law(commands: Commands) -> str:
+    """What is said of friction that bears no force at rest; empty if there is none."""
+    lines = [*commands.pair, *(line for line in commands.fixes.values() if "wall/gran" in line)]
+    words = {without_suffix(word) for line in lines for word in line.split()}
+    styles: list[str] = [style for style in ("linear_nohistory", "gran/hooke") if style in words]
+    if "wall/gran" in words and "hooke" in words and not words & {"granular", "linear_nohistory"}:
+        styles.append("wall/gran hooke")
+    if not styles:
+        return ""
+    return (
+        f"the friction of {styles[0]} opposes velocities alone and bears no force at rest, so that slopes and heaps "
+        "creep without end: take linear_history, or hooke/history"
+    )
+
+
 def known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
     """Why forces are out of balance though the packing may be at rest; empty if no cause is known."""
     if says := restless_fix(commands):
         return f"{says}, and run on"
+    if says := creeping_law(commands):
+        return says
     if touch_twice(contacts.i[~contacts.wall], contacts.j[~contacts.wall]):
         return TWICE
     if commands.after_run.startswith("rerun"):

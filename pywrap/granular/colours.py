@@ -15,7 +15,7 @@ from scipy.sparse import csr_array, eye_array
 from scipy.spatial import cKDTree
 
 from ...analysis.arrays import Floats, Indices
-from .force_probe import Particles
+from .force_probe import ProbedParticles
 
 GAP_OF_NEIGHBOURS = 1e-3
 """Gap between particles, as a share of a radius, up to which they are looked for: far beyond all displacements."""
@@ -32,8 +32,8 @@ class Pairs:
     acts: NDArray[np.bool_]
 
 
-def neighbouring_pairs(lmp: Any, particles: Particles) -> Pairs:
-    """Pairs that touch or nearly do, and those of bonds and angles; in a copy, where it runs zero steps."""
+def neighbouring_pairs(lmp: Any, particles: ProbedParticles) -> Pairs:
+    """Pairs that touch or nearly touch, and pairs of bonds and angles. The instance is a copy, and runs zero steps."""
     lmp.command("compute faultgouge_i all property/local patom1 patom2")
     try:
         lmp.command("compute faultgouge_c all pair/local dist force")
@@ -57,7 +57,7 @@ def neighbouring_pairs(lmp: Any, particles: Particles) -> Pairs:
     )
 
 
-def _nearly_touching(lmp: Any, particles: Particles) -> Pairs:
+def _nearly_touching(lmp: Any, particles: ProbedParticles) -> Pairs:
     """Pairs a little apart: compute pair/local hands none of them out. LAMMPS has ghosts of particles across a periodic
     boundary."""
     every = [np.array(lmp.numpy.extract_atom(name)) for name in ("id", "x", "radius")]
@@ -101,7 +101,7 @@ class Colours:
         The body that each particle feels, -1 if it feels none.
     """
 
-    def __init__(self, particles: Particles, pairs: Pairs, near: float, reach: int = 1) -> None:
+    def __init__(self, particles: ProbedParticles, pairs: Pairs, near: float, reach: int = 1) -> None:
         count = len(particles.ids)
         moved = particles.constraint.tocoo()
         leads: list[set[int]] = [set() for _ in range(count)]

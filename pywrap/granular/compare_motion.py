@@ -6,15 +6,18 @@ From rest with the velocities :math:`\mathbf v_0` small motion is
     G = \begin{pmatrix} 0 & 1 \\ -M^{-1} K & -M^{-1} C \end{pmatrix} .
 
 LAMMPS runs twice, with :math:`\pm \mathbf v_0`, in copies of the process, without drag. Half of the difference has
-neither the motion of what was out of balance nor terms of second order in :math:`\mathbf v_0`. Three errors are left:
-of the time step, of its second order, or with dashpots of its first, since LAMMPS takes the velocity of the half step
-for them; of the forces' cubic terms, of the second order of the amplitude; and of `granular`, which turns a history
-only where it has left the contact's plane by 1e-10 of Coulomb's bound. The last one grows as the inverse of the
-amplitude. At the best amplitude the last two are together 1e-7 to 1e-5, more where overlaps are small.
+neither the motion by residual forces nor terms of second order in :math:`\mathbf v_0`. Three errors are left:
+
+- the error of the time step h, of the order h^2, or h with dashpots, which feel the velocity of the half step;
+- the cubic terms of the forces, of second order in the amplitude;
+- in `granular`, a history that is turned only once it has left the contact's plane by 1e-10 of Coulomb's bound: an
+  error that grows as the inverse of the amplitude.
+
+At the best amplitude the last two together are 1e-7 to 1e-5, more where overlaps are small.
 
 Laws with two derivatives (mindlin_rescale) have other forces while a contact closes than while it parts. With the mean
-K of both, and N and B of :func:`~faultgouge.analysis.operators.linearised_contacts.rescaling_operators`, the motion is
-that of
+K of both, and N and B of :func:`~faultgouge.analysis.operators.linearised_contacts.rescaling_operators`, the motion
+obeys
 
 .. math:: M \dot{\mathbf v} = \mathbf F - C \mathbf v, \qquad
     \dot{\mathbf F} = -K \mathbf v + B\, |N \mathbf v| ,

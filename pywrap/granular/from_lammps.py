@@ -1,9 +1,9 @@
 """A Configuration of a live LAMMPS with its own granular styles, or ours: any packing, as it stands.
 
-Where its contacts have a law that can be measured, K and C are those of the law
-(:mod:`~faultgouge.pywrap.granular.configuration_by_laws`). Whatever has none (cohesion, rolling and twisting friction,
-regions, bonds, springs, a lid that moves as one) has K and C by differences of LAMMPS's own forces
-(:mod:`~faultgouge.pywrap.granular.configuration_by_differences`). A few of LAMMPS's own steps prove both
+Where all contacts have laws that can be measured, K and C are those of the laws
+(:mod:`~faultgouge.pywrap.granular.configuration_by_laws`). With other forces (cohesion, rolling and twisting friction,
+regions, bonds, springs, a lid that moves as one) K and C are differences of LAMMPS's own forces
+(:mod:`~faultgouge.pywrap.granular.configuration_by_differences`). A few of LAMMPS's own steps prove either
 (:mod:`~faultgouge.pywrap.granular.motion_proof`).
 """
 
@@ -22,7 +22,7 @@ from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError,
 from .instance_queries import open_files, require_instance
 from .look_in_a_copy import can_copy, in_a_copy
 from .looks import look_at_contacts
-from .motion_proof import BOUND, GOOD, NotProvedError, OtherStiffnessError
+from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError, OtherStiffnessError
 from .motion_proof import prove as prove_motion
 
 
@@ -85,7 +85,7 @@ def take_configuration(
     prove: bool,
     differences: bool = False,
 ) -> Configuration:
-    """What :func:`from_lammps` does. Laws that are known are not measured again, and those that are new are added."""
+    """As :func:`from_lammps`, with known laws: these are not measured again, and new ones are added to them."""
     check_balance(balance)
     require_instance(lmp, "from_lammps")
     given = None if commands is None else read_commands(commands)
@@ -103,12 +103,13 @@ def take_configuration(
             ) from reason
         if not isinstance(reason, NotProvedError):
             return _by_differences(lmp, given, balance=balance, prove=prove)
-        # what acts on velocities, or on particles far apart, is not in differences either, and has been named
+        # differences lack forces on velocities, or between particles far apart, too, and these have been named
         with suppress(NotTakenError):
             found = _by_differences(lmp, given, balance=balance, prove=prove)
-            if found.proof is not None and max(found.proof / BOUND, found.operator_error / GOOD) <= 1:
+            proved = found.proof is not None and found.proof <= LARGEST_DIFFERENCE
+            if proved and found.operator_error <= SMALL_DIFFERENCE:
                 return found
-            # no linear motion is that of contacts which slide on one side, and no verdict is given
+            # contacts that slide on one side have no linear motion, and no verdict is given
             if isinstance(reason, OtherStiffnessError) and len(found.one_sided_particles):
                 return found
         raise
@@ -122,7 +123,7 @@ def _by_laws(
     deck, fixes, found = in_a_copy(look) if can_copy(lmp) else look()
     try:
         configuration = configuration_by_laws(lmp, deck, found, laws)
-    except ValueError as error:  # of what no contact at rest has
+    except ValueError as error:  # numbers that no contact at rest has
         raise NotTakenError(f"The packing moves: {error}; bring it to rest by faultgouge.relax(lmp).") from error
     configuration = derive_frozen(configuration, remarks=(*configuration.remarks, *drag_remarks(fixes)))
     contacts = configuration.contacts

@@ -45,15 +45,19 @@ TANGENTIAL = (
 
 
 class NotTakenError(FaultgougeError):
-    """A packing of LAMMPS cannot be taken as it stands: one sentence with what would do."""
+    """A packing of LAMMPS cannot be taken as it stands: one sentence with the reason and the way out."""
+
+
+SnapshotError = NotTakenError
+"""The name of `NotTakenError` in earlier states of this version, for scripts that catch it."""
 
 
 class NotLinearisedError(NotTakenError):
-    """What has no linearised contacts here: K and C by differences of forces may serve."""
+    """Contacts cannot be linearised by their laws: K and C by differences of forces may serve."""
 
 
 def with_one_rank(reason: NotLinearisedError) -> str:
-    """What is said where differences of forces cannot serve: they are taken in copies of the process."""
+    """The sentence where differences of forces cannot serve, which need copies of the process."""
     return f"{str(reason).rstrip('.')}; or take one rank and one thread, where K is found by differences of forces."
 
 
@@ -212,7 +216,7 @@ def check_rest(styles: dict[str, str], commands: Commands) -> None:
 
 
 def check_fixes(styles: dict[str, str], commands: Commands) -> None:
-    """Refuse fixes, by ID and style, that hold or move particles or walls as contacts do not tell."""
+    """Refuse fixes, by ID and style, that hold or move particles or walls otherwise than contacts do."""
     for name, style in styles.items():
         plain = without_suffix(style)
         if plain.startswith("wall/") and plain not in WALLS:

@@ -1,4 +1,4 @@
-"""What a LAMMPS instance says of itself: its ranks, its styles, its log, and why it has stopped."""
+"""Ranks, styles and log of a LAMMPS instance, and the reason why it has stopped."""
 
 import ctypes
 import os
@@ -44,7 +44,7 @@ def styles_of(lmp: Any) -> Styles:
         said = communicator(lmp).bcast(answer.read(), root=0)
     fixes = re.findall(r"^ *Fix\[ *\d+\]: *(\w+), *style = ([^,\s]+), *group = (\S+)", said, re.MULTILINE)
     values = dict(re.findall(r"^ *(Atoms|Atom style) *= *(.*?) *$", said, re.MULTILINE))
-    # Atoms = N, types = T, style = that of the pairs
+    # Atoms = N, types = T, style = the pair style
     styles, groups = ({name: each[k] for name, *each in fixes} for k in (0, 1))
     return Styles(values["Atoms"].rpartition("style = ")[2], styles, groups, values["Atom style"])
 
@@ -62,7 +62,7 @@ def explain_error(error: BaseException) -> str:
 
 
 def name_of(file: IO[Any]) -> str:
-    """A name by which LAMMPS opens a file of this process: a file that has no name is left behind by no end of it."""
+    """A name by which LAMMPS opens a nameless file of this process, which no end of the process can leave behind."""
     return f"/dev/fd/{file.fileno()}"
 
 

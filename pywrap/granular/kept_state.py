@@ -1,7 +1,7 @@
-"""The last state of a deck is taken, or kept: hours of a run are not lost where a packing cannot be taken.
+"""Keep the last state of a deck whose packing cannot be taken, so that hours of a run are not lost.
 
-The restart is written by a run of one step. LAMMPS forgets tangential histories in a file that `write_restart` writes
-after a run, and has all of them in one that the run itself writes.
+A run of one step writes the restart file: in a file that `write_restart` writes after a run, LAMMPS leaves tangential
+histories out.
 """
 
 from collections.abc import Iterable
@@ -56,7 +56,7 @@ def _keep(lmp: Any, file: Path) -> Path | None:
     """Write a restart; None if LAMMPS cannot, if there is nothing to write, or there is such a file."""
     if file.exists() or lmp.get_natoms() == 0:
         return None
-    with suppress(Exception):  # LAMMPS raises what its bindings choose, and the first error is the one to be said
+    with suppress(Exception):  # LAMMPS's bindings raise any error, and the first error is told
         lmp.command("timer timeout unlimited")
         lmp.command(f'restart 1 "{file.resolve()}.*"')
         lmp.command("run 1 post no")

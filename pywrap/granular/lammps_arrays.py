@@ -20,7 +20,7 @@ from .instance_queries import communicator
 Arrays = dict[str, Any]
 
 ATOM_ARRAYS = ("x", "image", "v", "omega", "f", "torque")
-"""What `given_back` restores."""
+"""Arrays that `given_back` restores."""
 
 NO_FORCE = 1.2345678e300
 """A number that is no force."""
@@ -85,7 +85,7 @@ def forces_in_order(lmp: Any, ids: Indices) -> Floats:
 
 
 def contacts_of_plane(lmp: Any, fix: str, line: str, found: Arrays, before: Floats) -> tuple[Floats, Floats]:
-    """What `fix wall/gran ... contacts` hands out of each particle, of planes without that word; in a copy.
+    """The columns of `fix wall/gran ... contacts` for each particle, of planes without the word contacts; in a copy.
 
     The wall's force on a particle is the force that is missing without the wall.
 

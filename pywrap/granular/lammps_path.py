@@ -1,17 +1,18 @@
 """The loading path of a live LAMMPS: at each load its own dynamics relax the packing, with drag.
 
-An equilibrium that the path keeps is a copy of the process (`fork`), which waits with LAMMPS in it. Contact histories
-stay what they are, to the bit; a restart file of LAMMPS may lose some. The instance of the user stays as it was.
+An equilibrium that the path keeps is a copy of the process (`fork`), which waits with LAMMPS in it. So contact
+histories are kept to the bit, as no restart file of LAMMPS can keep them. The instance of the user stays as it was.
 
-**Newton's method.** A step of the load in which no contact slides moves particles by :math:`K^{-1}` times what is out
-of balance. LAMMPS moves them in one long step, in which slips advance, and gives the forces; some iterations with the K
-of the last equilibrium do. The copy that has done so is kept if nothing slides, nothing has a negative eigenvalue, and
-the balance is that of a relaxation. Else another copy relaxes.
+**Newton's method.** If no contact slides, a step of the load displaces the particles by :math:`K^{-1}` times the forces
+that are out of balance. LAMMPS makes this displacement in one long time step, in which slips advance, and returns the
+forces. K of the last equilibrium serves for some iterations. The equilibrium is kept if no contact slides, K has no
+negative eigenvalue, and the balance is as close as that of a relaxation. Otherwise another copy of the last equilibrium
+relaxes.
 
-**Relaxation.** Otherwise the load jumps, and the drag takes what the jump sets free. Motion ends soonest at the
-critical damping of the slowest mode, where the force that is out of balance is half of the drag: the rate of the drag
-is doubled where the force is more than twice the drag, and halved where it is less than a quarter, since the packing
-creeps or a loose sphere rolls away.
+**Relaxation.** The load jumps, and a drag takes the energy that the jump sets free. Motion ends soonest at the critical
+damping of the slowest mode, where the force out of balance is half of the drag. So the rate of the drag is doubled
+where the force is more than twice the drag. The rate is halved where the force is less than a quarter of the drag,
+since the packing then creeps, or a loose sphere rolls away.
 """
 
 import os
@@ -32,7 +33,7 @@ import numpy as np
 from scipy.sparse import csc_array, eye_array
 
 from ...analysis import Configuration, negative_eigenvalues, stiffness_matrix
-from ...analysis.arrays import derive_frozen
+from ...analysis.arrays import Floats, derive_frozen
 from ...analysis.errors import FaultgougeError, place_in_user_code
 from ...analysis.factors.sparse_lu import general_lu
 from ...parent_death import end_with
@@ -46,10 +47,10 @@ from .lammps_arrays import owned_array, rows_of, set_velocity
 from .look_in_a_copy import can_copy, in_a_copy, interrupts_wait, quieten, silent_copy
 from .relax import DRAG_RATE, REST_SHARE, bring_to_rest
 
-ITERATIONS = 10
+MOST_ITERATIONS = 10
 """Iterations of Newton's method, each of which must halve the residual until rounding stops it: six are the rule."""
 
-LONG = 1e6
+DISPLACEMENT_STEP = 1e6
 """Length of a step in which particles are displaced, in time steps: so slow that dashpots have no share in forces."""
 
 
@@ -243,7 +244,7 @@ class _Relaxation:
             # the first of all others, which are forked from it
             self.found = found = self.look(prove=True) if self.found is None else found
             change = in_a_copy(lambda: self.force_change(value))
-        except Exception as error:  # LAMMPS, and a user's function, raise what they choose
+        except Exception as error:  # LAMMPS, and a user's function, raise any error
             if not relaxes:
                 return None  # particles that nothing holds fly off: the relaxation has its own words for it
             return (
@@ -303,9 +304,8 @@ class _Relaxation:
         if not np.array_equal(start.contacts.closing, start.contacts.parting):
             return None
         stiffness = stiffness_matrix(start)
-        # what no contact feels has zero rows, and stays where it is
+        # a coordinate that no contact feels has a zero row, and does not move
         solver = general_lu(csc_array(stiffness + 1e-9 * abs(stiffness).max() * eye_array(start.coordinates)))
-        allowed = self.balance * float(start.contacts.normal_force.mean())
         files = open_files()
         given = self.commands or in_a_copy(lambda: log_of(lmp, files)) or []
         fixes = read_commands(given, log=self.commands is None).fixes
@@ -314,25 +314,12 @@ class _Relaxation:
             lmp.command(f"unfix {name}")
         lmp.command("fix faultgouge_moves all nve/noforce")
         step = float(lmp.extract_global("dt"))
-        lmp.command(f"timestep {LONG * step:.17g}")
-        sizes: list[float] = []
-        while True:
-            set_velocity(lmp, start, np.zeros(start.coordinates))
-            lmp.command("run 0 post no")
-            rows = rows_of(lmp, start)
-            torque = owned_array(lmp, "torque")[rows] / start.radius[:, None]
-            forces = np.where(
-                np.tile(start.free, start.axes), start.join_vectors(owned_array(lmp, "f")[rows], torque), 0.0
-            )
-            sizes.append(float(np.linalg.norm(forces.reshape(start.axes, -1), axis=0).max()))
-            slow = len(sizes) > 1 and sizes[-1] > 0.5 * sizes[-2]
-            if sizes[-1] <= 1e-4 * allowed or slow or len(sizes) > ITERATIONS:
-                break
-            set_velocity(lmp, start, np.asarray(solver.solve(forces)) / (LONG * step))
-            lmp.command("run 1 post no")
+        lmp.command(f"timestep {DISPLACEMENT_STEP * step:.17g}")
+        allowed = self.balance * float(start.contacts.normal_force.mean())
+        left = _iterate(lmp, start, solver.solve, DISPLACEMENT_STEP * step, 1e-4 * allowed)
         for line in ("unfix faultgouge_moves", *moving.values(), f"timestep {step:.17g}"):
             lmp.command(line)
-        if sizes[-1] > allowed:
+        if left > allowed:
             return None
         found = self.look()
         good = found.residual <= self.balance * found.contacts.normal_force.mean()
@@ -345,3 +332,35 @@ class _Relaxation:
             self.lmp, self.look, self.look(), self.balance, self.steps, self.rate, f" at {value:.10g}"
         )
         return found
+
+
+def _iterate(lmp: Any, start: Configuration, solve: Callable[[Floats], Floats], step: float, wanted: float) -> float:
+    """Displace the particles by Newton's method until forces are small, or fall slowly; the largest that is left.
+
+    Parameters
+    ----------
+    lmp : lammps.lammps
+        An instance in which nothing but their velocities moves the particles.
+    start : Configuration
+        Where the particles were at first.
+    solve : callable
+        Displacements that would take forces away, by K of the start.
+    step : float
+        Length of a time step: one for each displacement.
+    wanted : float
+        Size of small forces.
+    """
+    sizes: list[float] = []
+    while True:
+        set_velocity(lmp, start, np.zeros(start.coordinates))
+        lmp.command("run 0 post no")
+        rows = rows_of(lmp, start)
+        torque = owned_array(lmp, "torque")[rows] / start.radius[:, None]
+        on_coordinates = start.join_vectors(owned_array(lmp, "f")[rows], torque)
+        forces = np.where(np.tile(start.free, start.axes), on_coordinates, 0.0)
+        sizes.append(float(np.linalg.norm(forces.reshape(start.axes, -1), axis=0).max()))
+        slow = len(sizes) > 1 and sizes[-1] > 0.5 * sizes[-2]
+        if sizes[-1] <= wanted or slow or len(sizes) > MOST_ITERATIONS:
+            return sizes[-1]
+        set_velocity(lmp, start, solve(forces) / step)
+        lmp.command("run 1 post no")

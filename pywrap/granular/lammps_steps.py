@@ -20,12 +20,12 @@ from .look_in_a_copy import in_a_copy, quieten
 COMMON_MULTIPLE = 2**12 * 5**9 * 3**4 * 7 * 11 * 13
 """A time step that is a multiple of the intervals that people write: some fixes act every so many steps alone."""
 
-SHORT = 1e-12
+STILL_STEP = 1e-12
 """A step in which nothing moves, as a share of the others."""
 
 
 class Steps(NamedTuple):
-    """What some steps of LAMMPS end with.
+    """The end of some steps of LAMMPS.
 
     `velocity` has the velocities of the coordinates, shape (axes N,); `force_change` by how much a common displacement
     of all particles changes each force (F, T/R) at rest, shape (axes N,), or None if none was asked for. It is the
@@ -78,7 +78,7 @@ def set_up_run(lmp: Any) -> None:
         lmp.command("run 0 post no")
         return
     timestep = float(lmp.extract_global("dt"))
-    lmp.command(f"timestep {SHORT * timestep:.17g}")
+    lmp.command(f"timestep {STILL_STEP * timestep:.17g}")
     try:
         lmp.command("run 1 post no")
     finally:
@@ -108,7 +108,7 @@ def _take_steps(
     if displacement is None:
         return Steps(end, None)
     set_velocity(lmp, configuration, np.zeros(configuration.coordinates))
-    lmp.command(f"timestep {SHORT * timestep:.17g}")
+    lmp.command(f"timestep {STILL_STEP * timestep:.17g}")
     before = _forces_after(lmp, configuration, "run 0 post no")
     # within one run: a spring of fix smd begins where a run begins
     changes = []

@@ -12,11 +12,15 @@ import numpy as np
 from .contact_law_measurement import MeasuredLaw, PowerOfOverlap, State
 from .granular_commands import Commands, without_suffix
 
-DIFFERENT = 0.01
+LAW_DIFFERENCE = 0.01
 """Relative difference from which on a number is remarked."""
 
-WORDS = {"stiffness": "a normal stiffness", "tangential": "a tangential stiffness", "mu": "a friction coefficient"}
-"""What the numbers are called."""
+NAMES_OF_NUMBERS = {
+    "stiffness": "a normal stiffness",
+    "tangential": "a tangential stiffness",
+    "mu": "a friction coefficient",
+}
+"""Names of the numbers in sentences."""
 
 
 def remark_on(law: MeasuredLaw, commands: Commands, name: tuple[int, int] | str, state: State) -> str | None:
@@ -32,8 +36,8 @@ def remark_on(law: MeasuredLaw, commands: Commands, name: tuple[int, int] | str,
             continue  # without friction there is no tangential force
         measured = law.mu if isinstance(said, float) else float(getattr(law, what).at(radius, overlap))
         given = said if isinstance(said, float) else float(said.at(radius, overlap))
-        if given > 0 and abs(measured / given - 1) > DIFFERENT:
-            says.append(f"{WORDS[what]} {measured / given:.3g} times that of the line")
+        if given > 0 and abs(measured / given - 1) > LAW_DIFFERENCE:
+            says.append(f"{NAMES_OF_NUMBERS[what]} {measured / given:.3g} times that of the line")
     return f"{who}: LAMMPS has {' and '.join(says)} {' '.join(line)!r}, and K has LAMMPS's" if says else None
 
 

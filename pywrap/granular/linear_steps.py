@@ -1,8 +1,8 @@
 r"""Steps of the linearised packing, as LAMMPS takes them: contact by contact, without the matrices K and C.
 
-The few steps of a proof cost a quarter of the assembly of both, and a test holds them to the matrices. Symbols are
-those of :mod:`~faultgouge.analysis.assembly`: a displacement and a velocity of the coordinates change the forces of
-each contact by
+The few steps of a proof take a quarter of the time of the assembly of K and C; a test compares them with the matrices.
+With the symbols of :mod:`~faultgouge.analysis.assembly`, a displacement and a velocity of the coordinates change the
+forces of each contact by
 
 .. math::
 
@@ -11,8 +11,8 @@ each contact by
     - \mathbf n\, (\mathbf f_t \cdot \mathrm d\mathbf n) .
 
 A contact at Coulomb's bound slides on ahead and sticks on the way back, by the play of
-:mod:`~faultgouge.analysis.operators.sliders`. The bound is that of the contact: a contact a little below it sticks up
-to it. Where b is one while a contact closes and another one while it parts, it is taken as the contact moves.
+:mod:`~faultgouge.analysis.operators.sliders`; a contact a little below the bound sticks until it reaches the bound. In
+laws with two derivatives b is that of the way in which the contact moves.
 """
 
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class LinearForces(Protocol):
     """Changes of the forces on the coordinates, to first order."""
 
     def at_rest(self) -> Memory:
-        """What contacts remember at the beginning."""
+        """The memory of contacts at the beginning."""
 
     def change(self, displacement: Floats, velocity: Floats, memory: Memory) -> Floats:
         """By how much a displacement and a velocity, shape (axes N,), change the forces (F, T/R); shape (axes N,)."""
@@ -183,7 +183,7 @@ class ContactForces:
         )
 
     def at_rest(self) -> Memory:
-        """Sliders remember what is missing to the bound."""
+        """The memory at rest: sliders begin with the force that is missing to the bound."""
         return Memory(self._missing, np.zeros(len(self.pair)), np.zeros(len(self.pair)))
 
     @property

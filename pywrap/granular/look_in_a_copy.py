@@ -1,11 +1,15 @@
 """Look into a LAMMPS instance in a copy of the process (`fork`).
 
-LAMMPS hands out contacts in a run alone, and a run of zero steps sorts particles, may cut a history once more at
-Coulomb's bound, and scales a rescaled one. In a copy all of this may happen: the instance stays as it is. The copy
-shares open files with the process, down to the place at which each of them is written. So the first thing that the copy
-does is to put the null device in the place of every file that is open for writing, whoever has opened it: what LAMMPS,
-zlib or Python write as they close a dump or a log goes nowhere. A copy of one of several ranks could not speak with the
-others, and a copy of a process has none of its threads (:mod:`~faultgouge.pywrap.granular.lammps_arrays`).
+LAMMPS hands out contacts only in a run. A run of zero steps sorts particles, may cut a history once more at Coulomb's
+bound, and scales rescaled histories. In a copy of the process all of this may happen: the instance itself stays as it
+is.
+
+**Files.** The copy shares open files with the process, with the positions at which they are written. So the copy first
+puts the null device in the place of every file that is open for writing, whoever has opened the file. All that LAMMPS,
+zlib or Python write as they close a dump or a log then goes nowhere.
+
+**No copy** is possible on several ranks, since a copy cannot communicate with the other ranks, or with threads, which a
+copy does not have (:mod:`~faultgouge.pywrap.granular.lammps_arrays`).
 """
 
 import ctypes
@@ -34,7 +38,7 @@ PER_STEP = ("ave/", "print", "vector", "halt", "balance", "adapt", "dt/reset", "
 INSERTS = ("pour", "deposit", "evaporate")
 """Fixes that put particles in or take them out, with which no time step may be changed."""
 
-DRAG = ("viscous", "langevin", "overdamped")
+DRAG_STYLES = ("viscous", "langevin", "overdamped")
 """Fixes that take energy away, and may shake."""
 
 
@@ -49,7 +53,7 @@ def silent_copy(*keep: int) -> int:
 
     The process decides what Ctrl-C ends: call this where :func:`interrupts_wait`.
     """
-    ctypes.CDLL(None).fflush(None)  # what is buffered would be written twice
+    ctypes.CDLL(None).fflush(None)  # buffered text would be written twice
     child = os.fork()
     if child == 0:
         if threading.current_thread() is threading.main_thread():
@@ -62,7 +66,7 @@ def _silence(keep: tuple[int, ...]) -> None:
     """Put the null device in the place of all files, pipes and terminals that are open for writing."""
     nowhere = os.open(os.devnull, os.O_RDWR)
     for descriptor in map(int, os.listdir("/dev/fd")):
-        with suppress(OSError):  # that of the list itself is closed
+        with suppress(OSError):  # the file of the list itself is closed
             writes = fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE != os.O_RDONLY
             kind = os.fstat(descriptor).st_mode
             shared = stat.S_ISREG(kind) or stat.S_ISFIFO(kind) or os.isatty(descriptor)
@@ -73,7 +77,8 @@ def _silence(keep: tuple[int, ...]) -> None:
 
 
 def in_a_copy(work: Callable[[], Found]) -> Found:
-    """What some work finds in a copy of this process, whose traces end with it; so does an interrupt of this process.
+    """The result of some work in a copy of this process. All traces of the work end with the copy, and an interrupt of
+    this process ends the copy, too.
 
     Raises
     ------
@@ -139,5 +144,5 @@ def quieten(lmp: Any, *, drag: bool = False) -> None:
     for name in lmp.available_ids("dump"):
         lmp.command(f"undump {name}")
     for name, style in styles_of(lmp).fixes.items():
-        if style.startswith((*PER_STEP, *INSERTS)) or (drag and style.startswith(DRAG)):
+        if style.startswith((*PER_STEP, *INSERTS)) or (drag and style.startswith(DRAG_STYLES)):
             lmp.command(f"unfix {name}")

@@ -1,4 +1,4 @@
-"""What a LAMMPS instance says of its particles, contacts and fixes, in a copy of the process if there can be one."""
+"""Particles, contacts and fixes of a LAMMPS instance, read in a copy of the process if there can be one."""
 
 from contextlib import nullcontext, suppress
 from typing import Any
@@ -82,7 +82,7 @@ def _logged_commands(lines: list[str] | None) -> Commands:
 
 
 def _join_ranks(parts: list[Floats]) -> Floats:
-    """Rows of all ranks; those of a rank that has none may have another number of columns."""
+    """Rows of all ranks; the array of a rank without rows may have another number of columns."""
     return np.concatenate([part for part in parts if len(part)] or parts[:1])
 
 
@@ -137,7 +137,7 @@ def _forces_of_walls(lmp: Any, styles: Styles, commands: Commands, found: Arrays
 
 
 def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
-    """Refuse what an instance has that is not linearised here, whatever its particles do."""
+    """Refuse styles of an instance that are not linearised here."""
     if without_suffix(styles.pair) != commands.style:
         raise NotTakenError(
             f"The commands have pair_style {commands.style}, and the instance has {styles.pair}: {GIVE_LINES}."
@@ -178,7 +178,7 @@ def box_of(lmp: Any) -> tuple[Floats, Floats, NDArray[np.bool_]]:
 
 
 def particles_of(lmp: Any, found: Arrays, free: NDArray[np.bool_], factor: Floats) -> dict[str, Any]:
-    """Fields of a Configuration that are those of the particles and of the box, without load.
+    """Fields of a Configuration that concern particles and box, without the load.
 
     `free` says which particles move, shape (N,), and `factor` is the moment of inertia over m R^2, shape (N,).
     """

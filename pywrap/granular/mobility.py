@@ -81,7 +81,7 @@ class _Coordinates:
 
 
 def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass: Floats, dimension: int) -> Mobility:
-    """What the fixes move.
+    """The coordinates that the fixes move.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
 
 
 def _apply(found: _Coordinates, name: str, style: str, words: list[str], members: NDArray[np.bool_]) -> None:
-    """What one fix moves, holds or joins."""
+    """Apply one fix, which moves, holds or joins coordinates."""
     if style in ("nve/sphere", "nve/disc", "overdamped/disc"):
         found.moves[:, members] = True
         own = {"nve/disc": 0, "overdamped/disc": 1}.get(style)
@@ -158,7 +158,7 @@ def _apply(found: _Coordinates, name: str, style: str, words: list[str], members
 
 
 def _move_body(found: _Coordinates, axes: tuple[bool, bool, bool], members: NDArray[np.bool_]) -> None:
-    """What a body moves that does not rotate."""
+    """Apply a body that does not rotate."""
     found.moves[:, members] = False
     for k in range(3):
         if axes[k] and members.any():

@@ -1,25 +1,26 @@
 r"""The proof of a Configuration: a few steps of LAMMPS beside the same steps of the linearised packing.
 
-LAMMPS starts from small random velocities, in a copy of the process. The linearised packing, its contacts at Coulomb's
-bound sliding on ahead and sticking on the way back (:mod:`~faultgouge.pywrap.granular.linear_steps`), starts from the
-same velocities and with the forces that are left at rest, and takes LAMMPS's own steps of velocity Verlet. So no error
-of the step is left, and the step may be as long as a stable one. Dashpots feel the velocities of half steps in LAMMPS's
-styles, and extrapolated ones in mindlin/smooth (fix dashpot/velocities).
+LAMMPS starts from small random velocities, in a copy of the process. The linearised packing starts from the same
+velocities, with the residual forces, and takes LAMMPS's own steps of velocity Verlet; its contacts at Coulomb's bound
+slide on ahead and stick on the way back (:mod:`~faultgouge.pywrap.granular.linear_steps`). So the comparison has no
+error of the time step, and the step may be as long as a stable one. Dashpots feel the velocities of half steps in
+LAMMPS's styles, and extrapolated velocities in mindlin/smooth (fix dashpot/velocities).
 
-K by differences of forces has no contacts at the bound. A model that acts one step late differs by less in shorter
-steps, which are taken if the first ones do not agree. Where its forces are one-sided, K is the mean of both sides,
-and no linear motion is LAMMPS's: the difference is said, and refuses nothing.
+**The proof** is :math:`|\Delta v - \Delta u| / |\Delta u|`, weighted with the root of the masses, with the changes of
+the velocities v of LAMMPS and u of the linearised packing. One motion is compared first. If its difference is not
+small, the motions with both signs of the velocities are compared: half of their difference has no terms of second order
+in the amplitude. With contacts at the bound the motions of both signs are not opposite. Then each is compared by
+itself, after the motion from rest has been subtracted.
 
-The proof is :math:`|\Delta v - \Delta u| / |\Delta u|` with the changes of the velocities v of LAMMPS and u of the
-linearised packing, and with the root of the masses. One motion is compared first. If its difference is not small, half
-of the difference of the motions of both signs is, which has no terms of second order in the amplitude. With contacts at
-the bound the motions of both signs are no opposites; each is compared by itself, without the motion from rest.
+**K by differences of forces** has no contacts at the bound. If the model acts one step late, the difference is smaller
+in shorter steps, which are taken if the first steps do not agree. If forces are one-sided, K is the mean of both sides,
+and no linear motion is LAMMPS's: the difference is told, and the packing is not refused.
 
-A force that no contact has, and that depends on the position, may be weak beside those of the contacts, and strong
-beside the lowest eigenvalues of K. Therefore all particles are displaced alike, too. Then no contact between particles
-changes, and only particles at walls may feel other forces. K by differences has such forces, to its own error. A spring
-between particles changes by no common displacement, and bears a part of the weight, so that without the spring the
-motion is another one, too: where there is a spring, laws that do not agree as well as usual are not enough.
+**Forces by position.** A force that depends on the position and belongs to no contact may be weak beside the contacts,
+and strong beside the lowest eigenvalues of K. So all particles are also displaced alike. No contact between particles
+then changes, and only particles at walls may feel other forces. (K by differences contains such forces.) A spring
+between particles does not change, either, but bears a part of the weight, so that the motion without the spring is
+another one. With such a spring the laws have to agree to `SMALL_DIFFERENCE`.
 """
 
 from collections.abc import Callable
@@ -38,16 +39,16 @@ from .granular_commands import GIVE_LINES, NotLinearisedError, NotTakenError
 from .lammps_steps import steps_in_a_copy
 from .linear_steps import LinearForces, linear_forces, linear_steps
 
-BOUND = 1e-3
+LARGEST_DIFFERENCE = 1e-3
 """Difference from which on a packing is refused. Packings at rest have 1e-9 to 1e-5, by curvatures and roundings of
 forces; what is out of balance by the share e of the mean contact force adds some e, for K is that of other overlaps. A
 wrong stiffness of one contact in a hundred gives 1e-2 or more. An eigenvalue of K far below the largest may still be
 wrong by this share of the largest."""
 
-CLOSE = 0.99
+CREEP_SHARE = 0.99
 """Share of Coulomb's bound from which on a contact of a packing that creeps may slide: dashpots bear the rest."""
 
-OTHER = 1e-6
+OTHER_STIFFNESS = 1e-6
 """Stiffness that is none of contacts, as a share of the mean normal stiffness of contacts, from which on a packing is
 refused: far below the smallest eigenvalues, some 1e-4 of the largest, and far above rounding, 1e-11 and less."""
 
@@ -61,15 +62,15 @@ SHORTER_STEPS = 10
 """By how much steps are shorter where a model may act one step late, as the volume of particles does in mdr: then the
 difference falls as the step, and that of a K which is not LAMMPS's does not."""
 
-PHASE = 1.5
-"""A step times a bound of the fastest rate, some three times the fastest rate: five steps are half an oscillation of
-it. Below 2 steps are stable."""
+STEP_PHASE = 1.5
+"""Time step times a bound of the fastest rate, which is some three times this rate: five steps are half an oscillation
+of the fastest motion. Below 2 steps are stable."""
 
-COMMON = 1.0
+COMMON_VELOCITY = 1.0
 """Velocity that all particles share, in units of their random ones. A fix that changes the total momentum changes this
 velocity."""
 
-DISPLACED = 1e-3
+COMMON_DISPLACEMENT = 1e-3
 """Common displacement in units of the mean radius."""
 
 COORDINATE_ROUNDING = 1e-14
@@ -78,13 +79,13 @@ COORDINATE_ROUNDING = 1e-14
 SMALL_OVERLAP = 1e-2
 """Share of the median overlap: smaller overlaps do not decide how small the velocities are."""
 
-GOOD = 1e-5
+SMALL_DIFFERENCE = 1e-5
 """Difference from which on no other amplitude is tried."""
 
-CURES = 0.1
+CAUSE_SHARE = 0.1
 """Share of the difference that is left without a fix that is its cause."""
 
-UNCHANGED = 0.5
+CHANGE_SHARE = 0.5
 """Share of the difference, or its inverse, up to which the difference without all fixes is the same, and none is the
 cause. Where a packing creeps 0.87 of the difference is left without two constant forces. Without rhok, which also keeps
 the balance, the difference is 3.7 times as large."""
@@ -92,12 +93,12 @@ the balance, the difference is 3.7 times as large."""
 AMPLITUDES = 1.0, 0.03, 30.0
 """Amplitudes that are tried, in units of the first."""
 
-OVERLAP = 1e-4
+USUAL_OVERLAP = 1e-4
 """Overlap as a share of the mean radius where no contact is known."""
 
 
 class NotProvedError(NotLinearisedError):
-    """Something acts on particles as the laws of contacts do not tell, and LAMMPS's motion shows it."""
+    """LAMMPS's motion shows a force on particles besides those of the contacts."""
 
 
 class OtherStiffnessError(NotProvedError):
@@ -130,20 +131,20 @@ def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extr
         return None
     others, moves = acting_fixes(fixes), partial(comparison.least_difference, lmp)
     difference, other_stiffness = moves()
-    if other_stiffness > OTHER:
+    if other_stiffness > OTHER_STIFFNESS:
         raise _other_stiffness(others, moves)
     if len(configuration.one_sided_particles):
         return difference  # no linear motion is LAMMPS's, and no verdict is given
-    if difference > BOUND and configuration.operators == "differences":
+    if difference > LARGEST_DIFFERENCE and configuration.operators == "differences":
         difference = min(difference, comparison.in_shorter_steps().least_difference(lmp)[0])
-    tells = difference > GOOD
+    tells = difference > SMALL_DIFFERENCE
     pulls = [says for name, says in others.items() if fixes[name].startswith(tuple(HOLDING))]
     if tells and pulls and configuration.operators == "laws":
         raise OtherStiffnessError(f"{_differs(difference)}; {' and '.join(pulls)}.")
-    causes = [says for name, says in others.items() if tells and moves((name,))[0] < CURES * difference]
-    if difference <= BOUND and not causes:
+    causes = [says for name, says in others.items() if tells and moves((name,))[0] < CAUSE_SHARE * difference]
+    if difference <= LARGEST_DIFFERENCE and not causes:
         return difference
-    if not causes and others and not UNCHANGED < moves(tuple(others))[0] / difference < 1 / UNCHANGED:
+    if not causes and others and not CHANGE_SHARE < moves(tuple(others))[0] / difference < 1 / CHANGE_SHARE:
         causes = list(others.values())  # which of them is not known, but without them the motion is another one
     raise _not_proved(configuration, difference, causes)
 
@@ -154,8 +155,8 @@ Moves = Callable[..., tuple[float, float]]
 
 def _other_stiffness(others: dict[str, str], moves: Moves) -> OtherStiffnessError:
     """The error of forces that change where all particles are displaced alike, with the fixes that exert them."""
-    causes = [says for name, says in others.items() if moves((name,))[1] < OTHER]
-    if not causes and moves(tuple(others))[1] < OTHER:
+    causes = [says for name, says in others.items() if moves((name,))[1] < OTHER_STIFFNESS]
+    if not causes and moves(tuple(others))[1] < OTHER_STIFFNESS:
         causes = list(others.values())
     return OtherStiffnessError(
         "LAMMPS's forces do not change as K says: where all particles are displaced alike, forces change that no "
@@ -164,7 +165,7 @@ def _other_stiffness(others: dict[str, str], moves: Moves) -> OtherStiffnessErro
 
 
 def _differs(difference: float) -> str:
-    """What a difference is, without a stop."""
+    """A difference in words, without a full stop."""
     return (
         f"LAMMPS's forces do not change as K says: in {STEPS_OF_PROOF} steps from small velocities the change differs "
         f"by {difference:.2g} of itself"
@@ -174,7 +175,7 @@ def _differs(difference: float) -> str:
 def _not_proved(configuration: Configuration, difference: float, causes: list[str]) -> NotTakenError:
     """The error of a motion that is another one, with its causes, or the likeliest ones."""
     says = _differs(difference)
-    close = configuration.mobilised > CLOSE
+    close = configuration.mobilised > CREEP_SHARE
     if causes:
         slide = counted(int(close.sum()), "contact")
         or_slide = f"; or {slide} at Coulomb's bound or just below {SLIDES_ON}" if close.any() else ""
@@ -227,7 +228,7 @@ class _Comparison:
         rate = forces.fastest_rate()
         if not rate:
             return None
-        timestep, start = PHASE / rate, _start(configuration)
+        timestep, start = STEP_PHASE / rate, _start(configuration)
         start = start / _deformation(configuration, STEPS_OF_PROOF * timestep * start)
         return cls(configuration, forces, extrapolates, start, timestep)
 
@@ -260,7 +261,7 @@ class _Comparison:
         alone, both = rounding ** (1 / 2), rounding ** (1 / 2 if self.one_sided else 1 / 3)
         best, other = self.difference(lmp, alone, (1.0,), without)
         for factor in AMPLITUDES:
-            if best < GOOD or other > OTHER:
+            if best < SMALL_DIFFERENCE or other > OTHER_STIFFNESS:
                 break
             signs = (1.0, -1.0, 0.0) if self.one_sided else (1.0, -1.0)
             best = min(best, self.difference(lmp, factor * both, signs, without)[0])
@@ -282,7 +283,8 @@ class _Comparison:
             what is out of balance; (1, -1, 0) each of two without what is out of balance.
         """
         c, sizes = self.configuration, amplitude * np.array(signs)
-        way = DISPLACED * float(c.radius.mean()) * np.where(np.arange(3) < c.dimension, [0.48, 0.6, 0.64], 0.0)
+        direction = np.where(np.arange(3) < c.dimension, [0.48, 0.6, 0.64], 0.0)
+        way = COMMON_DISPLACEMENT * float(c.radius.mean()) * direction
         displaces = c.operators == "laws"
         ends = [
             steps_in_a_copy(
@@ -333,7 +335,7 @@ def _start(configuration: Configuration) -> Floats:
     touches[configuration.rattlers] = False
     translation, rotation = configuration.vectors(random.standard_normal(configuration.coordinates))
     common = random.standard_normal(3)
-    translation += COMMON * np.sqrt(3) * common / np.linalg.norm(common)
+    translation += COMMON_VELOCITY * np.sqrt(3) * common / np.linalg.norm(common)
     start = configuration.join_vectors(translation, rotation)
     return start * (configuration.coordinate_free & np.tile(touches, configuration.axes))
 
@@ -347,6 +349,6 @@ def _deformation(configuration: Configuration, displacement: Floats) -> float:
 
 
 def _overlaps(configuration: Configuration) -> Floats:
-    """Sizes of overlaps, of which those of cohesive contacts may be gaps; a small one where no contact is known."""
+    """Sizes of overlaps, or of the gaps of cohesive contacts; a small one where no contact is known."""
     overlap = np.abs(configuration.contacts.overlap)
-    return overlap if len(overlap) else np.array([OVERLAP * configuration.radius.mean()])
+    return overlap if len(overlap) else np.array([USUAL_OVERLAP * configuration.radius.mean()])

@@ -2,8 +2,9 @@
 
 `fix viscous`, and `fix viscous/sphere` where this LAMMPS has one, take energy away. The drag follows the motion: where
 the forces are much larger than the drag, particles accelerate, and the drag grows; where the drag balances the forces,
-particles creep, and the drag falls. A packing rests when forces and drags are far below the mean contact force, both,
-since the forces of a vibration vanish together at times, and those on a sphere that rolls away always.
+particles creep, and the drag falls. A packing rests when both the forces and the drags are far below the mean contact
+force. The forces alone do not tell: those of a vibration may all vanish at one time, and a sphere that rolls away feels
+no force.
 """
 
 from collections.abc import Callable, Iterable
@@ -17,7 +18,7 @@ from ...analysis import BadInputError, Configuration, NoEquilibriumError, stable
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
 from .acting_fixes import acting_fixes
-from .balance import check_balance, force_scale, restless_fix
+from .balance import check_balance, creeping_law, force_scale, restless_fix
 from .configuration_by_differences import still_particles
 from .from_lammps import take_configuration
 from .granular_commands import NotTakenError, read_commands
@@ -34,7 +35,8 @@ STEPS_BETWEEN_LOOKS = 2000
 """Steps between two looks: many beside the set-up of a run, few beside a relaxation."""
 
 FORCE_ROUNDING = 1e-15
-"""Rounding of a coordinate, as a share of the largest one: nothing comes closer to rest."""
+"""Rounding of forces: that of the largest coordinate, as a share, times the largest entry of K. Nothing comes closer to
+rest."""
 
 DRAG_RATE = 0.01
 """Rate of the drag at the beginning, per time step: critical for a mode of 1000 steps."""
@@ -94,8 +96,12 @@ def relax(
     try:
         found, _ = bring_to_rest(lmp, look, still.configuration, balance, steps, DRAG_RATE, "", far=FARTHEST_DRIFT)
     except NoEquilibriumError as error:
-        says = restless_fix(still.commands) or " and ".join(
-            f"fix {name} {still.fixes[name]} may drive the packing" for name in acting_fixes(still.fixes)
+        says = (
+            restless_fix(still.commands)
+            or creeping_law(still.commands)
+            or " and ".join(
+                f"fix {name} {still.fixes[name]} may drive the packing" for name in acting_fixes(still.fixes)
+            )
         )
         if says:
             raise NoEquilibriumError(f"{str(error).rstrip('.')}; {says}.") from error
@@ -159,7 +165,7 @@ def bring_to_rest(
             if force == 0.0 or residual <= max(balance * force, rounding):
                 found = look()
                 force = force_scale(found)
-                # what touches nothing has no residual; without a load, LAMMPS's forces are those of the drag
+                # particles without contacts have no residual; without a load, LAMMPS's forces are those of the drag
                 falls = force == 0.0 and np.linalg.norm(forces + drag_forces) > 0.5 * np.linalg.norm(drag_forces)
                 if found.residual <= max(balance * force, rounding) and not falls:
                     set_velocity(lmp, found, np.zeros(found.coordinates))
@@ -225,7 +231,7 @@ class _Drag:
 
 
 def _rounding(found: Configuration) -> float:
-    """What a rounding of a coordinate makes of the force of the stiffest contact."""
+    """Change of the force of the stiffest contact by the rounding of a coordinate."""
     stiffness = found.contacts.normal_stiffness if found.stiffness is None else found.stiffness.data
     return FORCE_ROUNDING * float(np.abs(found.position).max() * np.abs(stiffness).max(initial=0.0))
 
@@ -247,7 +253,7 @@ def _run(lmp: Any, count: int, where: str, *, set_up: bool) -> None:
             set_up_run(lmp)
         began = lmp.extract_global("ntimestep")
         lmp.command(f"run {STEPS_BETWEEN_LOOKS} pre no post no")
-    except Exception as error:  # LAMMPS raises what its bindings choose
+    except Exception as error:  # LAMMPS's bindings raise any error
         raise NotTakenError(f"While the packing came to rest{where}, {explain_error(error)}") from error
     if lmp.extract_global("ntimestep") != began + STEPS_BETWEEN_LOOKS:
         raise NotTakenError(

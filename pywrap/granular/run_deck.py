@@ -59,7 +59,7 @@ class Deck(NamedTuple):
 
     @property
     def ahead(self) -> str:
-        """What LAMMPS may still carry out after the head, with the lines to which a loop goes back."""
+        """Lines that LAMMPS may still carry out after the head, among them those to which a loop goes back."""
         loop = re.search(r"(?m)^\s*label\b", self.head)
         return (self.head[loop.start() :] if loop else "") + self.rest
 
@@ -138,14 +138,14 @@ def _carry_out(lmp: Any, path: Path, name: str) -> None:
     try:
         os.chdir(path.parent.resolve())
         lmp.file(name)
-    except Exception as error:  # LAMMPS raises what its bindings choose
+    except Exception as error:  # LAMMPS's bindings raise any error
         raise NotTakenError(f"{path}: {explain_error(error)}") from error
     finally:
         os.chdir(here)
 
 
 def _text_of_logs(lmp: Any, log: IO[str], path: Path) -> str:
-    """What LAMMPS has logged so far, on all ranks."""
+    """LAMMPS's log so far, on all ranks."""
     ctypes.CDLL(None).fflush(None)
     log.seek(0)
     return communicator(lmp).bcast(logged_text(log.read(), path.parent), root=0)

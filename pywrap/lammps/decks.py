@@ -14,7 +14,7 @@ from .plain_file_names import DECKS, decks_folder, is_plain
 __all__ = ["DECKS", "Decks"]
 
 DECORATION = re.compile(r"^'?ERROR( on proc \d+)?: | \([^ ()]+:\d+\)'?$")
-"""What surrounds the sentence of an error of LAMMPS: who says it, and where in the source."""
+"""Text around the sentence of an error of LAMMPS: the rank, and the place in the source."""
 
 
 class Decks:

@@ -23,7 +23,7 @@ from .lammps_state import LammpsState
 from .plain_file_names import shared_folder
 
 PERIODS_AWAY = "image"
-"""Of the state of a layer that is drawn: by how many periods each disk is away from where it began."""
+"""Name in the state of a drawn layer: by how many periods each disk has moved from its beginning."""
 
 
 class MotionState(NamedTuple):

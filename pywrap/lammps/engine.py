@@ -172,7 +172,7 @@ class Engine:
             Largest number of time steps.
         """
         self._state.end_displacements()
-        self._decks.command("variable relax_step delete")  # that of an earlier call
+        self._decks.command("variable relax_step delete")  # the variable of an earlier call
         if time_step is not None:
             self._decks.variables(relax_step=time_step)
         start = self._decks.steps

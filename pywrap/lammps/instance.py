@@ -15,21 +15,7 @@ class EngineError(FaultgougeError):
 
 
 def lammps_instance(communicator: MPI.Comm, log: Path | None, *options: str) -> Any:
-    """Start LAMMPS with the plugin.
-
-    Parameters
-    ----------
-    communicator : mpi4py.MPI.Comm
-        The ranks.
-    log : Path, optional
-        File for LAMMPS's log; None for no log.
-    options : str
-        Further words of LAMMPS's command line.
-
-    Returns
-    -------
-    lammps.lammps
-        The instance; the caller closes it.
+    """Start LAMMPS as `start_lammps` does, with the plugin.
 
     Raises
     ------

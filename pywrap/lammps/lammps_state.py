@@ -32,10 +32,19 @@ Arrays: TypeAlias = dict[str, Floats]
 Channel: TypeAlias = tuple[Floats, Callable[[], None], Callable[[], None]]
 """Memory whose address is looked up once, and what takes one array of LAMMPS there and back."""
 
-DOUBLE = 1
-LOW_COLUMNS = 5
-STATE_COLUMNS = 10
-GIVEN, POSITION, ANGLE, VELOCITY, FORCE = 0, slice(1, 3), 3, slice(4, 7), slice(7, 10)
+LAMMPS_DOUBLE = 1
+"""The number for doubles in LAMMPS's library."""
+
+LOW_COLUMNS, STATE_COLUMNS = 5, 10
+"""Columns of fix ``low``, and of fix displace/disc."""
+
+GIVEN_COLUMN, POSITION_COLUMNS, ANGLE_COLUMN, VELOCITY_COLUMNS, FORCE_COLUMNS = (
+    0,
+    slice(1, 3),
+    3,
+    slice(4, 7),
+    slice(7, 10),
+)
 """Columns of fix displace/disc."""
 
 FLOOR_SLIP, FLOOR_OVERLAP, FLOOR_SLIP_LOW = 2, 6, 7
@@ -142,7 +151,7 @@ class LammpsState:
         else:
             self._angle = packing.angle if velocity is None else packing.angle + velocity[:, 2]
         state = arrays["f_move"]
-        state[:, GIVEN], state[:, VELOCITY] = 1.0, 0.0 if velocity is None else velocity
+        state[:, GIVEN_COLUMN], state[:, VELOCITY_COLUMNS] = 1.0, 0.0 if velocity is None else velocity
         for name, values in arrays.items():
             if name != "f_move" or self._displacing:
                 self._scatter(name, values)
@@ -159,7 +168,7 @@ class LammpsState:
     def _arrays_of(self, packing: Packing) -> Arrays:
         """The arrays of a packing that LAMMPS receives, by their names in LAMMPS."""
         state = np.zeros((len(packing), STATE_COLUMNS))
-        state[:, POSITION], state[:, ANGLE] = packing.position, packing.angle
+        state[:, POSITION_COLUMNS], state[:, ANGLE_COLUMN] = packing.position, packing.angle
         arrays = {"f_move": state}
         if self._static.compensated:
             arrays["f_low"] = np.zeros((len(packing), LOW_COLUMNS))
@@ -218,7 +227,7 @@ class LammpsState:
             arrays["f_low"] = self._gather("f_low", LOW_COLUMNS)
         position, low = self._split(columns, arrays.get("f_low"))
         if self._static.law.frictional:
-            angle = columns[:, ANGLE]
+            angle = columns[:, ANGLE_COLUMN]
             arrays["f_slips"] = self._gather("f_slips", self._columns_of("slips"))
             arrays["f_floor"] = self._gather("f_floor", self._floor_columns)
             graph, slip, slip_low = self._contacts(arrays["f_slips"], arrays["f_floor"])
@@ -236,22 +245,22 @@ class LammpsState:
         """Positions, their low parts in compensated arithmetic, and velocities (v_x, v_y, omega)."""
         columns = self._state_columns()
         low = self._gather("f_low", LOW_COLUMNS) if self._static.compensated else None
-        return *self._split(columns, low), columns[:, VELOCITY]
+        return *self._split(columns, low), columns[:, VELOCITY_COLUMNS]
 
     def _net_force(self, columns: Floats) -> Floats:
-        return np.divide(columns[:, FORCE].T, self.levers, order="C").ravel()
+        return np.divide(columns[:, FORCE_COLUMNS].T, self.levers, order="C").ravel()
 
     def _state_columns(self) -> Floats:
         """The columns of fix displace/disc, whether there is one or not, shape (N, 10)."""
         if self._displacing:
             return self._gather("f_move", STATE_COLUMNS)
         columns = np.zeros((len(self._static), STATE_COLUMNS))
-        columns[:, POSITION] = self._gather("x", 3)[:, :2]
+        columns[:, POSITION_COLUMNS] = self._gather("x", 3)[:, :2]
         velocity, force = self._gather("v", 3), self._gather("f", 3)
         if self._static.law.frictional:
-            columns[:, ANGLE] = self._gather("d_theta", 1)[:, 0]
+            columns[:, ANGLE_COLUMN] = self._gather("d_theta", 1)[:, 0]
             velocity[:, 2], force[:, 2] = (self._gather(name, 3)[:, 2] for name in ("omega", "torque"))
-        columns[:, VELOCITY], columns[:, FORCE] = velocity, force
+        columns[:, VELOCITY_COLUMNS], columns[:, FORCE_COLUMNS] = velocity, force
         return columns
 
     def _contacts(self, slips: Floats, floor: Floats) -> tuple[ContactGraph, Floats, Floats | None]:
@@ -278,7 +287,9 @@ class LammpsState:
     @staticmethod
     def _split(columns: Floats, low: Floats | None) -> tuple[Floats, Floats | None]:
         """Coordinates and their low parts, if there are any, as packings have them."""
-        return (columns[:, POSITION], None) if low is None else exact_sum(columns[:, POSITION], low[:, :2])
+        return (
+            (columns[:, POSITION_COLUMNS], None) if low is None else exact_sum(columns[:, POSITION_COLUMNS], low[:, :2])
+        )
 
     # all that a run has, to go on from there
 
@@ -338,7 +349,13 @@ class LammpsState:
         if (name, columns) not in self._channels:
             kind = "" if name[:2] in ("f_", "d_") else "_atoms"
             values = np.zeros((len(self._static), columns))
-            arguments: tuple[Any, ...] = self._decks.lammps.lmp, name.encode(), DOUBLE, columns, values.ctypes.data
+            arguments: tuple[Any, ...] = (
+                self._decks.lammps.lmp,
+                name.encode(),
+                LAMMPS_DOUBLE,
+                columns,
+                values.ctypes.data,
+            )
             gather, scatter = (
                 partial(getattr(self._library, f"lammps_{way}{kind}"), *arguments) for way in ("gather", "scatter")
             )

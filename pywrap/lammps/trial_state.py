@@ -18,6 +18,7 @@ from ...analysis.packing.law import Derivatives
 from .contact_graph import ContactGraph
 
 EPSILON = float(np.finfo(float).eps)
+"""Distance of the doubles next to one."""
 
 
 class Branches(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +17,18 @@ from ...analysis.motion.slips import Slip, find_slips
 from ..equilibria.quasistatic import Equilibrium
 from ..scenes.drive_section import Drive
 from ..scenes.scene import Scene
-from .drive import DriveSample, DriveState, DriveStep, drive, layer_period
+from .drive import drive
+from .drive_plan import layer_period
+from .drive_states import DriveCheckpoint, DriveSample, DriveState, DriveStep
 from .run_recorder import Record, raise_on_all_ranks
 from .undamped import Checkpoint
 
 SERIES = "drive"
 """Name of the series in the file."""
+
+PENDING = "pending"
+"""Of a checkpoint in the file: how many of the last frames are pending states of the run, which the next part replaces
+by those of them that are stored in the end."""
 
 NOISES = 3
 """Runs with noise beside one with a signal. Of the advances by noise in research/cycle, the largest that one run has
@@ -51,7 +57,7 @@ class DriveRecord(Record):
     ) -> None:
         super().__init__(path, scene, communicator, "drive", saved)
         self._others: Mapping[Path, Scene] = {}
-        self._step = 0
+        self._step, self._decided = 0, 1
 
     def _stored_equilibrium(self, file: RunFile) -> Equilibrium:
         return Equilibrium.of(file.packing(0))
@@ -66,6 +72,11 @@ class DriveRecord(Record):
             self._append_states([DriveState(0.0, 0.0, equilibrium.packing)])
             self._file.save()
         self.last = equilibrium
+
+    @property
+    def slips(self) -> int:
+        """Slips in the file so far; 0 on ranks that do not write."""
+        return 0 if self._file is None else len(slips_in(self._file))
 
     def drive(self, others: Mapping[Path, Scene] | None = None) -> Iterator[DriveStep]:
         """Run the scene's drive and write its rows and states; an interrupted run continues.
@@ -85,7 +96,7 @@ class DriveRecord(Record):
         assert self.last is not None
         if self.complete:
             return
-        known, checkpoint = raise_on_all_ranks(self.communicator, lambda: self._known(SERIES, DriveSample))
+        known, checkpoint = raise_on_all_ranks(self.communicator, self._reached)
         self._others, self._step = others or {}, 0 if checkpoint is None else checkpoint.step
         steps: list[DriveStep] = []
         run = drive(
@@ -101,11 +112,28 @@ class DriveRecord(Record):
             yield step
         self._keep_steps(steps, None)
 
-    def _keep_steps(self, steps: list[DriveStep], reached: Checkpoint | None) -> None:
+    def _reached(self) -> tuple[list[DriveSample], DriveCheckpoint | None]:
+        """Rows of the series so far, and where the run goes on."""
+        known, reached = self._known(SERIES, DriveSample)
+        if self._file is None or reached is None:
+            return known, None
+        begin = len(self._file) - int(reached.state.pop(PENDING, 0))
+        times, moved = (self._file.observable(name) for name in ("time", "displacement"))
+        frames = range(begin, len(self._file))
+        states = [DriveState(float(times[k]), float(moved[k]), self._file.packing(k)) for k in frames]
+        self._decided = begin
+        return known, DriveCheckpoint(reached.step, reached.state, tuple(states))
+
+    def _keep_steps(self, steps: list[DriveStep], reached: DriveCheckpoint | None) -> None:
         if self._file is not None:
             with self._file.change():
-                self._append_states([state for step in steps for state in step.states])
-                self._keep(SERIES, [step.sample for step in steps], [], reached)
+                self._file.cut(self._decided)
+                self._append_states(state for step in steps for state in step.states)
+                self._decided, pending = len(self._file), () if reached is None else reached.pending
+                self._append_states(pending)
+                stored = reached and Checkpoint(reached.step, reached.state | {PENDING: np.array(len(pending))})
+                self._keep(SERIES, [step.sample for step in steps], [], stored)
+                self._file.complete = reached is None  # in one change with the last rows
             if reached is not None and self._others:
                 self._divide(steps[-1].sample.time, reached.step)
         steps.clear()
@@ -127,7 +155,7 @@ class DriveRecord(Record):
                         file.put_attribute("scene", json.dumps(scene.resolved()))
                     copy.replace(path)
 
-    def _append_states(self, states: list[DriveState]) -> None:
+    def _append_states(self, states: Iterable[DriveState]) -> None:
         assert self._file is not None
         for state in states:
             self._file.append(state.packing, time=state.time, displacement=state.displacement)

@@ -70,7 +70,7 @@ def ramp(
         for k, fx in enumerate(wanted[behind:].tolist(), behind):
             start = next_equilibrium(engine, start, fx, scene)
             if dumps is not None:
-                engine.restore(start.packing)  # what was found, and not what was tried last
+                engine.restore(start.packing)  # the equilibrium, and not the last trial
                 engine.dump(Path(f"{dumps}.{k}"))
             yield start
 

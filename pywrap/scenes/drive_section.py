@@ -104,7 +104,7 @@ class Drive(Section):
         """The first key that is missing or does not belong here, and the advice."""
         if (self.velocity is None) == (self.protocol is None):
             return "velocity", "or drive.protocol says how the far end of the spring moves: give one of the two"
-        if self.fastest == 0:
+        if self.fastest * (1.0 if self.spring == "rigid" else self.spring) == 0:
             return "protocol" if self.protocol else "velocity", "moves nothing: give a velocity other than 0"
         if self.until is None and self.slips is None and self.protocol is None:
             return "until", "is missing: give the length of the run, or drive.slips, after which it ends"

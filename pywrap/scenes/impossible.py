@@ -2,7 +2,7 @@ r"""Refuse scenes that no computation can complete, before any work starts.
 
 `refuse_impossible` finds impossible numbers in a scene: overlaps beyond the contact law, forces below the rounding of
 the coordinates, a settling that never ends. `refuse_endless` finds a command that would take years, more memory than
-there is, or a file that no disk holds. How long a command takes its progress line tells.
+there is, or a file that no disk holds. The progress line of a command tells how long it takes.
 
 A contact that carries the force f has :math:`\delta = (f/k_n)^{1/p}` and the stiffness :math:`k = p\, k_n
 \delta^{p-1}`, with p = 3/2 for Hertz. A time step is a share of :math:`(m/k)^{1/2}`, a disk falls under :math:`F_y`
@@ -23,7 +23,8 @@ from .validation import SceneError
 
 Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "reproduce"]
 
-EPSILON = 2.3e-16
+DOUBLE_ROUNDING = 2.3e-16
+"""Relative rounding of a double, rounded up."""
 
 FORCE_CHAINS = 10.0
 """The largest contact force, in units of F_y, for which LAMMPS's time steps are made."""
@@ -41,8 +42,8 @@ SETTLING_STEPS = 100.0
 """Steps to rest, in units of the time step that F_y's own time has: 26,000 at k_n = 2e5, F_y = 3, as many for 30 disks
 as for 100, and growing with (k_n/F_y)^(1/3) from 26,000 to 665,000."""
 SETTLING_WITH_FRICTION = 25.0
-"""The same with packing.settle_friction, in units of the overdamped time step: between 11 and 33 for 30 disks, Hertz
-with k_n = 2e5 and 2e6 and harmonic with 2e4."""
+"""Steps to rest with packing.settle_friction, in units of the overdamped time step: between 11 and 33 for 30 disks,
+Hertz with k_n = 2e5 and 2e6 and harmonic with 2e4."""
 OVERDAMPED_STEPS = 16_000
 """Steps of the default length in one increment of overdamped dynamics."""
 STAGED_DISKS = 300
@@ -107,30 +108,39 @@ def refuse_impossible(scene: SceneKeys) -> tuple[str, str] | None:
             f"= {fy:g} presses two disks {overlap:.2g} into each other, deeper than the smallest radius {smallest:g}, "
             f"where the contact law does not hold: lower it, or raise law.kn = {law.kn:g}"
         )
-    rounding = EPSILON * packing.width * _stiffness(scene, fy) / fy
+    rounding = DOUBLE_ROUNDING * packing.width * _stiffness(scene, fy) / fy
     if not rounding < ROUNDING_LIMIT:
         return "law.kn", (
             f"= {law.kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is {rounding:.1g} of F_y, "
             "and no packing comes to rest: lower it, or raise load.fy"
         )
+    return _refuse_long_settling(scene, packing) or _refuse_long_ramp(scene)
+
+
+def _refuse_long_settling(scene: SceneKeys, packing: GeneratedPacking) -> tuple[str, str] | None:
     steps = _settling_steps(scene)
     if packing.settle_friction:
         ends = LEAST_SETTLING_SHARE * steps < STEPS_TO_REST
     else:
         ends = steps < STEPS_TO_REST if packing.disks <= STAGED_DISKS else LEAST_SETTLING_SHARE * steps < SINKING_STEPS
-    if not ends:
-        return "law.kn", (
-            f"= {law.kn:g} is too stiff for load.fy = {fy:g}: settling takes about {_count(steps)} time steps, more "
-            "than are made: lower it, or raise load.fy"
-        )
-    if scene.ramp is not None and scene.ramp.method == "overdamped":
-        steps = _overdamped_steps(scene)
-        if not steps < STEPS_TO_REST:
-            return "relax.time_step", (
-                f"= {scene.relax.time_step:g} needs about {_count(steps)} steps to an equilibrium, more than are made: "
-                f"raise it, or leave it out for {_overdamped_step(scene):.2g}"
-            )
-    return None
+    if ends:
+        return None
+    return "law.kn", (
+        f"= {scene.law.kn:g} is too stiff for load.fy = {scene.load.fy:g}: settling takes about {_count(steps)} time "
+        "steps, more than are made: lower it, or raise load.fy"
+    )
+
+
+def _refuse_long_ramp(scene: SceneKeys) -> tuple[str, str] | None:
+    if scene.ramp is None or scene.ramp.method != "overdamped":
+        return None
+    steps = _overdamped_steps(scene)
+    if steps < STEPS_TO_REST:
+        return None
+    return "relax.time_step", (
+        f"= {scene.relax.time_step:g} needs about {_count(steps)} steps to an equilibrium, more than are made: "
+        f"raise it, or leave it out for {_overdamped_step(scene):.2g}"
+    )
 
 
 def _at_settling(scene: SceneKeys, at: SettlingLoad) -> SceneKeys:

@@ -221,7 +221,7 @@ def _section_in_numbers(
 
 
 def _put(scene: Scene, path: str, section: Mapping[str, Any]) -> dict[str, Any]:
-    """The scene with a section, or a table in a section, in place of its own."""
+    """The scene with a section, or a table in a section, replaced."""
     name, _, below = path.partition(".")
     return {**scene, name: _put(_section(scene, name), below, section) if below else section}
 

@@ -50,44 +50,62 @@ class Scene(SceneKeys):
 
     @model_validator(mode="after")
     def _consistent(self) -> "Scene":
-        perturb, ramp = self.perturb, self.ramp
-        if perturb and ramp and perturb.fx is not None and perturb.fx > max(0.0, ramp.first):
-            says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.first}: ramp further"
-            raise refusal_sentence("perturb.fx", says)
-        if perturb and perturb.fx is None and ramp is None:
-            raise refusal_sentence(
-                "perturb.fx", "is missing: give it, or a section [ramp] in which the onset is sought"
-            )
-        if perturb and isinstance(perturb.target, tuple):
-            disks = self.packing.disks
-            beyond = [disk for disk in perturb.target if disk >= disks]
-            if beyond:
-                raise refusal_sentence("perturb.target", f"names disk {beyond[0]}: name disks from 0 to {disks - 1}")
+        self._check_perturb()
         cannot = refuse_impossible(self)
         if cannot is not None:
             raise refusal_sentence(*cannot)
         if self.friction and self.law.mus[0] == 0:
             raise refusal_sentence("friction", "has no mu to weaken: leave it out or give law.mu a value above 0")
-        if self.damping and ramp and ramp.method == "overdamped":
+        self._check_damping()
+        self._check_drive()
+        real_units(self)
+        return self
+
+    def _check_perturb(self) -> None:
+        """[perturb] starts on the ramp, and names disks of the packing."""
+        perturb, ramp = self.perturb, self.ramp
+        if perturb is None:
+            return
+        if ramp and perturb.fx is not None and perturb.fx > max(0.0, ramp.first):
+            says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.first}: ramp further"
+            raise refusal_sentence("perturb.fx", says)
+        if perturb.fx is None and ramp is None:
+            raise refusal_sentence(
+                "perturb.fx", "is missing: give it, or a section [ramp] in which the onset is sought"
+            )
+        if isinstance(perturb.target, tuple):
+            disks = self.packing.disks
+            beyond = [disk for disk in perturb.target if disk >= disks]
+            if beyond:
+                raise refusal_sentence("perturb.target", f"names disk {beyond[0]}: name disks from 0 to {disks - 1}")
+
+    def _check_damping(self) -> None:
+        """[damping] acts on something."""
+        if self.damping is None:
+            return
+        if self.ramp and self.ramp.method == "overdamped":
             says = (
                 "acts in dynamics ([perturb]) and no equilibrium depends on it, so that an overdamped ramp has no use "
             )
             raise refusal_sentence("damping", says + 'for it: set ramp.method = "newton", or leave [damping] out')
-        if self.damping and self.damping.ct > 0 and self.law.mus[0] == 0:
+        if self.damping.ct > 0 and self.law.mus[0] == 0:
             says = f"= {self.damping.ct:g} has no friction to damp: leave it out or give law.mu a value above 0"
             raise refusal_sentence("damping.ct", says)
-        if self.drive and self.law.mus[0] == 0:
+
+    def _check_drive(self) -> None:
+        """[drive] has friction, a signal within the run, and no drag on a layer that moves rigidly."""
+        if self.drive is None:
+            return
+        if self.law.mus[0] == 0:
             raise refusal_sentence("drive", "needs friction, which holds the layer: give law.mu a value above 0")
-        if self.drive and self.drive.at is not None:
+        if self.drive.at is not None:
             end = self.drive.length(self.law.mus[0] * self.load.fy)
             if self.drive.at >= end:
                 says = f"= {self.drive.at:g} is after the end of the run, {end:g}: let the signal begin before"
                 raise refusal_sentence("drive.at", says)
-        if self.drive and self.drive.spring == "rigid" and self.damping and self.damping.tau is not None:
+        if self.drive.spring == "rigid" and self.damping and self.damping.tau is not None:
             says = "would slow down a layer that is moved rigidly: leave it out, or give drive.spring a stiffness"
             raise refusal_sentence("damping.tau", says)
-        real_units(self)
-        return self
 
     @classmethod
     def from_toml(
@@ -182,7 +200,7 @@ class _Part(Section):
 
 
 def _check_keys(mapping: Mapping[str, Any]) -> None:
-    """Refuse unknown sections and keys, whatever their values and whichever of them are read."""
+    """Refuse unknown sections and keys, also in sections that are not read."""
     errors: list[InitErrorDetails] = []
     for name, section in mapping.items():
         keys = section if isinstance(section, Mapping) else {}

@@ -57,7 +57,8 @@ MINIMIZER_ITERATIONS = 60
 """Iterations before dynamics takes over again; where no rearrangement is under way, 15 to 40 do."""
 
 FLOATING_STIFFNESS = 1e-8
-"""Stiffness, in units of that of a contact that carries F_y, that is added to what has none: to what nothing holds."""
+"""Stiffness, in units of that of a contact that carries F_y, that is added to coordinates without stiffness, which
+nothing holds."""
 
 LONGEST_DISPLACEMENT = 0.1
 """Longest displacement in one iteration, in smallest radii: no disk jumps over another."""

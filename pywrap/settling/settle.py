@@ -31,7 +31,7 @@ LARGEST_IMBALANCE = 1e-3
 """Residual of a stored packing, in units of F_y, above which it counts as not settled: the packing would
 rearrange rather than relax."""
 
-STIFFNESS = {1.5: 2e5, 1.0: 7e3}
+SETTLING_STIFFNESS = {1.5: 2e5, 1.0: 7e3}
 """k_n while a packing settles, by the exponent of the law (of others that of 3/2): the paper's, and of harmonic disks
 the stiffness 3/2 k_n delta^(1/2) that a contact of the paper's law has under the paper's load."""
 
@@ -130,7 +130,7 @@ def settle_bed(
 
 
 def shared_bed(scene: Scene) -> Packing | None:
-    """The bed that all friction coefficients of a scene begin from; None if each has its own, or there is one alone."""
+    """The bed that all friction coefficients of a scene share; None if each has its own bed, or there is only one."""
     alone = len(scene.law.mus) == 1
     own = isinstance(scene.packing, GeneratedPacking) and scene.packing.settle_friction
     return None if alone or own else settle_bed(scene)
@@ -198,7 +198,7 @@ def settling_units(scene: Scene, law: MindlinLaw) -> tuple[GeneratedPacking, Min
 
 
 def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[GeneratedPacking, MindlinLaw, float]:
-    """The scene in the units of its packing: the smallest diameter is the length, and k_n is `STIFFNESS`.
+    """The scene in the units of its packing: the smallest diameter is the length, and k_n is `SETTLING_STIFFNESS`.
 
     Settling is chaotic, and amplifies the last digit of any number. A seed is one packing all the same, whatever units
     the scene has: radii, width and F_y are rounded to `DIGITS` when they are converted, so that two scenes that differ
@@ -219,7 +219,7 @@ def own_units(packing: GeneratedPacking, law: MindlinLaw, fy: float) -> tuple[Ge
     GeneratedPacking, MindlinLaw, float
         The same in the packing's units. Dashpots are left out: settling has a damping of its own.
     """
-    length, stiffness = 2 * min(packing.radii), STIFFNESS.get(law.exponent, STIFFNESS[1.5])
+    length, stiffness = 2 * min(packing.radii), SETTLING_STIFFNESS.get(law.exponent, SETTLING_STIFFNESS[1.5])
     undamped = replace(law, cn=0.0, ct=0.0)
     if length == 1.0 and law.kn == stiffness:
         return packing, undamped, fy

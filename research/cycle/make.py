@@ -201,14 +201,8 @@ def numbers(rows: Sequence[Row], many: Sequence[Row] = ()) -> dict[str, Any]:
     every = {law: [row for row in rows if row["law"] == law] for law in found["laws"]}
     better = {law: concordance(every[law]) for law in every}
     states = [state for row in rows for state in row["states"]]
-    early = [
-        row["slips"][state["slip"]]["begins"] - state["time"]
-        for row in rows
-        for state in row["states"]
-        if state["kind"] == "before"
-    ]
     return found | {
-        "before_begin": [each for each in early if each > 0],
+        "earlier": [row["seed"] for row in rows if row.get("earlier_version")],
         "runs": [sizes(row) for row in rows],
         "slips": {law: sum(len(row["slips"]) for row in every[law]) for law in every},
         "concordance": better,

@@ -34,7 +34,7 @@ SPRINGS = (3.0, 10.0, 30.0)
 
 LOOKED_AT = 3
 SHARES = {"control": 1 / 3, "late": 0.9, "before": 1.0}
-"""`before` is the last stored state until the slip begins, at the largest force."""
+"""`before` is the state in which the slip begins, at the largest force."""
 
 
 def rows_of(seed: int) -> Iterator[dict[str, Any]]:

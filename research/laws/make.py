@@ -14,7 +14,7 @@ from pathlib import Path
 from research.laws.page import write_page
 from research.laws.sets import sets
 from research.modes.make import compute_seeds, different
-from research.modes.packing_rows import condense, read_known, table_of
+from research.modes.packing_rows import computed_again, condense, read_known, table_of
 
 HERE = Path(__file__).parent
 TABLES = HERE / "tables"
@@ -38,14 +38,11 @@ def compute(folder: Path, names: list[str], share: float = 1.0, tables: Path | N
 def check(folder: Path, names: list[str]) -> None:
     """The first tenth of the packings of each set that has a table, compared with it: every number of every load."""
     compute(folder, names or [name for name in sets() if table_of(TABLES, name).exists()], 0.1)
-    condense(folder, folder / "tables")
     compared, wrong = 0, []
-    for path in sorted((folder / "tables").glob("*.jsonl")):
-        before = read_known(TABLES, path.stem)
-        for seed, row in read_known(folder / "tables", path.stem).items():
-            compared += 1
-            one, other = ({key: each[key] for key in each if key != "cpu_seconds"} for each in (row, before[seed]))
-            wrong += [f"{path.stem}, seed {seed}: {key}" for key in different(one, other, allowed=TOLERANCES)]
+    for packing, *rows in computed_again(folder, TABLES):
+        compared += 1
+        one, other = ({key: each[key] for key in each if key != "cpu_seconds"} for each in rows)
+        wrong += [f"{packing}: {key}" for key in different(one, other, allowed=TOLERANCES)]
     said = "the same" if not wrong else f"{len(wrong)} numbers differ"
     print("\n".join([f"{compared} packings compared: {said}", *wrong]))
     sys.exit(len(wrong) > 0)

@@ -105,8 +105,8 @@ def _blocks(symmetric: csc_array, limits: Limits) -> Iterator[_Block]:
             yield each.values[each.own], each.vectors[:, each.own]
         return
     values, vectors = eigh(symmetric.toarray(), driver="evd")
-    for first in range(0, len(values), limits.own):
-        own = slice(first, first + limits.own)
+    for first in range(0, len(values), limits.slice_size):
+        own = slice(first, first + limits.slice_size)
         yield values[own], vectors[:, own]
 
 

@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from faultgouge.figures import styled
-from faultgouge.studies.modes.draw import LABELS, Course, draw_band
+from faultgouge.studies.modes.draw import LABELS, MediansOverLoad, draw_band
 
 
 @styled
-def collapse(sizes: Mapping[int, Course], power: float, random: Mapping[int, Course]) -> Figure:
+def collapse(sizes: Mapping[int, MediansOverLoad], power: float, random: Mapping[int, MediansOverLoad]) -> Figure:
     """Shares over the load times a power of the number of disks, and shares of random matrices over the measured ones.
 
     Parameters

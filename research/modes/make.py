@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from faultgouge.studies.sweep import TASKS, Sweep, run_sweep
-from research.modes.packing_rows import condense, read_known
+from research.modes.packing_rows import computed_again, condense, read_known
 from research.modes.page import write_page
 from research.modes.sets import SHARES, sets
 
@@ -43,18 +43,14 @@ def compute_seeds(folder: Path, name: str, sweep: Sweep, seeds: list[int], worke
 def check(folder: Path, names: list[str]) -> None:
     """The first tenth of the packings of each set, compared with the tables: every number of every load."""
     compute(folder, names, (0.1,))
-    condense(folder, folder / "tables")
     compared, wrong = 0, []
-    for path in sorted((folder / "tables").glob("*.jsonl")):
-        before = read_known(TABLES, path.stem)
-        for seed, row in read_known(folder / "tables", path.stem).items():
-            ours, theirs = row.get("loads", []), before[seed].get("loads", [])
-            if len(ours) != len(theirs):
-                wrong.append(f"{path.stem}, seed {seed}: {len(ours)} loads, and {len(theirs)} in the table")
-            for one, other in zip(ours, theirs, strict=False):
-                compared += 1
-                differ = different(one, other)
-                wrong += [f"{path.stem}, seed {seed}, F_x/F_y = {one['fx_over_fy']}: {key}" for key in differ]
+    for packing, new, known in computed_again(folder, TABLES):
+        ours, theirs = new.get("loads", []), known.get("loads", [])
+        if len(ours) != len(theirs):
+            wrong.append(f"{packing}: {len(ours)} loads, and {len(theirs)} in the table")
+        for one, other in zip(ours, theirs, strict=False):
+            compared += 1
+            wrong += [f"{packing}, F_x/F_y = {one['fx_over_fy']}: {key}" for key in different(one, other)]
     print("\n".join([f"{compared} loads compared, {len(wrong)} numbers of them differ", *wrong]))
     sys.exit(len(wrong) > 0)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,16 @@ def read_known(tables: Path, name: str) -> dict[int, dict[str, Any]]:
     """The rows of a set's table by seed; none where there is no table."""
     path = table_of(tables, name)
     return {row["seed"]: row for row in read_rows(path)} if path.exists() else {}
+
+
+def computed_again(results: Path, tables: Path) -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:
+    """Packings that sweeps have computed again: set and seed, the new row, and the row of the table."""
+    again = results / "tables"
+    condense(results, again)
+    for path in sorted(again.glob(f"*{TABLE_SUFFIX}")):
+        before = read_known(tables, path.stem)
+        for seed, row in read_known(again, path.stem).items():
+            yield f"{path.stem}, seed {seed}", row, before[seed]
 
 
 def _line(row: dict[str, Any]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from faultgouge.analysis.motion.rising_load import FADE_WINDOWS, WINDOWS
+from faultgouge.analysis.motion.rising_load import FADE_WINDOWS, HALVES_DIFFERENCE
 from faultgouge.figures import render, save, styled
 from faultgouge.studies.statistics import share
 from research.laws.both_laws import RESTITUTIONS as WEAKEST_FIRST
@@ -238,7 +238,7 @@ def longer_runs(rows: list[Row]) -> list[Row]:
                 for part in (slice(-LAST_WINDOWS, None), slice(-2 * LAST_WINDOWS, -LAST_WINDOWS))
             )
             ends[name] = [
-                {"vibration": float(now), "steady": bool(abs(now - then) <= WINDOWS * now)}
+                {"vibration": float(now), "steady": bool(abs(now - then) <= HALVES_DIFFERENCE * now)}
                 for now, then in zip(last, before, strict=True)
             ]
         found.append({"seed": row["seed"], "time": row["chunk"] * (windows.shape[1] + FADE_WINDOWS)} | ends)

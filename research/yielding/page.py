@@ -6,6 +6,7 @@ history of the slip.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -224,29 +225,7 @@ def standard(rows: list[dict[str, Any]]) -> dict[str, Any]:
     which noise grows and the spectrum has no growth.
     """
     losses = sorted({run["restitution"] for row in rows for run in row["dynamic"]}, reverse=True)
-    runs = []
-    for load in SHARES:
-        for loss in losses:
-            each = [
-                [run for run in row["dynamic"] if (run["share"], run["restitution"]) == (load, loss)] for row in rows
-            ]
-            each = [draws for draws in each if draws]
-            cell: dict[str, Any] = {"share": load, "restitution": loss, "packings": len(each)}
-            cell["grows"] = sum(draws[0]["rate"] > ROUNDED_RATE for draws in each)
-            which = [[run["largest_D"] > SEEN_GROWTH for run in draws] for draws in each]
-            cell["grown"] = [sum(map(all, which)), sum(map(any, which))]
-            for kind in UNREST:
-                which = [[run["ends"] == kind for run in draws] for draws in each]
-                cell[kind] = [sum(map(all, which)), sum(map(any, which))]
-            which = [[run.get("D", 0.0) > ELSEWHERE for run in draws] for draws in each]
-            cell["elsewhere"] = [sum(map(all, which)), sum(map(any, which))]
-            slips = [abs(run["slip"]) for draws in each for run in draws if run["ends"] not in UNREST]
-            cell["slip"] = float(np.median(slips)) if slips else None
-            cell["largest"] = float(np.median([run["largest_D"] for draws in each for run in draws])) if each else None
-            cell["decades"] = (
-                float(np.median([draws[0]["rate"] for draws in each])) * TIME / np.log(10) if each else None
-            )
-            runs.append(cell)
+    runs = [_of_standard(rows, load, loss) for load in SHARES for loss in losses]
     flows = {
         loss: share(
             sum(any(run["ends"] == "flows" for run in row["dynamic"] if run["restitution"] == loss) for row in rows),
@@ -262,6 +241,36 @@ def standard(rows: list[dict[str, Any]]) -> dict[str, Any]:
     }
     found = {"static": median([row["static"] for row in rows]), "of": len(rows), "runs": runs, "flows": flows}
     return found | {"at_bound": sorted(at_bound)}
+
+
+def _ends_as(kind: str) -> Callable[[dict[str, Any]], bool]:
+    """Whether a run ends as this kind."""
+    return lambda run: bool(run["ends"] == kind)
+
+
+def _of_standard(rows: list[dict[str, Any]], load: float, loss: float) -> dict[str, Any]:
+    """One of the "runs" of `standard`."""
+    each = [[run for run in row["dynamic"] if (run["share"], run["restitution"]) == (load, loss)] for row in rows]
+    each = [draws for draws in each if draws]
+    runs = [run for draws in each for run in draws]
+
+    def in_all_and_any(happens: Callable[[dict[str, Any]], bool]) -> list[int]:
+        which = [[happens(run) for run in draws] for draws in each]
+        return [sum(map(all, which)), sum(map(any, which))]
+
+    slips = [abs(run["slip"]) for run in runs if run["ends"] not in UNREST]
+    return {
+        "share": load,
+        "restitution": loss,
+        "packings": len(each),
+        "grows": sum(draws[0]["rate"] > ROUNDED_RATE for draws in each),
+        "grown": in_all_and_any(lambda run: run["largest_D"] > SEEN_GROWTH),
+        **{kind: in_all_and_any(_ends_as(kind)) for kind in UNREST},
+        "elsewhere": in_all_and_any(lambda run: run.get("D", 0.0) > ELSEWHERE),
+        "slip": float(np.median(slips)) if slips else None,
+        "largest": float(np.median([run["largest_D"] for run in runs])) if runs else None,
+        "decades": float(np.median([draws[0]["rate"] for draws in each])) * TIME / np.log(10) if each else None,
+    }
 
 
 def count_vibrating_draws(lasting: list[dict[str, Any]], further: list[dict[str, Any]]) -> dict[str, Any] | None:

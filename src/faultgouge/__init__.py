@@ -1,9 +1,9 @@
 """Stability of packings of frictional grains: whether they move, and what happens when they do.
 
-What most users need is here, and is imported when it is used. ``faultgouge.analysis`` has the stability operator,
-spectrum, onset and growth of a configuration; ``faultgouge.pywrap`` drives LAMMPS from a scene to stored
-configurations; ``faultgouge.studies`` computes and reports results; ``faultgouge.assessment`` measures errors, run time
-and limits.
+This module offers the names that most users need, each imported when it is used. ``faultgouge.analysis`` has the
+stability operator, spectrum, onset and growth of a configuration; ``faultgouge.pywrap`` drives LAMMPS from a scene to
+stored configurations; ``faultgouge.studies`` computes and reports results; ``faultgouge.assessment`` measures errors,
+run time and limits.
 """
 
 import sys

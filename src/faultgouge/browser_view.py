@@ -1,4 +1,4 @@
-"""A page of a stored file that any browser opens offline: what the command `faultgouge view` writes."""
+"""The page that `faultgouge view` writes: a stored file, for any browser, offline."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .analysis import BadInputError, Configuration, RunFile
-from .analysis.configuration import HasConfiguration
+from .analysis.has_configuration import HasConfiguration
 from .analysis.motion.hysteresis import turning_points
 from .figures.browser_page import Axis, equally_spaced, loads_shown, write_view
 from .figures.followed_pairs import seconds

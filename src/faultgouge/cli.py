@@ -1,10 +1,16 @@
 """The command ``faultgouge``: :mod:`faultgouge.commands` has its parts, :mod:`faultgouge.exit_status` its errors."""
 
+import io
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import NoReturn
 
 from .signal_guard import guarded, raise_interrupt_in
+
+STANDARD_OUTPUT = "standard output"
+"""The name of the file behind it in errors."""
 
 
 def main() -> NoReturn:
@@ -28,6 +34,32 @@ def _open_streams() -> None:
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(number, "w" if number else "r"))
+    if isinstance(out := sys.stdout, io.TextIOWrapper):
+        how = {name: getattr(out, name) for name in ("encoding", "errors", "line_buffering", "write_through")}
+        sys.stdout = StandardOutput(out.detach(), **how)
+
+
+class StandardOutput(io.TextIOWrapper):
+    """Standard output, whose errors name it, as those of a full disk."""
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        with _naming_standard_output():
+            return super().write(text)
+
+    def flush(self) -> None:
+        """Write what is left."""
+        with _naming_standard_output():
+            super().flush()
+
+
+@contextmanager
+def _naming_standard_output() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        error.filename = STANDARD_OUTPUT
+        raise
 
 
 def _command() -> None:
@@ -36,6 +68,11 @@ def _command() -> None:
 
     try:
         program()(standalone_mode=False)
+        sys.stdout.flush()
     except Exception as error:
         raise_interrupt_in(error)
+        if getattr(error, "filename", None) == STANDARD_OUTPUT:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what Python still writes at its end
+        if isinstance(error, BrokenPipeError):  # whoever read the output has gone
+            sys.exit(1)
         fail(error)

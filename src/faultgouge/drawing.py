@@ -1,4 +1,4 @@
-"""Draw a packing, or that of a file."""
+"""Draw a packing, or the packing of a file."""
 
 from .figures import draw_packing
 from .stored_files import takes_file

@@ -4,7 +4,7 @@ Exit codes: 1 for a computation that failed, 2 for bad input; 130 and 143 for si
 :mod:`faultgouge.signal_guard`.
 
 An error on all ranks ends them one by one. After an error on one rank alone, the other ranks would wait for ever. To
-distinguish the two cases, ranks with an error wait for each other: a rank that is alone for the time `MEETING` ends all
+distinguish the two cases, ranks with an error wait for each other: a rank that is alone for `SECONDS_TO_MEET` ends all
 ranks.
 """
 
@@ -20,10 +20,10 @@ from typing import NoReturn
 from .mpi_rank import is_root, size
 from .signal_guard import has_ended
 
-MEETING = 3.0
+SECONDS_TO_MEET = 3.0
 """Seconds within which all ranks come to an error that all of them meet."""
 
-HEARD = 0.5
+SECONDS_TO_READ = 0.5
 """Seconds between the sentence and the end of all ranks: an abort drops what mpiexec has not yet passed on."""
 
 
@@ -38,7 +38,7 @@ def fail(error: Exception) -> NoReturn:
         from mpi4py import MPI
 
         has_ended()
-        time.sleep(HEARD)
+        time.sleep(SECONDS_TO_READ)
         MPI.COMM_WORLD.Abort(code)
     sys.exit(code)
 
@@ -49,7 +49,7 @@ def _all_are_here() -> bool:
         return True  # MPI is not there to be waited in
     from mpi4py import MPI
 
-    meeting, deadline = MPI.COMM_WORLD.Ibarrier(), time.monotonic() + MEETING
+    meeting, deadline = MPI.COMM_WORLD.Ibarrier(), time.monotonic() + SECONDS_TO_MEET
     while not meeting.Test():
         if time.monotonic() > deadline:
             return False

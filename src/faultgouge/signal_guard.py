@@ -106,7 +106,7 @@ def guarded(work: Callable[[], None]) -> NoReturn:
 
 
 def _work(work: Callable[[], None], guard: bool) -> NoReturn:
-    """What the child does."""
+    """The work of the child."""
     try:
         work()
     except Interrupted as signalled:

@@ -1,4 +1,4 @@
-"""Packings of files, of whatever kind."""
+"""Read a packing from a file of any kind."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 from .analysis import BadInputError, Configuration, MindlinLaw, Packing, RunFile, read_dump
 from .analysis import spectrum as spectrum_of_packing
 from .analysis import stability as stability_of_packing
-from .analysis.configuration import HasConfiguration
 from .analysis.files.configuration_file import holds_configuration, read_configuration
 from .analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
 from .analysis.files.runfile_header import law_of_parameters
+from .analysis.has_configuration import HasConfiguration
 
 
 def load(

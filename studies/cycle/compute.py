@@ -20,22 +20,27 @@ says which states are equilibria.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg import lu_factor, lu_solve
+from scipy.linalg import eigvals, lu_factor, lu_solve
 
 from ...analysis import Configuration, Packing
 from ...analysis.arrays import Complexes, Floats, derive_frozen
-from ...analysis.configuration import HasConfiguration
+from ...analysis.has_configuration import HasConfiguration
 from ...analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, unit_rounding, zero_uncertainties
 from ...analysis.motion.modes import Modes, participation_ratio
 from ...analysis.motion.motion import Motion
-from ...analysis.motion.rates import rates_of
+from ...analysis.motion.rates import DENSE_DAMPED, FREE_SHARE, rates_of
 
 LONE_PARTICIPATION = 1.5
 """Disks that take part in a motion, below which the motion is that of one disk."""
+
+ALL_RATES = 1500
+"""Coordinates up to which LAPACK computes all eigenvalues with dissipation, ten seconds: the fastest growing motions
+alone, which `rates_of` has of so many coordinates, may all be those of one disk each."""
 
 INVERSE_STEPS = 3
 """Steps of inverse iteration with an eigenvalue that is known to nine digits: two leave 1e-12 of the others."""
@@ -124,11 +129,20 @@ def linear_state(configuration: Configuration, sliding: bool) -> LinearState:
 def _damped_rate(motion: Motion) -> float | None:
     """Largest 2 Re s of the motions that more than one disk takes part in; None if no such motion is known."""
     stiffness, damping = motion.stiffness.toarray(), motion.damping.toarray()
-    for s in rates_of(motion).values:  # the fastest growing first
+    for s in _rates(motion):
         pencil = s * s * np.eye(len(stiffness)) + s * damping + stiffness
         if _disks(motion, null_vector(pencil)[:, None])[0] >= LONE_PARTICIPATION:
             return float(2 * s.real)
     return None
+
+
+def _rates(motion: Motion) -> Sequence[complex] | Complexes:
+    """Eigenvalues s with dissipation, the fastest growing first: all of them, unless the packing is large."""
+    if not DENSE_DAMPED < len(motion.active) <= ALL_RATES:
+        return rates_of(motion).values
+    values = eigvals(motion.first_order, check_finite=False)
+    moves = (values.imag >= 0) & (np.abs(values) > FREE_SHARE * np.abs(values).max())
+    return sorted(values[moves], key=lambda s: -s.real)
 
 
 def null_vector(singular: Complexes) -> Complexes:

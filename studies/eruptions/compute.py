@@ -69,7 +69,7 @@ WALK_FACTOR = 10.0
 """Factor from the D of a random walk, one rounding of a coordinate a time step, below which D has not risen: strong
 drag leaves D at 1e-30 in the first time unit, and the walk is at 3e-25 after fifty."""
 
-Ends = Literal["opens", "slides", "law", "flows", "stable", "rises", "cut off"]
+EndOfRun = Literal["opens", "slides", "law", "flows", "stable", "rises", "cut off"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,8 +105,8 @@ def erupt(start: Start) -> dict[str, Any]:
         largest D, length^2, and the largest kinetic energy; slip : largest displacement of the upper layer along x,
         length; lost, gained, sliding : most contacts, in any sample, that were open, new, or slid; ended : when D first
         reached a tenth of its largest value, time, None if it did not grow; ends : what ended the growth, one of
-        `Ends`; noise : largest D of the first time unit; balance : kinetic energy less work, in units of the larger of
-        the two and of the kinetic energy; series : the samples as columns.
+        `EndOfRun`; noise : largest D of the first time unit; balance : kinetic energy less work, in units of the larger
+        of the two and of the kinetic energy; series : the samples as columns.
     """
     with threadpool_limits(1):
         rate = growth_rate(start.packing)
@@ -144,7 +144,7 @@ def growth_rate(packing: Packing) -> float:
 
 
 def _course(dynamics: Dynamics, dt: float, longest: float) -> Iterator[tuple[float, MotionState]]:
-    """Samples that are close together at first and further apart later, each at a step of its own."""
+    """Samples, close together at first and farther apart later, no two at one step."""
     last = int(longest / dt)
     early = np.geomspace(min(100, last), last, SAMPLES_OF_RUN).astype(np.int64)
     steps = np.union1d(early, np.linspace(min(100, last), last, SAMPLES_OF_RUN).astype(np.int64))
@@ -230,7 +230,7 @@ def _end_of_growth(
     """Time and cause of the end of the growth, see the module."""
     ended: float | None = None
     drift = WALK_FACTOR * start.packing.coordinate_rounding**2 * columns["time"][-1] / time_step(start.packing)
-    ends: Ends = "stable" if columns["msd"].max() <= max(RISE_OF_D * _noise(columns, unit), drift) else "rises"
+    ends: EndOfRun = "stable" if columns["msd"].max() <= max(RISE_OF_D * _noise(columns, unit), drift) else "rises"
     if rate > 0:
         place = int(np.argmax(columns["msd"] >= END_OF_GROWTH * columns["msd"].max()))
         ended = float(columns["time"][place])

@@ -33,7 +33,7 @@ def _compute(scene: Scene, work: Work) -> Result:
     flows_beyond = None
     if missing:
         work.say(f"{len(wanted) - len(missing)} of {len(wanted)} loads are known; ramp up to F_x = {missing[-1]:g}")
-        # through the known loads as well: the path, and with it the last digits, is that of one run of the command
+        # through the known loads as well, so that the path, and with it the last digits, is that of one run
         starts, flows_beyond = _starts(scene, [fx for fx in wanted if fx <= missing[-1]], time)
         starts = [each for each in starts if rows.find(fx=each.packing.fx, longest=time, damped=each.damped) is None]
         if flows_beyond is not None:
@@ -52,7 +52,7 @@ def _compute(scene: Scene, work: Work) -> Result:
 
 
 def _runs(rows: Rows, wanted: Sequence[float], time: float) -> list[dict[str, Any]]:
-    """The runs of that length at these loads."""
+    """Runs of the given length at the given loads."""
     runs = [row for row in rows.rows if row["fx"] in wanted and row["longest"] == time]
     return sorted(runs, key=lambda row: (row["fx"], row["damped"]))
 

@@ -75,7 +75,7 @@ SWITCH_DISKS = 300
 SHIFT_OFFSET = 1e-9
 """Distance of a shift from the eigenvalue whose vectors are wanted, in units of the eigenvalue."""
 
-NORM = 1e-6
+NORM_ERROR = 1e-6
 """Relative error of the norm squared: it is a bound that is several times larger than what it bounds."""
 
 FREQUENCY_DIGITS = 7
@@ -155,7 +155,7 @@ def antisymmetric_norm(packing: Packing) -> float:
     if skew.shape[0] < 3 or abs(skew).max() == 0:
         return 0.0
     start = np.random.default_rng(0).standard_normal(skew.shape[0])
-    largest = eigsh(csr_array(skew.T @ skew), 1, which="LA", v0=start, tol=NORM, return_eigenvectors=False)
+    largest = eigsh(csr_array(skew.T @ skew), 1, which="LA", v0=start, tol=NORM_ERROR, return_eigenvectors=False)
     return float(np.sqrt(largest[0]))
 
 

@@ -27,12 +27,14 @@ LABELS = {
     "critical_restitution": "critical restitution",
 }
 
-Course = Mapping[str, Any]
+MediansOverLoad = Mapping[str, Any]
 """loads, and for each quantity a list of [median, low, high]."""
 
 
 @styled
-def over_load(courses: Mapping[str, Course], names: Sequence[str] = ("share", "growth_rate", "least_q")) -> Figure:
+def over_load(
+    courses: Mapping[str, MediansOverLoad], names: Sequence[str] = ("share", "growth_rate", "least_q")
+) -> Figure:
     """Medians with their intervals over F_x/F_y, a panel for each quantity.
 
     Parameters

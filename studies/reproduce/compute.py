@@ -17,7 +17,7 @@ import numpy as np
 from ...analysis import Growth, Onset, Packing, RunFile, Spectrum, fit_growth, solid_fraction, spectrum
 from ...analysis.counted import counted
 from ...analysis.motion.growth import growing_range
-from ...analysis.motion.growth_of_run import BELOW_TOP
+from ...analysis.motion.growth_of_run import PLATEAU_SHARE
 from ...analysis.packing.packing import Floats
 from ...analysis.windows.pair_over_load import pair_eigenvalues
 from ...figures.pair import PairCurve
@@ -34,7 +34,7 @@ EFOLDS = 48.0
 MOST_RUN_STEPS = 3_000_000
 """Steps of the undamped run, at the most: about 20 s for 100 disks."""
 
-NEARBY = np.concatenate(
+DISTANCES = np.concatenate(
     [
         -np.geomspace(3e-2, 1e-3, 7)[:-1],
         -np.geomspace(1e-3, 1e-7, 13),
@@ -91,7 +91,7 @@ def triggering_run(scene: Scene, runs: list[Onset], path: Path) -> Triggering | 
             f"F_x = {fx:g} is below the onset {weakened[0].fx_c:g} of the weakened friction, too: no "
             "window between the two, and nothing to erupt."
         )
-    *_, start = reach(scene, fx)  # to the bit the one of `perturb`, and so is v_0
+    *_, start = reach(scene, fx)  # to the bit the equilibrium of `perturb`, with its v_0
     modes = spectrum(start.packing)
     if modes.is_stable is False:
         what = f"{counted(len(modes.pairs), 'complex pair')} and {counted(len(modes.negative), 'negative eigenvalue')}"
@@ -104,7 +104,7 @@ def triggering_run(scene: Scene, runs: list[Onset], path: Path) -> Triggering | 
 def recorded_ramp(scene: Scene, mu: float, path: Path, bed: Packing | None = None) -> Onset:
     """Ramp and onset for one friction coefficient, from a settled bed; every equilibrium goes to the file."""
     one = scene.model_copy(update={"law": scene.law.model_copy(update={"mu": mu})})
-    near = NEARBY * require_section(scene.ramp, "ramp").first
+    near = DISTANCES * require_section(scene.ramp, "ramp").first
     path.unlink(missing_ok=True)
     with Record(path, one) as record:
         run = onset_run(one, mu, reached=record.append, near_onset=near, bed=bed)
@@ -141,7 +141,7 @@ def growth_run(scene: Scene, run: Onset, path: Path) -> GrowthRun:
         file.append_series("undamped", **series)
     time, msd = series["time"], series["msd"]
     try:
-        measured = fit_growth(time, msd, *growing_range(time, msd, min(ceiling, BELOW_TOP * float(msd.max()))))
+        measured = fit_growth(time, msd, *growing_range(time, msd, min(ceiling, PLATEAU_SHARE * float(msd.max()))))
     except ValueError:
         measured = None
     return GrowthRun(start, time, msd, modes, dt, predicted, measured)

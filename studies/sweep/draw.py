@@ -31,9 +31,10 @@ SAMPLE_DISTANCE, EDGE_MARGIN = 0.035, 0.08
 """Distance of samples at one value, and of the outermost from the edge, in units of the range of values."""
 
 FEWEST_SCENES = 6
-"""Scenes of a sample from which a median has an interval of 95 %: with five, all lie on one side of it once in 16."""
+"""Scenes of a sample from which a median has an interval of 95 %: with five, all lie on one side of the median once in
+16."""
 
-Reach = tuple[float, bool]
+OnsetOrBound = tuple[float, bool]
 """The largest F_x up to which there is no window, and whether that is the onset."""
 
 
@@ -49,7 +50,7 @@ def draw_sweep(rows: Sequence[Row], folder: Path, say: Callable[[str], None]) ->
     return ""
 
 
-def reach_of(row: Row) -> Reach | None:
+def reach_of(row: Row) -> OnsetOrBound | None:
     """How far the (first) ramp of a row went without a window; None if the row has no ramp."""
     result = row["result"]
     end = next(iter(_dicts(result.get("ramps"))), result)
@@ -86,10 +87,10 @@ class SeedSample:
         return ", ".join(f"{key} = {value}" for key, value in self.values.items())
 
 
-def samples_of(found: Sequence[tuple[Row, Reach]]) -> list[SeedSample]:
+def samples_of(found: Sequence[tuple[Row, OnsetOrBound]]) -> list[SeedSample]:
     """The samples of a sweep, in the order of their first rows."""
     keys = _varied_keys([row for row, _ in found])
-    groups: dict[str, list[tuple[Row, Reach]]] = {}
+    groups: dict[str, list[tuple[Row, OnsetOrBound]]] = {}
     for row, reach in found:
         groups.setdefault(str([row["values"][key] for key in keys]), []).append((row, reach))
     return [
@@ -103,7 +104,7 @@ def samples_of(found: Sequence[tuple[Row, Reach]]) -> list[SeedSample]:
 
 
 @styled
-def onsets_figure(found: Sequence[tuple[Row, Reach]]) -> Figure:
+def onsets_figure(found: Sequence[tuple[Row, OnsetOrBound]]) -> Figure:
     """The share of scenes with an onset up to F_x, a curve a sample, and the onsets over each swept key.
 
     Forces are per disk of the upper layer. Small symbols are scenes; triangles stand where there is no onset up to

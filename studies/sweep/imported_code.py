@@ -1,8 +1,8 @@
 """The code of a Python file and of the modules of its own that it imports, as one digest.
 
-The imports are read from the text, wherever in a file they stand: a module that only one function imports counts, and
-nothing is run. Comments, docstrings and layout do not count. What a program imports by a computed name, and the data
-that it reads, is not known.
+The imports are read from the text, without running it, wherever in a file they stand: a module that only one function
+imports counts. Comments, docstrings and layout do not count. Modules imported by a computed name, and data that a
+program reads, are not found.
 """
 
 from __future__ import annotations

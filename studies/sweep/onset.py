@@ -36,11 +36,11 @@ from ...pywrap.runs.ramp_loads import ramp_loads
 from ...pywrap.scenes.validation import require_section
 from ..packing_tools import Start, contact_pairs, path_from
 
-Ends = Literal["onset", "until", "flows"]
+EndOfRamp = Literal["onset", "until", "flows"]
 
 DISTANCE_BELOW = 1e-7
-"""Distance below the onset at which the pair is looked at, in units of F_x^c: its eigenvectors have an angle of about
-the root of that, and are well known."""
+"""Distance below the onset at which the pair is looked at, in units of F_x^c: the angle between its eigenvectors is
+about the root of this distance, so that both are accurate."""
 
 
 def onset(scene: Scene, start: Start) -> dict[str, Any]:
@@ -70,7 +70,7 @@ def onset(scene: Scene, start: Start) -> dict[str, Any]:
     return row
 
 
-def first_window(path: LoadPath[Equilibrium], scene: Scene) -> tuple[Ends, float, Onset | None]:
+def first_window(path: LoadPath[Equilibrium], scene: Scene) -> tuple[EndOfRamp, float, Onset | None]:
     """How the ramp ends, the largest F_x up to which there is no window, and the onset if there is one."""
     try:
         found = find_onset(path, ramp_loads(scene), first=True)

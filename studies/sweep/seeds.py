@@ -2,9 +2,9 @@
 
 Settling is chaotic: it amplifies the last digit of its load and of its stiffness. A seed therefore stands for one
 packing at one ratio of k_n to F_y alone (in any units, see :func:`~faultgouge.pywrap.settling.settle.own_units`), and a
-sweep over load.fy or law.kn compares packings that have nothing but their loose start in common. With `settle_friction`
-this holds for friction, too. Packings that settle at a load of reference (`settle_at`) and are carried to their own are
-one packing. Stored packings are what they are.
+sweep over load.fy or law.kn compares packings that have only their loose start in common; with `settle_friction`, so
+does a sweep over friction. Packings that settle at a load of reference (`settle_at`) and are carried to other loads
+remain one packing. Stored packings have no seed.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A task takes the scene and a function that returns the settled packing for a friction coefficient. The task returns one
 row: numbers, strings, lists and dicts of these. A task that settles by itself does not call the function. A task may
-also be a function of the user (:mod:`.user_function`). How long scenes take the rows tell that are there.
+also be a function of the user (:mod:`.user_function`). The rows that are there tell how long scenes take.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ Row = dict[str, Any]
 
 
 def rise_in_decades(eruption: Row, of: str = "weakening") -> float:
-    """Decades between the largest D of the perturbed run and that of the run with mu(v), or of the "control"."""
+    """Decades between the largest D of the perturbed run and of the run with mu(v), or of the "control"."""
     return float(np.log10(eruption[of] / eruption["perturbed"]))
 
 

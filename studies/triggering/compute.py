@@ -54,8 +54,8 @@ SAMPLES_OF_FALL = 20_000
 many samples include each step up to there."""
 
 LARGEST_DISTANCE = 1e-2
-"""Largest distance 1 - F_x/F_x^c at which the response is compared with its power law: further off, the pair is no
-longer the whole of it."""
+"""Largest distance 1 - F_x/F_x^c at which the response is compared with its power law: farther off, other modes
+contribute."""
 
 GROWTH_FACTOR = 2.0
 """Factor between two largest D from which on they differ. Without an instability, the phases in which many modes happen
@@ -70,7 +70,7 @@ ABOVE_NOISE = 1e3
 """Factor of the perturbation that is compared with the linear response: a million times in D."""
 
 COMPARED_TIME = 50.0
-"""Length of that run, in `unit_of_time`: a few hundred periods of the pair."""
+"""Length of the run that is compared with linear response, in `unit_of_time`: a few hundred periods of the pair."""
 
 
 Series = dict[str, Floats]

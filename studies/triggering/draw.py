@@ -30,7 +30,7 @@ from ...pywrap.lammps.dynamics import Weakening
 from ..study import Figures
 from .compute import Sensitivity, Triggering
 
-Course = tuple[Floats, Floats]
+GrowthCurve = tuple[Floats, Floats]
 """Times, and D at these, length^2."""
 
 UNPERTURBED, PERTURBED, WEAKENING, CONTROL = "C1", "C2", "C0", "C3"
@@ -58,10 +58,10 @@ def figures(found: Triggering) -> Figures:
 
 @styled
 def eruption_figure(
-    unperturbed: Course,
-    perturbed: Course,
-    weakening: Course,
-    control: Course | None = None,
+    unperturbed: GrowthCurve,
+    perturbed: GrowthCurve,
+    weakening: GrowthCurve,
+    control: GrowthCurve | None = None,
     crossing: float | None = None,
 ) -> Figure:
     """D(t) below the onset: left alone, perturbed, and perturbed with weakening friction (the paper's figure 5a).
@@ -239,7 +239,7 @@ def damping_figure(pairs: Sequence[NormalForm]) -> Figure:
 
 
 @styled
-def response_figure(run: Course, linear: Floats) -> Figure:
+def response_figure(run: GrowthCurve, linear: Floats) -> Figure:
     """D of the linear response of a packing, from K, at the times of a run of LAMMPS, over D of the run.
 
     Panel (a) both, panel (b) the difference in units of the largest D so far: D itself passes close to zero.

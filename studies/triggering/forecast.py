@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...analysis import spectrum
-from ...analysis.motion.growth_of_run import JUMP_SHARE, LINEAR
+from ...analysis.motion.growth_of_run import JUMP_SHARE, LINEAR_RANGE
 from ...analysis.motion.response import LinearMotion
 from ...pywrap import Equilibrium
 
@@ -58,6 +58,6 @@ def forecast(start: Equilibrium, mu: float, time: float, window: float | None = 
     return Forecast(
         jump=first,
         growth=float(np.log10(msd.max() / first)),
-        room=float(np.log10((LINEAR * packing.smallest_overlap) ** 2 / first)),
+        room=float(np.log10((LINEAR_RANGE * packing.smallest_overlap) ** 2 / first)),
         rate=spectrum(weak).growth_rate(),
     )

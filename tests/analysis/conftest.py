@@ -3,6 +3,7 @@
 import bisect
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -75,3 +76,12 @@ def cluster(request: pytest.FixtureRequest) -> Packing:
         fx=0.5,
         fy=3.0,
     )
+
+
+@pytest.fixture
+def bound(cluster: Packing) -> Packing:
+    """Six disks with Coulomb's slider and dashpots; contacts slide at the bound in either direction, or stick."""
+    law = MindlinLaw(2e3, 6e2, 0.7, exponent=cluster.law.exponent, cn=9.0, ct=4.0, coulomb=True)
+    bare, c = replace(cluster, law=law), cluster.contacts
+    share = np.resize([1.0, 0.3, -1.0, -0.4], len(c))
+    return replace(bare, contacts=Contacts(c.i, c.j, share * law.slip_limit(bare.geometry.overlap)))

@@ -168,6 +168,16 @@ def test_a_read_only_file_is_kept(refusal, stored, command):
     assert (stored / name).read_text() == "kept"
 
 
+@pytest.mark.parametrize("buffered", ["", "1"])
+def test_a_full_disk_behind_standard_output_is_named(buffered):
+    """Also where the output is short, so that it is written at the end."""
+    command = [sys.executable, "-m", "faultgouge", "--help"]
+    with open("/dev/full", "w") as full:
+        environment = os.environ | {"PYTHONUNBUFFERED": buffered}
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, env=environment, check=False)
+    assert (done.returncode, done.stderr) == (1, "Error: standard output: No space left on device\n")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".vtp", ".xyz", ".data"])
 def test_a_picture_replaces_a_file_as_a_whole(faultgouge_here, stored, monkeypatch, suffix):

@@ -8,8 +8,10 @@ import pytest
 from PIL import Image
 
 from faultgouge.analysis import Packing
-from faultgouge.figures.film import LARGEST_SHOWN, RampFilm, RunFilm, RunMotion
-from faultgouge.figures.writers import UNSEEN, usual_suffix, write_film
+from faultgouge.figures.film import LARGEST_SHOWN
+from faultgouge.figures.ramp_film import RampFilm
+from faultgouge.figures.run_film import RunFilm, RunMotion
+from faultgouge.figures.writers import COLOUR_DIFFERENCE, usual_suffix, write_film
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +81,7 @@ def test_a_gif_holds_every_frame_and_stays_close_to_it(tmp_path, motion):
             gif.seek(number)
             off = np.abs(np.asarray(gif.convert("RGB")).astype(int) - film.frame(number)).max(axis=2)
             # the palette has 63 colours, and rare ones are farther from theirs than what stays unseen
-            assert np.mean(off > UNSEEN) < 0.01
+            assert np.mean(off > COLOUR_DIFFERENCE) < 0.01
     # so that 100 frames, the default, take less than 1.5 MB even here, where each disk moves anew in each frame
     assert (tmp_path / "film.gif").stat().st_size < 12 * 15_000
 

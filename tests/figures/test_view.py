@@ -80,7 +80,7 @@ def mark(page, plot="growth"):
     return float(page.get_attribute(f"#{plot} .mark", "x1"))
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.long)])
 def test_all_plots_are_in_view_on_a_wide_screen(there_and_back, opened, scheme):
     page = opened(there_and_back, scheme=scheme)
     plots = boxes(page, ".plots .plot svg")

@@ -79,7 +79,7 @@ def test_a_stiffness_that_rises_is_a_load_that_falls():
     assert (stiff.fy, stiff.law.kn, low.fy, low.law.kn) == (3.0, 4e5, 1.5, 2e5)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_packing_settled_with_friction_keeps_its_slips_on_the_way():
     settled, carried = (settle(scene(fy, settle_friction=True, settle_at={"fy": 3.0})).packing for fy in (3.0, 3.3))
     assert settled.contacts.slip.any()

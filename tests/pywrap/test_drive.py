@@ -12,7 +12,7 @@ from faultgouge.analysis import RunFile, read_dump
 from faultgouge.pywrap import Equilibrium, Scene, SceneError
 from faultgouge.pywrap.lammps.data_file import data_file
 from faultgouge.pywrap.lammps.decks import DECKS
-from faultgouge.pywrap.runs.drive import check_drive, drive, settle_for_drive
+from faultgouge.pywrap.runs.drive import drive
 from faultgouge.pywrap.runs.drive_recorder import (
     CONFIDENCE,
     NOISES,
@@ -21,6 +21,7 @@ from faultgouge.pywrap.runs.drive_recorder import (
     clock_advance,
     slips_in,
 )
+from faultgouge.pywrap.runs.drive_setup import check_drive, settle_for_drive
 from faultgouge.pywrap.runs.run_recorder import Record
 
 BASE = {
@@ -78,7 +79,10 @@ def test_interrupted_run_goes_on_to_the_bit(scene, tmp_path, precision):
         with RunFile(tmp_path / "cut.h5") as file:
             assert not file.complete
             assert file.checkpoint
-    run_to_end(wanted, tmp_path / "cut.h5")
+    with DriveRecord(tmp_path / "cut.h5", wanted) as record:
+        assert list(record.drive())
+    with DriveRecord(tmp_path / "cut.h5", wanted) as record:  # it was killed before it could finish the file
+        assert record.complete
     whole, cut = datasets(tmp_path / "whole.h5"), datasets(tmp_path / "cut.h5")
     assert whole.keys() == cut.keys()
     for name, values in whole.items():
@@ -196,6 +200,7 @@ def test_rigid_layer_has_force_and_no_slips(scene, tmp_path):
         ({"spring": 10.0, "velocity": 1e-3, "protocol": [[1, 1]]}, "give one of the two"),
         ({"spring": "soft", "velocity": 1e-3}, 'give a stiffness above 0, or "rigid"'),
         ({"spring": 10.0, "velocity": 0.0}, "moves nothing"),
+        ({"spring": 1e-90, "velocity": 1e-300}, "moves nothing"),
         ({"spring": 10.0, "velocity": 1e-3}, "drive.until is missing"),
         ({"spring": 10.0, "protocol": [[1e-3, 0.0]]}, "give pairs of a velocity and a time above 0"),
         ({"spring": "rigid", "velocity": 1e-3, "slips": 3}, "drive.until is missing"),
@@ -264,6 +269,7 @@ def test_drive_in_python_warns_and_refuses_as_the_command_does(scene):
         ({"drive": {"spring": 1e9, "velocity": 1e-11}}, "blows up: lower drive.spring"),
         ({"damping": {"cn": 1e6}}, "blows up: lower damping.cn and damping.ct"),
         ({"drive": {"spring": "rigid", "velocity": 1e3}}, "farther than the smallest radius 0.5: lower drive.velocity"),
+        ({"drive": {"velocity": 1e-20, "until": 1e50}}, "the run would take .* time steps of"),
         ({"drive": {"signal": "pulse", "at": 0.5, "omega": 1e9}}, "has a period of 6.28e-09, and the time step is"),
     ],
 )
@@ -371,6 +377,8 @@ def test_clock_advance_is_the_time_between_comparable_slips(scene, tmp_path):
 
     store("with.h5", wanted.drive, [(30.0, 0.05), (66.0, 0.045), (100.0, 0.06)])
     store("without.h5", wanted.drive.without_signal(), [(30.0, 0.05), (120.0, 0.1)])
+    with DriveRecord(tmp_path / "with.h5", wanted) as record:
+        assert record.slips == 3
     advance = clock_advance(tmp_path / "with.h5", tmp_path / "without.h5")
     assert advance == pytest.approx(20.0, abs=0.2)
     store("none.h5", wanted.drive.without_signal(), [(30.0, 0.05)])
@@ -378,7 +386,7 @@ def test_clock_advance_is_the_time_between_comparable_slips(scene, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scale", [0.0, 1e-11])
+@pytest.mark.parametrize("scale", [pytest.param(0.0, marks=pytest.mark.long), 1e-11])
 def test_signal_that_does_nothing_has_no_clock_advance_beyond_its_error(faultgouge_here, tmp_path, scale):
     """The layer of seed 1 with the standard law, shortly before its first slip; without a force runs are the same."""
     text = f"""[packing]
@@ -409,6 +417,10 @@ scale = {scale}
         assert told["clock_advance"] == 0
     with RunFile(tmp_path / "d.h5") as file:
         assert told["clock_advance_error"] >= np.diff(file.series("drive")["time"]).min()
+        times, force = file.observable("time"), file.fx
+    for slip in told["slips"]:
+        for end, frame, said in (("begins", "before", "force_before"), ("ends", "after", "force_after")):
+            assert (times[slip[f"frame_{frame}"]], force[slip[f"frame_{frame}"]]) == (slip[end], slip[said])
 
 
 def test_error_of_a_clock_advance_is_that_of_one_more_draw():

@@ -35,7 +35,7 @@ def test_a_ramp_ends_at_until_with_a_shorter_increment(step, loads):
     assert [each.fx for each in ramp(scene)] == loads
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_increments_that_meet_a_contact_that_hardly_opens_reach_the_end():
     """Of seed 11, halved increments end at F_x = 0.07846, where Newton's residual falls slowly; others pass."""
     reached, ways = [], []

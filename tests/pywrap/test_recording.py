@@ -133,7 +133,13 @@ def test_a_film_of_an_undamped_run_is_stored_unasked(tmp_path):
     np.testing.assert_array_equal(whole["position"][same], film["position"])
 
 
-@pytest.mark.parametrize("kind", FORCED)
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(each, marks=pytest.mark.long) if "cosine" in each and "damped" not in each else each
+        for each in FORCED
+    ],
+)
 @pytest.mark.slow
 def test_it_goes_on_to_the_bit(kind, tmp_path, monkeypatch):
     monkeypatch.setattr(undamped, "SHORTEST_PART", 300)  # in place of 10,000 steps

@@ -47,14 +47,16 @@ BROUGHT = {
 
 @pytest.fixture(scope="module")
 def paper():
-    return explain(Scene.from_toml(SCENES / "paper.toml"))
+    return explain(Scene.from_toml(SCENES / "paper.toml"), timed=True)
 
 
 @pytest.fixture(scope="module")
 def frictionless():
     mapping = Scene.from_toml(SCENES / "frictionless.toml").resolved()
     pulse = {"fx": 0.0, "time": 1.0, "signal": "pulse", "amplitude": 1e-9, "omega": 3.0}
-    return explain(Scene.from_mapping(mapping | {"output": {"dumps": True, "trajectory": True}, "perturb": pulse}))
+    return explain(
+        Scene.from_mapping(mapping | {"output": {"dumps": True, "trajectory": True}, "perturb": pulse}), timed=True
+    )
 
 
 def test_the_first_sentences_say_what_is_in_what_is_out_and_what_that_saves():
@@ -68,9 +70,12 @@ def test_the_first_sentences_say_what_is_in_what_is_out_and_what_that_saves():
         part("signal", False, [0.9, 1.02, 1.1]),
         part("threads", False, None),
     )
-    said = in_words(SimpleNamespace(parts=parts))
+    said = in_words(SimpleNamespace(parts=parts, timed=True))
     assert said == "In: floor. Out: drag, signal and threads. A step would take longer by 30 % for drag, one at a time."
-    assert in_words(SimpleNamespace(parts=parts[:1])).endswith("Out: nothing; that saves no time that can be measured.")
+    (alone,) = parts[:1]
+    said = in_words(SimpleNamespace(parts=(alone,), timed=True))
+    assert said == "In: floor. Out: nothing; that saves no time that can be measured."
+    assert in_words(SimpleNamespace(parts=(alone,), timed=False)) == "In: floor. Out: nothing."
 
 
 def included(explanation):
@@ -137,10 +142,11 @@ def test_a_wrong_claim_is_found_out(run, tmp_path):
         loaded = InstanceContents.of(engine, tmp_path / "log")
     top = np.flatnonzero(run.packing.top)
     for touched, moves in (((), True), (top, False)):
-        part = _run_feature(Feature("push", "", run, pushed, touched, moves), loaded, 50, tmp_path)
+        part = _run_feature(Feature("push", "", run, pushed, touched, moves), loaded, 50, tmp_path, timed=False)
         assert part.identical is False
         assert not part.included
-    honest = _run_feature(Feature("push", "", run, pushed, top), loaded, 50, tmp_path)
+        assert part.cost is None
+    honest = _run_feature(Feature("push", "", run, pushed, top), loaded, 50, tmp_path, timed=False)
     assert honest.identical is True
 
 
@@ -153,7 +159,7 @@ def test_spring_of_a_driven_scene_is_told_with_its_share(tmp_path):
         still = dynamics.advance(1).position
     np.testing.assert_allclose(still, own.packing.position, atol=1e-9)  # in small steps, from rest
     spring = {feature.name: feature for feature in features(own)}["spring"]
-    part = _run_feature(spring, loaded, 300, tmp_path)
+    part = _run_feature(spring, loaded, 300, tmp_path, timed=True)
     assert part.included
     assert part.identical
     assert set(part.adds) == BROUGHT["spring"]
@@ -173,10 +179,14 @@ def test_open_scene_has_no_period(run):
 
 
 @pytest.mark.long
-def test_command_prints_a_table(faultgouge):
+def test_command_prints_a_table_with_times_on_request(faultgouge):
+    timed = faultgouge("explain", "--time", SCENES / "minimal.toml")
     done = faultgouge("explain", SCENES / "minimal.toml")
     for name in BROUGHT:
         assert name in done.stdout
+    for said in ("time with it : without it", "load average", "A step would take longer by"):
+        assert said in timed.stdout
+        assert said not in done.stdout
     assert "deck parts: system.in, friction.in, undamped.in\n" in done.stdout
     assert "not imported: matplotlib, MDAnalysis" in done.stdout
     assert "law.mu = 1.0" in done.stdout

@@ -70,7 +70,7 @@ def test_stated_intervals_contain_the_extrapolated_onset(mu, below):
             assert found.error < 1e-7
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_contact_that_slides_before_the_onset_is_covered():
     """Of this packing a contact reaches the Coulomb bound before the onset: the error is bounded, not extrapolated."""
     found = {}
@@ -135,6 +135,13 @@ def test_an_onset_that_is_not_found_again_is_uncertain_by_the_increment():
     assert part.error == pytest.approx(5e-4)
 
 
+@pytest.fixture(scope="module")
+def climbed():
+    """A path and its onset, without the error of the path."""
+    with path_of(scene_of(HUNDRED, "double", 5e-3, 0.02)) as path:
+        yield path, find_onset(path, np.array([0.0, 5e-3, 1e-2, 1.5e-2, 2e-2]))
+
+
 @dataclass(frozen=True)
 class FailingSolver:
     """Whatever is asked for beside what a path knows fails."""
@@ -150,14 +157,16 @@ class FailingSolver:
     [NoEquilibriumError("no equilibrium was found"), LinAlgError("no convergence"), OnsetError("a pair was lost")],
     ids=lambda failure: type(failure).__name__,
 )
-def test_an_onset_is_kept_where_the_other_path_fails(failure):
-    scene = scene_of(HUNDRED, "double", 5e-3, 0.02)
-    with path_of(scene) as path:
-        found = find_onset(path, np.array([0.0, 5e-3, 1e-2, 1.5e-2, 2e-2]))
-        whole = with_path_error(found, path)
-        alone = with_path_error(found, LoadPath(FailingSolver(failure), path.equilibria))
+def test_an_onset_is_kept_where_the_other_path_fails(climbed, failure):
+    path, found = climbed
+    alone = with_path_error(found, LoadPath(FailingSolver(failure), path.equilibria))
     assert alone.windows == found.windows
     assert alone.as_dict()["error_of_path"] is None
+
+
+def test_the_other_path_has_an_error_that_is_part_of_the_onsets(climbed):
+    path, found = climbed
+    whole = with_path_error(found, path)
     assert 0 < whole.as_dict()["error_of_path"] <= whole.error
 
 

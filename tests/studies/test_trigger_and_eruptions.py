@@ -47,7 +47,7 @@ def test_prediction_is_what_lammps_bisects(tmp_path):
     assert {"map.png", "thresholds.png", "trigger.md"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_distances_count_from_the_onset_with_dissipation(tmp_path):
     """Normal dashpots alone lower it, from 0.0218331 to 0.0218328; the wave is damped, in K's answer as in LAMMPS."""
     trigger = {"distance": [0.1], "omega": [14.0], "time": 1.0, "runs": 1}

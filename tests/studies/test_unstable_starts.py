@@ -45,7 +45,7 @@ def test_onset_counts_the_pairs_and_states_no_digits_of_zero(faultgouge_here, tm
     assert (found["fx_c"], found["error"], found["unstable_at_start"]["pairs"]) == (0.0, 0.0, pairs[0])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_all_windows_of_each_friction_coefficient_are_where_its_ramp_has_complex_pairs(faultgouge_here, pairs):
     """As many windows hold a load as LAPACK finds pairs in the equilibrium there; those of the start begin at zero."""
     done = faultgouge_here("onset", "scene.toml", "--all", "--json")

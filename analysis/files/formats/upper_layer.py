@@ -18,10 +18,10 @@ LAYER_WAYS = (
     'region such as "y>10"'
 )
 
-FEW_TOUCH = 0.5
+LEAST_TOUCHING_SHARE = 0.5
 """Share of disks that touch something below which a packing is not at rest yet, and contacts tell nothing."""
 
-MOST_NAMED = 10
+MOST_NAMES = 10
 """Disks that are named; more are counted."""
 
 OPERATORS = {"<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": operator.ge}
@@ -125,7 +125,7 @@ def _highest(disks: Disks, count: int) -> NDArray[np.bool_]:
         raise UpperLayerError(str(count), f"{disks.source} has {len(disks)} disks alone")
     order = np.argsort(-disks.position[:, 1], kind="stable")
     held = ~touching_nothing(disks)[order]
-    if held.sum() >= max(count, FEW_TOUCH * len(disks)):
+    if held.sum() >= max(count, LEAST_TOUCHING_SHARE * len(disks)):
         order = order[held]
     chosen = np.zeros(len(disks), dtype=np.bool_)
     chosen[order[:count]] = True
@@ -143,7 +143,7 @@ def touching_nothing(disks: Disks) -> NDArray[np.bool_]:
 def layer_remark(disks: Disks, says: str | None, layer: NDArray[np.bool_]) -> str:
     """A remark on disks that touch nothing, in the layer or above it; empty for none, or too many."""
     alone = touching_nothing(disks)
-    if alone.mean() > 1 - FEW_TOUCH:
+    if alone.mean() > 1 - LEAST_TOUCHING_SHARE:
         return ""
     loose = disks.id[layer & alone].tolist()
     if loose:
@@ -159,7 +159,7 @@ def layer_remark(disks: Disks, says: str | None, layer: NDArray[np.bool_]) -> st
 
 
 def _list_ids(ids: list[int]) -> str:
-    return ", ".join(map(str, ids[:MOST_NAMED])) + (", ..." if len(ids) > MOST_NAMED else "")
+    return ", ".join(map(str, ids[:MOST_NAMES])) + (", ..." if len(ids) > MOST_NAMES else "")
 
 
 def _read_list(disks: Disks, says: str, value: str) -> NDArray[np.bool_]:

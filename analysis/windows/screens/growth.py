@@ -12,7 +12,7 @@ to :math:`H_{kk}`, so that its damping is :math:`d_k = \Gamma_{kk} + \mathrm{Im}
 at least one factor of :math:`\Gamma` have imaginary parts. The third order is estimated in this way, however weak the
 damping is: the root of the sum of squares of its terms, times `Limits.third_order`. A mode surely loses energy if
 :math:`d_k` exceeds this estimate and `Limits.spare` of :math:`\Gamma_{kk}`, at both loads and half-way, and if no other
-mode comes so close that :math:`|V_{kl}/g_{kl}|` exceeds `Limits.mixed` in between.
+mode comes so close that :math:`|V_{kl}/g_{kl}|` exceeds `Limits.largest_mixing` in between.
 
 **A cluster is quiet** where no motion of it can be fed as much as it loses. On the axis, :math:`s = i\omega`, a unit
 vector x has :math:`x^H A_s x = \omega^2` and :math:`\omega\, x^H G x = |x^H A_a x|`, with the symmetric and the
@@ -91,7 +91,7 @@ class Reduced:
         if not (softest > 0 and np.any(feed)):
             return 0.0 if softest <= 0 else np.inf
         try:
-            taken = LIMITS.dissipated * np.sqrt(softest) * (loss + loss.T)
+            taken = LIMITS.dissipation_share * np.sqrt(softest) * (loss + loss.T)
             return 1 / float(eigh(1j * (feed - feed.T), taken, eigvals_only=True)[-1])
         except np.linalg.LinAlgError:
             return 0.0
@@ -140,14 +140,16 @@ class Cluster:
         softest = min(float(eigvalsh(0.5 * (each + each.T))[0]) for each in (a, b))
         turning = max(float(np.linalg.norm(each - each.T)) for each in (g, h))
         frequency = np.sqrt(max(0.0, softest)) - turning
-        forms = (LIMITS.dissipated * frequency * (loss + loss.T) + 1j * (force - force.T) for force, loss in self.ends)
+        forms = (
+            LIMITS.dissipation_share * frequency * (loss + loss.T) + 1j * (force - force.T) for force, loss in self.ends
+        )
         try:
             return frequency > 0 and all(np.linalg.cholesky(form).size > 0 for form in forms)
         except np.linalg.LinAlgError:
             return False
 
     def owns(self, frequency: float) -> bool:
-        """Whether a motion of this frequency is its own, and no other cluster's."""
+        """Whether a motion of this frequency belongs to this cluster, and not to another one."""
         return self.own_range[0] <= frequency <= self.own_range[1]
 
     def lift(self, mode: Space) -> tuple[Floats, Floats]:
@@ -158,7 +160,11 @@ class Cluster:
     def search(self, limits: Limits = LIMITS) -> Search:
         """The search of its windows from the lower load to the upper one."""
         below, above = self.loads
-        search = Search(self.system, limits.cluster * (above - below), limits=replace(limits, root=limits.cluster))
+        search = Search(
+            self.system,
+            limits.increment_window * (above - below),
+            limits=replace(limits, root_width=limits.increment_window),
+        )
         for _ in search.along(np.array(self.loads)):
             pass
         return search
@@ -184,7 +190,7 @@ class GrowthScreen:
         self._basis: Basis | None = None
         self._seen: tuple[System, Reduced] | None = None
 
-    def __call__(self, here: System, there: System, known: Sequence[Space], depth: int) -> Few | None:
+    def __call__(self, here: System, there: System, growing: Sequence[Space], depth: int) -> Few | None:
         """The modes of the system that grow at the upper load, sought where a few clusters announce them.
 
         None if the clusters are not known, or too many. A DoubtError says where a cluster has a window in between.
@@ -193,14 +199,14 @@ class GrowthScreen:
         most = max(1, self.limits.clusters * here.stiffness.shape[0] ** 2) / 2**depth
         if clusters is None or len(clusters) > most:
             return None
-        growing: list[Space] = []
+        found: list[Space] = []
         for guess, rate in [each for cluster in clusters for each in self._guesses(cluster, there)]:
             mode = guess.at(there, self.limits, rate)
             if mode is None:
                 raise DoubtError
-            if mode.grows and not any(mode.equals(each) for each in growing):
-                growing.append(mode)
-        return Few([(None, mode) for mode in growing], len(clusters))
+            if mode.grows and not any(mode.equals(each) for each in found):
+                found.append(mode)
+        return Few([(None, mode) for mode in found], len(clusters))
 
     def _guesses(self, cluster: "Cluster", there: System) -> list[tuple[Space, complex]]:
         """Modes of a cluster that grow or nearly grow at the upper load: guesses for modes of the system."""
@@ -257,7 +263,7 @@ def _damping(system: System) -> csr_array:
 
 def find_cores(suspects: Indices) -> list[Indices]:
     """Suspects that are close to each other."""
-    return np.split(suspects, np.flatnonzero(np.diff(suspects) > LIMITS.apart) + 1) if len(suspects) else []
+    return np.split(suspects, np.flatnonzero(np.diff(suspects) > LIMITS.suspect_distance) + 1) if len(suspects) else []
 
 
 def group_clusters(
@@ -292,12 +298,12 @@ def may_grow(here: Reduced, there: Reduced) -> Indices:
     points = here, here.mean(there), there
     frequency = np.min([each.frequencies for each in points], axis=0)
     gamma = np.max([each.damping.diagonal for each in points], axis=0)
-    strong = ~(gamma < LIMITS.oscillating * frequency)
+    strong = ~(gamma < LIMITS.oscillation_damping * frequency)
     mixing, third = _mixing_and_third_order(here, there, np.max([each.frequencies for each in points], axis=0))
     least = np.min([each.damping_of_modes for each in points], axis=0)
     own = np.min([each.damping.diagonal for each in points], axis=0)
     lost = ~(least - LIMITS.third_order * third / frequency > LIMITS.spare * own)
-    return np.flatnonzero(strong | lost | (mixing > LIMITS.mixed))
+    return np.flatnonzero(strong | lost | (mixing > LIMITS.largest_mixing))
 
 
 def _mixing_and_third_order(here: Reduced, there: Reduced, frequency: Floats) -> tuple[Floats, Floats]:

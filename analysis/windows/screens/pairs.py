@@ -26,9 +26,9 @@ So the discriminant is positive up to this order, and the two modes do not meet,
 
     |B_{ii} - B_{jj}| - R_{ii} - R_{jj} > 2 \sqrt{(|w| + R_{ij})^2 - (|s| - R_{ij})^2} ,
 
-without the last square where :math:`|s| < R_{ij}`, and without the root where it is of a negative number. Denominators
-are taken no smaller than twice the coupling: where they would be, that pair does not pass the test itself. Between the
-loads, H and B are taken to stay within `Limits.slack` of the straight line.
+without the last square where :math:`|s| < R_{ij}`, and without the root of a negative number. No denominator is taken
+smaller than twice the coupling: a pair with a smaller distance does not pass its own test. Between the loads, H and B
+are taken to stay within `Limits.slack` of the straight line.
 """
 
 from collections.abc import Sequence
@@ -61,7 +61,7 @@ def may_meet(here: Levels, there: Levels, slack: float) -> Indices:
     second += second.T.copy()
     second *= 0.5
     aside = slack * np.abs(there.diagonal - here.diagonal).astype(np.float32)
-    # A coarse test of all, in which the second order is a bound as well, and the sharp one of those that fail.
+    # A coarse test of all pairs, in which the second order is a bound as well; then the sharp test of pairs that fail.
     shift = np.diag(second) + aside
     reach = 2 * (largest + second) + shift
     reach += shift[:, None]
@@ -114,10 +114,11 @@ class PairScreen:
         self._seen: tuple[csr_array, Levels] | None = None
         self._reached: list[Space] = []
 
-    def __call__(self, here: System, there: System, known: Sequence[Space], depth: int) -> Few | None:
-        """The pairs at both loads; None if they are more than `Limits.few`, or one is a pair to within rounding."""
-        planes = self._planes(here.stiffness, there.stiffness, len(known))
-        reached = [*known, *(each for each in self._reached if each.system is here)]
+    def __call__(self, here: System, there: System, growing: Sequence[Space], depth: int) -> Few | None:
+        """The pairs at both loads; None if they are more than `Limits.few_pairs`, or one is a pair to within
+        rounding."""
+        planes = self._planes(here.stiffness, there.stiffness, len(growing))
+        reached = [*growing, *(each for each in self._reached if each.system is here)]
         self._reached = []
         pairs: list[tuple[Space, Space]] = []
         for plane in planes or []:
@@ -134,15 +135,15 @@ class PairScreen:
         self._reached = [above for _, above in pairs]
         return Few(pairs, len(pairs))
 
-    def _planes(self, here: csr_array, there: csr_array, known: int) -> list[Floats] | None:
+    def _planes(self, here: csr_array, there: csr_array, complex_pairs: int) -> list[Floats] | None:
         """Orthonormal bases of the pairs, shape (n, 2); None if they are too many, or if the coordinates change.
 
-        The basis is renewed where it names more pairs than those that are known to be complex.
+        The basis is renewed where it names more pairs than those that are complex_pairs to be complex.
         """
-        if known > self.limits.few:
+        if complex_pairs > self.limits.few_pairs:
             return None
         found = None if self._basis is None else self._look(self._basis, here, there)
-        if (found is None or len(found) > known) and self._base is not here:
+        if (found is None or len(found) > complex_pairs) and self._base is not here:
             self._base, self._basis, self._seen = here, Basis.of(here, self.limits), None
             found = self._look(self._basis, here, there)
         return found
@@ -156,4 +157,4 @@ class PairScreen:
         after = basis.change(before, there - here)
         self._seen = there, after
         pairs = may_meet(before, after, self.limits.slack)
-        return [basis.lift(pair) for pair in pairs] if len(pairs) <= self.limits.few else None
+        return [basis.lift(pair) for pair in pairs] if len(pairs) <= self.limits.few_pairs else None

@@ -6,17 +6,17 @@ far to the left. So the imaginary axis is covered by discs, from zero to the lar
 of them Arnoldi's iteration with :math:`(Z - \sigma)^{-1}` finds the eigenvalues next to the middle :math:`\sigma`. A
 disc reaches as far as these have converged.
 
-**What is covered** is the whole right half-plane. With :math:`s = p + i \omega` the imaginary part of
-:math:`x^H (s^2 + s G + A) x = 0` says that 2 p is no more than the largest eigenvalue of :math:`-G - i A_a / \omega`,
-with the antisymmetric part of A: it falls with :math:`\omega`, as G takes energy. And the real part says that
-:math:`p^2` is no more than :math:`\omega^2` less the lowest eigenvalue of the symmetric part. With both, and
-:math:`\beta` for the largest eigenvalue of :math:`i A_a`, :math:`\omega^2 \le \max x^H A_s x + \beta^2/4\omega^2`: the
-axis is covered up to there. Where the discs on the axis do not reach as far to the right, rectangles are covered with
-further discs, and halved as long as a disc does not hold one of them. Both bounds are Lanczos's, taken larger by as
-much as they may be wrong.
+**The whole right half-plane is covered.** Let :math:`s = p + i \omega`. The imaginary part of
+:math:`x^H (s^2 + s G + A) x = 0` says that 2 p is at most the largest eigenvalue of :math:`-G - i A_a / \omega`, with
+the antisymmetric part of A; this bound falls with :math:`\omega`, as G takes energy. The real part says that
+:math:`p^2` is at most :math:`\omega^2` less the lowest eigenvalue of the symmetric part. Both together, with
+:math:`\beta` the largest eigenvalue of :math:`i A_a`, give :math:`\omega^2 \le \max x^H A_s x + \beta^2/4\omega^2`: the
+axis is covered up to this frequency. Where the discs on the axis do not reach as far to the right as the bounds,
+rectangles are covered with further discs, and halved until a disc contains each. Lanczos's iteration computes both
+bounds, and they are enlarged by its error.
 
 A disc costs one sparse factorisation and `Limits.krylov` solutions in single precision, which tell eigenvalues to 1e-3
-of their distance from the middle. Whatever comes as close to the axis as that is solved for in double precision.
+of their distance from the middle. Eigenvalues as close to the axis as this error are solved for in double precision.
 """
 
 from dataclasses import dataclass
@@ -210,11 +210,11 @@ def _cover_axis(scaled: _Scaled) -> tuple[list[Space], list[Rectangle]]:
         middle = covered + LIMITS.next_disc * radius
         reach, more = scaled.look(1j * middle)
         found += more
-        if middle - LIMITS.covered * reach > covered:
+        if middle - LIMITS.covered_share * reach > covered:
             radius = min(reach, 0.8 * radius)
             continue
-        begin, covered, radius = covered, middle + LIMITS.covered * reach, min(reach, 1.0)
-        height, fastest = float(np.sqrt(1 - LIMITS.covered**2) * reach), scaled.fastest_growth(begin, covered)
+        begin, covered, radius = covered, middle + LIMITS.covered_share * reach, min(reach, 1.0)
+        height, fastest = float(np.sqrt(1 - LIMITS.covered_share**2) * reach), scaled.fastest_growth(begin, covered)
         if height < fastest:
             beside.append((complex(height, begin), complex(fastest, covered)))
     return found, beside
@@ -223,7 +223,7 @@ def _cover_axis(scaled: _Scaled) -> tuple[list[Space], list[Rectangle]]:
 def _solve(system: System, x: Complexes, s: complex, distance: float) -> list[Space]:
     """The mode of a nearly known eigenvalue; if the iteration strays, the growing modes next to the eigenvalue."""
     mode = Space.of(system, x, x.conj(), s).refine(s)
-    if mode is not None and abs(mode.mean - s) < LIMITS.strayed * distance:
+    if mode is not None and abs(mode.mean - s) < LIMITS.stray_share * distance:
         return [mode]
     try:
         return find_growing_near(system, s, 1)
@@ -236,8 +236,8 @@ def _largest_eigenvalue(matrix: csr_array) -> float:
     if matrix.shape[0] < 3:
         return float(np.linalg.eigvalsh(matrix.toarray())[-1])
     start = np.random.default_rng(0).standard_normal(matrix.shape[0]).astype(matrix.dtype)
-    largest = eigsh(matrix, k=1, which="LA", v0=start, tol=LIMITS.norm, return_eigenvectors=False)[0]
-    return float((1 + LIMITS.norm) * largest)
+    largest = eigsh(matrix, k=1, which="LA", v0=start, tol=LIMITS.norm_error, return_eigenvectors=False)[0]
+    return float((1 + LIMITS.norm_error) * largest)
 
 
 def _factors(matrix: csc_array) -> Factors:

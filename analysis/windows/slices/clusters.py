@@ -7,9 +7,9 @@ whose windows the search of small packings finds. What clusters announce is conf
 has the same digits as in the search among all modes.
 
 **Where the clusters are wrong.** Between two loads the projected system is taken to be a straight line, which it is not
-where contacts open, close or slide. What the system has instead shows it: the announced motion is not there, cannot be
-followed, or begins to grow elsewhere. The increment is then divided. What is in doubt even in the finest parts is
-handed out with the result. Elsewhere the onsets of clusters were within a tenth of an increment of the confirmed ones
+where contacts open, close or slide. The system itself then contradicts the clusters: the announced motion is not there,
+cannot be followed, or begins to grow elsewhere. The increment is divided. The finest parts that are still in doubt are
+named with the result. Elsewhere the onsets of clusters were within a tenth of an increment of the confirmed ones
 (packings of 1,000 disks, increments of 1e-3).
 """
 
@@ -92,12 +92,12 @@ class SliceSearch(ABC):
 
     def ahead(self, done: int) -> int:
         """Increments that are looked at while bases that are not kept pass by, after so many others."""
-        return self.limits.ahead
+        return self.limits.increments_ahead
 
     def along(self, loads: Floats) -> None:
         """Walk along a ramp, to the first window or to the last load.
 
-        Loads beyond the one above the onset are not asked for, except those of `Limits.ahead` increments; a
+        Loads beyond the one above the onset are not asked for, except those of `Limits.increments_ahead` increments; a
         NoEquilibriumError at one of them is raised if no window has been found before.
         """
         here = self.at(float(loads[0]))
@@ -149,13 +149,13 @@ class SliceSearch(ABC):
         """Results of the slices of all ranks, in the order of the spectrum; waits for the slices of other searches."""
         first, stop = self.bases.range(places[0].matrices[0])
         while True:
-            known = self._stored_slices(places)
-            fresh = self.ranks.together(partial(self._search_slices, places, known))
-            found = sorted(chain(known.found, *fresh), key=lambda each: each.border.modes)
-            if known.folder is None or sum(each.border.size for each in found) == stop - first:
+            stored = self._stored_slices(places)
+            fresh = self.ranks.together(partial(self._search_slices, places, stored))
+            found = sorted(chain(stored.found, *fresh), key=lambda each: each.border.modes)
+            if stored.folder is None or sum(each.border.size for each in found) == stop - first:
                 return found
             if not any(fresh):
-                time.sleep(self.limits.wait)
+                time.sleep(self.limits.wait_seconds)
 
     def _stored_slices(self, places: Sequence[System]) -> SlicePass:
         """Results that other searches have left; none if bases are kept, since later increments need them."""
@@ -165,18 +165,18 @@ class SliceSearch(ABC):
         folder = pass_folder(self.folder, places, self.bases.range(matrix), self.limits)
         return self.ranks.together(lambda: SlicePass.read(folder) if self.ranks.rank == 0 else NEW_PASS)[0]
 
-    def _search_slices(self, places: Sequence[System], known: SlicePass) -> list[SliceResult]:
-        """Results of this rank's slices, without the slices that are known."""
+    def _search_slices(self, places: Sequence[System], stored: SlicePass) -> list[SliceResult]:
+        """Results of this rank's slices, without the slices that are stored."""
         found: list[SliceResult] = []
         first, stop = self.bases.range(places[0].matrices[0])
-        before = sum(each.size for each in known.borders)
+        before = sum(each.size for each in stored.borders)
         done, wanted = (-(-modes // self.ranks.size) for modes in (before, stop - first))
         failure: FaultgougeError | None = None
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
         report_progress(
-            f"{where}: {f'{before} of {stop - first} modes are known' if known.shifts else 'modes are counted'}"
+            f"{where}: {f'{before} of {stop - first} modes are known' if stored.shifts else 'modes are counted'}"
         )
-        for basis, levels in self.bases.at(places[0].matrices[0], known):
+        for basis, levels in self.bases.at(places[0].matrices[0], stored):
             done += basis.own.stop - basis.own.start
             report_progress(f"{where}: {min(done, wanted)} of {wanted} modes")
             try:
@@ -184,7 +184,7 @@ class SliceSearch(ABC):
             except FaultgougeError as error:
                 failure = failure or error  # it waits: the ranks meet at the end of their bases
                 continue
-            known.keep(found[-1])
+            stored.keep(found[-1])
         if failure is not None:
             raise failure
         return found
@@ -219,7 +219,8 @@ class SliceSearch(ABC):
         if it finds no window.
         """
         here = self.passed[-1]
-        off = 2 * self.limits.reach  # of what clusters locate, in shares of the way or of the increment
+        # error of loads that clusters locate, as a share of the way or of the increment
+        off = 2 * self.limits.cluster_reach
         first: Window | None = None
         lost: Exception | None = None
         doubt = False

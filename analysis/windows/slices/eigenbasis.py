@@ -54,7 +54,7 @@ class Levels:
     def block(self, cluster: ModeCluster) -> Floats:
         """The operator in a cluster, with the second order of the modes outside; 1 / time^2."""
         diagonal = self.diagonal[cluster.modes]
-        # Modes of the margin may lie close to modes outside: what these do is right for the core.
+        # Modes of the margin may lie close to modes outside, whose effect is right for the core.
         core = np.sort(diagonal[cluster.core[0] : cluster.core[1] + 1])
         distance = np.clip(diagonal, core[0], core[-1])[:, None] - self.diagonal
         weight = np.divide(1.0, distance, out=np.zeros_like(distance), where=distance != 0)
@@ -192,41 +192,41 @@ class Bases:
         """Whether there is memory for the bases of all modes that are looked at."""
         first, stop = self.range(matrix)
         limits = self.limits
-        margins = 2 * (limits.margin + limits.beyond) * max(1, round((stop - first) / limits.own))
+        margins = 2 * (limits.margin + limits.modes_beyond) * max(1, round((stop - first) / limits.slice_size))
         return (stop - first + margins) * matrix.shape[0] <= limits.largest_basis
 
-    def at(self, matrix: csr_array, known: SlicePass = NEW_PASS) -> Iterable[tuple[Basis, Levels]]:
+    def at(self, matrix: csr_array, stored: SlicePass = NEW_PASS) -> Iterable[tuple[Basis, Levels]]:
         """The bases and the operator in them; bases of an earlier load as long as the bases of all ranks serve.
 
-        If bases are not kept in memory, the slices that are known already are left out.
+        If bases are not kept in memory, the slices that are stored already are left out.
         """
         serving = self._usable_bases(matrix)
         if serving is not None:
             return serving
-        bases: Iterable[Basis] = self._make_bases(matrix, known)
+        bases: Iterable[Basis] = self._make_bases(matrix, stored)
         if self.keeps(matrix):
             self._kept = []  # its memory is free before that for the next ones is taken
             bases = self._kept = list(bases)
         return ((basis, basis.levels(matrix)) for basis in bases)
 
     def _usable_bases(self, matrix: csr_array) -> list[tuple[Basis, Levels]] | None:
-        """The bases that are kept and the operator in them; None if the bases of all ranks do not serve."""
+        """The stored bases, and the operator in them; None if the bases of some rank do not serve."""
         covering = all(basis.covers(matrix) for basis in self._kept)
-        known = [(basis, basis.levels(matrix)) for basis in self._kept if covering]
-        mine = [each for basis, levels in known for each in basis.mixing(levels)] if covering else [np.inf]
+        kept = [(basis, basis.levels(matrix)) for basis in self._kept if covering]
+        mine = [each for basis, levels in kept for each in basis.mixing(levels)] if covering else [np.inf]
         mixing = [each for one in self.ranks.together(lambda: mine) for each in one]
-        return known if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing else None
+        return kept if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing else None
 
-    def _make_bases(self, matrix: csr_array, known: SlicePass) -> Iterator[Basis]:
+    def _make_bases(self, matrix: csr_array, stored: SlicePass) -> Iterator[Basis]:
         """The bases of slices of the spectrum; a small operator has one, which the first rank makes."""
         limits, active = self.limits, active_coordinates(matrix)
         if len(active) <= limits.one_basis:
-            if self.ranks.rank == 0 and not known.found:
+            if self.ranks.rank == 0 and not stored.found:
                 yield replace(Basis.of(matrix, limits), own=slice(*self.range(matrix)))
             return
         from .lanczos import slices  # with libraries that nothing else needs
 
         inner = matrix[active][:, active]
-        symmetric, margin = csc_array(0.5 * (inner + inner.T)), limits.margin + limits.beyond
-        for part in slices(symmetric, margin, self.range(matrix), limits, ranks=self.ranks, known=known):
+        symmetric, margin = csc_array(0.5 * (inner + inner.T)), limits.margin + limits.modes_beyond
+        for part in slices(symmetric, margin, self.range(matrix), limits, ranks=self.ranks, stored=stored):
             yield Basis(part.first, part.values, part.vectors, part.own, matrix.shape[0], active, limits)

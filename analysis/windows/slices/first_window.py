@@ -23,8 +23,8 @@ def first_window(
     """The first window of a family of large systems, if there is one, and increments before it that are in doubt.
 
     On increments in doubt clusters announce a motion that the system was not seen to have. With strong dashpots, of
-    more than `Limits.axis` coordinates, they are all loads before the window, where clusters may have missed one. The
-    window's end is None where its motion grows at the next load.
+    more than `Limits.axis_coordinates` coordinates, they are all loads before the window, where clusters may have
+    missed one. The window's end is None where its motion grows at the next load.
 
     Parameters
     ----------

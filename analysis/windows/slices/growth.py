@@ -2,20 +2,21 @@
 
 Dissipation and the antisymmetric part couple a mode to its neighbours in the spectrum only. So slices are searched as
 for complex pairs (:mod:`~faultgouge.analysis.windows.slices.pairs`). In the eigenbasis of a slice the modes that may
-grow are named, clusters about them announce where one begins to, and the system itself confirms it
+grow are named, clusters about these announce an onset, and the system itself confirms the onset
 (:mod:`~faultgouge.analysis.windows.screens.growth`).
 
 **Slices that are left out.** In each slice the antisymmetric part may be so many times larger before it can feed any
-motion as much as the motion loses (`Reduced.bears`). As long as it has not grown by `Limits.trusted` of that, a
-slice is not looked at again.
+motion as much as the motion loses (`Reduced.bears`). A slice is looked at again once the antisymmetric part has grown
+by `Limits.bearing_share` of this factor.
 
-**Strong dashpots** couple more modes than a cluster can have, and clusters may miss a motion. From the load on at which
-that is so, all motions that grow are looked for with the operator itself
-(:mod:`~faultgouge.analysis.windows.slices.axis`), at loads whose numbers on the ramp grow by `Limits.stride`. Those
-that grow are followed back to where they begin to, and all are looked for again right below the first onset and at the
-last load of the ramp before, until none grows there. So no other window is open at the first onset, unless increments
-before it are in doubt. A window that opens and ends between two of these loads is not excluded. Of more than
-`Limits.axis` coordinates clusters alone are searched, and all loads before the window are named as in doubt.
+**Strong dashpots** couple more modes than a cluster can have, so that clusters may miss a motion. From the first load
+with such dashpots on, all motions that grow are looked for with the operator itself
+(:mod:`~faultgouge.analysis.windows.slices.axis`), at loads whose numbers on the ramp grow by `Limits.stride`. Motions
+that grow are followed back to their onsets. All growing motions are then looked for once more, right below the first
+onset and at the last load of the ramp before, until none grows there. So no other window is open at the first onset,
+unless increments before it are in doubt. A window that opens and ends between two of these loads is not excluded. Of
+more than `Limits.axis_coordinates` coordinates clusters alone are searched, and all loads before the window are named
+as in doubt.
 """
 
 from collections.abc import Iterator, Sequence
@@ -65,11 +66,11 @@ class SlicedGrowth(SliceSearch):
 
     def _few_enough(self, place: System) -> bool:
         """Whether all motions that grow at a load can be looked for."""
-        return place.stiffness.shape[0] <= self.limits.axis
+        return place.stiffness.shape[0] <= self.limits.axis_coordinates
 
     def ahead(self, done: int) -> int:
         """More and more increments, as dissipation may put off the onset by much; each costs a tenth of the bases."""
-        return min(done + 1, self.limits.most_ahead)
+        return min(done + 1, self.limits.most_increments_ahead)
 
     def first_window(self, loads: Floats) -> tuple[Window | None, Increments]:
         first, doubtful = super().first_window(loads)
@@ -97,7 +98,7 @@ class SlicedGrowth(SliceSearch):
             return [[] for _ in places[1:]]
         first, stop = self.bases.modes or (0, 0)
         if min(self._borne[:first].min(initial=np.inf), self._borne[stop:].min(initial=np.inf)) <= feed:
-            feed *= self.limits.wider
+            feed *= self.limits.bearing_factor
         loud = np.flatnonzero(self._borne <= feed)
         self.bases.narrow((int(loud[0]), int(loud[-1]) + 1))
         self._passing = not self.bases.keeps(places[0].stiffness)
@@ -111,7 +112,7 @@ class SlicedGrowth(SliceSearch):
             return [replace(each, candidates=[[] for _ in places[1:]]) for each in found]
         if self._borne is not None:
             for each in found:
-                self._borne[slice(*each.border.modes)] = self.limits.trusted * each.bears
+                self._borne[slice(*each.border.modes)] = self.limits.bearing_share * each.bears
         return found
 
     def look_at_basis(self, basis: Basis, levels: Levels, places: Sequence[System]) -> SliceResult:
@@ -142,12 +143,12 @@ class SlicedGrowth(SliceSearch):
         UncoveredAxisError, LostPairError
             If the motions of a load cannot be told, or none of those that grow can be followed.
         """
-        known = self.passed[-1].fx
+        quiet = self.passed[-1].fx
         if not self._few_enough(self.passed[-1]):
-            return self.first, (*doubtful, (self.passed[0].fx, known))
+            return self.first, (*doubtful, (self.passed[0].fx, quiet))
         while True:
             done = int(np.searchsorted(loads, self.passed[-1].fx, side="right"))
-            farther = self.limits.stride * int(np.searchsorted(loads, known, side="right"))
+            farther = self.limits.stride * int(np.searchsorted(loads, quiet, side="right"))
             flows = self._pass_loads(loads[done : max(done + 1, farther)])
             growing = self._all_growing(self.passed[-1])
             if growing:
@@ -156,31 +157,31 @@ class SlicedGrowth(SliceSearch):
                 raise flows
             if self.passed[-1].fx >= loads[-1]:
                 return None, doubtful
-            known = self.passed[-1].fx
-        first = self._earliest_of(growing, None, known)
+            quiet = self.passed[-1].fx
+        first = self._earliest_of(growing, None, quiet)
         while first is not None:
-            earlier = self._earlier_than(first, known)
+            earlier = self._earlier_than(first, quiet)
             if earlier is first:  # nothing that grows there was followed back: the increments are named as in doubt
                 break
             first = earlier
         return first, (*doubtful, *self.doubtful)
 
-    def _earlier_than(self, first: Window, known: float) -> Window:
+    def _earlier_than(self, first: Window, quiet: float) -> Window:
         """A window that opens before the first one so far, by motions that grow where this one opens; else the same.
 
         They are looked for right below its onset and, if none is followed back from there, at the last load before.
         """
-        below = [each for each in self.passed if known < each.fx < first.fx_onset]
-        beside = first.fx_onset - max(self.limits.below_onset * (first.fx_onset - known), 10 * first.error)
+        below = [each for each in self.passed if quiet < each.fx < first.fx_onset]
+        beside = first.fx_onset - max(self.limits.below_onset * (first.fx_onset - quiet), 10 * first.error)
         places = []
-        if beside > known:
+        if beside > quiet:
             try:
                 places.append(self.at(beside))
             except NoEquilibriumError:  # nobody has looked there
-                self.doubtful.append((known, first.fx_onset))
+                self.doubtful.append((quiet, first.fx_onset))
         for place in [*places, *below[-1:]]:
             growing = self._all_growing(place)
-            earlier = self._earliest_of(growing, first, known) if growing else first
+            earlier = self._earliest_of(growing, first, quiet) if growing else first
             if earlier is not None and earlier is not first:
                 return earlier
         return first
@@ -199,8 +200,9 @@ class SlicedGrowth(SliceSearch):
         report_progress(f"all motions that grow at F_x = {place.fx:.6g}, as the dashpots couple many modes")
         return sorted(growing_modes(place), key=lambda mode: -mode.mean.real)
 
-    def _earliest_of(self, growing: list[Space], first: Window | None, known: float) -> Window | None:
-        """The first window, once all motions that grow at a load are followed back; at the load `known` none grows."""
+    def _earliest_of(self, growing: list[Space], first: Window | None, quiet: float) -> Window | None:
+        """The first window, once all motions that grow at a load are followed back; no motion grows at the load
+        `quiet`."""
         below = [each for each in self.passed if each.fx < growing[0].fx]
         lost: FaultgougeError | None = None
         for mode in growing:
@@ -210,7 +212,7 @@ class SlicedGrowth(SliceSearch):
                     first = window if first is None or window.fx_onset < first.fx_onset else first
             except (LostPairError, NoEquilibriumError) as error:
                 lost = error
-                self.doubtful.append((known, mode.fx))
+                self.doubtful.append((quiet, mode.fx))
         if first is None and lost is not None:
             raise lost
         return first
@@ -237,7 +239,9 @@ class SlicedGrowth(SliceSearch):
         """
         try:
             for place in places:
-                growing = find_growing_near(place, rate if rate.imag == 0 else 1j * rate.imag, self.limits.nearest)
+                growing = find_growing_near(
+                    place, rate if rate.imag == 0 else 1j * rate.imag, self.limits.nearest_modes
+                )
                 if growing:
                     return min(growing, key=lambda each: abs(each.mean - rate))
         except ArpackError as error:
@@ -250,19 +254,19 @@ class SlicedGrowth(SliceSearch):
         try:
             ends = [follow_to(mode, place, self.limits) for place in (here, there)]
             at = track(self.at, {each.fx: each for each in (mode, *ends)}, self.limits)
-            known = {each.fx: each for each in (mode, *ends)}
-            if len(known) < 3:
+            modes = {each.fx: each for each in (mode, *ends)}
+            if len(modes) < 3:
                 middle = 0.5 * (here.fx + there.fx)
-                known[middle] = at(middle)
+                modes[middle] = at(middle)
             for _ in range(self.limits.places):
-                best = max(known.values(), key=lambda each: each.mean.real)
+                best = max(modes.values(), key=lambda each: each.mean.real)
                 if best.grows:
                     return best
-                fx = parabola_vertex(sorted(known.values(), key=lambda each: abs(each.fx - best.fx))[:3])
+                fx = parabola_vertex(sorted(modes.values(), key=lambda each: abs(each.fx - best.fx))[:3])
                 fx = float(np.clip(fx, here.fx, there.fx))
-                if min(abs(fx - load) for load in known) < self.limits.settled * (there.fx - here.fx):
+                if min(abs(fx - load) for load in modes) < self.limits.place_tolerance * (there.fx - here.fx):
                     return None
-                known[fx] = at(fx)
+                modes[fx] = at(fx)
         except LostPairError as error:  # nothing is lost but what a cluster has announced
             raise DoubtError from error
         raise DoubtError
@@ -274,7 +278,7 @@ def antisymmetric(place: System) -> float:
 
 
 def find_growing(cluster: Cluster, limits: Limits = LIMITS) -> Iterator[Candidate]:
-    """The modes of a cluster that begin to grow, and those that nearly do so at its upper load."""
+    """Modes of a cluster that begin to grow, and modes that nearly grow at its upper load."""
     below, above = cluster.loads
     search = cluster.search(limits)
     for window in search.windows:

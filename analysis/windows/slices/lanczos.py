@@ -9,11 +9,10 @@ serves the slice, and slices know nothing of each other, so that threads share t
 
 **That none is missing** is known from *Sylvester's law of inertia*: in :math:`S - \sigma = L D L^T` the negative pivots
 are as many as there are eigenvalues below :math:`\sigma`. So every eigenvalue of a slice has its number in the whole
-spectrum. Where two slices meet both must give the same eigenvalue the same number.
+spectrum. Two slices that meet must give the same eigenvalue the same number.
 
-Several ranks count together, and each finds a run of neighbouring slices
-(:mod:`~faultgouge.analysis.windows.slices.ranks`) of those that no other search has found or taken
-(:mod:`~faultgouge.analysis.windows.slices.store`).
+Several ranks count together (:mod:`~faultgouge.analysis.windows.slices.ranks`). Each then finds a run of neighbouring
+slices that no other search has found or taken (:mod:`~faultgouge.analysis.windows.slices.store`).
 """
 
 from collections import deque
@@ -47,7 +46,7 @@ def slices(
     limits: Limits = LIMITS,
     factorise: Callable[[csc_array, float], Factorization] | None = None,
     ranks: Ranks = ALONE,
-    known: SlicePass = NEW_PASS,
+    stored: SlicePass = NEW_PASS,
 ) -> Iterator[Slice]:
     """Eigenvalues and eigenvectors of a symmetric matrix, slice by slice in the order of the spectrum.
 
@@ -64,7 +63,7 @@ def slices(
     ranks : Ranks
         Who shares the slices; those of this rank are found. Its threads are also the slices at the most that are under
         way beyond the one that is asked for. All ranks must come to the end of their slices.
-    known : SlicePass
+    stored : SlicePass
         The slices in it are left out, and those that another search takes. The shifts are taken from it; if it has
         none, the first rank keeps them there.
 
@@ -77,14 +76,14 @@ def slices(
     mine: list[Border] = []
     failure: FaultgougeError | None = None
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(ranks.workers) as pool:
-        shifts = known.shifts or spectrum.shifts(pool, *(modes or (0, matrix.shape[0])))
-        if ranks.rank == 0 and not known.shifts:
-            known.keep_shifts(shifts)
-        found = {each.modes for each in known.borders}
+        shifts = stored.shifts or spectrum.shifts(pool, *(modes or (0, matrix.shape[0])))
+        if ranks.rank == 0 and not stored.shifts:
+            stored.keep_shifts(shifts)
+        found = {each.modes for each in stored.borders}
         wanted = [each for each in shifts if each[1] not in found]
         own = wanted[ranks.part(len(wanted))]
         try:
-            with known.lock_slices() as take:
+            with stored.lock_slices() as take:
                 for part in _in_turn(pool, ranks.workers, spectrum, own, margin, take):
                     mine.append(part.border)
                     _compare_slices(*mine[-2:])
@@ -97,7 +96,7 @@ def slices(
             raise failure
         return mine
 
-    _compare_slices(*sorted(chain(known.borders, *ranks.together(borders))))
+    _compare_slices(*sorted(chain(stored.borders, *ranks.together(borders))))
 
 
 def _in_turn(
@@ -146,8 +145,10 @@ class _Spectrum:
 
     def shifts(self, pool: ThreadPoolExecutor, first: int, stop: int) -> list[Shift]:
         """The shifts of all slices from eigenvalue number `first` on, and before eigenvalue number `stop`."""
-        places, numbers = count_places(self.matrix, partial(self.count_below, pool), (first, stop), self.limits.coarse)
-        pieces = max(1, round((stop - first) / self.limits.own))
+        places, numbers = count_places(
+            self.matrix, partial(self.count_below, pool), (first, stop), self.limits.count_spacing
+        )
+        pieces = max(1, round((stop - first) / self.limits.slice_size))
         ends = first + np.arange(pieces + 1) * (stop - first) // pieces
         borders = places_of_numbers(places, numbers, ends)
         middles = 0.5 * (borders[:-1] + borders[1:])
@@ -171,7 +172,9 @@ class _Spectrum:
             if ends[0] >= 0 and ends[1] <= len(values):
                 inner = slice(*ends)
                 spacing = np.ptp(values[inner]) / (ends[1] - ends[0])
-                if np.all(residuals[order[inner]] <= self.limits.accurate * spacing * inverse[order[inner]] ** 2):
+                if np.all(
+                    residuals[order[inner]] <= self.limits.vector_residual * spacing * inverse[order[inner]] ** 2
+                ):
                     break
             krylov.extend(self.limits.looks)
         kept = slice(max(0, own[0] - first - margin), min(len(values), own[1] - first + margin))
@@ -199,7 +202,7 @@ class _Spectrum:
         for rows in self.limits.chunks(len(vectors)):
             quotients += np.einsum("ij,ij->j", vectors[rows], self.given[rows] @ vectors)
         worst = int(np.argmax(np.abs(quotients - values)))
-        if abs(quotients[worst] - values[worst]) > self.limits.accurate * part.border.spacing:
+        if abs(quotients[worst] - values[worst]) > self.limits.vector_residual * part.border.spacing:
             number = part.first + part.own.start + worst
             raise SliceError(
                 f"the eigenvalue of number {number} is {values[worst]:.10g} from the factors and "
@@ -226,7 +229,8 @@ class _Krylov:
         self.basis[:block] = qr(start.T, mode="economic")[0].T
         self.next = np.zeros((block, block))
         self.used = self.firm = block  # vectors, and those of them that are orthogonal to all others
-        self.together = limits.together  # blocks that settle at a time; 0: each is orthogonal to all before it at once
+        # blocks that are made orthogonal at a time; 0: each is orthogonal to all before it at once
+        self.together = limits.blocks_together
 
     def extend(self, blocks: int) -> None:
         """So many blocks more, each orthogonal to all before it."""

@@ -40,7 +40,7 @@ class SlicedPairs(SliceSearch):
 
     def _announce_pairs(self, basis: Basis, here: Reached, there: Reached) -> Iterator[Candidate]:
         """The pairs of a basis that turn complex in their clusters."""
-        named = may_meet(here[1], here[1].beyond(there[1], 1 + self.limits.reach), self.limits.slack)
+        named = may_meet(here[1], here[1].beyond(there[1], 1 + self.limits.cluster_reach), self.limits.slack)
         for cluster in basis.clusters:
             first, last = (cluster.modes.start + end for end in cluster.core)
             if np.any((named >= first) & (named <= last)):
@@ -51,15 +51,15 @@ class SlicedPairs(SliceSearch):
         increment = there[0] - here[0]
         before, after = (levels.block(cluster) for _, levels in (here, there))
         if len(before) < len(basis.active):
-            before, after = (_with_larger_feed(block, self.limits.excess) for block in (before, after))
+            before, after = (_with_larger_feed(block, self.limits.coupling_excess) for block in (before, after))
 
         def small(fx: float) -> System:
             share = (fx - here[0]) / increment
             return System(fx, csr_array((1 - share) * before + share * after))
 
-        limits = replace(self.limits, root=self.limits.cluster)
-        last = there[0] + self.limits.reach * increment
-        narrowest, screen = limits.finest * increment, PairScreen(limits)
+        limits = replace(self.limits, root_width=self.limits.increment_window)
+        last = there[0] + self.limits.cluster_reach * increment
+        narrowest, screen = limits.cluster_window * increment, PairScreen(limits)
         *_, (_, windows) = windows_along(small, np.array([here[0], last]), narrowest, screen, limits=limits)
         for window in windows:
             end = last if window.fx_end is None else window.fx_end
@@ -84,12 +84,12 @@ class SlicedPairs(SliceSearch):
             raise DoubtError
         here = self.passed[-1]
         try:
-            known = [pair, *(follow_to(pair, each, self.limits) for each in (here, there) if each.fx != pair.fx)]
-            inside = next((each for each in known if each.grows), None)
+            images = [pair, *(follow_to(pair, each, self.limits) for each in (here, there) if each.fx != pair.fx)]
+            inside = next((each for each in images if each.grows), None)
             if inside is not None:
                 return inside
-            narrowest = self.limits.finest * (there.fx - here.fx)
-            found = other_growth(self.at, [[each] for each in known], narrowest, limits=self.limits)
+            narrowest = self.limits.cluster_window * (there.fx - here.fx)
+            found = other_growth(self.at, [[each] for each in images], narrowest, limits=self.limits)
             return None if found is None else found[0]
         except LostPairError as error:
             raise DoubtError from error

@@ -1,8 +1,8 @@
 """The processes that search together: each has the operator, and looks at its own slices of the spectrum.
 
-What takes time is the eigenvectors of slices, and slices need nothing of each other. So each rank finds those of its
-share, and hands the others the pairs that may turn complex. All ranks do the rest alike, in step: no rank has the
-vectors of another, and the result is that of one process to the bit.
+The eigenvectors of slices take most of the time, and one slice needs nothing of another. So each rank finds the
+eigenvectors of its own slices, and hands the pairs that may turn complex to the other ranks. All ranks do the rest
+alike and in step. No rank has the vectors of another, and the result is that of one process to the bit.
 """
 
 import os

@@ -1,12 +1,12 @@
 """Results of a search in the slices of a spectrum, and the folder that keeps them.
 
 A *pass* goes through all slices of the spectrum, for a few neighbouring loads. A slice of 100,000 disks takes 13 s, and
-leaves little: the pairs that may turn complex, and the eigenvalues that neighbouring slices must agree on. So each
-slice has a file, which the rank that has searched the slice writes in one step; and a search that was cut off goes on.
-Several searches may share a folder: each takes what no other has taken.
+its result is small: the pairs that may turn complex, and the eigenvalues that neighbouring slices must agree on. So the
+rank that has searched a slice writes one file for the slice, in one step, and a search that was cut off goes on from
+these files. Several searches may share a folder: each takes slices that no other has taken.
 
-The folder of a pass is named by a checksum of the loads, of the operators there, of the modes and of the limits, and of
-the version of this program. What was found for another packing, or by another version, is not taken for this one.
+The name of a pass's folder is a checksum of the loads, the operators there, the modes, the limits, and the version of
+this program, so that results of another packing or version are never used.
 """
 
 import errno

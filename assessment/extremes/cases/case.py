@@ -54,7 +54,7 @@ class Case:
     quick: bool = False
 
     def outcome(self) -> Outcome:
-        """Run it; whatever goes wrong is a failure of this case alone, unless the ranks have lost each other."""
+        """Run the case. Any error is a failure of this case alone, unless the ranks have lost each other."""
         try:
             return self.run()
         except Exception as error:

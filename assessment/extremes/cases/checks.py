@@ -1,13 +1,13 @@
 r"""Criteria that several cases share.
 
-**Balance.** Newton's method ends where the force on a disk no longer falls; what is left must be within ten times the
-estimate of what the rounding of coordinates leaves, or it is no equilibrium (`pywrap.quasistatic`).
+**Balance.** Newton's method ends where the force on a disk no longer falls. In an equilibrium this force is at most ten
+times the estimated effect of the rounding of coordinates (`pywrap.equilibria.quasistatic`).
 
 **Derivative.** Along a random direction q the forces of LAMMPS, slips advanced on the way, have the derivative -K q.
 Central differences of widths h and h/2 are extrapolated, since f'' jumps at s = 0 and at Coulomb's bound. h is far
-below every overlap and every slip limit, and coordinates are compensated; what is left is the rounding of net forces,
-u F against a change k h, and the curvature of the law, :math:`(h/\delta)^2`. The slips are put in every state, at the
-bound as well; the packing need not be in balance.
+below every overlap and every slip limit, and coordinates are compensated; what is left is the rounding of net forces, u
+F against a change k h, and the curvature of the law, :math:`(h/\delta)^2`. Slips have all states, also at the bound;
+the packing need not be in balance.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ FLOORS = 10.0
 """Newton's own limit, in units of the rounding floor."""
 
 DIRECTIONS = 4
+"""Random directions of a derivative: each has all coordinates."""
 
 SLIP_SHARES = (0.1, -0.4, 1.0, 0.02, -0.99, 0.7, -1.0)
 """Slips at which K is examined, in units of their limits."""

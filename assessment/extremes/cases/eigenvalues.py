@@ -37,12 +37,13 @@ from .packings import bed, crystal, law, shear_packing, with_rattlers
 GROUP = "eigenvalues"
 
 SIZE, SPLIT = 60, 0.05
+"""Modes of the operator, and d of the hidden block: all other eigenvalues are far from the pair."""
 
 FX_C = 0.021833056408
 """Onset of the reference packing, by an independent code."""
 
 DISTANCES = np.array([1e-4, 1e-6, 1e-8])
-"""Distances from that onset, in units of it."""
+"""Distances from the onset, in units of the onset."""
 
 CURVATURE = 10.0
 """Curvature of D(F_x), relative to its slope over F_x^c; 3.4 was measured."""

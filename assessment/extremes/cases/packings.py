@@ -24,6 +24,7 @@ from ....analysis.packing.packing import Floats
 from ....pywrap import Engine, Equilibrium, Scene, equilibrate, settle
 
 KN = 2e5
+"""Normal stiffness of the paper."""
 LOAD = 1.5e-5
 """F_y in units of k_n times length^(3/2), the paper's."""
 

@@ -24,6 +24,7 @@ from .packings import arches, bed, crystal, law, with_low_parts
 GROUP = "restart in the middle"
 
 STEPS_BETWEEN = 2000
+"""Time steps before and after the restart: contacts slide, open and close in them."""
 
 LARGEST_FORCE = 1e-3
 """Largest force along x, in units of k_n: a layer that nothing holds would soon cross its radius in one step."""

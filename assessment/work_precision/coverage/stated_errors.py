@@ -28,7 +28,7 @@ from ....pywrap.runs.path_error import PathErrors, with_path_error
 from ....pywrap.runs.ramp_loads import ramp_loads
 from ....pywrap.runs.scene_path import scene_path
 
-Kind = Literal["undamped", "damped"]
+Dissipation = Literal["undamped", "damped"]
 
 REFINEMENT = 20
 """How many times smaller the increments of the ramp are on which the true onset is found."""
@@ -76,7 +76,7 @@ class CoverageCase:
         Whether the scene was drawn after the rule for the stated error was chosen.
     """
 
-    kind: Kind
+    kind: Dissipation
     number: int
     disks: int
     mu: float

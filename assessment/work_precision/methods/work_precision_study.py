@@ -228,7 +228,8 @@ def best_of(points: Iterable[Point]) -> dict[str, Point]:
 
 
 def compensate(equilibrium: Equilibrium) -> Equilibrium:
-    """The same equilibrium, its coordinates with low parts and its forces balanced to the floor of that arithmetic."""
+    """The same equilibrium in compensated arithmetic: coordinates with low parts, and forces balanced to its rounding
+    floor."""
     packing = replace(equilibrium.packing, position_low=np.zeros_like(equilibrium.packing.position))
     with Engine(packing) as engine:
         return equilibrate(engine, replace(equilibrium, packing=packing), packing.fx)

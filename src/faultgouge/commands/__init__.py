@@ -15,7 +15,7 @@ import typer
 
 from .on_demand import CommandGroup, CommandsByName
 
-FAMILIES = ("runs", "drive", "spectrum", "onset", "pictures", "exchange", "studies", "sweeps")
+FAMILIES = ("runs", "drive", "spectrum", "onset", "pictures", "import_command", "export_command", "studies", "sweeps")
 """Modules with commands."""
 
 

@@ -1,4 +1,4 @@
-"""A spring draws the upper layer, which sticks and slips: drive."""
+"""The command drive: a spring draws the upper layer, which sticks and slips."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = Fa
     The packing settles at F_x = 0; then the spring of [drive] draws, with the dashpots
     of [damping]. The file contains the force on each disk of the layer, the displacement
     and the mean height of the layer and the kinetic energy over time, and states at
-    intervals and before and after each slip, which spectrum and draw take by --frame.
+    intervals and at both ends of each slip, which spectrum and draw take by --frame.
     The slips are also written as a table beside the file, with the suffix .csv.
     """
     from faultgouge.pywrap.scenes.validation import require_section
@@ -80,8 +80,8 @@ def _run(
     The files of other scenes, which differ in the signal, begin where the signal does.
     """
     from faultgouge.pywrap import Equilibrium
-    from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
     from faultgouge.pywrap.runs.drive_recorder import DriveRecord
+    from faultgouge.pywrap.runs.drive_setup import check_drive, settle_for_drive
 
     with DriveRecord(output, scene, saved=keeps) as record:
         if record.last is None:
@@ -93,11 +93,11 @@ def _run(
             record.append(Equilibrium.of(start))
         assert record.last is not None
         with status(what) as show:
-            slips = 0
+            slips = record.slips
             for step in record.drive(others):
                 slips += step.slip is not None
                 sample = step.sample
-                show(f"{what}: t = {sample.time:.4g}, F = {sample.force:.3g}, {slips} slips")
+                show(f"{what}: t = {sample.time:.4g}, F = {sample.force:.3g}, {slips} slip{'s' * (slips != 1)}")
         record.finish()
         return record.last.packing
 
@@ -150,7 +150,7 @@ def _advance_in_words(result: dict[str, Any]) -> str:
 
 
 def _result(path: Path, scene: Scene) -> dict[str, Any]:
-    """What a drive.h5 says, for JSON."""
+    """The content of a drive.h5 for JSON."""
     import numpy as np
 
     from faultgouge.analysis import RunFile

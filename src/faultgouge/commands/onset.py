@@ -1,4 +1,4 @@
-"""The load at which a layer becomes unstable: onset."""
+"""The command onset: the load at which a layer becomes unstable."""
 
 from __future__ import annotations
 
@@ -91,6 +91,7 @@ def onset(
     with status("settling") as show, show_progress(show, "settling: "):
         bed = shared_bed(wanted)
     found: list[dict[str, Any]] = []
+    failed: Exception | None = None
     for mu in wanted.law.mus:
         try:
             if wanted.damping is not None:
@@ -99,27 +100,27 @@ def onset(
                 found.append(_undamped_onset(part, folder, wanted, mu, bed, not every, tell))
         except (OnsetError, NoEquilibriumError) as error:
             found.append({"mu": mu, "fx_c": None, "no_onset": str(error)} | _only_undamped(mu, error, tell))
-            failed: Exception = error
+            failed = error
             if len(wanted.law.mus) > 1:
                 tell(f"mu = {mu:g}: no onset: {error}")
-                failed = OnsetError(
-                    f"None of the {len(wanted.law.mus)} friction coefficients has an onset on this ramp."
-                )
-    none = all(each["fx_c"] is None for each in found)
-    if none and not any("undamped" in each for each in found):
+    if any(each["fx_c"] is not None for each in found):
+        failed = None
+    elif failed is not None and len(wanted.law.mus) > 1:
+        failed = OnsetError(f"None of the {len(wanted.law.mus)} friction coefficients has an onset on this ramp.")
+    if failed is not None and not any("undamped" in each for each in found):
         raise failed
     tell(f'law of friction: {wanted.law.in_words} (history = "{wanted.law.history}")')
     result = _write_result(output, found)
     if is_root() and folder is not None and not slices:
-        shutil.rmtree(folder, ignore_errors=True)  # the result is there: what is left over does no harm
+        shutil.rmtree(folder, ignore_errors=True)  # the result is there: files left over do no harm
     if as_json:
         print_json(result)
-    if none:
+    if failed is not None:
         raise failed
 
 
 def _only_undamped(mu: float, error: Exception, tell: Tell) -> dict[str, Any]:
-    """What JSON and user are told of a ramp on which motion grows without dissipation alone; nothing of others."""
+    """The JSON of a ramp on which motion grows only without dissipation, told to the user, too; empty for others."""
     from faultgouge.analysis.windows import NoGrowthError
 
     if not isinstance(error, NoGrowthError) or error.undamped is None:
@@ -154,7 +155,7 @@ def _check_all_windows(scene: Scene, modes: tuple[int, int] | None) -> None:
 
 
 def _write_result(output: Path | None, found: list[dict[str, Any]]) -> dict[str, Any]:
-    """The JSON of all friction coefficients, beside that of the first with an onset, written if there is a file."""
+    """The JSON of the first friction coefficient with an onset, and of all, written if there is a file."""
     from faultgouge.analysis.files.atomic_write import write_json
 
     first = next((each for each in found if each["fx_c"] is not None), found[0])
@@ -187,7 +188,7 @@ def _undamped_onset(
     first: bool,
     tell: Tell,
 ) -> dict[str, Any]:
-    """The onset of a scene, as its JSON; and what a user reads of it."""
+    """The onset of a scene as JSON, told to the user in words."""
     from faultgouge.pywrap.onset import onset_run
 
     with status(f"mu = {mu:g}") as show:
@@ -219,7 +220,7 @@ def _damped_onset(
     folder: Path | None,
     before: list[dict[str, Any]],
 ) -> dict[str, Any]:
-    """The onset of a scene with dissipation, as its JSON; and what a user reads of it.
+    """The onset of a scene with dissipation as JSON, told to the user in words.
 
     What is known is written as it comes, beside what is known `before` of other friction coefficients, with the load
     up to which that is all as the key `searched_to`.

@@ -1,4 +1,4 @@
-"""Packings, modes and runs to look at: draw, movie, view."""
+"""The commands draw, movie and view: pictures of packings, modes and runs."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from faultgouge.figures.film import Film
     from faultgouge.figures.mode import ModeShape
 
-    from ..analysis.configuration import HasConfiguration
+    from ..analysis.has_configuration import HasConfiguration
 
 app = typer.Typer()
 
@@ -186,7 +186,7 @@ def movie(
     lock_output(context, output, file)
     if not is_root():
         return
-    from faultgouge.figures.film import ModeFilm
+    from faultgouge.figures.mode_film import ModeFilm
 
     film: Film
     if mode:
@@ -285,7 +285,8 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
     """The run if the file has its trajectory, else its drive or its ramp."""
     from faultgouge.analysis import PackingFileError, RunFile
     from faultgouge.figures.drive import course_of
-    from faultgouge.figures.film import RampFilm, RunFilm, RunMotion
+    from faultgouge.figures.ramp_film import RampFilm
+    from faultgouge.figures.run_film import RunFilm, RunMotion
 
     if file.suffix == ".disks":
         raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")

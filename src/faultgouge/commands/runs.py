@@ -1,4 +1,4 @@
-"""A scene, and from it to run.h5: init, settle, ramp, perturb."""
+"""The commands init, settle, ramp and perturb: a scene, its equilibria and its undamped run."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
 
 @app.command(epilog="Example: faultgouge perturb paper.toml -o run.h5")
 def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson = False) -> None:
-    """Run the undamped dynamics from the equilibrium at perturb.fx, and record D(t).
+    """Run the dynamics from the equilibrium at perturb.fx, and record D(t).
 
     Without perturb.fx the load is just beyond the onset, which is found first; with
     [friction] it is between the onsets of the weakened and of the static friction.
@@ -130,28 +130,18 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
     was long enough. With several friction coefficients, the run uses the first.
     """
     from faultgouge.analysis import RunFile
-    from faultgouge.pywrap import Record, reach
-    from faultgouge.pywrap.onset import load_at_onset
-    from faultgouge.pywrap.runs.ramp import step_of
+    from faultgouge.pywrap import Record
     from faultgouge.pywrap.scenes.validation import require_section
 
     wanted = read_scene(scene, "perturb", "perturb")
     check_output(output, scene, *stored_files(wanted))
-    settings = require_section(wanted.perturb, "perturb")
+    require_section(wanted.perturb, "perturb")
     mus = wanted.law.mus
     if len(mus) > 1:
         say(f"the run uses mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene")
     with Record(output, wanted, task="perturb", saved=keeps) as record:
         if record.last is None:
-            fx = settings.fx
-            if fx is None:
-                fx = load_at_onset(wanted)
-                say(f"the scene has no perturb.fx: the run starts at F_x = {fx:.10g}, chosen by the onset")
-            total = ceil(fx / step_of(wanted) * (1 - 1e-9)) + 1
-            for start in progress(reach(wanted, fx), "equilibria", total):
-                report_fallback(start)
-            _lines(wanted, start)  # refuses what the packing does not allow, before anything is written
-            record.append(start)
+            record.append(_start(wanted))
         assert record.last is not None
         weakening = _weakening(wanted, record)
         run = record.undamped(wanted, record.last, weakening=weakening)
@@ -173,6 +163,24 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
         )
         print(growth.says, flush=True)  # before what follows on standard error
     say(f"written to {output}")
+
+
+def _start(scene: Scene) -> Equilibrium:
+    """The equilibrium at perturb.fx, or just beyond the onset."""
+    from faultgouge.pywrap import reach
+    from faultgouge.pywrap.onset import load_at_onset
+    from faultgouge.pywrap.runs.ramp import step_of
+
+    assert scene.perturb is not None
+    fx = scene.perturb.fx
+    if fx is None:
+        fx = load_at_onset(scene)
+        say(f"the scene has no perturb.fx: the run starts at F_x = {fx:.10g}, chosen by the onset")
+    total = ceil(fx / step_of(scene) * (1 - 1e-9)) + 1
+    for start in progress(reach(scene, fx), "equilibria", total):
+        report_fallback(start)
+    _lines(scene, start)  # refuses what the packing does not allow, before anything is written
+    return start
 
 
 def _lines(scene: Scene, start: Equilibrium) -> int:
@@ -202,7 +210,7 @@ def _weakening(scene: Scene, record: Record) -> Weakening | None:
 
 
 def _hysteresis(path: Path, settings: Ramp) -> Hysteresis | None:
-    """What is left when F_x comes back; None on a ramp without turning points."""
+    """Displacement and work that remain when F_x returns; None on a ramp without turning points."""
     from faultgouge.analysis import RunFile
     from faultgouge.analysis.motion.hysteresis import hysteresis
 

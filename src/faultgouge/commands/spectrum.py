@@ -1,4 +1,4 @@
-"""Whether a packing is stable, and its eigenvalues: spectrum."""
+"""The command spectrum: whether a stored packing is stable, and its eigenvalues."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .terminal import (
 
 if TYPE_CHECKING:
     from ..analysis import Spectrum, Stability
-    from ..analysis.configuration import HasConfiguration
+    from ..analysis.has_configuration import HasConfiguration
 
 app = typer.Typer()
 
@@ -62,8 +62,8 @@ def spectrum(
     contacts at Coulomb's bound as they are, which slide on ahead and stick on the
     way back. The eigenvalues are those of K alone, without dissipation.
     """
-    from faultgouge.analysis import Packing, solid_fraction, stability
     from faultgouge.analysis import spectrum as eigenvalues_of
+    from faultgouge.analysis import stability
     from faultgouge.analysis.progress import show_progress
 
     if values and (gain or rise or verbose):
@@ -74,7 +74,6 @@ def spectrum(
         raise typer.BadParameter(f"--rise: {file} has no upper layer that a load could push; leave it out")
     if not is_root():
         return
-    spring = packing.configuration.spring
     size = packing.configuration.coordinates
     if size > SLOW_COORDINATES:
         # four matrices of doubles; 18000 coordinates took 10.2 GB
@@ -88,33 +87,37 @@ def spectrum(
     gains = _gain_of(packing) if gain else None
     if not as_json:
         _print_spectrum(packing, result, verdict, gains, verbose)
-        if spring:
-            print(f"K has the stiffness of the spring that draws the layer, {spring:g} on each of its disks")
         return
+    print_json(_as_json(packing, result, verdict, gains))
+
+
+def _as_json(
+    packing: HasConfiguration, result: Spectrum, verdict: Stability, gain: dict[str, Any] | None
+) -> dict[str, Any]:
+    """The document that docs/json.md explains."""
+    from faultgouge.analysis import Packing, solid_fraction
+
     names = ("condition", "overlap", "growth_rate", "frequency", "quality", "participation", "rotation")
-    print_json(
-        {
-            "stability": verdict.as_dict(),
-            "eigenvalues": [[value.real, value.imag] for value in result.eigenvalues.tolist()],
-            "pairs": [
-                {"eigenvalue": [pair.eigenvalue.real, pair.eigenvalue.imag]}
-                | {name: getattr(pair, name) for name in names}
-                for pair in result.pairs
-            ],
-            "pair_count": len(result.pairs),
-            "least_q": result.least_q if result.pairs else None,
-            "negative": result.negative.tolist(),
-            "stable": verdict.stable,
-            "largest_growth_rate": result.growth_rate(),
-            "rattlers": result.rattlers.tolist(),
-            "fx": packing.configuration.fx,
-            "spring": spring,
-            "residual": packing.residual,
-            "solid_fraction": solid_fraction(packing) if isinstance(packing, Packing) else None,
-            "noise_pairs": result.noise_pairs,
-            "transient_gain": gains,
-        }
-    )
+    return {
+        "stability": verdict.as_dict(),
+        "eigenvalues": [[value.real, value.imag] for value in result.eigenvalues.tolist()],
+        "pairs": [
+            {"eigenvalue": [pair.eigenvalue.real, pair.eigenvalue.imag]} | {name: getattr(pair, name) for name in names}
+            for pair in result.pairs
+        ],
+        "pair_count": len(result.pairs),
+        "least_q": result.least_q if result.pairs else None,
+        "negative": result.negative.tolist(),
+        "stable": verdict.stable,
+        "largest_growth_rate": result.growth_rate(),
+        "rattlers": result.rattlers.tolist(),
+        "fx": packing.configuration.fx,
+        "spring": packing.configuration.spring,
+        "residual": packing.residual,
+        "solid_fraction": solid_fraction(packing) if isinstance(packing, Packing) else None,
+        "noise_pairs": result.noise_pairs,
+        "transient_gain": gain,
+    }
 
 
 def _values(packing: HasConfiguration, as_json: bool) -> None:
@@ -156,6 +159,8 @@ def _print_spectrum(
                 f"{counted(result.noise_pairs, 'pair')} of eigenvalues with imaginary parts within the rounding error: "
                 "they count as real"
             )
+    if spring := packing.configuration.spring:
+        print(f"K has the stiffness of the spring that draws the layer, {spring:g} on each of its disks")
 
 
 def _print_size(packing: HasConfiguration, result: Spectrum) -> None:

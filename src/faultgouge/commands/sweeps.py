@@ -1,4 +1,4 @@
-"""Many scenes: sweep, merge, and the complex modes over the load."""
+"""The commands sweep, merge and modes: studies of many scenes."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON."
 
 
 def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
-    """What a command reads of a scene, a TOML file; a task that would never end is refused."""
+    """The part of a scene file that a command reads; a task that would never end is refused."""
     from faultgouge.pywrap.scenes.impossible import refuse_endless
     from faultgouge.pywrap.scenes.scene import Scene
 
@@ -207,7 +207,8 @@ def print_json(value: dict[str, Any]) -> None:
 
 
 def print_line(result: str) -> None:
-    """A line of the result on standard output, for people; `print_json` is for programs, and goes instead of it."""
+    """Print a line of the result for people, on standard output; `print_json` prints the result for programs
+    instead."""
     if is_root():
         print(result, flush=True)  # before what follows on standard error
 
@@ -229,7 +230,7 @@ def report_fallback(equilibrium: Equilibrium) -> None:
 
 @contextmanager
 def status(what: str) -> Iterator[Callable[[str], None]]:
-    """A line on a terminal while something is under way; what is yielded replaces its text.
+    """A line on a terminal while work is under way; the function that is yielded replaces the text of the line.
 
     Off a terminal it is a line of the log, every minute. A thread says it: work may be within one call for longer.
     """
@@ -289,7 +290,7 @@ def progress(items: Iterable[T], what: str, total: int | None = None, done: int 
 
 
 def table_of(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """A table as lines of text, whose columns are as wide as what is in them."""
+    """A table as lines of text; a column is as wide as its widest entry."""
     lines = [list(headings), *map(list, rows)]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join("   ".join(map(str.ljust, line, widths)).rstrip() for line in lines)

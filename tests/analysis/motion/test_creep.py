@@ -7,7 +7,7 @@ from linearised import dissipative
 from faultgouge.analysis import stability
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.motion import creep
-from faultgouge.analysis.motion.creep import STILL_TO_COME, follow_creep
+from faultgouge.analysis.motion.creep import REMAINING_SHARE, follow_creep
 from faultgouge.analysis.motion.one_sided import OneSidedSystem
 
 
@@ -27,6 +27,7 @@ def wearing(reference_packing):
     return make
 
 
+@pytest.mark.long
 def test_strong_dashpots_end_it(wearing):
     """It settles, and a longer time adds next to nothing."""
     here = wearing(0.5, 600.0)
@@ -35,11 +36,11 @@ def test_strong_dashpots_end_it(wearing):
     assert "and they stay displaced" in str(told)
     assert "may reach" not in str(told)
     longer = stability(here, time=1.5 * told.creep.time).creep
-    assert longer.amplification == pytest.approx(told.creep.amplification, rel=(1 + STILL_TO_COME) ** 2 - 1)
+    assert longer.amplification == pytest.approx(told.creep.amplification, rel=(1 + REMAINING_SHARE) ** 2 - 1)
 
 
 def test_weak_dashpots_leave_a_limit_that_holds(wearing, monkeypatch):
-    monkeypatch.setattr(creep, "SPANS", 1)
+    monkeypatch.setattr(creep, "MOST_SPANS", 1)
     here = wearing(0.5, 100.0)
     told = stability(here)
     assert not told.creep.settled

@@ -106,20 +106,25 @@ def test_the_space_of_slow_motions_is_invariant(damped):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damped", [STRONG, pytest.param(WEAKER, marks=pytest.mark.long), WITH_DRAG], indirect=True)
+@pytest.mark.parametrize(
+    "damped", [STRONG, *(pytest.param(each, marks=pytest.mark.long) for each in (WEAKER, WITH_DRAG))], indirect=True
+)
 def test_rates_of_a_packing_beyond_lapack_have_its_slowest_decay(damped, monkeypatch):
     expected = rates_of(Motion.of(damped))
     assert not expected.grows.any()
     assert expected.growth_rate < 0
     monkeypatch.setattr(module, "DENSE_DAMPED", 100)
+    searches, search = [], module.fastest_growing
+    monkeypatch.setattr(module, "fastest_growing", lambda *a, **k: searches.append(k["periods"]) or search(*a, **k))
     found = rates_of(Motion.of(damped))
+    assert searches == [(module.FIRST_SEARCH, module.FIRST_SEARCH)]  # once all decays, a longer one would say less
     assert not found.grows.any()
     assert found.growth_rate == pytest.approx(expected.growth_rate, rel=1e-6)
     assert found.free == expected.free
     assert found.searched == 0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_dashpots_too_weak_for_the_time_leave_a_rate_below_which_growth_may_hide(reference_packing, monkeypatch):
     monkeypatch.setattr(module, "DENSE_DAMPED", 100)
     monkeypatch.setattr(decay_module, "WORK_OF_DECAY", 1e8)

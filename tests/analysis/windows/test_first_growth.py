@@ -154,7 +154,7 @@ def test_where_dashpots_couple_all_modes_what_grows_is_followed_back_to_its_onse
     assert window.kind == "hopf"
     assert fastest(window.fx_onset * (1 - 1e-6)) < 0 < fastest(window.fx_onset * (1 + 1e-6))
     # where all motions are too many to be looked for, all loads before the window are in doubt
-    assert first_window(dashpot_on_all, loads, limits=replace(LIMITS, axis=0))[1] == ((0.5, 0.575),)
+    assert first_window(dashpot_on_all, loads, limits=replace(LIMITS, axis_coordinates=0))[1] == ((0.5, 0.575),)
 
 
 @pytest.mark.long

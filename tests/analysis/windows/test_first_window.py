@@ -78,7 +78,7 @@ def test_load_without_equilibrium_ends_the_search_for_the_first_window(ahead):
 
         return until
 
-    limits = Limits(largest_basis=0, ahead=ahead)
+    limits = Limits(largest_basis=0, increments_ahead=ahead)
     with pytest.raises(NoEquilibriumError, match="no equilibrium"):
         complex_windows(ending(crossing(0.37, 1e-3)), [0.0, 1.0, 2.0])
     with pytest.raises(NoEquilibriumError, match="no equilibrium"):
@@ -95,15 +95,15 @@ def test_the_search_ends_with_the_first_window():
         asked.append(f)
         return crossing(0.0, -0.04)(np.cos(np.pi * f))
 
-    window, _ = searched(operator, [0.0, 1.0, 2.0, 3.0], Limits(largest_basis=0, ahead=3))
+    window, _ = searched(operator, [0.0, 1.0, 2.0, 3.0], Limits(largest_basis=0, increments_ahead=3))
     assert window.fx_end == pytest.approx(np.arccos(-0.2) / np.pi, abs=DIGITS)
     assert {f for f in asked if f > 1.0} == {2.0, 3.0}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_pair_that_cannot_be_followed_is_not_lost_silently():
     """A pair whose planes are never good enough: the parts of the increment that its window touches are named."""
-    window, doubtful = searched(crossing(0.47, -0.04), [0.0, 1.0], Limits(residual=0.0))
+    window, doubtful = searched(crossing(0.47, -0.04), [0.0, 1.0], Limits(residual_factor=0.0))
     assert window is None
     assert [below for below, _ in doubtful] == [k / 16 for k in range(4, 11)]
 
@@ -124,7 +124,7 @@ def test_pair_that_is_announced_and_not_found_is_told_of():
 @pytest.mark.long
 def test_doubtful_increments_come_with_the_onset(path):
     """Couplings so much enlarged that clusters announce pairs that stay real, and nobody looks at these."""
-    limits = Limits(all_windows=50, excess=200.0, dips=0)
+    limits = Limits(all_windows=50, coupling_excess=200.0, dips=0)
     found = find_onset(path, path.grid[20:], limits=limits)
     (below, above), *_ = found.as_dict()["doubtful"]
     assert path.grid[20] <= below < above < found.fx_c

@@ -19,7 +19,7 @@ from faultgouge.analysis.windows.slices.first_window import first_window
 from faultgouge.analysis.windows.slices.lanczos import SliceError
 from faultgouge.analysis.windows.slices.store import Border, Candidate, DamagedSliceError, SlicePass, SliceResult
 
-PASSING = replace(FEW, largest_basis=0, wait=0.1)
+PASSING = replace(FEW, largest_basis=0, wait_seconds=0.1)
 """Slices of 24 modes, in bases that are not kept in memory."""
 
 

@@ -12,7 +12,7 @@ from faultgouge.analysis.factors.inertia import factor_shifted
 from faultgouge.analysis.windows import LIMITS, Limits, Ranks
 from faultgouge.analysis.windows.slices.lanczos import SliceError, slices
 
-FEW = Limits(own=24, coarse=60, first_look=20, one_basis=50)
+FEW = Limits(slice_size=24, count_spacing=60, first_look=20, one_basis=50)
 
 
 def network(size, seed):
@@ -43,7 +43,7 @@ def test_slices_are_the_whole_spectrum(workers):
         spacing = np.ptp(own) / len(own)
         residual = np.linalg.norm(matrix @ vectors - vectors * part.values, axis=0)[part.own]
         overlap = np.linalg.norm(basis[:, count - len(own) : count].T @ vectors[:, part.own], axis=0)
-        assert residual.max() < 10 * LIMITS.accurate * spacing
+        assert residual.max() < 10 * LIMITS.vector_residual * spacing
         np.testing.assert_allclose(overlap, 1.0, atol=1e-3)
     # the residual squared over the distance of the next eigenvalues, which may be a hundredth of the mean one
     np.testing.assert_allclose(np.concatenate(values), expected, atol=1e-4 * 8 / 1156)
@@ -59,7 +59,7 @@ def test_part_of_the_spectrum(modes):
         shifts.append(shift)
         return factor_shifted(matrix, shift)
 
-    kinds = {"limits": Limits(coarse=60), "factorise": record_shift}
+    kinds = {"limits": Limits(count_spacing=60), "factorise": record_shift}
     matrix = network(34, 4)
     expected = np.linalg.eigvalsh(matrix.toarray())
     parts = list(slices(matrix, 20, modes=modes, **kinds))

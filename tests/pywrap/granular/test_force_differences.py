@@ -249,7 +249,7 @@ run 20000
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_forces_that_depend_on_all_contacts_of_a_particle(lammps_with):
     """In a die the model mdr has a particle's volume resist: its neighbours feel one another through it."""
     from faultgouge.pywrap import from_lammps

@@ -69,7 +69,9 @@ def look(lmp, log, lines: str = "", run: int = 0, *, prove: bool = True):
             "smd cvel 2.0 1e-9 tether 1.5 1.5 NULL 0.0", "fix trap smd pulls at particles", marks=pytest.mark.long
         ),
         ("rhok 1 0 0 20.0 0.2", "fix trap rhok acts on particles as contacts do not tell"),
-        ("flow/gauss 1 1 0", "fix trap flow/gauss acts on particles as contacts do not tell"),
+        pytest.param(
+            "flow/gauss 1 1 0", "fix trap flow/gauss acts on particles as contacts do not tell", marks=pytest.mark.long
+        ),
         ("momentum 1000 linear 1 1 0", "fix trap momentum changes velocities"),
         ("temp/rescale 1000 1e-20 1e-20 0.0 1.0", "fix trap temp/rescale changes velocities"),
         ("temp/berendsen 1e-20 1e-20 1.0", "fix trap temp/berendsen changes velocities"),

@@ -102,6 +102,30 @@ def test_a_thermostat_is_named(lammps_with):
     assert relax(lmp) < 1e-8
 
 
+@pytest.mark.parametrize(
+    ("pair", "wall", "style"),
+    [
+        ("gran/hooke 1e4 3e3 20 10 0.5 1", "hooke 1e4 3e3 20 10 0.5 1", "gran/hooke"),
+        ("gran/hooke/history 1e4 3e3 20 10 0.5 1", "hooke 1e4 3e3 20 10 0.5 1", "wall/gran hooke"),
+        (
+            "granular\npair_coeff * * hooke 1e4 20 tangential linear_nohistory 10 0.5",
+            "granular hooke 1e4 20 tangential linear_nohistory 10 0.5",
+            "linear_nohistory",
+        ),
+    ],
+)
+def test_friction_that_holds_nothing_is_named(lammps_with, pair, wall, style):
+    """A sphere on a slope: without a tangential spring it creeps."""
+    from faultgouge import relax
+    from faultgouge.analysis import NoEquilibriumError
+
+    deck = BALL.format(z=0.4999, wall=f"fix floor all wall/gran {wall} zplane 0 NULL contacts", more="")
+    deck = deck.replace("pair_style gran/hooke/history 1e4 3e3 20 10 0.5 1", f"pair_style {pair}")
+    lmp = lammps_with(deck.replace("vector 0 0 -1", "vector 0.1 0 -1").replace("pair_coeff * *\n", "", "\n" in pair))
+    with pytest.raises(NoEquilibriumError, match=f"; the friction of {style} opposes velocities alone and bears no"):
+        relax(lmp, steps=10_000)
+
+
 def test_a_packing_so_stiff_that_rounding_moves_it(lammps_with):
     """An overlap of 5e-11 at a coordinate of 4: the rounding of the force is 1e-5 of the weight."""
     from faultgouge import relax

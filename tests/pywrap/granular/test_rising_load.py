@@ -53,7 +53,7 @@ def test_a_load_counts_from_the_rise_that_is_said(bed):
     load[:, 0, :2] += TILT * direction
     found = stability(derive_frozen(here, load=load), rise=direction)
     assert found.at_bound == 0
-    least, drift = found.rising["least_rise"], found.rising["drift"]
+    least, drift = found.rising.least_rise, found.rising.drift
     assert 10 * TILT < least < 20 * TILT
     assert f"from a rise of {least:.1g} on, where residual forces do not count" in str(found)
     assert displaced(lmp, here, least) == pytest.approx(least * drift, rel=0.12)

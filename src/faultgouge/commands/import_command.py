@@ -1,4 +1,4 @@
-"""Packings from and to other codes: import, export."""
+"""The command import: packings of other codes, and decks of LAMMPS, as run.h5."""
 
 from __future__ import annotations
 
@@ -9,19 +9,7 @@ import typer
 
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
-from .pictures import modes_of
-from .terminal import (
-    Frame,
-    PackingFile,
-    counted,
-    lock_output,
-    print_line,
-    progress,
-    say,
-    status,
-    stored_configuration,
-    stored_packing,
-)
+from .terminal import counted, lock_output, print_line, say, status
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
@@ -30,8 +18,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
-
-Source = Annotated[
+SourceFile = Annotated[
     Path,
     typer.Argument(
         metavar="FILE",
@@ -40,7 +27,8 @@ Source = Annotated[
         show_default=False,
     ),
 ]
-Layer = Annotated[
+
+UpperLayer = Annotated[
     str | None,
     typer.Option(
         metavar="LAYER",
@@ -49,12 +37,17 @@ Layer = Annotated[
         "or a region such as 'y>10 and x<5'. By default the upper layer of the file.",
     ),
 ]
-Like = Annotated[Path | None, typer.Option(help="Law, load, damping and inertia of this scene.", show_default=False)]
-Width = Annotated[
+
+LawOfScene = Annotated[
+    Path | None, typer.Option(help="Law, load, damping and inertia of this scene.", show_default=False)
+]
+
+Period = Annotated[
     str | None, typer.Option(metavar="L|open", help="Period along x, or open sides; by default as in the file.")
 ]
-Slips = Annotated[
-    Path | None, typer.Option(help="Slips: CSV with id1, id2 (0: the floor), slip; or a LAMMPS dump local.")
+
+SlipsFile = Annotated[
+    Path | None, typer.Option(help="SlipsFile: CSV with id1, id2 (0: the floor), slip; or a LAMMPS dump local.")
 ]
 
 
@@ -64,10 +57,10 @@ Slips = Annotated[
 )
 def import_(
     context: typer.Context,
-    file: Source,
+    file: SourceFile,
     output: Annotated[Path, typer.Option("-o", "--output", help="The run.h5 to write.")] = Path("packing.h5"),
-    top: Layer = None,
-    scene: Like = None,
+    top: UpperLayer = None,
+    scene: LawOfScene = None,
     kn: Annotated[float | None, typer.Option(help="Normal stiffness, without a scene.", show_default=False)] = None,
     kt: Annotated[str | None, typer.Option(help="Tangential stiffness: a number, or '2/7 kn'.")] = None,
     mu: Annotated[float | None, typer.Option(help="Friction coefficient; 1 by default.", show_default=False)] = None,
@@ -78,8 +71,8 @@ def import_(
     floor: Annotated[
         float, typer.Option(help="y of the floor in the file; the packing is shifted so that the floor is at 0.")
     ] = 0.0,
-    width: Width = None,
-    contacts: Slips = None,
+    width: Period = None,
+    contacts: SlipsFile = None,
     frame: Annotated[
         int | None, typer.Option(help="Number of the frame; negative numbers count from the last.")
     ] = None,
@@ -167,7 +160,7 @@ def _import_deck(file: Path, output: Path, slides: bool, balance: float | None, 
 
 
 def _verdict(configuration: Configuration, output: Path) -> str:
-    """What `spectrum` says first of the packing, for those whose spectrum takes seconds."""
+    """The verdict of `spectrum`, if the packing's spectrum takes seconds."""
     from faultgouge.analysis import stability
     from faultgouge.analysis.motion.stability import LARGE
     from faultgouge.analysis.progress import show_progress
@@ -180,7 +173,7 @@ def _verdict(configuration: Configuration, output: Path) -> str:
 
 
 def _time_steps(configuration: Configuration) -> str:
-    """The largest stable time step beside the one that the speed of Rayleigh's wave would give."""
+    """The largest stable time step beside the time step by the speed of Rayleigh's wave."""
     from faultgouge.analysis import rayleigh_timestep, stable_timestep
 
     found, usual = stable_timestep(configuration), rayleigh_timestep(configuration)
@@ -189,83 +182,8 @@ def _time_steps(configuration: Configuration) -> str:
     return f"largest stable time step {found:.4g}, {found / usual:.3g} of Rayleigh's formula ({usual:.4g})"
 
 
-@app.command(epilog="Example: faultgouge export run.h5 --mode pair -o packing.vtp")
-def export(
-    context: typer.Context,
-    file: PackingFile,
-    frame: Frame = -1,
-    mode: Annotated[
-        str | None,
-        typer.Option("--mode", metavar="pair|N", help="Also a mode as vectors, as in `faultgouge draw`."),
-    ] = None,
-    frames: Annotated[
-        str | None,
-        typer.Option(
-            "--frames",
-            metavar="all|START:STOP[:STEP]",
-            help="Frames of the undamped run if the file has its trajectory, else of the ramp; .xyz, .gsd or .pvd.",
-        ),
-    ] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="The file: .vtp, .pvd, .xyz, .data or .gsd.")] = Path(
-        "packing.vtp"
-    ),
-) -> None:
-    """Write a stored packing for ParaView (.vtp), OVITO (.xyz), LAMMPS (.data) or HOOMD (.gsd).
-
-    The file contains disks with radii, net forces and mobilised friction; contacts
-    with forces and slips (in .vtp as lines); modes as vectors (not in .data).
-    `faultgouge import` reads .xyz, .data and .gsd back unchanged, to the bit. A .gsd
-    needs pip install 'faultgouge[export]'. With --frames the file is a film of
-    displacements; a .pvd for ParaView comes with a folder of .vtp.
-    """
-    from faultgouge.analysis import Configuration
-    from faultgouge.analysis.files.formats import ModeVectors
-    from faultgouge.analysis.files.formats.configuration_export import check_configuration_writer, export_configuration
-    from faultgouge.analysis.files.formats.registry import check_writer, write_packing
-
-    lock_output(context, output, file)
-    if frames is not None:
-        if mode is not None or frame != -1:
-            raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")
-        _export_frames(file, frames, output)
-        return
-    configuration = stored_configuration(file, frame)
-    if configuration is None:
-        check_writer(output, mode is not None)
-    else:
-        check_configuration_writer(output)
-    packing = configuration or stored_packing(file, frame)
-    if not is_root():
-        return
-    modes = [] if mode is None else modes_of(packing, mode)[0]
-    vectors = [ModeVectors(f"mode_{each.number}", each.eigenvalue, each.displacement) for each in modes]
-    if isinstance(packing, Configuration):
-        words = export_configuration(output, packing, vectors)
-    else:
-        words = f"F_x = {packing.fx:g}: {write_packing(output, packing, vectors)}"
-    print_line(f"{words}; written to {output}")
-
-
-def _export_frames(file: Path, says: str, output: Path) -> None:
-    """The frames of a ramp or of an undamped run."""
-    from faultgouge.analysis import PackingFileError, RunFile
-    from faultgouge.analysis.files.formats.frames import choose_frames, frames_of
-    from faultgouge.analysis.files.formats.registry import check_frames_writer, write_frames
-
-    check_frames_writer(output)
-    if file.suffix == ".disks":
-        raise PackingFileError(f"{file} is one packing: leave --frames out, or give a run.h5.")
-    if not is_root():
-        return
-    with RunFile(file) as run:
-        numbers = choose_frames(run, says)
-        write_frames(output, progress(frames_of(run, numbers), "frames", len(numbers)))
-        what = "an undamped run" if "trajectory" in run.names_of_series else "equilibria"
-    print_line(f"{counted(len(numbers), 'frame')} of {what}; written to {output}")
-
-
 def _place_disks(file: Path, frame: int | None, floor: float, width: str | None, contacts: Path | None) -> Disks:
-    """The disks of the file, with what options say instead of it."""
+    """The disks of the file; options replace numbers of the file."""
     from dataclasses import replace
 
     from faultgouge.analysis.files.formats.csv_json import read_slips
@@ -334,7 +252,7 @@ def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict
 
 
 def _scene(scene: Path | None, values: dict[str, Any], smallest: float) -> Scene:
-    """The scene, or one that says what options and file say; with disks of the smallest radius in place of its own."""
+    """The scene, or a scene made of options and file; its disks have the smallest radius of the packing."""
     from faultgouge.pywrap.scenes.scene import Scene
 
     packing = {"radii": [smallest], "width": 20 * smallest}

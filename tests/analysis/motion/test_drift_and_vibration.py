@@ -1,0 +1,178 @@
+"""Drift and vibration under a load that rises, and how far this motion goes on."""
+
+import json
+from dataclasses import replace
+from itertools import count, islice
+
+import numpy as np
+import pytest
+from quasistatic import moved
+from three_disks import balanced, stuck_at_rest, three_disks
+
+from faultgouge.analysis import (
+    Contacts,
+    MindlinLaw,
+    Packing,
+    stability,
+    stiffness_matrix,
+)
+from faultgouge.analysis.motion import rising_load
+from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
+from faultgouge.analysis.motion.rising_load import DriftAndVibration, RisingMotion, Span, follow_load
+
+RISE = np.tile([1.0, 0.0], (3, 1))
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5])
+def test_what_follows_a_load_that_rises_does_not_vibrate(exponent):
+    """The drift is solved for, and is that of the motion that is followed."""
+    at_rest = stuck_at_rest(cn=2.0, ct=1.0, exponent=exponent)
+    assert np.any(at_rest.contacts.closing != at_rest.contacts.parting) == (exponent == 1.5)
+    rising = stability(at_rest, rise=RISE).rising
+    assert rising.steady
+    assert rising.vibration == 0
+    assert rising.time is None
+    system = OneSidedSystem.of(at_rest)
+    followed = follow_load(system, forces_on_coordinates(at_rest, RISE), 30.0)
+    assert rising.drift == pytest.approx(followed.drift, rel=1e-3)
+    assert rising.next_change == pytest.approx(followed.next_change, rel=1e-2)
+    assert followed.vibration < 1e-2 * rising.drift
+
+
+@pytest.mark.parametrize(("mu", "up", "event"), [(0.5, 0.0, "reaches Coulomb's bound"), (0.0, 1.0, "opens")])
+def test_the_load_may_rise_until_a_contact_reaches_the_bound_or_opens(mu, up, event):
+    """At the increase that is told the law itself, displaced by K^-1 times the rise, is about at the bound, or open."""
+    bare, slips = three_disks(), [0.3, -0.3, 0.2, 0.9, 0.1]
+    law = replace(bare.law, exponent=1.0, mu=mu)
+    slips = np.array(slips) * law.slip_limit(bare.geometry.overlap) if mu else np.zeros(5)
+    packing = replace(bare, contacts=bare.contacts.slipped(slips, None), law=law)
+    at_rest = balanced(packing)
+    rise = np.array([[1 - up, 0.0], [1 - up, 0.0], [1 - up, up]])
+    found = stability(at_rest, rise=rise)
+    rising = found.rising
+    assert rising.next_event == event
+    drift = np.linalg.lstsq(stiffness_matrix(packing).toarray(), [*rise.T.ravel(), 0.0, 0.0, 0.0])[0]
+    assert rising.drift == pytest.approx(np.sqrt(np.mean(drift[:6] ** 2)), rel=1e-4)
+    before, after = (moved(packing, share * rising.next_change * drift, 0.0) for share in (0.9, 1.1))
+    if event == "opens":
+        assert len(after.contacts) < len(before.contacts) == len(packing.contacts)
+    else:
+        assert before.configuration.mobilised.max() < 1 - 1e-3
+        assert after.configuration.contacts.at_bound.any()
+    assert str(found).endswith(f"until the load has risen by {rising.next_change:.2g} (a contact {event})")
+
+
+def test_the_drift_of_a_slow_cycle_is_its_mean_velocity(monkeypatch):
+    """Ten units of motion in one window of five, and rest in four: a drift of two, and a vibration of four."""
+    at_rest = stuck_at_rest()
+    system = OneSidedSystem.of(at_rest)
+    shape = np.zeros((3, 2, 1))
+    coordinates = np.zeros(at_rest.coordinates)
+    coordinates[[0, 3]] = at_rest.mass[0] ** 0.5 * np.array([0.6, 0.8])
+    shape[0, :, 0] = [0.6, 0.8]
+    z = coordinates[system.motion.active, None]
+
+    def windows(system, direction, length):
+        for number in count():
+            speed = 10.0 if number % 5 == 0 else 0.0
+            yield Span(length, speed * length * z, np.zeros((system.rescaled[1].shape[1], 1)),
+                       speed**2 * length * shape**2, np.zeros((system.sliders[1].shape[0], 1)))  # fmt: skip
+
+    monkeypatch.setattr(rising_load, "windows_under_load", windows)
+    found = follow_load(system, forces_on_coordinates(at_rest, RISE))
+    size = np.sqrt(1 / 6)
+    assert found.drift == pytest.approx(2 * size, abs=2 * found.drift_error)
+    assert found.vibration == pytest.approx(4 * size, abs=2 * found.vibration_error)
+    assert found.drift_error < 0.3 * found.drift
+    assert found.steady
+
+
+def test_a_rise_that_comes_after_the_next_change_is_refused(monkeypatch):
+    """A contact that counts as at the bound lacks 5e-7 of it, and another one reaches it before."""
+    three = three_disks()
+    limit = three.law.slip_limit(three.geometry.overlap)
+    slips = np.array([1 - 5e-7, -0.3, 0.2, 0.3, 0.1]) * limit
+    at_rest = balanced(replace(three, contacts=three.contacts.slipped(slips, None)))
+    assert at_rest.contacts.at_bound.sum() == 1
+    found = stability(at_rest, rise=RISE, time=4.0)
+    least, change = found.rising.least_rise, found.rising.next_change
+    assert 0 < least < change
+    assert f"from a rise of {least:.1g} on" in str(found)
+    monkeypatch.setattr(rising_load, "next_change", lambda *given: (0.5 * least, "opens"))
+    found = stability(at_rest, rise=RISE, time=4.0)
+    assert found.rising is None
+    assert found.not_followed.endswith(
+        f"another contact opens before, at {0.5 * least:.1g}: bring the packing to rest more closely"
+    )
+
+
+def test_spans_of_windows_are_joined_exactly(bound):
+    system = OneSidedSystem.of(bound)
+    direction = forces_on_coordinates(bound.configuration, np.random.default_rng(4).standard_normal((len(bound), 2)))
+    short = list(islice(rising_load.windows_under_load(system, direction, 0.2), 6))
+    whole = Span.joined(short)
+    assert whole.time == pytest.approx(1.2)
+    np.testing.assert_allclose(
+        Span.joined([Span.joined(short[:4]), Span.joined(short[4:])]).drift_and_vibration(system),
+        whole.drift_and_vibration(system),
+        rtol=1e-12,
+    )
+    # what the means of the windows differ by is no drift of the whole, but vibration
+    apart = np.var([system.displacement(each.displacement) / each.time for each in short], axis=0).mean(axis=(0, 1))
+    of_windows = np.mean([each.drift_and_vibration(system) ** 2 for each in short], axis=0)
+    assert np.all(apart > 1e-3 * of_windows[0])
+    drift, vibration = whole.drift_and_vibration(system) ** 2
+    np.testing.assert_allclose(drift, of_windows[0] - apart, rtol=1e-9)
+    # sums over the steps of a short window may fall below the square of its mean, and count as none
+    np.testing.assert_allclose(vibration, of_windows[1] + apart, rtol=1e-4)
+
+
+def test_a_load_that_accelerates_a_free_motion_is_not_followed():
+    """Three disks without friction on a floor, on which they slide together."""
+    packing = replace(
+        three_disks(), law=replace(three_disks().law, mu=0.0), contacts=three_disks().contacts.slipped(np.zeros(5))
+    )
+    at_rest = balanced(packing)
+    found = stability(at_rest, rise=RISE)
+    assert found.stable is True
+    assert found.free == 1
+    assert found.rising is None
+    says = "under a load that rises: not followed, since the load accelerates 1 motion that no force opposes"
+    assert found.sentences[-1] == says
+
+
+def test_under_a_rising_load_a_packing_that_is_unstable_is_not_followed():
+    """A disk that stands on another, pressed by its weight, falls over."""
+    law = MindlinLaw(2e3, 6e2, 50.0, cn=0.5, ct=0.1, coulomb=True)
+    position, c = [[0.0, 0.49], [0.0, 1.47]], Contacts([0, 1], [-1, 0], np.zeros(2))
+    pile = Packing(position=position, radius=[0.5] * 2, contacts=c, law=law)
+    found = stability(balanced(pile), rise=np.tile([1.0, 0.0], (2, 1)))
+    assert found.stable is False
+    assert found.rising is None
+    assert found.sentences[-1] == "under a load that rises: not followed, since small motion grows"
+    json.dumps(found.as_dict(), allow_nan=False)
+
+
+def test_two_vibrations_of_one_packing_are_told_apart():
+    """What is said of two starts, whose motions are those of a layer that vibrates in two ways."""
+    at_rest = balanced(replace(three_disks(), law=replace(three_disks().law, cn=0.02, ct=0.01)))
+    found = stability(at_rest, rise=np.tile([1.0, 0.0], (3, 1)), time=4.0)
+    one = DriftAndVibration(3.75e-3, 1e-5, 6.85e-4, 2e-5, steady=True)
+    for other, says in (
+        (
+            {"vibration": 1.05e-3},
+            "\u00b1 2e-05, and from another start drift 0.00375 \u00b1 1e-05, vibration 0.00105 \u00b1 2e-05",
+        ),
+        ({"steady": False}, "vibration 0.000685 \u00b1 2e-05, not steady yet"),
+        ({"vibration": 6.8e-4}, "1e-05, vibration 0.000685 \u00b1 2e-05"),
+    ):
+        rising = RisingMotion(**one, time=4.0, span=3.0, other_start=replace(one, **other))
+        assert replace(found, rising=rising).sentences[-1].endswith(says)
+    assert set(found.rising.other_start) == set(one)
+
+
+def test_a_rising_load_is_followed_where_pushes_have_not_settled():
+    at_rest = balanced(three_disks())
+    found = stability(at_rest, rise=np.tile([1.0, 0.0], (3, 1)), time=0.05)
+    assert found.stable is None
+    assert found.rising.drift > 0
