@@ -40,7 +40,7 @@ COMPARED_LOOKS = 10
 SAME_WAY = 0.1
 """Relative difference of two displacements that are the same: D then is right to a fifth."""
 
-SIZES = 8
+COMPARED_SIZES = 8
 """Sizes that are tried, each ten times the one before."""
 
 COMPARED_UP_TO = 6000
@@ -190,7 +190,7 @@ def _reaching_scale(
     if not size or system.motion.configuration.coordinates > COMPARED_UP_TO:
         return size
     count = round((seen[-1].time - start.time) / step)
-    for _ in range(SIZES):
+    for _ in range(COMPARED_SIZES):
         state = start.copy()
         state.missing = system.missing_forces / size
         other = _follow(system, state, step, count, load)

@@ -37,7 +37,7 @@ from ..progress import report_progress
 from .contact_reach import PUSH_OVER_RESIDUAL, reaching_scale
 from .next_change import next_change
 from .one_sided import OneSidedSystem
-from .one_sided_outcome import window_and_most
+from .one_sided_outcome import WINDOWS_OF_TIME, window_and_most
 from .steady_drift import NotFollowedError, refuse_flight, steady_velocity
 
 SAMPLES_OF_WINDOW = 400
@@ -74,10 +74,6 @@ LEAST_WINDOWS = 8
 ACCELERATION_RATIO = 3.0
 """Ratio of the mean velocities of the last and the first quarter of the time from which on a motion has no constant
 drift: 4 for a velocity that rises as the time after the drag has faded, and 17 for one that rises as its square."""
-
-ACCELERATION_SHARE = 0.2
-"""Time in windows of the usual length, two periods of a slow mode, after which a motion that only begins is told from
-one that the load accelerates for ever."""
 
 LARGEST_GROWTH = 1e12
 """Growth of the vibration of a motion that has no drift."""
@@ -254,13 +250,13 @@ def follow_load(
 
 def _refuse_acceleration(system: OneSidedSystem, windows: list[Span], length: float) -> None:
     """Refuse a motion whose mean velocity rises on, as of contacts that slide on and on."""
-    if length * len(windows) < ACCELERATION_SHARE * window_and_most(system, 1, None)[0]:
-        return
-    quarters = _parts(system, windows[FADE_WINDOWS:] or windows)[0, 3:, 0]
+    quarters, time = _parts(system, windows[FADE_WINDOWS:] or windows)[0, 3:, 0], length * len(windows)
+    if time < WINDOWS_OF_TIME * window_and_most(system, 1, None)[0]:
+        return  # a slow vibration begins like that
     if np.all(np.diff(quarters) > 0) and quarters[-1] > ACCELERATION_RATIO * quarters[0]:
         raise NotFollowedError(
-            f"there is no constant drift: the load accelerates particles whose contacts slide on, from a mean velocity "
-            f"of {quarters[0]:.3g} to one of {quarters[-1]:.3g} over the rate within t = {length * len(windows):.4g}"
+            f"no constant drift is seen: the mean velocity over the rate rises from {quarters[0]:.3g} to "
+            f"{quarters[-1]:.3g} within t = {time:.4g}, as where the load accelerates particles whose contacts slide on"
         )
 
 

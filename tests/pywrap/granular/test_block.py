@@ -87,9 +87,9 @@ def test_a_load_that_rises_accelerates_a_block_that_slides_and_pushes_one_back_t
 
     lmp = block(1.0)
     here = from_lammps(lmp)
-    ahead = stability(here, rise=[[1.0, 0.0, 0.0]], time=8.0)
+    ahead = stability(here, rise=[[1.0, 0.0, 0.0]], time=250.0)
     assert ahead.rising is None
-    assert "there is no constant drift: the load accelerates particles whose contacts slide on" in str(ahead)
+    assert "no constant drift is seen: the mean velocity over the rate rises from" in str(ahead)
     back = stability(here, rise=[[-1.0, 0.0, 0.0]], time=8.0)
     assert np.sqrt(3) * back.rising["drift"] == pytest.approx(1 / 300, rel=0.02)
     assert back.rising["vibration"] < 1e-6 * back.rising["drift"]
