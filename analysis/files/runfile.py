@@ -35,9 +35,10 @@ of the root. One file contains one set of disks and one law.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -238,7 +239,7 @@ class RunFile(SealedFile):
     def _packing(self, frame: int) -> Packing:
         rows = self._file["observables/contacts/value"][frame]
         rows = rows[~np.isnan(rows[:, 0])]
-        parameters = {name: item[()] for name, item in self._file["parameters"].items()}
+        parameters = self._parameters
         low = self._file.get("observables/position_low")
         return Packing(
             position=self._file["particles/disks/position/value"][frame, :, :2],
@@ -372,10 +373,15 @@ class RunFile(SealedFile):
         row[tuple(slice(extent) for extent in value.shape)] = value
         data[frame] = row
 
+    @cached_property
+    def _parameters(self) -> dict[str, Any]:
+        """What all frames share: written once, when the file is made."""
+        return {name: item[()] for name, item in self._file["parameters"].items()}
+
     def _check_same(self, packing: Packing) -> None:
-        parameters, values = self._file["parameters"], parameters_of(packing)
+        parameters, values = self._parameters, parameters_of(packing)
         for name in parameters.keys() | values.keys():
-            if not (name in parameters and name in values and np.array_equal(parameters[name][()], values[name])):
+            if not (name in parameters and name in values and np.array_equal(parameters[name], values[name])):
                 raise ValueError(f"{self.path} was begun for a packing with another {name}.")
 
 

@@ -126,11 +126,11 @@ class DriveRecord(Record):
 
     def _keep_steps(self, steps: list[DriveStep], reached: DriveCheckpoint | None) -> None:
         if self._file is not None:
+            decided = [state for step in steps for state in step.states]
+            pending = () if reached is None else reached.pending
             with self._file.change():
-                self._file.cut(self._decided)
-                self._append_states(state for step in steps for state in step.states)
-                self._decided, pending = len(self._file), () if reached is None else reached.pending
-                self._append_states(pending)
+                self._put_states([*decided, *pending])
+                self._decided += len(decided)
                 stored = reached and Checkpoint(reached.step, reached.state | {PENDING: np.array(len(pending))})
                 self._keep(SERIES, [step.sample for step in steps], [], stored)
                 self._file.complete = reached is None  # in one change with the last rows
@@ -154,6 +154,15 @@ class DriveRecord(Record):
                     with RunFile(copy, "a") as file:
                         file.put_attribute("scene", json.dumps(scene.resolved()))
                     copy.replace(path)
+
+    def _put_states(self, states: Sequence[DriveState]) -> None:
+        """Write states behind the decided ones; those that are pending in the file already stay."""
+        assert self._file is not None
+        there = self._file.observable("time")[self._decided :]
+        same = next((k for k, (time, state) in enumerate(zip(there, states, strict=False)) if time != state.time), None)
+        kept = min(len(there), len(states)) if same is None else same
+        self._file.cut(self._decided + kept)
+        self._append_states(states[kept:])
 
     def _append_states(self, states: Iterable[DriveState]) -> None:
         assert self._file is not None
