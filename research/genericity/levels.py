@@ -58,7 +58,7 @@ increments, and its difference stands seven digits out of the residuals."""
 
 
 @dataclass(frozen=True, eq=False)
-class Pencil:
+class InterpolatedOperator:
     """diag(values) + F (symmetric + antisymmetric), the operator about rest.
 
     Attributes
@@ -77,7 +77,7 @@ class Pencil:
     basis: Floats
 
     @classmethod
-    def between(cls, rest: csr_array, there: csr_array, fx: float) -> Pencil:
+    def between(cls, rest: csr_array, there: csr_array, fx: float) -> InterpolatedOperator:
         """From the operator at rest and at a small load."""
         active: Indices = np.flatnonzero(np.diff(rest.indptr))
         dense = rest[active][:, active].toarray()
@@ -93,12 +93,12 @@ class Pencil:
         return np.diag(self.values) + fx * (self.symmetric + self.antisymmetric)
 
 
-def pencil_of(scene: Scene, rest: Equilibrium) -> Pencil:
+def pencil_of(scene: Scene, rest: Equilibrium) -> InterpolatedOperator:
     """The operator of a scene's packing about rest, from a small load."""
     step = float(ramp_loads(scene)[1])
     with path_from(rest, scene) as path:
         there = path(SMALL * step)
-    return Pencil.between(full_operator(rest.packing), full_operator(there), there.fx)
+    return InterpolatedOperator.between(full_operator(rest.packing), full_operator(there), there.fx)
 
 
 def levels(scene: Scene, rest: Equilibrium) -> dict[str, Any]:

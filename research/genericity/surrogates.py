@@ -31,7 +31,7 @@ from faultgouge.analysis import Floats, NoEquilibriumError, Packing, mass_weight
 from faultgouge.analysis.windows import complex_windows, force_bearing
 from faultgouge.pywrap import Equilibrium, Scene, ramp_loads
 from faultgouge.studies.packing_tools import path_from
-from research.genericity.levels import Pencil, pencil_of
+from research.genericity.levels import InterpolatedOperator, pencil_of
 
 BLOCK = 20
 """Levels among which spacings and couplings are permuted: their means change little over so many."""
@@ -67,7 +67,7 @@ def _first(operator: Callable[[float], csr_array], steps: Floats, narrowest: flo
     return {"ends": "until", "reach": float(steps[-1])}
 
 
-def randomise_pencil(pencil: Pencil, generator: np.random.Generator) -> Pencil:
+def randomise_pencil(pencil: InterpolatedOperator, generator: np.random.Generator) -> InterpolatedOperator:
     """A packing's pencil with spacings and couplings permuted among neighbouring levels, and random signs."""
     gaps = np.diff(pencil.values)
     for k in range(0, len(gaps), BLOCK):
@@ -78,7 +78,9 @@ def randomise_pencil(pencil: Pencil, generator: np.random.Generator) -> Pencil:
     diagonal = np.diag(pencil.symmetric).copy()
     for k in range(0, len(diagonal), BLOCK):
         diagonal[k : k + BLOCK] = generator.permutation(diagonal[k : k + BLOCK])
-    return Pencil(values, symmetric + symmetric.T + np.diag(diagonal), antisymmetric - antisymmetric.T, pencil.basis)
+    return InterpolatedOperator(
+        values, symmetric + symmetric.T + np.diag(diagonal), antisymmetric - antisymmetric.T, pencil.basis
+    )
 
 
 def _permute_elements(matrix: Floats, generator: np.random.Generator) -> Floats:

@@ -26,7 +26,7 @@ from scipy.special import erf
 from faultgouge.analysis import Floats, Packing, dynamical_matrix
 from faultgouge.pywrap import Equilibrium, Scene
 from faultgouge.studies.modes import PairCounts, along_ramp
-from research.genericity.levels import Pencil, local_mean
+from research.genericity.levels import InterpolatedOperator, local_mean
 from research.genericity.surrogates import randomise_pencil
 
 SEED = 35
@@ -64,7 +64,7 @@ def predict_shares(packing: Packing) -> dict[str, Any]:
     spacing = local_mean(gaps)
     near = np.sqrt(local_mean(np.diag(couplings, 1) ** 2))
     ratios = np.minimum(gaps[1:], gaps[:-1]) / np.maximum(gaps[1:], gaps[:-1])
-    pencil = Pencil(values, np.zeros_like(couplings), couplings, basis)
+    pencil = InterpolatedOperator(values, np.zeros_like(couplings), couplings, basis)
     generator = np.random.default_rng(SEED)
     drawn = [PairCounts.of(eigvals(randomise_pencil(pencil, generator).at(1.0))).as_dict() for _ in range(DRAWS)]
     least = [each["least_q"] for each in drawn if each["least_q"] is not None]

@@ -10,7 +10,7 @@ from reference_layer import parted
 from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.tasks import TASKS
 from research.genericity.fits import size_law
-from research.genericity.levels import Pencil, entry_factor
+from research.genericity.levels import InterpolatedOperator, entry_factor
 from research.genericity.make import TABLES, check, write_page
 from research.genericity.sets import sets
 from research.genericity.surrogates import randomise_pencil
@@ -39,7 +39,7 @@ def test_random_matrices_keep_spacings_and_couplings():
     generator = np.random.default_rng(1)
     values = np.sort(generator.normal(size=70))
     square = generator.normal(size=(70, 70))
-    pencil = Pencil(values, square + square.T, square - square.T, np.eye(70))
+    pencil = InterpolatedOperator(values, square + square.T, square - square.T, np.eye(70))
     drawn = randomise_pencil(pencil, generator)
     np.testing.assert_allclose(np.sort(np.diff(drawn.values)), np.sort(np.diff(values)), rtol=0, atol=1e-13)
     np.testing.assert_array_equal(drawn.symmetric, drawn.symmetric.T)
