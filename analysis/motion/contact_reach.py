@@ -44,7 +44,8 @@ COMPARED_SIZES = 8
 """Sizes that are tried, each ten times the one before."""
 
 COMPARED_UP_TO = 6000
-"""Coordinates of packings whose motion at another size is followed: each size takes as long as the close looks."""
+"""Coordinates of packings whose motion at another size is followed: each size takes as long as `COMPARED_STEPS`. Of
+larger ones the slip that is seen stands for this motion."""
 
 
 @dataclass(eq=False)
@@ -116,10 +117,15 @@ class ContactReach:
             return float(np.nan_to_num(np.sqrt(self.by_residual.size / self.size), nan=0.0).max(initial=0.0))
 
     @property
+    def unsettled(self) -> bool:
+        """Whether residual forces alone take another contact to the bound, open one or close one."""
+        return self.by_residual is not None and self.by_residual.largest_scale < 1
+
+    @property
     def least_scale(self) -> float:
-        """The multiple from which on neither missing forces nor residual forces count; infinite if residual forces
-        alone take another contact to the bound, open one or close one."""
-        if self.by_residual is not None and self.by_residual.largest_scale < 1:
+        """The multiple from which on neither missing forces nor residual forces count; infinite if none was found, or
+        if the packing is `unsettled`."""
+        if self.unsettled:
             return np.inf
         return max(self.reaching, PUSH_OVER_RESIDUAL * self.residual_scale)
 
@@ -169,9 +175,8 @@ def _follow(
 def _reaching_scale(
     system: OneSidedSystem, start: OneSidedState, seen: list[OneSidedState], step: float, load: Floats | None
 ) -> float:
-    """The multiple of a motion from which on forces missing to Coulomb's bound do not change the motion.
-
-    The largest multiple that is tried stands for all above.
+    """The multiple of a motion from which on forces missing to Coulomb's bound do not change the motion; infinite if
+    these change the largest motion that is tried.
 
     Parameters
     ----------
@@ -197,7 +202,7 @@ def _reaching_scale(
         if all(_agree(*pair) for pair in zip(seen[COMPARED_LOOKS // 2 :], other[COMPARED_LOOKS // 2 :], strict=True)):
             return size
         size *= 10
-    return size
+    return np.inf
 
 
 def _agree(one: OneSidedState, other: OneSidedState) -> bool:

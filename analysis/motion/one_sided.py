@@ -112,6 +112,7 @@ class OneSidedSystem:
 
     @cached_property
     def _weight_transposed(self) -> csr_array:
+        """Its transpose, in rows."""
         return csr_array(self._weight.T)
 
     @cached_property

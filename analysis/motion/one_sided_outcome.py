@@ -113,7 +113,7 @@ class OneSidedOutcome(FieldsByName):
     scales : tuple of float
         Between which velocities of the push along an axis this holds. Below, contacts that count as at the bound do not
         reach it, or the residual forces move the packing as well; above, other contacts reach the bound, or open. The
-        first is infinite if the residual forces alone take another contact so far.
+        first is infinite if no such push was found, or if the residual forces alone take another contact so far.
     """
 
     grows: bool | None

@@ -26,6 +26,12 @@ UNSETTLED = (
 )
 """Why there is no verdict where the residual forces alone change a contact."""
 
+NOT_REACHED = (
+    "no push was found after which contacts that count as at Coulomb's bound reach the bound: bring the packing to "
+    "rest more closely"
+)
+"""Why there is no verdict where forces that are missing to the bound change the largest motion that was tried."""
+
 
 @dataclass(frozen=True)
 class LinearRates:
@@ -167,7 +173,7 @@ def _after_pushes(sticks: SmallMotion, found: OneSidedOutcome, reach: ContactRea
             f"than exp({found.searched:.2g} t) would not have been seen"
         )
     elif not found.grows and np.isinf(least):
-        reasons.append(UNSETTLED)
+        reasons.append(UNSETTLED if reach.unsettled else NOT_REACHED)
     elif not found.grows and least >= most and least > PUSH_OVER_RESIDUAL * residual:
         reasons.append(
             f"contacts that count as at Coulomb's bound reach it after pushes above {least:.1g} (velocity along an "

@@ -242,11 +242,13 @@ class Stability:
             return
         least, most = self.one_sided.scales
         if self.one_sided.grows:
-            if np.isfinite(least):
-                yield (
-                    f"this growth is seen after pushes from {least:.1g} on (velocity along an axis): after smaller "
-                    "ones contacts that count as at the bound may stay below it, or residual forces count"
-                )
+            yield (
+                f"this growth is seen after pushes from {least:.1g} on (velocity along an axis): after smaller "
+                "ones contacts that count as at the bound may stay below it, or residual forces count"
+                if np.isfinite(least)
+                else "from which push on this growth is seen is not known: contacts that count as at the bound may "
+                "stay below it, and residual forces count"
+            )
             return
         if least < most:
             yield (

@@ -45,7 +45,7 @@ def test_stability_of_three_disks():
         stability(at_rest, rise=np.zeros((3, 2)))
 
 
-@pytest.mark.parametrize(("scales", "stable"), [((1e-7, 1e-9), None), ((1e-9, np.inf), True)])
+@pytest.mark.parametrize(("scales", "stable"), [((1e-7, 1e-9), None), ((1e-9, np.inf), True), ((np.inf, 1e-3), None)])
 def test_a_motion_that_is_that_of_no_push_has_no_verdict(monkeypatch, scales, stable):
     """Some contacts count as at the bound and are not, and others are as near to it."""
     at_rest = balanced(three_disks())
@@ -59,6 +59,7 @@ def test_a_motion_that_is_that_of_no_push_has_no_verdict(monkeypatch, scales, st
     found = stability(at_rest)
     assert found.stable is stable
     assert any("bring the packing to rest more closely" in each for each in found.reasons) is (stable is None)
+    assert any("no push was found after which" in each for each in found.reasons) is bool(np.isinf(scales[0]))
     assert "Infinity" not in json.dumps(found.as_dict())
 
 
