@@ -1,8 +1,9 @@
 r"""The sizes of a push, or of a rate of loading, for which a motion to first order holds.
 
 Motion to first order has no size of its own. Real motion has. A large motion takes other contacts to Coulomb's bound,
-opens contacts, or closes others. A small motion leaves contacts that count as at the bound short of the bound: contact
-c lacks a force :math:`m_c`, and slides by
+opens contacts, closes others, or turns the forces of contacts at the bound
+(:mod:`~faultgouge.analysis.operators.contact_changes`). A small motion leaves contacts that count as at the bound short
+of the bound: contact c lacks a force :math:`m_c`, and slides by
 
 .. math:: p_c(t) = \max_{t' \le t} \left(Y_c q + Z_c \dot q - m_c\right)_+ .
 
@@ -13,7 +14,7 @@ particles, too. The motion counts if it goes much farther than they do.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,6 +26,9 @@ SLIP_SHARE = 0.1
 
 FIRST_LOOKS = 1000
 """Looks in steps of `LOOK_STEP`, over some ten periods of a slow mode. Contacts go farthest at the beginning."""
+
+LOOKS_TOGETHER = 50
+"""States whose contacts are looked at together."""
 
 PUSH_OVER_RESIDUAL = 10.0
 """Displacement by a push over that by the residual forces, from which on the push counts: D then is right to a fifth,
@@ -58,8 +62,10 @@ class ContactReach:
         Of the configuration.
     size : ndarray, shape (P,), or None
         Largest D that was seen.
-    farthest : ndarray, shape (R, P), or None
-        Largest products of the system's margins with displacements.
+    waiting : list of OneSidedState
+        States that were looked at, and whose contacts were not: some together take less time than one by one.
+    smallest : float
+        Smallest multiple seen so far that takes a contact to another state.
     reaching : float
         Multiple of the motion from which on contacts that count as at Coulomb's bound reach the bound so soon that the
         motion is the same.
@@ -69,15 +75,24 @@ class ContactReach:
 
     system: OneSidedSystem
     size: Floats | None = None
-    farthest: Floats | None = None
+    waiting: list[OneSidedState] = field(default_factory=list)
+    smallest: float = np.inf
     reaching: float = 0.0
     by_residual: "ContactReach | None" = None
 
     def look(self, state: OneSidedState) -> None:
         """Look at the motion once more."""
-        size, now = self.system.mean_square_displacement(state.z), self.system.margins[0] @ state.z
+        size = self.system.mean_square_displacement(state.z)
         self.size = size if self.size is None else np.maximum(self.size, size)
-        self.farthest = now if self.farthest is None else np.maximum(self.farthest, now)
+        self.waiting.append(state.copy())
+        if len(self.waiting) == LOOKS_TOGETHER:
+            self._look_at_contacts()
+
+    def _look_at_contacts(self) -> None:
+        """At the contacts of the states that wait."""
+        together = [np.hstack([getattr(state, name) for state in self.waiting]) for name in ("z", "v", "p", "r")]
+        self.waiting.clear()
+        self.smallest = min(self.smallest, self.system.contact_changes.first(*together))
 
     def look_closely(self, start: OneSidedState, time: float = np.inf, rise: Floats | None = None) -> None:
         """Look at the beginning of a motion step by step, and at the motion by the residual forces.
@@ -131,12 +146,11 @@ class ContactReach:
 
     @property
     def largest_scale(self) -> float:
-        """The multiple up to which no contact that is not at the bound reaches the bound, opens or closes."""
-        if self.farthest is None:
-            return np.inf
-        with np.errstate(divide="ignore", invalid="ignore"):
-            limit = self.system.margins[1][:, None] / self.farthest
-        return float(limit[self.farthest > 0].min(initial=np.inf))
+        """The multiple up to which no contact that is not at the bound reaches the bound, opens or closes, and none at
+        the bound reaches it on the way back, or turns its force."""
+        if self.waiting:
+            self._look_at_contacts()
+        return self.smallest
 
 
 def reaching_scale(system: OneSidedSystem, slid: Floats) -> float:

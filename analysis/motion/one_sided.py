@@ -26,7 +26,7 @@ motion to rounding.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeAlias
 
@@ -39,8 +39,9 @@ from scipy.sparse.linalg import expm_multiply
 from ..arrays import Floats, Indices, floats
 from ..configuration import Configuration
 from ..has_configuration import HasConfiguration
+from ..operators.contact_changes import ContactChanges
 from ..operators.linearised_contacts import rescaling_operators
-from ..operators.sliders import margins, sliders_of
+from ..operators.sliders import sliders_of
 from .motion import Motion
 from .stable_timestep import stable_timestep
 
@@ -124,17 +125,6 @@ class OneSidedSystem:
         """Mass-weighted forces, shape (E, P), of forces on all coordinates, shape (coordinates, P)."""
         return np.asarray(self._weight_transposed @ forces)
 
-    def of_particles(self, z: Floats) -> Floats:
-        """The values of all coordinates, shape (coordinates,), of one mass-weighted displacement, shape (E, 1)."""
-        return np.asarray(self._weight @ z)[:, 0]
-
-    def of_contacts(self, r: Floats) -> Floats:
-        """r of one motion for all contacts, shape (C,); zero of contacts with one derivative."""
-        contacts = self.motion.configuration.contacts
-        whole = np.zeros(len(contacts))
-        whole[self._two_derivatives] = r[:, 0]
-        return whole
-
     @cached_property
     def _two_derivatives(self) -> Indices:
         """Numbers of the contacts whose derivatives differ while they close and while they part."""
@@ -157,10 +147,11 @@ class OneSidedSystem:
         return np.maximum(c.friction - np.linalg.norm(c.tangential_force, axis=1), 0.0)[c.one_sided, None]
 
     @cached_property
-    def margins(self) -> tuple[Matrix, Floats]:
-        """Rows, shape (R, E), and limits, shape (R,), see :func:`~faultgouge.analysis.operators.sliders.margins`."""
-        rows, limits = margins(self.motion.configuration)
-        return _for_products(rows @ self._weight), limits
+    def contact_changes(self) -> ContactChanges:
+        """Which mass-weighted motions take contacts to another state."""
+        changes = ContactChanges.of(self.motion.configuration)
+        rows, viscous = (_for_products(each @ self._weight) for each in (changes.rows, changes.viscous))
+        return replace(changes, rows=rows, viscous=viscous)
 
     @cached_property
     def rescaled(self) -> tuple[Matrix, Matrix, Matrix]:

@@ -112,7 +112,8 @@ class OneSidedOutcome(FieldsByName):
         How many pushes, the opposite of each among them.
     scales : tuple of float
         Between which velocities of the push along an axis this holds. Below, contacts that count as at the bound do not
-        reach it, or the residual forces move the packing as well; above, other contacts reach the bound, or open. The
+        reach it, or the residual forces move the packing as well; above, other contacts reach the bound, open or
+        close, or the force of one at the bound turns. The
         first is infinite if no such push was found, or if the residual forces alone take another contact so far.
     """
 

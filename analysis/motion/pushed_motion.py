@@ -29,7 +29,8 @@ class OneSidedMotion:
     scales : tuple of float
         Between which multiples of the push, or of the rate, the motion holds, as it was seen in `FIRST_LOOKS` at its
         beginning and at these times: with smaller ones contacts that count as at the bound do not reach it, or the
-        residual forces move the packing as well, and with larger ones other contacts reach the bound, open or close.
+        residual forces move the packing as well, and with larger ones other contacts reach the bound, open or
+        close, or the force of one at the bound turns.
     """
 
     times: Floats

@@ -278,7 +278,7 @@ def _rising_motion(moves: DriftAndVibration, system: OneSidedSystem, span: Span,
         If there are none.
     """
     velocity, paths, slid = (each[:, :1] / span.time for each in (span.displacement, span.paths, span.slid))
-    reached, (change, event) = reaching_scale(system, slid), next_change(system, velocity, paths)
+    reached, (change, event) = reaching_scale(system, slid), next_change(system, velocity, slid, paths)
     drift = float(np.sqrt(system.mean_square_displacement(velocity)[0]))
     moved = PUSH_OVER_RESIDUAL * residual / drift if drift else 0.0
     least = max(reached, moved)

@@ -254,7 +254,7 @@ class Stability:
             yield (
                 f"this is the motion after pushes of {least:.1g} to {most:.1g} (velocity along an axis): below, "
                 "contacts that count as at the bound do not reach it, or residual forces count; above, others reach "
-                "it, open or close"
+                "it, open or close, or one of these turns"
             )
         elif self.stable:
             yield (

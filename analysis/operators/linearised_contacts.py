@@ -45,6 +45,26 @@ def unit_forces(configuration: Configuration, force: Floats) -> csr_array:
     return csr_array(on_particles @ (configuration.constraint != 0).astype(np.float64))
 
 
+def tangential_rows(configuration: Configuration, along: Floats, tangential: Floats, normal: Floats) -> csr_array:
+    """Rows -k e . ds + b d delta of the contacts.
+
+    Parameters
+    ----------
+    along : ndarray, shape (C, 3)
+        Unit vectors e in the planes of the contacts.
+    tangential, normal : ndarray, shape (C,)
+        k and b.
+    """
+    c = configuration.contacts
+    across = np.cross(along, c.normal)
+    shift = -tangential[:, None] * along - normal[:, None] * c.normal
+    rows = [
+        np.hstack([sign * shift, -(tangential * c.slip_arm[:, p] / configuration.radius[partner])[:, None] * across])
+        for p, (partner, sign) in enumerate(((c.i, 1.0), (c.j, -1.0)))
+    ]
+    return contact_rows(configuration, np.array(rows))
+
+
 def contact_rows(configuration: Configuration, rows: Floats) -> csr_array:
     """A matrix with a row a contact, from its numbers on (translation, rotation as R theta) of i and of j.
 

@@ -31,12 +31,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, vstack
+from scipy.sparse import csr_array
 
 from ..arrays import Floats, Indices, derive_frozen
 from ..configuration import Configuration
-from .gaps import gaps_of
-from .linearised_contacts import contact_rows, unit_forces
+from .linearised_contacts import tangential_rows, unit_forces
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,56 +79,18 @@ def with_sticking_contacts(configuration: Configuration) -> Configuration:
 def sliders_of(configuration: Configuration) -> Sliders:
     """The one-sided contacts of a configuration; see :class:`Sliders`."""
     which = np.flatnonzero(configuration.contacts.one_sided)
-    here, along, excess = _springs(configuration, which)
-    c = here.contacts
-    bound = -c.friction / c.normal_force * c.normal_dashpot * c.viscous_slider
-    return Sliders(
-        contact=which,
-        force=csr_array(unit_forces(here, along).T),
-        excess=excess,
-        viscous_excess=_excess(here, along, c.tangential_dashpot, bound),
-        rectified=0.5 * np.einsum("ca,ca->c", c.closing - c.parting, along),
-        viscous=c.viscous_slider,
-    )
-
-
-def margins(configuration: Configuration) -> tuple[csr_array, Floats]:
-    """How far contacts are from another state: rows, shape (R, coordinates), whose products with a displacement reach
-    the limits, shape (R,), where a contact that is not at Coulomb's bound reaches the bound, where one opens, or where
-    two particles, or a particle and a plane, begin to touch.
-
-    To first order, springs alone. A contact whose tangential force points nowhere is far from the bound.
-    """
-    c = configuration.contacts
-    size = np.linalg.norm(c.tangential_force, axis=1)
-    below = np.flatnonzero(c.slider & ~c.at_bound & (size > 0) & np.isfinite(c.friction) & (c.normal_force > 0))
-    _, _, excess = _springs(configuration, below)
-    touching = np.flatnonzero((c.overlap > 0) & (c.normal_force > 0))
-    here = derive_frozen(configuration, contacts=c.chosen(touching))
-    parting = np.hstack([here.contacts.normal, np.zeros((len(touching), 3))])
-    opens = contact_rows(here, np.array([parting, -parting]))
-    gaps = gaps_of(configuration)
-    limits = np.concatenate([c.friction[below] - size[below], c.overlap[touching], gaps.gap])
-    return csr_array(vstack([excess, opens, gaps.rates(configuration)])), limits
-
-
-def _springs(configuration: Configuration, which: Indices) -> tuple[Configuration, Floats, csr_array]:
-    """The configuration with some of its contacts, the directions of their tangential forces, and Y."""
     c = configuration.contacts.chosen(which)
     here = derive_frozen(configuration, contacts=c)
     along = c.tangential_force / np.linalg.norm(c.tangential_force, axis=1, keepdims=True)
     coupling = np.einsum("ca,ca->c", 0.5 * (c.closing + c.parting), along)
-    stiff = coupling - c.friction / c.normal_force * c.normal_stiffness
-    return here, along, _excess(here, along, c.tangential_stiffness, stiff)
-
-
-def _excess(here: Configuration, along: Floats, tangential: Floats, normal: Floats) -> csr_array:
-    """Rows -k_t' e . ds + k d delta of the contacts of `here`."""
-    c = here.contacts
-    across = np.cross(along, c.normal)
-    shift = -tangential[:, None] * along - normal[:, None] * c.normal
-    rows = [
-        np.hstack([sign * shift, -(tangential * c.slip_arm[:, p] / here.radius[partner])[:, None] * across])
-        for p, (partner, sign) in enumerate(((c.i, 1.0), (c.j, -1.0)))
-    ]
-    return contact_rows(here, np.array(rows))
+    friction = c.friction / c.normal_force
+    return Sliders(
+        contact=which,
+        force=csr_array(unit_forces(here, along).T),
+        excess=tangential_rows(here, along, c.tangential_stiffness, coupling - friction * c.normal_stiffness),
+        viscous_excess=tangential_rows(
+            here, along, c.tangential_dashpot, -friction * c.normal_dashpot * c.viscous_slider
+        ),
+        rectified=0.5 * np.einsum("ca,ca->c", c.closing - c.parting, along),
+        viscous=c.viscous_slider,
+    )

@@ -112,6 +112,20 @@ def test_a_block_below_the_angle_of_repose_vibrates_and_rests(block):
     assert abs(moved(lmp, PUSH, 5000)) < 1e-6
 
 
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_a_push_back_may_be_so_large_that_the_block_slides_back(block, share):
+    """On the level, where its contact has no tangential force, and at the angle of repose, where the force turns round
+    to the bound on the other side. Nothing else limits the push."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = block(share)
+    motion = one_sided_motion(from_lammps(lmp), [[-1.0, 0.0, 0.0]], times=np.linspace(0.01, 0.2, 20))
+    of_small, near, beyond = (moved(lmp, -size * motion.scales[1], 200) for size in (0.01, 0.95, 2.0))
+    assert of_small == pytest.approx(motion.displacement[-1, 0, 0], rel=0.01)  # of LAMMPS's time steps
+    assert near == pytest.approx(of_small, rel=1e-6)
+    assert abs(beyond - of_small) > 0.1 * abs(of_small)
+
+
 def test_of_a_block_that_slides_the_load_alone_is_not_accused(block):
     """The slope is 4e-6 beyond the angle of repose: less is out of balance than is allowed, but nothing stops it."""
     from faultgouge.pywrap import from_lammps
