@@ -1,7 +1,6 @@
 """Sparse factors of large matrices with a symmetric pattern, such as K. All sparse factors are made here.
 
-**Symmetric matrices** in an order of elimination are factored by :mod:`~faultgouge.analysis.factors.ldlt`, without
-pivoting.
+**Real matrices** in an order of elimination are factored by :mod:`~faultgouge.analysis.factors.ldlt`, without pivoting.
 
 **SuperLU**, which SciPy has, factors all others, and finds orders of elimination of minimum degree on the pattern of
 A + A^T. Pivots are taken from the diagonal. By default SuperLU joins small columns of the elimination tree to
@@ -24,7 +23,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from ..errors import FaultgougeError
 from ..packing.packing import Indices
-from .ldlt import SymmetricFactors, library
+from .ldlt import CompiledFactors, library
 
 
 class SingularMatrixError(FaultgougeError):
@@ -99,9 +98,9 @@ def symmetric_lu(
     """
     if mumps and matrix.shape[0] >= MUMPS_FROM and _mumps() is not None:
         return MumpsFactors(matrix, symmetric)
-    compiled = library() if ordered and symmetric and pivoting == 0 else None
+    compiled = library() if ordered and pivoting == 0 and np.isrealobj(matrix.data) else None
     # where a pivot is zero SuperLU takes another one
-    factors = SymmetricFactors.of(matrix, compiled) if compiled is not None else None
+    factors = CompiledFactors.of(matrix, compiled, symmetric=symmetric) if compiled is not None else None
     return factors or SuperLUFactors(_superlu(matrix, "NATURAL" if ordered else "MMD_AT_PLUS_A", pivoting))
 
 
