@@ -3,8 +3,10 @@
 //
 // This program is free software under the terms of version 2 of the GNU General Public License; see the file LICENSE.
 
-// Factors L D U of a sparse matrix with a symmetric pattern without pivoting, and solutions with them, see ldlt.py.
-// A matrix has one half, its lower one, if it is symmetric: U is L^T. Otherwise its transpose has the other half.
+// Factors L D U of a sparse matrix without pivoting, and solutions with them, see ldlt.py. L and U^T have the pattern
+// that they would have if A had the entries of A + A^T.
+//
+// A symmetric matrix has one half, its lower one: U is L^T. Of any other matrix the transpose has the other half.
 //
 // No fused multiply-add (-ffp-contract=off): results are then the same to the bit on every machine.
 
@@ -82,36 +84,34 @@ EVERY_MACHINE void eliminate(const Fronts &fronts, int32_t pivots, double *pivot
 // below, its update, waits until the front of its parent in the elimination tree is assembled.
 class Multifrontal {
 public:
-  // A half of A, its entries where those of A^T or of A are, and the same half of the factors.
+  // A, or A^T, of which the lower half counts, and the same half of the factors.
   struct Half {
-    const double *given;
+    Columns given;
     double *made;
     std::vector<double> front;
     std::vector<std::vector<double>> update;    // by last column: the lower half, by columns
   };
 
-  Multifrontal(const Columns &matrix, const int32_t *parent, const Columns &lower, int32_t *row,
-               std::vector<Half> &halves, double *pivot) :
-      matrix(matrix),
+  Multifrontal(const int32_t *parent, const Columns &lower, int32_t *row, std::vector<Half> &halves, double *pivot) :
       parent(parent),
       lower(lower),
       row(row),
       halves(halves),
       pivot(pivot),
-      place(matrix.size),
-      seen(matrix.size, -1),
-      child(matrix.size, -1),
-      sibling(matrix.size, -1)
+      place(lower.size),
+      seen(lower.size, -1),
+      child(lower.size, -1),
+      sibling(lower.size, -1)
   {
-    for (Half &half : halves) half.update.resize(matrix.size);
+    for (Half &half : halves) half.update.resize(lower.size);
   }
 
   // Whether all pivots were other than zero.
   bool factor()
   {
-    for (int32_t first = 0, next; first < matrix.size; first = next) {
+    for (int32_t first = 0, next; first < lower.size; first = next) {
       next = first + 1;
-      while (next < matrix.size && parent[next - 1] == next && lower.count(next - 1) == lower.count(next) + 1) ++next;
+      while (next < lower.size && parent[next - 1] == next && lower.count(next - 1) == lower.count(next) + 1) ++next;
       find_rows(first, next);
       for (Half &half : halves) assemble(half, first, next);
       const Fronts fronts = {{halves.front().front.data(), halves.back().front.data()},
@@ -129,7 +129,6 @@ public:
   }
 
 private:
-  const Columns &matrix;
   const int32_t *parent;
   const Columns &lower;
   int32_t *row;
@@ -153,7 +152,7 @@ private:
       }
     };
     for (int32_t j = first; j < next; ++j) {
-      see(matrix, j);
+      for (const Half &half : halves) see(half.given, j);
       for (int32_t c = child[j]; c >= 0; c = sibling[c]) see(lower, c);
     }
     std::sort(rows.begin(), rows.end());
@@ -166,8 +165,9 @@ private:
   {
     half.front.assign(rows.size() * rows.size(), 0.0);
     for (int32_t j = first; j < next; ++j) {
-      for (int64_t p = matrix.start[j]; p < matrix.start[j + 1]; ++p)
-        if (matrix.row[p] >= j) column(half, j - first)[place[matrix.row[p]]] += half.given[p];
+      const Columns &given = half.given;
+      for (int64_t p = given.start[j]; p < given.start[j + 1]; ++p)
+        if (given.row[p] >= j) column(half, j - first)[place[given.row[p]]] += given.value[p];
       for (int32_t c = child[j]; c >= 0; c = sibling[c]) add(half, c);
     }
   }
@@ -322,17 +322,18 @@ EXPORTED void elimination_tree(int32_t size, const int64_t *start, const int32_t
   }
 }
 
-// Fills L, D and U^T of a matrix: 1 if it has, 0 if a pivot is zero, -1 without enough memory. Without entries of A^T
-// A is symmetric.
+// Fills L, D and U^T of a matrix A: 1 if it has, 0 if a pivot is zero, -1 without enough memory. Given are the columns
+// of A and of A^T; without A^T, A is symmetric.
 EXPORTED int32_t factor_ldlt(int32_t size, const int64_t *start, const int32_t *row, const double *value,
-                             const double *turned, const int32_t *parent, const int64_t *lower_start,
-                             int32_t *lower_row, double *lower_value, double *upper_value, double *pivot)
+                             const int64_t *turned_start, const int32_t *turned_row, const double *turned_value,
+                             const int32_t *parent, const int64_t *lower_start, int32_t *lower_row, double *lower_value,
+                             double *upper_value, double *pivot)
 {
-  const Columns matrix = {size, start, row, value}, lower = {size, lower_start, lower_row, lower_value};
+  const Columns lower = {size, lower_start, lower_row, lower_value};
   try {
-    std::vector<Multifrontal::Half> halves = {{value, lower_value, {}, {}}};
-    if (turned) halves.push_back({turned, upper_value, {}, {}});
-    return Multifrontal(matrix, parent, lower, lower_row, halves, pivot).factor();
+    std::vector<Multifrontal::Half> halves = {{{size, start, row, value}, lower_value, {}, {}}};
+    if (turned_start) halves.push_back({{size, turned_start, turned_row, turned_value}, upper_value, {}, {}});
+    return Multifrontal(parent, lower, lower_row, halves, pivot).factor();
   } catch (const std::bad_alloc &) {
     return -1;
   }

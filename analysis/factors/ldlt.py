@@ -1,6 +1,6 @@
-r"""Factors L D U of a sparse matrix with a symmetric pattern, without pivoting, and solutions for many right sides.
+r"""Factors L D U of a sparse matrix without pivoting, and solutions for many right sides.
 
-L and :math:`U^T` have the same pattern, and ones on their diagonals. Of a symmetric matrix :math:`U = L^T`, so that
+L and :math:`U^T` have the same pattern, that of the factors of :math:`A + A^T`, and ones on their diagonals. Of a symmetric matrix :math:`U = L^T`, so that
 factors take half of the time and of the memory. The library of `ldlt.cpp` is built with the plugin. A solution for
 four right sides takes a fifth of the time of SuperLU, which takes any matrix. The method is multifrontal (Liu, SIAM
 Rev. 34, 82 (1992)). Neighbouring columns of one pattern, such as those of a disk, are eliminated together in a small
@@ -32,7 +32,7 @@ def library() -> ctypes.CDLL | None:
         return None
     integer, array = ctypes.c_int32, ctypes.c_void_p
     found.elimination_tree.argtypes = [integer, *[array] * 4]
-    found.factor_ldlt.argtypes = [integer, *[array] * 10]
+    found.factor_ldlt.argtypes = [integer, *[array] * 12]
     found.solve_ldlt.argtypes = [integer, *[array] * 5, integer, array]
     found.elimination_tree.restype = found.solve_ldlt.restype = None
     found.factor_ldlt.restype = integer
@@ -64,8 +64,8 @@ class CompiledFactors:
 
     @classmethod
     def of(cls, matrix: csc_array, library: ctypes.CDLL, *, symmetric: bool) -> "CompiledFactors | None":
-        """The factors of a real matrix in the order of elimination; None if a pivot is zero, or the pattern is not
-        symmetric. `symmetric` says that the matrix is, to the bit.
+        """The factors of a real matrix in the order of elimination; None if a pivot is zero. `symmetric` says that the
+        matrix is, to the bit.
 
         Raises
         ------
@@ -73,22 +73,17 @@ class CompiledFactors:
             If there is none for the fronts.
         """
         transposed = matrix if symmetric else csc_array(matrix.T)
-        if not symmetric:
-            matrix.sort_indices()  # those of the transpose are sorted
-            if not (np.array_equal(matrix.indptr, transposed.indptr) and
-                    np.array_equal(matrix.indices, transposed.indices)):  # fmt: skip
-                return None
+        pattern = _columns(matrix if symmetric else _entries(matrix) + _entries(transposed))
         size = matrix.shape[0]
-        columns = matrix.indptr.astype(np.int64), matrix.indices.astype(np.int32, copy=False)
         parent, below, start = np.empty(size, np.int32), np.empty(size, np.int64), np.zeros(size + 1, np.int64)
-        library.elimination_tree(size, *_places(*columns, parent, below))
+        library.elimination_tree(size, *_places(*pattern[:2], parent, below))
         np.cumsum(below, out=start[1:])
         lower = np.empty(start[-1])
         upper = lower if symmetric else np.empty(start[-1])
         factors = cls(library, start, np.empty(start[-1], np.int32), lower, upper, np.empty(size))
-        given, turned = (np.ascontiguousarray(each.data, dtype=np.float64) for each in (matrix, transposed))
-        halves = [*_places(given), None if symmetric else turned.ctypes.data]
-        made = library.factor_ldlt(size, *_places(*columns), *halves, parent.ctypes.data, *factors._parts)
+        given, turned = _columns(matrix), _columns(transposed)
+        halves = [*_places(*given), *([None] * 3 if symmetric else _places(*turned))]
+        made = library.factor_ldlt(size, *halves, parent.ctypes.data, *factors._parts)
         if made < 0:
             raise MemoryError(f"the fronts of a matrix of {size} rows")
         return factors if made else None
@@ -109,6 +104,17 @@ class CompiledFactors:
     @property
     def _parts(self) -> list[int]:
         return _places(self.start, self.row, self.lower, self.upper, self.pivot)
+
+
+def _columns(matrix: csc_array) -> tuple[NDArray[np.int64], Integers, Floats]:
+    """Where the columns of a matrix begin, the rows of their entries, and these."""
+    entries = np.ascontiguousarray(matrix.data, dtype=np.float64)
+    return matrix.indptr.astype(np.int64), matrix.indices.astype(np.int32, copy=False), entries
+
+
+def _entries(matrix: csc_array) -> csc_array:
+    """A matrix with a one for each entry, zeros among them."""
+    return csc_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def _places(*arrays: NDArray[Any]) -> list[int]:

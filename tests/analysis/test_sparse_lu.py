@@ -130,7 +130,7 @@ def test_compiled_factors_are_those_of_the_matrix(size, entries, seed, symmetric
     # diagonally dominant, of either sign
     matrix = some + some.T + np.diag(rng.choice([-1, 1], size) * (2 * size + 1.0))
     if not symmetric:
-        matrix *= rng.uniform(0.5, 1, (size, size))
+        matrix *= rng.integers(0, 3, (size, size)) + 2 * size * np.eye(size)
     factors = symmetric_lu(csc_array(matrix), ordered=True, symmetric=symmetric)
     assert isinstance(factors, CompiledFactors)
     lower, diagonal, upper = dense(factors)
