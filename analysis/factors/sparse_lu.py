@@ -1,7 +1,6 @@
 """Sparse factors of large matrices with a symmetric pattern, such as K. All sparse factors are made here.
 
-**Symmetric matrices** in an order of elimination are factored by :mod:`~faultgouge.analysis.factors.ldlt`, without
-pivoting.
+**Real matrices** in an order of elimination are factored by :mod:`~faultgouge.analysis.factors.ldlt`, without pivoting.
 
 **SuperLU**, which SciPy has, factors all others, and finds orders of elimination of minimum degree on the pattern of
 A + A^T. Pivots are taken from the diagonal. By default SuperLU joins small columns of the elimination tree to
@@ -23,8 +22,8 @@ from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from ..errors import FaultgougeError
-from ..packing.packing import Indices
-from .ldlt import SymmetricFactors, library
+from ..packing.packing import Floats, Indices
+from .ldlt import CompiledFactors, library
 
 
 class SingularMatrixError(FaultgougeError):
@@ -41,6 +40,9 @@ SYMMETRIC: dict[str, Any] = {"relax": 1, "options": {"SymmetricMode": True}}
 DIAGONAL_PIVOT = 0.01
 """Share of the largest entry of its column that a diagonal entry must have to be the pivot of any matrix: MUMPS's
 default, too."""
+
+INACCURATE = 1e-9
+"""Relative residual of solutions without pivoting from which on pivots are chosen; usually it is some 1e-13."""
 
 MUMPS_FROM = 1_000_000
 """Coordinates from which on MUMPS is used: it takes as long there, and half of the memory."""
@@ -66,6 +68,11 @@ class SuperLUFactors:
     def solve(self, right: Any, trans: str = "N") -> Any:
         """See :class:`Factors`."""
         return self.lu.solve(right, trans)
+
+    @property
+    def entries(self) -> int:
+        """Entries of both factors."""
+        return int(self.lu.nnz)
 
     @property
     def negative(self) -> int:
@@ -99,9 +106,15 @@ def symmetric_lu(
     """
     if mumps and matrix.shape[0] >= MUMPS_FROM and _mumps() is not None:
         return MumpsFactors(matrix, symmetric)
-    compiled = library() if ordered and symmetric and pivoting == 0 else None
+    return _without_mumps(matrix, ordered=ordered, pivoting=pivoting, symmetric=symmetric)
+
+
+def _without_mumps(
+    matrix: csc_array, *, ordered: bool, pivoting: float = 0.0, symmetric: bool = False
+) -> "SuperLUFactors | CompiledFactors":
+    compiled = library() if ordered and pivoting == 0 and np.isrealobj(matrix.data) else None
     # where a pivot is zero SuperLU takes another one
-    factors = SymmetricFactors.of(matrix, compiled) if compiled is not None else None
+    factors = CompiledFactors.of(matrix, compiled, symmetric=symmetric) if compiled is not None else None
     return factors or SuperLUFactors(_superlu(matrix, "NATURAL" if ordered else "MMD_AT_PLUS_A", pivoting))
 
 
@@ -118,6 +131,58 @@ def general_lu(matrix: csc_array) -> SuperLUFactors:
         If a pivot is zero.
     """
     return SuperLUFactors(_superlu(matrix, "MMD_AT_PLUS_A", DIAGONAL_PIVOT))
+
+
+def accurate_lu(matrix: csc_array) -> "SuperLUFactors | CompiledFactors":
+    """The factors of a real matrix in the order of elimination, without pivoting where the solutions are accurate.
+
+    Raises
+    ------
+    SingularMatrixError
+        If a pivot is zero.
+    """
+    right = np.random.default_rng(2).standard_normal(matrix.shape[0])
+    try:
+        factors = _without_mumps(matrix, ordered=True)
+        found = factors.solve(right)
+        size = np.abs(matrix.data).max() * np.linalg.norm(found)
+        if np.linalg.norm(matrix @ found - right) <= INACCURATE * size:
+            return factors
+    except SingularMatrixError:
+        pass
+    return _without_mumps(matrix, ordered=True, pivoting=DIAGONAL_PIVOT)
+
+
+@dataclass(frozen=True, eq=False)
+class ReorderedFactors:
+    """Factors of a real matrix, whose rows the order of elimination has moved.
+
+    Attributes
+    ----------
+    factors : SuperLUFactors or CompiledFactors
+    order : ndarray of int, shape (n,)
+        The rows in the order of elimination.
+    """
+
+    factors: "SuperLUFactors | CompiledFactors"
+    order: Indices
+
+    @classmethod
+    def of(cls, matrix: csc_array) -> "ReorderedFactors":
+        """Factor a matrix that may be far from symmetric; see `accurate_lu`."""
+        order = np.argsort(minimum_degree(csc_array(abs(matrix) + abs(matrix.T))))
+        return cls(accurate_lu(csc_array(matrix[order][:, order])), order)
+
+    @property
+    def entries(self) -> int:
+        """Entries of both factors."""
+        return self.factors.entries
+
+    def solve(self, right: Floats) -> Floats:
+        """The solution of A x = b, shape (n,) or (n, k)."""
+        found = np.empty(right.shape)
+        found[self.order] = self.factors.solve(right[self.order])
+        return found
 
 
 def minimum_degree(matrix: csc_array) -> Indices:

@@ -41,10 +41,10 @@ from .modes import Modes
 class SliceSizes:
     """Sizes and tolerances of slices, with their reasons."""
 
-    own: int = 45
+    own: int = 36
     """Eigenvalues of a slice. More cost more orthogonalisation, fewer cost more factors."""
-    block: int = 6
-    """Vectors that are solved for at a time: each takes half of the time of one by itself."""
+    block: int = 4
+    """Vectors that are solved for at a time, in the time of two by themselves. Larger blocks take more vectors."""
     beyond: float = 1.1
     """Radius of a disc in units of half its slice: what two neighbours both have."""
     accuracy: float = 1e-6
@@ -55,7 +55,7 @@ class SliceSizes:
     is found again from the plane of both."""
     complete: float = 1e-3
     """Error of the trace, in mean distances of eigenvalues, as of all errors together."""
-    largest: int = 12
+    largest: int = 15
     """Vectors of a space at the most, in units of `own`."""
     least: int = 540
     """Coordinates up to which LAPACK finds all: a space of the largest size would hold them, in no less time."""

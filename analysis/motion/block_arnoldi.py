@@ -22,12 +22,8 @@ from scipy.sparse import csc_array, eye_array
 
 from ..arrays import Complexes, Floats
 from ..errors import FaultgougeError
-from ..factors.sparse_lu import DIAGONAL_PIVOT, Factors, SingularMatrixError, symmetric_lu
+from ..factors.sparse_lu import Factors, accurate_lu
 from .modes import Modes
-
-INACCURATE = 1e-9
-"""Relative residual of solutions without pivoting from which on pivots are chosen; usually it is some 1e-13."""
-
 
 ROOM = 1.06
 """Vectors of the next space, in units of those that would have been enough for the last one."""
@@ -228,7 +224,8 @@ class ShiftedDisc:
         SpectrumError
             If the largest space does not hold them.
         """
-        factors, start = accurate_factors(matrix, shift), np.random.default_rng(seed)
+        factors = accurate_lu(csc_array(matrix - shift * eye_array(matrix.shape[0])))
+        start = np.random.default_rng(seed)
         krylov = Krylov(factors.solve, start.standard_normal((block, matrix.shape[0])), reach.most)
         while True:
             krylov.extend(first)
@@ -302,18 +299,3 @@ def ritz_values(krylov: Krylov, shift: float) -> tuple[Complexes, Floats, Floats
         errors = krylov.residuals(right) / np.abs(theta) ** 2
         values = shift + 1 / theta
     return values, overlap, np.where(theta == 0, np.inf, errors)
-
-
-def accurate_factors(matrix: csc_array, shift: float) -> Factors:
-    """Factors of A - shift, without pivoting where the solutions are accurate."""
-    shifted = csc_array(matrix - shift * eye_array(matrix.shape[0]))
-    right = np.random.default_rng(2).standard_normal(matrix.shape[0])
-    try:
-        factors = symmetric_lu(shifted, ordered=True, mumps=False)
-        found = factors.solve(right)
-        size = np.abs(shifted.data).max() * np.linalg.norm(found)
-        if np.linalg.norm(shifted @ found - right) <= INACCURATE * size:
-            return factors
-    except SingularMatrixError:
-        pass
-    return symmetric_lu(shifted, ordered=True, pivoting=DIAGONAL_PIVOT, mumps=False)

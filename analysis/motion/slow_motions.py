@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, eye_array, vstack
 
 from ..arrays import Complexes, Floats, Indices
-from ..factors.sparse_lu import general_lu
+from ..factors.sparse_lu import ReorderedFactors
 from ..progress import report_progress
 from .block_arnoldi import Krylov, SpectrumError, ritz_values
 
@@ -148,7 +148,7 @@ def slow_motions(
     size = matrix.shape[0]
     largest = float(np.sqrt(abs(matrix).sum(axis=1).max()))
     shift = SLOW_SHIFT * largest
-    factors = general_lu(csc_array(matrix + shift * damping + shift**2 * eye_array(size)))
+    factors = ReorderedFactors.of(csc_array(matrix + shift * damping + shift**2 * eye_array(size)))
 
     def inverse(columns: Floats) -> Floats:
         place, speed = columns[:size], columns[size:]
@@ -160,7 +160,7 @@ def slow_motions(
     held = matrix if float(abs(damping).sum(axis=1).max()) > HOLDS_UP * largest else None
     start = without(alone, np.random.default_rng(0).standard_normal((2 * size, BLOCK_OF_SLOW))).T
     krylov = Krylov(inverse, start, int(min(MOST_SLOW, BYTES_OF_SPACE / (16 * size), 2 * (size - alone.shape[1]))))
-    entries, wanted = matrix.nnz + damping.nnz + factors.lu.nnz, FIRST_SLOW
+    entries, wanted = matrix.nnz + damping.nnz + factors.entries, FIRST_SLOW
 
     def cost(vectors: int) -> float:
         """Multiplications of a space; those of dense matrices take a quarter of the time."""
@@ -168,7 +168,7 @@ def slow_motions(
 
     while True:
         krylov.extend(wanted)
-        found = replace(_inside(krylov, shift, largest, reference, alone, held), entries=int(factors.lu.nnz))
+        found = replace(_inside(krylov, shift, largest, reference, alone, held), entries=factors.entries)
         report_progress(
             f"slow motions: {len(found.values)} up to {found.radius / largest:.2%} of the largest frequency"
         )

@@ -8,7 +8,7 @@ from scipy.sparse import csc_array, diags_array, eye_array, kron
 from scipy.sparse.linalg import splu
 
 from faultgouge.analysis.factors import sparse_lu
-from faultgouge.analysis.factors.ldlt import SymmetricFactors
+from faultgouge.analysis.factors.ldlt import CompiledFactors
 from faultgouge.analysis.factors.sparse_lu import (
     SingularMatrixError,
     SuperLUFactors,
@@ -92,42 +92,53 @@ def test_singular_matrix_is_said_to_be_one(ordered, backend):
 
 
 def dense(factors):
-    """L and D of factors."""
+    """L, D and U of factors."""
     size = len(factors.pivot)
-    lower = csc_array((factors.value, factors.row, factors.start), shape=(size, size))
-    return lower.toarray() + np.eye(size), np.diag(factors.pivot)
+    lower, upper = (
+        csc_array((values, factors.row, factors.start), shape=(size, size)).toarray() + np.eye(size)
+        for values in (factors.lower, factors.upper)
+    )
+    return lower, np.diag(factors.pivot), upper.T
 
 
-@pytest.mark.parametrize("shape", [(432,), (432, 1), (432, 5), (432, 6), (432, 13)])
-def test_compiled_factors_solve(shape):
-    """An indefinite matrix, and numbers of right sides below, at and above the six that are solved for at a time."""
+@pytest.mark.parametrize("symmetric", [True, False])
+@pytest.mark.parametrize("shape", [(432,), (432, 1), (432, 3), (432, 4), (432, 15)])
+def test_compiled_factors_solve(shape, symmetric):
+    """An indefinite matrix, and numbers of right sides below, at and above the four that are solved for at a time."""
     order = np.argsort(minimum_degree(lattice(12)))
     matrix = csc_array(lattice(12) - 3 * eye_array(432))[order][:, order]
+    if not symmetric:
+        matrix.data *= np.random.default_rng(5).uniform(0.9, 1.1, matrix.nnz)
     right = np.random.default_rng(2).standard_normal(shape)
-    factors = symmetric_lu(matrix, ordered=True, symmetric=True)
-    assert isinstance(factors, SymmetricFactors)
-    found = factors.solve(right)
-    # |A x - b| <= 5 n u |L| |D| |L^T| |x| (Higham, Accuracy and Stability of Numerical Algorithms, 2002, theorems 9.3
+    factors = symmetric_lu(matrix, ordered=True, symmetric=symmetric)
+    assert isinstance(factors, CompiledFactors)
+    lower, diagonal, upper = (np.abs(each) for each in dense(factors))
+    # |A x - b| <= 5 n u |L| |D| |U| |x| (Higham, Accuracy and Stability of Numerical Algorithms, 2002, theorems 9.3
     # and 9.4, which count 3 n for L U)
-    lower, diagonal = np.abs(dense(factors))
-    size = lower @ diagonal @ lower.T @ np.abs(np.reshape(found, (432, -1)))
-    assert np.all(np.abs(matrix @ found - right).reshape(432, -1) <= 5 * 432 * np.finfo(float).eps * size)
+    product = lower @ diagonal @ upper
+    for trans, turned, size in (("N", matrix, product), ("T", matrix.T, product.T)):
+        found = factors.solve(right, trans)
+        bound = 5 * 432 * np.finfo(float).eps * size @ np.abs(np.reshape(found, (432, -1)))
+        assert np.all(np.abs(turned @ found - right).reshape(432, -1) <= bound)
 
 
-@given(size=st.integers(1, 90), entries=st.floats(0, 1), seed=st.integers(0, 1000))
-def test_compiled_factors_are_those_of_the_matrix(size, entries, seed):
+@given(size=st.integers(1, 90), entries=st.floats(0, 1), seed=st.integers(0, 1000), symmetric=st.booleans())
+def test_compiled_factors_are_those_of_the_matrix(size, entries, seed, symmetric):
     """Any pattern: full and empty, of one tree of elimination and of many, from one column to two panels of a front."""
     rng = np.random.default_rng(seed)
     some = np.where(rng.random((size, size)) < entries, rng.uniform(-1, 1, (size, size)), 0.0)
     # diagonally dominant, of either sign
     matrix = some + some.T + np.diag(rng.choice([-1, 1], size) * (2 * size + 1.0))
-    factors = symmetric_lu(csc_array(matrix), ordered=True, symmetric=True)
-    assert isinstance(factors, SymmetricFactors)
-    lower, diagonal = dense(factors)
-    # |L D L^T - A| <= n u |L| |D| |L^T| (Higham, theorem 9.3)
-    bound = (size + 2) * np.finfo(float).eps * np.abs(lower) @ np.abs(diagonal) @ np.abs(lower).T
-    assert np.all(np.abs(lower @ diagonal @ lower.T - matrix) <= 2 * bound)  # the product here is off by as much
-    assert factors.negative == np.count_nonzero(np.diag(matrix) < 0)
+    if not symmetric:
+        matrix *= rng.integers(0, 3, (size, size)) + 2 * size * np.eye(size)
+    factors = symmetric_lu(csc_array(matrix), ordered=True, symmetric=symmetric)
+    assert isinstance(factors, CompiledFactors)
+    lower, diagonal, upper = dense(factors)
+    # |L D U - A| <= n u |L| |D| |U| (Higham, theorem 9.3)
+    bound = (size + 2) * np.finfo(float).eps * np.abs(lower) @ np.abs(diagonal) @ np.abs(upper)
+    assert np.all(np.abs(lower @ diagonal @ upper - matrix) <= 2 * bound)  # the product here is off by as much
+    if symmetric:
+        assert factors.negative == np.count_nonzero(np.diag(matrix) < 0)
 
 
 def test_pivots_off_the_diagonal_are_left_to_superlu():
