@@ -33,14 +33,20 @@ def take_or_keep(
             _relax(lmp, commands)
         return from_lammps(lmp, commands, slides=slides, balance=balance)
     except (NotTakenError, NoEquilibriumError) as error:
-        kept = None if keep is None else _keep(lmp, keep.with_suffix(".restart"))
-        if kept is None:
-            raise
         longer = "" if isinstance(error, NoEquilibriumError) else ", and with a longer run"
-        raise NotTakenError(
-            f"{str(error).rstrip('.')}. The state is kept in {kept}: go on by a deck of read_restart {kept} and the "
-            f"lines of this deck from pair_style on, without those that make particles{longer}."
-        ) from error
+        raise NotTakenError(keep_state(lmp, str(error), keep, longer)) from error
+
+
+def keep_state(lmp: Any, says: str, keep: Path | None, change: str) -> str:
+    """A sentence on a deck, and where the state of the deck's runs is kept, if a restart file can be written beside
+    `keep`; `change` is what the lines have to have besides."""
+    kept = None if keep is None else _keep(lmp, keep.with_suffix(".restart"))
+    if kept is None:
+        return says
+    return (
+        f"{says.rstrip('.')}. The state is kept in {kept}: go on by a deck of read_restart {kept} and the lines of this "
+        f"deck from pair_style on, without those that make particles{change}."
+    )
 
 
 def _relax(lmp: Any, commands: Iterable[str]) -> None:

@@ -27,7 +27,7 @@ from .granular_commands import (
 from .instance_queries import OpenFile, Styles, communicator, log_of, only_log, styles_of
 from .lammps_arrays import Arrays, arrays_at_rest, contacts_of_plane, forces_in_order, given_back
 from .look_in_a_copy import can_copy, quieten
-from .moving_regions import refuse_moving_regions
+from .moving_regions import moving_region
 from .translating_bodies import translating_bodies
 
 BY_CONTACT = ("contacts", "partners")
@@ -106,7 +106,8 @@ def look_at_forces(
             )
         if name not in given.fixes or without_suffix(given.fixes[name].split()[3]) != without_suffix(style):
             raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINE}.")
-    refuse_moving_regions(lmp, given)
+    if moves := moving_region(lmp, given):
+        raise NotTakenError(moves)
     groups = {name: line.split()[2] for name, line in given.fixes.items() if name in moving}
     for name in list(groups):
         if without_suffix(styles.fixes[name]) in BODIES:

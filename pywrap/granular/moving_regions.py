@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .granular_commands import Commands, NotTakenError, without_suffix
+from .granular_commands import Commands, without_suffix
 from .instance_queries import styles_of
 from .look_in_a_copy import in_a_copy, quieten
 
@@ -17,14 +17,8 @@ STEPS_TO_CHANGE = 3
 """Steps in which a variable that depends on the time has other values."""
 
 
-def refuse_moving_regions(lmp: Any, commands: Commands) -> None:
-    """Refuse walls whose region moves; nothing is known of regions that are not among the commands.
-
-    Raises
-    ------
-    NotTakenError
-        With the region and its variable.
-    """
+def moving_region(lmp: Any, commands: Commands) -> str:
+    """The sentence on a wall whose region moves; empty if no region is known to move."""
     styles = styles_of(lmp).fixes
     found = [
         (name, region, variable)
@@ -36,10 +30,11 @@ def refuse_moving_regions(lmp: Any, commands: Commands) -> None:
     moving = in_a_copy(partial(_changing, lmp, sorted({each for *_, each in found}))) if found else set()
     for name, region, variable in found:
         if variable in moving:
-            raise NotTakenError(
+            return (
                 f"Region {region} of fix {name} moves with v_{variable}: give this variable a constant before the last "
                 "run, and run on until the packing rests."
             )
+    return ""
 
 
 def _parts(commands: Commands, region: str) -> list[str]:

@@ -8,6 +8,8 @@ the runs. LAMMPS's log, and the parts, are files without a name, which no end of
 import ctypes
 import os
 import re
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, Any, NamedTuple
@@ -20,6 +22,7 @@ from .balance import BALANCE, check_balance
 from .granular_commands import (
     GIVE_LINE,
     GIVE_LINES,
+    Commands,
     NotLinearisedError,
     NotTakenError,
     commands_in,
@@ -28,9 +31,10 @@ from .granular_commands import (
     with_one_rank,
 )
 from .instance_queries import communicator, explain_error, name_of, styles_of
-from .kept_state import take_or_keep
+from .kept_state import keep_state, take_or_keep
 from .look_in_a_copy import can_copy
 from .looks import check_instance
+from .moving_regions import moving_region
 
 MARK = "faultgouge_rest_of_the_deck"
 """Label of the first line of the second part of a deck."""
@@ -46,6 +50,11 @@ CHANGES = re.compile(
 
 CONDITION = re.compile(r"""\b(el)?if\s+("[^"]*"|'[^']*'|\S+)""")
 
+UNFIX = re.compile(r"(?m)^[ \t]*unfix[ \t]+(\w+)[ \t]*(?:#.*)?$")
+"""A command that takes one fix away, named by its ID."""
+
+REDEFINES = re.compile(r"(?<![\w/])(region|variable)\s")
+"""Commands that may bring a region to rest."""
 
 HIDES = re.compile(r"\s*(log|echo)\s")
 """Commands that keep what follows out of LAMMPS's log."""
@@ -75,7 +84,7 @@ def run_deck(
     """Run a deck in its own folder, as `lmp -in` there, and take its last state as `from_lammps` does.
 
     If `relaxes`, the last state comes to rest first, by :func:`~faultgouge.pywrap.granular.relax.relax`. A state that
-    cannot be taken is kept in a restart file beside `keep`.
+    cannot be taken, or at which LAMMPS stops, is kept in a restart file beside `keep`.
 
     Raises
     ------
@@ -92,13 +101,12 @@ def run_deck(
         raise BadInputError(f"{path}: quit ends this program, too, before the packing is taken: leave it out.")
     with TemporaryFile("w+", errors="replace") as log:
         lmp = lammps_instance(MPI.COMM_WORLD, Path(name_of(log)))
-        deck = _divide(text)
-        if deck is None:
-            _carry_out(lmp, path, path.name)
-        else:
-            _carry_out_text(lmp, path, deck.head)
-            _refuse_what_stays(lmp, path, _text_of_logs(lmp, log, path), deck)
-            _carry_out_text(lmp, path, deck.second_part)
+        try:
+            _carry_out_deck(lmp, path, text, log)
+        except NotTakenError as error:
+            ran = bool(lmp.extract_global("ntimestep"))
+            says = keep_state(lmp, str(error), keep if ran else None, ", and without what stopped LAMMPS")
+            raise NotTakenError(says) from error
         try:
             commands = commands_in(_text_of_logs(lmp, log, path))
             found = take_or_keep(lmp, commands, keep, slides=slides, balance=balance, relaxes=relaxes)
@@ -108,6 +116,17 @@ def run_deck(
             raise NotTakenError(says) from error
         lmp.close()
     return found
+
+
+def _carry_out_deck(lmp: Any, path: Path, text: str, log: IO[str]) -> None:
+    """Have LAMMPS carry out all of a deck, and look at its fixes and styles before the first run if that is known."""
+    deck = _divide(text)
+    if deck is None:
+        _carry_out(lmp, path, path.name)
+        return
+    _carry_out_text(lmp, path, deck.head)
+    _refuse_what_stays(lmp, path, _text_of_logs(lmp, log, path), deck)
+    _carry_out_text(lmp, path, deck.second_part)
 
 
 def _divide(text: str) -> Deck | None:
@@ -153,19 +172,34 @@ def _text_of_logs(lmp: Any, log: IO[str], path: Path) -> str:
 
 def _refuse_what_stays(lmp: Any, path: Path, text: str, deck: Deck) -> None:
     """Refuse what an instance cannot be taken with, unless a command ahead may change it."""
-    ahead = deck.ahead
-    if CHANGES.search(CONDITION.sub("", ahead)):
+    ahead = CONDITION.sub("", deck.ahead)
+    gone, ahead = set(UNFIX.findall(ahead)), UNFIX.sub("", ahead)
+    if CHANGES.search(ahead):
         return
     try:
         commands, styles = read_commands(commands_in(text), log=True), styles_of(lmp)
         again = re.findall(r"\bfix\s+(\S+)\s", ahead)  # a fix takes the place of one with the same ID
-        if not any(name in styles.fixes or "$" in name for name in again):
-            check_instance(lmp, styles, commands)
+        if any(name in styles.fixes or "$" in name for name in again):
+            return
+        stay = {name: style for name, style in styles.fixes.items() if name not in gone}
+        commands = replace(commands, fixes={name: commands.fixes[name] for name in commands.fixes if name not in gone})
+        check_instance(lmp, styles._replace(fixes=stay), commands)
     except NotLinearisedError as error:
         if not can_copy(lmp):  # for K by differences of forces
             raise BadInputError(f"{path}: {_of_deck(with_one_rank(error), deck.head)}") from error
+        _refuse_moving_region(lmp, path, commands, ahead)
     except NotTakenError as error:
         raise BadInputError(f"{path}: {_of_deck(str(error), deck.head)}") from error
+
+
+def _refuse_moving_region(lmp: Any, path: Path, commands: Commands, ahead: str) -> None:
+    """Refuse a region that moves, and stays as it is in the lines ahead."""
+    says = ""
+    if not REDEFINES.search(ahead):
+        with suppress(NotTakenError):  # a deck that LAMMPS cannot run yet tells nothing
+            says = moving_region(lmp, commands)
+    if says:
+        raise BadInputError(f"{path}: {says}")
 
 
 def _of_deck(says: str, text: str) -> str:

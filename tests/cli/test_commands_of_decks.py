@@ -97,7 +97,6 @@ def test_deck_with_logs_of_its_own(faultgouge_here, tmp_path):
 @pytest.mark.parametrize(
     ("before", "after", "says"),
     [
-        ("run 6000", "run 1000000000\nquit", "quit ends this program, too"),
         ("units lj", "echo screen\nunits lj", "No pair_style is in the log"),
         ("units lj", "log none\nunits lj", "leave out log none and echo"),
     ],
@@ -105,6 +104,15 @@ def test_deck_with_logs_of_its_own(faultgouge_here, tmp_path):
 def test_decks_that_leave_no_commands(faultgouge_here, tmp_path, before, after, says):
     (tmp_path / "mute.in").write_text(DECK.format(**FLAT, word="contacts").replace(before, after))
     assert says in faultgouge_here("import", "mute.in", code=2).stderr
+
+
+def test_deck_that_quit_ends(faultgouge_here, tmp_path):
+    """Lines behind it are not read; a text that has the word is no command."""
+    says = 'print """\nquit\n"""\n'
+    (tmp_path / "quits.in").write_text(
+        says + DECK.format(**FLAT, word="contacts") + "quit 1  # done\nno such command\n"
+    )
+    assert "3 disks, " in faultgouge_here("import", "quits.in", "-o", "quits.h5").stdout
 
 
 def test_deck_that_clears_all(faultgouge_here, tmp_path):

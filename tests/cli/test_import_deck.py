@@ -179,11 +179,32 @@ def test_what_is_taken_on_one_rank_alone(faultgouge, tmp_path):
 
 def test_regions_that_move(faultgouge_here, tmp_path):
     """A part of an intersection that rises with the time: its place is another one in each run."""
-    (tmp_path / "pour.in").write_text(POUR.format(law=LAW.format(g=1), rise="1e-6*elapsed", steps=2000))
+    deck = POUR.format(law=LAW.format(g=1), rise="1e-6*elapsed", steps=2000)
+    says = "Region floor of fix bin moves with v_rise: give this variable a constant before the last run"
+    (tmp_path / "pour.in").write_text(f"{deck}unfix ins\nrun 1000000000\n")
+    assert says in faultgouge_here("import", "pour.in", code=2).stderr  # before the first run
+    (tmp_path / "pour.in").write_text(f"{deck}variable later equal 0\n")
     for more in ((), ("--relax",)):
-        said = faultgouge_here("import", "pour.in", *more, code=1).stderr
-        assert "Region floor of fix bin moves with v_rise: give this variable a constant before the last run" in said
+        assert says in faultgouge_here("import", "pour.in", *more, code=1).stderr
         (tmp_path / "packing.restart").unlink()
+
+
+def test_a_region_that_comes_to_rest(faultgouge_here, tmp_path):
+    """A variable of time that a later line makes a constant."""
+    deck = POUR.format(law=LAW.format(g=1), rise="1e-6*elapsed", steps=2000)
+    (tmp_path / "pour.in").write_text(f"{deck}variable rise equal 0.002\nrun 1\n")
+    faultgouge_here("import", "pour.in", "-o", "pour.h5", "--relax")
+    assert read_configuration(tmp_path / "pour.h5").residual < 1e-7
+
+
+def test_a_line_at_which_lammps_stops(faultgouge_here, tmp_path):
+    """The state of the runs before it is kept."""
+    deck = DECK.format(**ROUND, word="contacts").replace("run 6000", "run 1500\ncompute what all no/such/style")
+    (tmp_path / "stops.in").write_text(deck)
+    said = faultgouge_here("import", "stops.in", "-o", "stops.h5", code=1).stderr
+    assert "LAMMPS stopped: Unrecognized compute style 'no/such/style'" in said
+    assert "The state is kept in stops.restart: go on by a deck of read_restart stops.restart" in said
+    assert (tmp_path / "stops.restart").is_file()
 
 
 @pytest.mark.long
