@@ -16,6 +16,9 @@ from .film import Film
 COLOURS = 64
 """Colours of a GIF: a packing or a mode has some dozens, and shades of lines take the rest."""
 
+PALETTE_FRAMES = 8
+"""Frames whose colours a GIF has: of three, a disk that turns green has its last green alone, and is grey until then."""
+
 COLOUR_DIFFERENCE = 18
 """A dot stays as it was while each of its three colours is off by no more than this, of 255. Without this a film of 20
 units of time is twice as large; with twice as much contacts that moved leave gaps in others."""
@@ -78,8 +81,9 @@ def _gif(film: Film, path: Path, rate: float, progress: Progress) -> None:
     from PIL import Image
     from PIL.GifImagePlugin import getdata, getheader
 
-    # One palette for all frames, from the first, the middle and the last: colours do not flicker.
-    samples = np.concatenate([film.frame(k) for k in (0, film.count // 2, film.count - 1)])
+    # One palette for all frames, so that colours do not flicker, from frames at even intervals: disks change colour.
+    some = np.unique(np.linspace(0, film.count - 1, PALETTE_FRAMES).astype(int))
+    samples = np.concatenate([film.frame(int(k)) for k in some])
     # It spans the colours evenly; the median cut, Pillow's own choice, has greys for the few dots of a bright colour.
     palette = Image.fromarray(samples).quantize(COLOURS - 1, method=Image.Quantize.MAXCOVERAGE, kmeans=3)
     colours = np.reshape((palette.getpalette() or [])[: 3 * (COLOURS - 1)], (-1, 3))
