@@ -1,5 +1,6 @@
 """The windows of random families against all eigenvalues at many loads."""
 
+from collections import Counter
 from functools import cache
 from itertools import product
 
@@ -60,28 +61,33 @@ def look_inside(windows):
 @pytest.mark.parametrize(
     ("increments", "dissipation"),
     [
-        (3, 0.0),
         (3, 0.3),
         *(
             pytest.param(*each, marks=pytest.mark.long)
-            for each in ((1, 0.0), (1, 1e-4), (3, 1e-4), (1, 1e-2), (3, 1e-2), (1, 0.3))
+            for each in ((1, 1e-4), (3, 1e-4), (1, 1e-2), (3, 1e-2), (1, 0.3))
         ),
     ],
 )
 def test_as_many_windows_are_open_at_each_load_as_motions_grow(increments, dissipation):
-    """Windows that begin and end within an increment, several of them, and gaps between two windows of one motion."""
-    found = 0
+    """Windows that begin and end within an increment, several of them, and gaps between two windows of one motion;
+    without dissipation and with it."""
+    found = Counter()
     for seed, feed in product(range(6), (0.05, 0.3, 1.0)):
         size, loads = 4 + seed, np.linspace(0.0, 1.0, increments + 1)
-        windows = undamped = find_windows(family(seed, size, feed, 0.0), loads)
-        if dissipation:
-            windows = find_windows(family(seed, size, feed, dissipation), loads, look=look_inside(undamped))
-        found += len(windows)
-        edges = np.array([edge for each in windows for edge in (each.fx_onset, each.fx_end) if edge is not None])
-        for fx, (growing, doubt) in zip(LOADS, growing_at_loads(seed, size, feed, dissipation), strict=True):
-            # LAPACK cannot tell next to an edge, or where two modes cross: Re s is known to the root of rounding there
-            if np.abs(edges - fx).min(initial=np.inf) < 1e-6 or doubt < 1e-6:
-                continue
-            begun = sum(each.fx_onset < fx and (each.fx_end is None or fx < each.fx_end) for each in windows)
-            assert begun == growing, (seed, feed, fx, windows)
-    assert found >= 10
+        undamped = find_windows(family(seed, size, feed, 0.0), loads)
+        damped = find_windows(family(seed, size, feed, dissipation), loads, look=look_inside(undamped))
+        for windows, loss in ((undamped, 0.0), (damped, dissipation)):
+            check_open_windows(windows, growing_at_loads(seed, size, feed, loss))
+            found[loss] += len(windows)
+    assert min(found.values()) >= 10
+
+
+def check_open_windows(windows, growing_at_loads):
+    """As many windows are open at each load as motions grow there."""
+    edges = np.array([edge for each in windows for edge in (each.fx_onset, each.fx_end) if edge is not None])
+    for fx, (growing, doubt) in zip(LOADS, growing_at_loads, strict=True):
+        # LAPACK cannot tell next to an edge, or where two modes cross: Re s is known to the root of rounding there
+        if np.abs(edges - fx).min(initial=np.inf) < 1e-6 or doubt < 1e-6:
+            continue
+        begun = sum(each.fx_onset < fx and (each.fx_end is None or fx < each.fx_end) for each in windows)
+        assert begun == growing, (fx, windows)

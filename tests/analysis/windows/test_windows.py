@@ -184,6 +184,7 @@ def test_the_error_of_no_onset_gives_each_user_his_own_advice(error):
 def test_what_nothing_happens_on_is_not_decomposed(ramp, mu, monkeypatch):
     """The same windows as from all modes at every load, which are computed next to the edges alone."""
     path, decomposed, decompose = ramp(mu, 1e-3, 22), [], SystemModes.of
+    loads = path.grid[12:]
 
     def count_decompositions(system):
         decomposed.append(system.fx)
@@ -193,10 +194,10 @@ def test_what_nothing_happens_on_is_not_decomposed(ramp, mu, monkeypatch):
         return full_operator(path(fx))
 
     monkeypatch.setattr(SystemModes, "of", count_decompositions)
-    quick = searched(operator, path.grid, PairScreen())
+    quick = searched(operator, loads, PairScreen())
     few, decomposed[:] = len(decomposed), []
-    every = searched(operator, path.grid)
-    assert len(decomposed) >= 23
+    every = searched(operator, loads)
+    assert len(decomposed) >= len(loads)
     assert few <= 4 * len(quick)
     assert len(quick) == len(every)
     # what equilibria of a residual of 1e-10 on ten disks can tell of the load
