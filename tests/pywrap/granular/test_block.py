@@ -135,6 +135,16 @@ def test_of_a_block_that_slides_the_load_alone_is_not_accused(block):
         from_lammps(block(1.0 + 4e-6))
 
 
+@pytest.mark.parametrize("speed", [1e-9, 0.1])
+def test_velocities_that_are_left_out_are_named(block, speed):
+    from faultgouge.pywrap import from_lammps
+
+    lmp = block(0.9)
+    of_particle(lmp, "v", 1)[0] = speed
+    says = f"velocities are left out: particle 1 moves at {speed:.3g}, and what is said is said of pushes from rest"
+    assert (says in str(stability(from_lammps(lmp)))) == (speed > 1e-3)
+
+
 HILL = f"""
 units lj
 atom_style sphere
