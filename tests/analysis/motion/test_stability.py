@@ -42,8 +42,10 @@ def test_stability_of_three_disks():
     assert dict(rising) == rising.as_dict() | {"other_start": rising.other_start}
     with pytest.raises(ValueError, match="upper layer"):
         stability(at_rest, rise="fx")
-    with pytest.raises(ValueError, match="a force on no particle"):
-        stability(at_rest, rise=np.zeros((3, 2)))
+    held = derive_frozen(at_rest, free=np.array([False, True, True]))
+    for where, forces in ((at_rest, np.zeros((3, 2))), (held, np.outer([1.0, 0.0, 0.0], [1.0, 0.0]))):
+        with pytest.raises(ValueError, match="a force on no particle that moves"):
+            stability(where, rise=forces)
 
 
 def test_without_dissipation_no_push_comes_to_rest():

@@ -93,6 +93,8 @@ def test_a_load_that_rises_accelerates_a_block_that_slides_and_pushes_one_back_t
     back = stability(here, rise=[[-1.0, 0.0, 0.0]], time=8.0)
     assert np.sqrt(3) * back.rising["drift"] == pytest.approx(1 / 300, rel=0.02)
     assert back.rising["vibration"] < 1e-6 * back.rising["drift"]
+    assert back.rising["steady"]
+    assert back.rising["next_change"] == pytest.approx(2 * here.contacts.friction[0], rel=0.01)  # slides back
     rate, time = 1e-7, 2.0
     command(lmp, f"unfix drag\nreset_timestep 0\nvariable rise equal {rate}*step*dt\nfix rise all addforce v_rise 0 0")
     before = float(of_particle(lmp, "x", 1)[0])
