@@ -262,7 +262,8 @@ def _refuse_acceleration(system: OneSidedSystem, windows: list[Span], length: fl
     if np.all(np.diff(quarters) > 0) and quarters[-1] > ACCELERATION_RATIO * quarters[0]:
         raise NotFollowedError(
             f"no constant drift is seen: the mean velocity over the rate rises from {quarters[0]:.3g} to "
-            f"{quarters[-1]:.3g} within t = {time:.4g}, as where the load accelerates particles whose contacts slide on"
+            f"{quarters[-1]:.3g} within t = {time:.4g}, as where the load accelerates particles whose contacts slide "
+            "on, or where the packing is slower than that: give more time"
         )
 
 
