@@ -321,7 +321,7 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     below = is_negative(marked.values, overlap, rounding, zero)
     resists = below | ~is_zero(marked.values, overlap, alike, zero)
     near_zero, not_free = np.abs(values) <= alike, resists & (np.abs(marked.values) <= alike)
-    free = np.count_nonzero(near_zero) - np.count_nonzero(not_free)
+    free = int(near_zero.sum() - not_free.sum())
     below &= marked.values.imag >= 0
     negative = np.sort(np.repeat(marked.values[below].real, np.where(marked.values[below].imag > 0, 2, 1)))
     pairs: list[Mode] = []
