@@ -2,9 +2,12 @@
 
 import math
 
+LEAST_PLAIN, MOST_PLAIN = 1e-5, 1e10
+"""Numbers that are written without a power of ten."""
+
 
 def with_uncertainty(value: float, error: float) -> str:
-    """A number and its uncertainty in units of its last digit, as in 0.02150746(3).
+    """A number and its uncertainty in units of its last digit, as in 0.02150746(3) or 1.5009(3)e-32.
 
     The uncertainty is rounded up, to one digit; a first digit of 1 is followed by another.
 
@@ -17,6 +20,10 @@ def with_uncertainty(value: float, error: float) -> str:
     """
     if not math.isfinite(value) or not 0 < error < math.inf:
         return f"{value:.17g}"
+    size = max(abs(value), error)
+    if not LEAST_PLAIN <= size < MOST_PLAIN:
+        power = _exponent(size)
+        return f"{with_uncertainty(value / 10.0**power, error / 10.0**power)}e{power:+03d}"
     places = 1 - _exponent(2 * error) if _first(error) < 2 else -_exponent(error)
     units = math.ceil(error * 10.0**places * (1 - 1e-9))
     if places <= 0:

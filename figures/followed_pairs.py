@@ -22,7 +22,7 @@ from faultgouge.analysis import (
 )
 from faultgouge.analysis.counted import counted
 from faultgouge.analysis.has_configuration import HasConfiguration
-from faultgouge.analysis.motion.eigenvalues import is_negative, zero_uncertainties, zero_uncertainty
+from faultgouge.analysis.motion.eigenvalues import is_negative, is_zero, zero_uncertainties, zero_uncertainty
 from faultgouge.analysis.windows import Space, System, SystemModes, force_bearing
 
 from .mode import Complexes, displacement
@@ -199,14 +199,16 @@ def _spectrum_of(packing: HasConfiguration, modes: SystemModes) -> Spectrum:
     zero = zero_uncertainties(packing, rounding, particle, modes.left, modes.right)
     numbers = zip(modes.values, found.overlap, found.participation, found.rotation, strict=True)
     pairs = [Mode(complex(value), *map(float, rest)) for value, *rest in numbers if value.imag > 0]
+    below = is_negative(modes.values, found.overlap, rounding, zero)
+    free = ~below & is_zero(modes.values, found.overlap, zero_uncertainty(packing, rounding), zero)
     return Spectrum(
         eigenvalues=modes.values,
         pairs=tuple(sorted(pairs, key=lambda pair: -pair.growth_rate)),
-        negative=np.sort(modes.values[is_negative(modes.values, found.overlap, rounding, zero)].real),
+        negative=np.sort(modes.values[below].real),
         noise_pairs=0,  # they have lost their imaginary parts
         rattlers=packing.rattlers,
         rounding=rounding,
-        uncertainty=zero_uncertainty(packing, rounding),
+        free=int(free.sum()),
         packing=packing,
     )
 

@@ -100,6 +100,11 @@ def is_negative(values: Complexes, overlap: Floats, rounding: float, uncertainty
     return (np.abs(values.imag) * overlap <= SAFETY * rounding) & (-values.real * overlap > uncertainty)
 
 
+def is_zero(values: Complexes, overlap: Floats, alike: float, uncertainty: Floats) -> NDArray[np.bool_]:
+    """Which eigenvalues are zero: within the uncertainty of zero of all modes alike, and kappa times that of each."""
+    return (np.abs(values) <= alike) & (np.abs(values) * overlap <= uncertainty)
+
+
 def exceeds_rounding(eigenvalue: complex, overlap: float | np.floating, rounding: float) -> bool:
     """Whether an imaginary part exceeds SAFETY kappa u |A|, its own rounding uncertainty.
 

@@ -17,6 +17,7 @@ from .eigenvalues import (
     SAFETY,
     growing,
     growing_undamped,
+    is_zero,
     operator_rounding,
     zero_uncertainties,
     zero_uncertainty,
@@ -153,7 +154,7 @@ class _StiffnessModes:
         zero = zero_uncertainties(packing, rounding, motion.particle, modes.left, modes.right)
         oscillates, buckles = growing_undamped(modes.values, modes.overlap, rounding, zero)
         grows, alike = oscillates | buckles, zero_uncertainty(packing, rounding)
-        free = ~grows & (np.abs(modes.values) <= alike) & (np.abs(modes.values) * modes.overlap <= zero)
+        free = ~grows & is_zero(modes.values, modes.overlap, alike, zero)
         return cls(modes.values, grows, free)
 
     @property

@@ -60,6 +60,7 @@ from .eigenvalues import (
     active_coordinates,
     exceeds_rounding,
     is_negative,
+    is_zero,
     mass_weighted,
     operator_rounding,
     zero_uncertainties,
@@ -101,8 +102,9 @@ class Spectrum(TableDisplay):
         Disks that touch nothing.
     rounding : float
         u |A|_F, 1 / time^2: uncertainty of a perfectly conditioned eigenvalue.
-    uncertainty : float
-        That of an eigenvalue of zero, 1 / time^2, by rounding and by forces that are out of balance.
+    free : int
+        Number of eigenvalues that are zero within the uncertainty of zero, of their own modes where these are known,
+        and not negative: no force opposes such a motion, which drifts.
     packing : Configuration or Packing
         Whose eigenvalues they are.
     remark : str
@@ -115,7 +117,7 @@ class Spectrum(TableDisplay):
     noise_pairs: int
     rattlers: Indices
     rounding: float
-    uncertainty: float
+    free: int
     packing: HasConfiguration
     remark: str = ""
 
@@ -203,15 +205,6 @@ class Spectrum(TableDisplay):
     @cached_property
     def _damped(self) -> Rates | None:
         return rates_of(Motion.of(self.packing)) if self.packing.configuration.damped else None
-
-    @property
-    def free(self) -> int:
-        """Number of eigenvalues that are zero within `uncertainty`, and not negative: no force opposes such a motion,
-        which drifts."""
-        zero, negative = (
-            int(np.count_nonzero(np.abs(each) <= self.uncertainty)) for each in (self.eigenvalues, self.negative)
-        )
-        return zero - negative
 
     @property
     def least_q(self) -> float:
@@ -321,11 +314,15 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
         rounding = operator_rounding(packing, matrix.data)
     if not np.isfinite(rounding):
         raise BadInputError("Stiffnesses overflow, and nothing can be said: take units in which numbers are smaller.")
-    uncertainty = zero_uncertainty(packing, rounding)
-    values, marked, remark = _values_and_vectors(matrix, SAFETY * rounding)
+    alike = zero_uncertainty(packing, rounding)
+    values, marked, remark = _values_and_vectors(matrix, SAFETY * rounding, alike)
     overlap, particle = marked.overlap, active % len(packing.configuration)
     zero = zero_uncertainties(packing, rounding, particle, marked.left, marked.right)
-    below = is_negative(marked.values, overlap, rounding, zero) & (marked.values.imag >= 0)
+    below = is_negative(marked.values, overlap, rounding, zero)
+    resists = below | ~is_zero(marked.values, overlap, alike, zero)
+    near_zero, not_free = np.abs(values) <= alike, resists & (np.abs(marked.values) <= alike)
+    free = int(near_zero.sum() - not_free.sum())
+    below &= marked.values.imag >= 0
     negative = np.sort(np.repeat(marked.values[below].real, np.where(marked.values[below].imag > 0, 2, 1)))
     pairs: list[Mode] = []
     noise = 0
@@ -345,15 +342,18 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
         noise_pairs=noise,
         rattlers=packing.rattlers,
         rounding=rounding,
-        uncertainty=uncertainty,
+        free=free,
         packing=packing,
         remark=remark,
     )
 
 
-def _values_and_vectors(matrix: csr_array, uncertainty: float) -> tuple[Complexes, Modes, str]:
-    """All eigenvalues, and those with vectors: at least the ones that are complex, or negative by more than that;
-    and why LAPACK took over."""
+def _values_and_vectors(matrix: csr_array, rounding: float, alike: float) -> tuple[Complexes, Modes, str]:
+    """All eigenvalues, and those with vectors; and why LAPACK took over.
+
+    Vectors are known at least of eigenvalues that are complex, or negative beyond rounding, and up to `SLICED`
+    coordinates of those that may be zero by forces that are out of balance: up to `alike`, but not by rounding.
+    """
     remark = ""
     if matrix.shape[0] > SLICED:
         try:
@@ -369,7 +369,8 @@ def _values_and_vectors(matrix: csr_array, uncertainty: float) -> tuple[Complexe
     # vectors take three times as long as eigenvalues: a large packing under a load has complex pairs, and needs both
     alone = len(dense) <= DENSE_LARGEST or (matrix != matrix.T).nnz == 0
     values = eigvals(dense) if len(dense) and alone else np.zeros(0, complex)
-    if alone and not np.any(values.imag != 0) and values.real.min(initial=0.0) >= -uncertainty:
+    doubtful = (values.imag != 0) | (values.real < -rounding) | ((values.real > rounding) & (values.real <= alike))
+    if alone and not doubtful.any():
         return values, Modes.none(len(dense)), remark
     values, left, right = eig(dense, left=True, right=True)
     return values, Modes(values, right, left), remark

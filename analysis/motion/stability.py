@@ -143,6 +143,6 @@ def _positive_time(time: float) -> float:
 def _direction(configuration: Configuration, rise: str | ArrayLike) -> Floats:
     """Forces per unit of time on all coordinates, shape (coordinates, 1)."""
     forces = forces_on_coordinates(configuration, rise)
-    if not forces.any():
-        raise ValueError("rise is a force on no particle: give the forces by which the load rises, not all zero.")
+    if not forces[configuration.coordinate_free].any():
+        raise ValueError("rise is a force on no particle that moves: give the forces by which the load rises.")
     return forces

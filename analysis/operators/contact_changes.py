@@ -125,7 +125,7 @@ class ContactChanges:
         along[self.slides] -= slid
         along[self.wears] += self.worn[0] * paths
         across[self.wears] += self.worn[1] * paths
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             reaches = self._reaches(along, across, bound)
             opens = np.where((closing < 0) & (self.overlap > 0), -self.overlap / closing, np.inf)
             gains = products[3 * count :]

@@ -1,10 +1,14 @@
 """Is a packing at rest? Forces that are out of balance, and the reasons if nothing moves all the same."""
 
+from typing import Any
+
 import numpy as np
 
 from ...analysis import BadInputError, Configuration, LinearisedContacts
 from ...analysis.arrays import Indices
 from .granular_commands import OWN, Commands, NotTakenError, without_suffix
+from .instance_queries import communicator
+from .lammps_arrays import owned_array
 
 BALANCE = 1e-4
 """Share of the mean contact force that may be out of balance. Beyond, the packing moves to another place of rest, and K
@@ -46,6 +50,23 @@ def refuse_motion(configuration: Configuration, balance: float, commands: Comman
     raise NotTakenError(
         f"The packing moves: the residual of particle {configuration.ids[worst]} at ({place}) is "
         f"{size[worst] / force:.3g} of the mean contact force, and {balance:g} is allowed{also}; {advice}."
+    )
+
+
+def velocity_remarks(lmp: Any, configuration: Configuration) -> tuple[str, ...]:
+    """A sentence on the fastest particle, if its contacts would stop it with more force than may be out of balance."""
+    world = communicator(lmp)
+    ids, v = (np.concatenate(world.allgather(np.array(owned_array(lmp, name)))) for name in ("id", "v"))
+    order = np.argsort(ids)
+    speed = np.linalg.norm(v[order[np.searchsorted(ids[order], configuration.ids)]], axis=1)
+    stiffness = configuration.assembled_stiffness().diagonal().reshape(configuration.axes, -1)
+    stopping = speed * np.sqrt(configuration.mass * np.abs(stiffness[: configuration.dimension]).max(axis=0))
+    fastest = int(np.argmax(stopping))
+    if not stopping[fastest] > BALANCE * force_scale(configuration):
+        return ()
+    return (
+        f"velocities are left out: particle {configuration.ids[fastest]} moves at {speed[fastest]:.3g}, and what is "
+        "said is said of pushes from rest",
     )
 
 

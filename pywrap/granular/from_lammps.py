@@ -15,7 +15,7 @@ from typing import Any
 from ...analysis import Configuration
 from ...analysis.arrays import derive_frozen
 from .acting_fixes import check_holding, drag_remarks
-from .balance import BALANCE, check_balance, force_scale, refuse_motion
+from .balance import BALANCE, check_balance, force_scale, refuse_motion, velocity_remarks
 from .configuration_by_differences import configuration_by_differences, still_particles
 from .configuration_by_laws import KnownLaws, check_friction, configuration_by_laws
 from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError, read_commands, with_one_rank
@@ -64,7 +64,7 @@ def from_lammps(
     -------
     Configuration
         With its contacts' laws, as they are measured; or, where these do not apply (`operators` says which), with K and
-        C by differences of forces, on one rank. Its `remarks` name the drag that is left out.
+        C by differences of forces, on one rank. Its `remarks` name the drag and the velocities that are left out.
 
     Raises
     ------
@@ -125,7 +125,8 @@ def _by_laws(
         configuration = configuration_by_laws(lmp, deck, found, laws)
     except ValueError as error:  # numbers that no contact at rest has
         raise NotTakenError(f"The packing moves: {error}; bring it to rest by faultgouge.relax(lmp).") from error
-    configuration = derive_frozen(configuration, remarks=(*configuration.remarks, *drag_remarks(fixes)))
+    said = (*configuration.remarks, *drag_remarks(fixes), *velocity_remarks(lmp, configuration))
+    configuration = derive_frozen(configuration, remarks=said)
     contacts = configuration.contacts
     rests = not configuration.residual > BALANCE * force_scale(configuration)
     proves = prove and can_copy(lmp) and rests
@@ -150,7 +151,8 @@ def _proved(lmp: Any, configuration: Configuration, commands: Commands, fixes: d
 def _by_differences(lmp: Any, given: Commands | None, *, balance: float, prove: bool) -> Configuration:
     """A Configuration whose K and C are differences of LAMMPS's forces, on one rank."""
     still = still_particles(lmp, given)
-    made = derive_frozen(configuration_by_differences(lmp, still), remarks=drag_remarks(still.fixes))
+    made = configuration_by_differences(lmp, still)
+    made = derive_frozen(made, remarks=(*drag_remarks(still.fixes), *velocity_remarks(lmp, made)))
     refuse_motion(made, balance, still.commands)
     proves = prove and made.residual <= BALANCE * force_scale(made)
     return _proved(lmp, made, still.commands, still.fixes) if proves else made

@@ -1,5 +1,6 @@
 """Spectra: which pairs are real, what is left out, and the large-packing solver against the dense one."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -213,6 +214,21 @@ def test_forces_out_of_balance_do_not_make_a_packing_unstable(force, negative):
     assert found.is_stable is (None if negative else True)
     assert ("not known whether the packing is stable: the packing moves" in repr(found)) == bool(negative)
     assert found.free == 3 - negative  # two rolling motions, and that of the disk above
+
+
+def test_forces_out_of_balance_on_light_disks_do_not_free_a_heavy_one():
+    """The packing of the test above. What the light disks leave open is ten times the eigenvalues of the heavy one."""
+    law, force = MindlinLaw(kn=2e5, kt=2e5 * 2 / 7, mu=1.0), 3e-5
+    rests, touches = (3.0 / law.kn) ** (2 / 3), (force / law.kn) ** (2 / 3)
+    position, radius = np.array([[0.5, 0.5 - rests], [2.5, 0.5 - touches], [2.5, 1.5 - 2 * touches]]), np.full(3, 0.5)
+    packing = Packing(
+        position=position, radius=radius, mass=[1e6, 1e-3, 1e-3], top=[True, False, False], box_length=5.0, law=law,
+        fy=3.0, contacts=touching(position, radius, 5.0),
+    )  # fmt: skip
+    found = spectrum(packing)
+    assert np.sum(np.abs(found.eigenvalues) < force / (0.5 * 1e-3)) == 5
+    assert found.free == 3
+    assert json.loads(json.dumps(stability(packing).as_dict()))["free"] == 3
 
 
 def test_negative_eigenvalues_of_more_disks_than_the_dense_solver_takes():

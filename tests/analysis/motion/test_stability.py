@@ -8,6 +8,7 @@ import pytest
 from three_disks import balanced, stuck_at_rest, three_disks
 
 from faultgouge.analysis import (
+    one_sided_motion,
     spectrum,
     stability,
 )
@@ -41,8 +42,21 @@ def test_stability_of_three_disks():
     assert dict(rising) == rising.as_dict() | {"other_start": rising.other_start}
     with pytest.raises(ValueError, match="upper layer"):
         stability(at_rest, rise="fx")
-    with pytest.raises(ValueError, match="a force on no particle"):
-        stability(at_rest, rise=np.zeros((3, 2)))
+    held = derive_frozen(at_rest, free=np.array([False, True, True]))
+    for where, forces in ((at_rest, np.zeros((3, 2))), (held, np.outer([1.0, 0.0, 0.0], [1.0, 0.0]))):
+        with pytest.raises(ValueError, match="a force on no particle that moves"):
+            stability(where, rise=forces)
+
+
+def test_without_dissipation_no_push_comes_to_rest():
+    """Contacts stop sliding, and what is left vibrates for ever."""
+    three = three_disks()
+    at_rest = balanced(replace(three, law=replace(three.law, cn=0.0, ct=0.0)))
+    told = stability(at_rest)
+    assert told.stable is True
+    assert str(told).startswith("stable: each of 4 pushes ends in vibration that goes on, but does not grow")
+    size = one_sided_motion(at_rest, np.ones((3, 2)), times=np.linspace(0, 12, 121)).mean_square_displacement
+    assert size[81:].max() > 0.8 * size[41:81].max()
 
 
 @pytest.mark.parametrize(("scales", "stable"), [((1e-7, 1e-9), None), ((1e-9, np.inf), True), ((np.inf, 1e-3), None)])

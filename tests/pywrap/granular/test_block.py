@@ -93,6 +93,8 @@ def test_a_load_that_rises_accelerates_a_block_that_slides_and_pushes_one_back_t
     back = stability(here, rise=[[-1.0, 0.0, 0.0]], time=8.0)
     assert np.sqrt(3) * back.rising["drift"] == pytest.approx(1 / 300, rel=0.02)
     assert back.rising["vibration"] < 1e-6 * back.rising["drift"]
+    assert back.rising["steady"]
+    assert back.rising["next_change"] == pytest.approx(2 * here.contacts.friction[0], rel=0.01)  # slides back
     rate, time = 1e-7, 2.0
     command(lmp, f"unfix drag\nreset_timestep 0\nvariable rise equal {rate}*step*dt\nfix rise all addforce v_rise 0 0")
     before = float(of_particle(lmp, "x", 1)[0])
@@ -133,6 +135,16 @@ def test_of_a_block_that_slides_the_load_alone_is_not_accused(block):
 
     with pytest.raises(NotTakenError, match="1 contact at Coulomb's bound or just below may slide while"):
         from_lammps(block(1.0 + 4e-6))
+
+
+@pytest.mark.parametrize("speed", [1e-9, 0.1])
+def test_velocities_that_are_left_out_are_named(block, speed):
+    from faultgouge.pywrap import from_lammps
+
+    lmp = block(0.9)
+    of_particle(lmp, "v", 1)[0] = speed
+    says = f"velocities are left out: particle 1 moves at {speed:.3g}, and what is said is said of pushes from rest"
+    assert (says in str(stability(from_lammps(lmp)))) == (speed > 1e-3)
 
 
 HILL = f"""
