@@ -324,10 +324,10 @@ EXPORTED void elimination_tree(int32_t size, const int64_t *start, const int32_t
 
 // Fills L, D and U^T of a matrix A: 1 if it has, 0 if a pivot is zero, -1 without enough memory. Given are the columns
 // of A and of A^T; without A^T, A is symmetric.
-EXPORTED int32_t factor_ldlt(int32_t size, const int64_t *start, const int32_t *row, const double *value,
-                             const int64_t *turned_start, const int32_t *turned_row, const double *turned_value,
-                             const int32_t *parent, const int64_t *lower_start, int32_t *lower_row, double *lower_value,
-                             double *upper_value, double *pivot)
+EXPORTED int32_t factor_ldu(int32_t size, const int64_t *start, const int32_t *row, const double *value,
+                            const int64_t *turned_start, const int32_t *turned_row, const double *turned_value,
+                            const int32_t *parent, const int64_t *lower_start, int32_t *lower_row, double *lower_value,
+                            double *upper_value, double *pivot)
 {
   const Columns lower = {size, lower_start, lower_row, lower_value};
   try {
@@ -340,8 +340,8 @@ EXPORTED int32_t factor_ldlt(int32_t size, const int64_t *start, const int32_t *
 }
 
 // L D U x = b for several right sides: x, shape (n, sides) by rows, holds b before and x after.
-EXPORTED void solve_ldlt(int32_t size, const int64_t *start, const int32_t *row, const double *lower_value,
-                         const double *upper_value, const double *pivot, int32_t sides, double *x)
+EXPORTED void solve_ldu(int32_t size, const int64_t *start, const int32_t *row, const double *lower_value,
+                        const double *upper_value, const double *pivot, int32_t sides, double *x)
 {
   const Columns lower = {size, start, row, lower_value}, upper = {size, start, row, upper_value};
   solve_all(lower, upper, pivot, sides, x);

@@ -34,10 +34,10 @@ def library() -> ctypes.CDLL | None:
         return None
     integer, array = ctypes.c_int32, ctypes.c_void_p
     found.elimination_tree.argtypes = [integer, *[array] * 4]
-    found.factor_ldlt.argtypes = [integer, *[array] * 12]
-    found.solve_ldlt.argtypes = [integer, *[array] * 5, integer, array]
-    found.elimination_tree.restype = found.solve_ldlt.restype = None
-    found.factor_ldlt.restype = integer
+    found.factor_ldu.argtypes = [integer, *[array] * 12]
+    found.solve_ldu.argtypes = [integer, *[array] * 5, integer, array]
+    found.elimination_tree.restype = found.solve_ldu.restype = None
+    found.factor_ldu.restype = integer
     return found
 
 
@@ -85,7 +85,7 @@ class CompiledFactors:
         factors = cls(library, start, np.empty(start[-1], np.int32), lower, upper, np.empty(size))
         given, turned = _columns(matrix), _columns(transposed)
         halves = [*_places(*given), *([None] * 3 if symmetric else _places(*turned))]
-        made = library.factor_ldlt(size, *halves, parent.ctypes.data, *factors._parts)
+        made = library.factor_ldu(size, *halves, parent.ctypes.data, *factors._parts)
         if made < 0:
             raise MemoryError(f"the fronts of a matrix of {size} rows")
         return factors if made else None
@@ -95,7 +95,7 @@ class CompiledFactors:
         x = np.array(right, dtype=np.float64, order="C").reshape(len(self.pivot), -1)
         start, row, lower, upper, pivot = self._parts
         halves = (lower, upper) if trans == "N" else (upper, lower)
-        self.library.solve_ldlt(len(x), start, row, *halves, pivot, x.shape[1], x.ctypes.data)
+        self.library.solve_ldu(len(x), start, row, *halves, pivot, x.shape[1], x.ctypes.data)
         return x.reshape(np.shape(right))
 
     @property

@@ -1,4 +1,4 @@
-"""Sparse factors of large matrices with a symmetric pattern, such as K. All sparse factors are made here.
+"""Sparse factors of large matrices with a symmetric pattern, such as K, or nearly so. All sparse factors are made here.
 
 **Real matrices** in an order of elimination are factored by :mod:`~faultgouge.analysis.factors.ldlt`, without pivoting.
 
@@ -41,7 +41,7 @@ DIAGONAL_PIVOT = 0.01
 """Share of the largest entry of its column that a diagonal entry must have to be the pivot of any matrix: MUMPS's
 default, too."""
 
-INACCURATE = 1e-9
+INACCURATE = 1e-11
 """Relative residual of solutions without pivoting from which on pivots are chosen; usually it is some 1e-13."""
 
 MUMPS_FROM = 1_000_000

@@ -65,7 +65,7 @@ class LinearRates:
         if configuration.damped:
             sticking = rates_of(Motion.of(configuration))
         one_sided = bool(configuration.contacts.one_sided.any())
-        sliding = rates_of(Motion.of(configuration, sliding=True)) if one_sided else sticking
+        sliding = rates_of(Motion.of(configuration, sliding=True), decides=False) if one_sided else sticking
         return cls(undamped, sticking, sliding, one_sided)
 
 

@@ -10,6 +10,7 @@ from scipy.sparse.linalg import splu
 from faultgouge.analysis.factors import sparse_lu
 from faultgouge.analysis.factors.ldlt import CompiledFactors
 from faultgouge.analysis.factors.sparse_lu import (
+    ReorderedFactors,
     SingularMatrixError,
     SuperLUFactors,
     general_lu,
@@ -139,6 +140,23 @@ def test_compiled_factors_are_those_of_the_matrix(size, entries, seed, symmetric
     assert np.all(np.abs(lower @ diagonal @ upper - matrix) <= 2 * bound)  # the product here is off by as much
     if symmetric:
         assert factors.negative == np.count_nonzero(np.diag(matrix) < 0)
+
+
+@pytest.mark.parametrize("diagonal", [20.0, 0.0])
+def test_factors_of_rows_in_any_order(diagonal):
+    """Of a matrix whose pattern is not symmetric, and of one without a diagonal, which needs other pivots."""
+    matrix = lattice(12).tolil()
+    matrix.setdiag(diagonal)
+    matrix = csc_array(matrix + diags_array(np.ones(430), offsets=2))
+    moved = np.random.default_rng(4).permutation(432)
+    matrix = csc_array(matrix[moved][:, moved])
+    right = np.random.default_rng(5).standard_normal((432, 3))
+    factors = ReorderedFactors.of(matrix)
+    assert isinstance(factors.factors, CompiledFactors if diagonal else SuperLUFactors)
+    found = factors.solve(right)
+    # other right sides than that for which the factors were looked at: ten times as far off at the most
+    size = np.abs(matrix.data).max() * np.linalg.norm(found, axis=0)
+    assert np.all(np.linalg.norm(matrix @ found - right, axis=0) <= 10 * sparse_lu.INACCURATE * size)
 
 
 def test_pivots_off_the_diagonal_are_left_to_superlu():
