@@ -16,7 +16,7 @@ UNSTABLE = {
     "law": {"kn": 2e5, "mu": [0.5, 0.4]},
     "load": {"fy": 3.0},
     "ramp": {"step": 0.01, "until": 0.03},
-    "perturb": {"fx": 0.0, "time": 5.0, "amplitude": 1e-9, "omega": 0.01},
+    "perturb": {"fx": 0.0, "time": 1.0, "amplitude": 1e-9, "omega": 0.01},
     "friction": {"v0": 1e-7, "v_ss": "10 v0"},
     "trigger": {"distance": [0.1], "omega": [14.0], "time": 1.0, "runs": 1},
 }
