@@ -74,7 +74,7 @@ def test_perturb_and_trigger(faultgouge_here, refusal, pairs):
 
 @pytest.mark.slow
 def test_a_sweep_infers_nothing_of_weakening():
-    """With mu = 0.4 the sweep finds no equilibrium at the next load: it was called a layer that flows."""
+    """With mu = 0.4 the sweep finds no equilibrium at the next load, which is no sign of a flow."""
     scene = Scene.from_mapping({name: UNSTABLE[name] for name in ("packing", "law", "load", "ramp")})
     found = triggering(scene, lambda mu: settle(scene, mu))
     assert [(each["ends"], each["reach"]) for each in found["ramps"]] == [("onset", 0.0)] * 2

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from granular_packings import LAWS, command, instance
+from granular_packings import LAWS, command, head, instance
 from scipy.spatial import cKDTree
 
 from faultgouge.analysis import damping_matrix, spectrum, stability, stiffness_matrix
@@ -45,15 +45,7 @@ def test_a_contact_at_the_bound_is_seen(lammps_with):
     """Its two particles have other derivatives forwards than backwards, and K is the mean of sticking and sliding."""
     from faultgouge.pywrap import from_lammps
 
-    lmp = lammps_with("""
-units lj
-dimension 2
-atom_style sphere
-boundary f f p
-newton off
-comm_modify vel yes
-region box block -4 4 -4 4 -0.5 0.5 units box
-create_box 1 box
+    lmp = lammps_with(head("block -4 4 -4 4 -0.5 0.5", "f f p", dimension=2) + """
 create_atoms 1 single 0 0 0
 create_atoms 1 single 0.99 0 0
 create_atoms 1 single -0.99 0 0
@@ -81,14 +73,9 @@ timestep 1e-3
     assert apart(stiffness_matrix(found), mean) < 1e-6
 
 
-ROW = """
-units lj
-atom_style sphere
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -4 4 -4 4 0 4 units box
-create_box 1 box
+ROW = (
+    head("block -4 4 -4 4 0 4")
+    + """
 create_atoms 1 single -1.5 0 0.4999 units box
 create_atoms 1 single 0.0 0 0.4999 units box
 create_atoms 1 single {x} 0 0.4999 units box
@@ -101,6 +88,7 @@ fix move all nve/sphere
 timestep 1e-3
 run 0
 """
+)
 
 
 def test_dashpots_of_frozen_particles(lammps_with):
@@ -163,14 +151,9 @@ run 0
     assert apart(stiffness_matrix(found), stiffness_matrix(laws)) < 1e-6
 
 
-BOX = """
-units lj
-atom_style sphere
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -10 10 -10 10 -10 10 units box
-create_box 1 box
+BOX = (
+    head("block -10 10 -10 10 -10 10")
+    + """
 {spheres}
 set group all diameter 1 density 1
 pair_style gran/hooke/history 4e3 NULL 100 NULL 0.5 1
@@ -183,6 +166,7 @@ fix drag all viscous 1
 timestep 0.004
 run 20000
 """
+)
 
 
 @pytest.mark.parametrize("kisses", [False, True])

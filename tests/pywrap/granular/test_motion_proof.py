@@ -141,7 +141,7 @@ def test_fixes_that_act_on_what_moves(bed, fix, says):
     ["addforce 0.01 0 0", "indent 1.0 sphere 0 0 100 1", "setforce NULL NULL NULL", "ave/time 1 1 1 c_thermo_temp"],
 )
 def test_fixes_without_effect_on_small_motion(bed, fix):
-    """Some of them were refused by their names before there was a proof."""
+    """Whatever their names are, the proof takes them."""
     found = look(*bed, f"fix trap all {fix}", 10000)
     assert found.operators == "laws"
     assert found.proof < 1e-5
