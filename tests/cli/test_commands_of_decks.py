@@ -187,6 +187,7 @@ def test_decks_that_end_early(faultgouge, faultgouge_here, tmp_path, monkeypatch
 
 
 @pytest.mark.ranks
+@pytest.mark.long
 def test_empty_deck_on_two_ranks(faultgouge, tmp_path):
     (tmp_path / "empty.in").write_text("")
     assert "No pair_style is in the log" in faultgouge("import", "empty.in", ranks=2, code=2).stderr
