@@ -151,7 +151,8 @@ class Probe:
     def _there_and_back(self, directions: list[Floats]) -> list[Sides]:
         """Forces along the directions before the first of which a way there and back changes the state."""
         first = rest = self._from_rest(0.0 * directions[0])
-        found, place = [], self._positions()
+        found: list[Sides] = []
+        place = self._positions()
         for q in directions:
             sides = []
             for way in (sign * size for size in self.sizes for sign in (1, -1)):
