@@ -7,7 +7,7 @@ only of new objects.
 """
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,9 @@ from .errors import BadInputError
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Indices = NDArray[np.int64]
+
+Matrix: TypeAlias = Floats | csr_array
+"""A dense or a sparse matrix."""
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

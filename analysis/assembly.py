@@ -57,19 +57,19 @@ class ContactDerivatives(NamedTuple):
 def contact_derivatives(c: LinearisedContacts, parting: ArrayLike = 0.5) -> ContactDerivatives:
     """The derivatives of each contact by u and w."""
     n, ft, b = (np.ascontiguousarray(each.T) for each in (c.normal, c.tangential_force, c.overlap_derivative(parting)))
-    size = np.sqrt(_dot(ft, ft))
+    size = np.sqrt(dot(ft, ft))
     along = np.divide(ft, size, out=np.zeros_like(ft), where=size > 0) * c.sliding
     nn, curvature, stiff = _outer(n, n), 1.0 / c.distance, c.tangential_stiffness
     plane = np.eye(3)[:, :, None] - nn
     # d f_t, with the resistance k_t' S of the slip u + n x w
-    in_plane = along - _dot(along, n) * n
+    in_plane = along - dot(along, n) * n
     ft_by_u = stiff * (_outer(along, in_plane) - plane)
-    ft_by_u -= _outer(b, n) + _outer(n, curvature * (ft - _dot(ft, n) * n))
-    ft_by_w = -stiff * (_cross_matrix(n) + _outer(along, _cross(n, along)))
+    ft_by_u -= _outer(b, n) + _outer(n, curvature * (ft - dot(ft, n) * n))
+    ft_by_w = -stiff * (_cross_matrix(n) + _outer(along, cross(n, along)))
     force_by_u = ft_by_u + (c.normal_force * curvature) * plane - c.normal_stiffness * nn
-    tilted = curvature * (_cross_matrix(ft) + _outer(_cross(n, ft), n))
+    tilted = curvature * (_cross_matrix(ft) + _outer(cross(n, ft), n))
     return ContactDerivatives(
-        force_by_u, ft_by_w, _cross(n, ft_by_u) - tilted, _cross(n, ft_by_w), -_outer(_cross(n, ft), n)
+        force_by_u, ft_by_w, cross(n, ft_by_u) - tilted, cross(n, ft_by_w), -_outer(cross(n, ft), n)
     )
 
 
@@ -204,11 +204,12 @@ def _outer(a: Floats, b: Floats) -> Floats:
     return np.asarray(a[:, None] * b[None])
 
 
-def _dot(a: Floats, b: Floats) -> Floats:
+def dot(a: Floats, b: Floats) -> Floats:
+    """a . b of vectors in columns, shape (C,)."""
     return np.asarray(np.einsum("kc,kc->c", a, b))
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
+def cross(a: Floats, b: Floats) -> Floats:
     """a x b of vectors in columns, or of a with each column of matrices, shape (3, C) or (3, 3, C)."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 

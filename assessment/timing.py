@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..analysis.packing.packing import Floats
+from ..analysis.arrays import Floats
 
 T = TypeVar("T")
 Progress = Callable[[Sequence[Any]], Iterable[Any]]

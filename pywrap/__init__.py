@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # what `OFFERS` imports when it is used
     from .equilibria.quasistatic import Equilibrium, equilibrate
     from .granular.compare_motion import MotionComparison, compare_motion
     from .granular.from_lammps import from_lammps
-    from .granular.granular_commands import NotTakenError, SnapshotError
+    from .granular.granular_commands import NotTakenError
     from .granular.lammps_path import lammps_path
     from .granular.look_in_a_copy import in_a_copy
     from .granular.relax import relax
@@ -46,8 +46,7 @@ OFFERS = {
     "NoEquilibriumError": "..analysis", "Equilibrium": ".equilibria.quasistatic",
     "equilibrate": ".equilibria.quasistatic", "MotionComparison": ".granular.compare_motion",
     "compare_motion": ".granular.compare_motion", "from_lammps": ".granular.from_lammps",
-    "NotTakenError": ".granular.granular_commands", "SnapshotError": ".granular.granular_commands",
-    "lammps_path": ".granular.lammps_path",
+    "NotTakenError": ".granular.granular_commands", "lammps_path": ".granular.lammps_path",
     "in_a_copy": ".granular.look_in_a_copy", "relax": ".granular.relax", "Dynamics": ".lammps.dynamics",
     "Engine": ".lammps.engine", "EngineError": ".lammps.instance", "lammps_instance": ".lammps.instance",
     "LoadPath": ".load_path", "onset_run": ".onset", "DriveCheckpoint": ".runs.drive_states",
@@ -64,7 +63,7 @@ OFFERS = {
 __all__ = [
     "Checkpoint", "DriveCheckpoint", "DriveSample", "DriveStep", "Dynamics", "Engine", "EngineError", "Equilibrium",
     "LoadPath", "MotionComparison", "NoEquilibriumError", "NotTakenError", "Record", "Sample", "Scene", "SceneError",
-    "SnapshotError", "bring_to_rest", "compare_motion", "dashpot", "drive", "equilibrate", "from_lammps", "in_a_copy",
+    "bring_to_rest", "compare_motion", "dashpot", "drive", "equilibrate", "from_lammps", "in_a_copy",
     "lammps_instance", "lammps_path", "onset_run", "perturb", "ramp", "ramp_loads", "reach", "real_units", "relax",
     "restitution", "scene_path", "settle", "settle_for_drive", "time_step",
 ]  # fmt: skip

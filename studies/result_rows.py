@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.arrays import Floats
 from ..analysis.files.plain_file import read_plain
-from ..analysis.packing.packing import Floats
 from ..pywrap import Scene, SceneError
 
 

@@ -14,9 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..analysis.packing.packing import Floats
+from ..analysis.arrays import Floats
 
 Bools = NDArray[np.bool_]
+
+DRAWS = 2000
+"""Resampled packings of which an interval is made."""
 
 
 def share(count: int, of: int) -> dict[str, Any]:
@@ -29,21 +32,21 @@ def share(count: int, of: int) -> dict[str, Any]:
     return {"count": count, "of": of, "share": count / of, "low": float(interval.low), "high": float(interval.high)}
 
 
-def median(values: Sequence[float] | Floats, draws: int = 2000) -> list[float]:
+def median(values: Sequence[float] | Floats) -> list[float]:
     """Median with its 95 % interval from resampled packings: [median, low, high]; inf without a bound."""
     values = np.sort(np.asarray(values, dtype=float))
     if len(values) == 0:
         return [np.nan] * 3
-    low, high = (values[place] for place in _ends_of_median(len(values), draws))
+    low, high = (values[place] for place in _ends_of_median(len(values)))
     return [float(each) for each in (values[len(values) // 2], low, high)]
 
 
 @cache
-def _ends_of_median(size: int, draws: int) -> tuple[int, int]:
+def _ends_of_median(size: int) -> tuple[int, int]:
     """Places in a sorted sample of a size between which the medians of 95 % of the resampled samples are."""
-    chosen = np.random.default_rng(0).integers(size, size=(draws, size))
+    chosen = np.random.default_rng(0).integers(size, size=(DRAWS, size))
     middles = np.sort(np.partition(chosen, size // 2, axis=1)[:, size // 2])
-    return int(middles[int(0.025 * draws)]), int(middles[int(0.975 * draws)])
+    return int(middles[int(0.025 * DRAWS)]), int(middles[int(0.975 * DRAWS)])
 
 
 def sign_test(strong: Mapping[str, Any], weak: Mapping[str, Any]) -> bool | None:
@@ -99,7 +102,7 @@ def quartiles(reach: ArrayLike, found: ArrayLike) -> list[float | None]:
     return [float(fx[place]) if place < len(fx) else None for place in places]
 
 
-def median_interval(reach: ArrayLike, found: ArrayLike, draws: int = 2000, seed: int = 0) -> list[float | None]:
+def median_interval(reach: ArrayLike, found: ArrayLike, draws: int = DRAWS, seed: int = 0) -> list[float | None]:
     """Median of F_x^c with lower and upper end of its 95 % interval from resampled packings.
 
     None stands for what lies beyond what the ramps reached.

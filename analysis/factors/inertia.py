@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import eigsh
 
-from ..packing.packing import Floats
+from ..arrays import Floats
 from .sparse_lu import symmetric_lu
 
 Solve = Callable[[Floats], Floats]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from ..packing.packing import Floats
+from ..arrays import Floats
 
 Integers = NDArray[np.int32]
 

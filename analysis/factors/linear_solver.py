@@ -27,8 +27,8 @@ from scipy.sparse import coo_array, csc_array, csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from ..arrays import Floats, Indices
 from ..packing.disk_operators import SIGNS
-from ..packing.packing import Floats, Indices
 from .sparse_lu import Factors, SingularMatrixError, minimum_degree, symmetric_lu
 
 Booleans = NDArray[np.bool_]

@@ -25,12 +25,13 @@ from typing import TextIO
 
 import numpy as np
 
+from ..arrays import Floats, Indices
 from ..errors import PackingFileError
 from ..packing.compensated import exact_sum
 from ..packing.contacts import FLOOR, Contacts
 from ..packing.geometry import nearest_image
 from ..packing.law import MindlinLaw
-from ..packing.packing import Floats, Indices, Packing
+from ..packing.packing import Packing
 from .plain_file import open_text, read_plain_text
 from .runfile_header import law_of_parameters
 

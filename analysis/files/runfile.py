@@ -43,9 +43,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import Floats
 from ..errors import PackingFileError
 from ..packing.contacts import Contacts
-from ..packing.packing import Floats, Packing
+from ..packing.packing import Packing
 from .checksummed_file import SealedFile, new_file, write
 from .runfile_header import CHECKSUM, COMPACT, law_of_parameters, parameters_of, write_header
 from .runfile_validation import equilibria

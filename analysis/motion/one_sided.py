@@ -28,7 +28,6 @@ motion to rounding.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,7 +35,7 @@ from scipy.linalg import expm
 from scipy.sparse import block_array, bsr_array, csr_array, eye_array
 from scipy.sparse.linalg import expm_multiply
 
-from ..arrays import Floats, Indices, floats
+from ..arrays import Floats, Indices, Matrix, floats
 from ..configuration import Configuration
 from ..has_configuration import HasConfiguration
 from ..operators.contact_changes import ContactChanges
@@ -54,9 +53,6 @@ LOOK_STEP = 0.3
 
 DENSE_ENTRIES = 150**2
 """Entries up to which a product with the dense matrix is as fast: ten times as fast for 60 coordinates and fewer."""
-
-Matrix: TypeAlias = csr_array | Floats
-"""A matrix for products with columns."""
 
 
 @dataclass

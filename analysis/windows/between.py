@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..packing.packing import Floats, Indices
+from ..arrays import Floats, Indices
 from .limits import LIMITS, Limits
 from .space import Space
 from .system import System

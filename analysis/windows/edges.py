@@ -19,8 +19,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from ..arrays import Floats
 from ..errors import FaultgougeError
-from ..packing.packing import Floats
 from .limits import LIMITS, Limits
 from .space import Space
 from .system import System, entries

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
+from ..arrays import Floats
 from ..errors import NoEquilibriumError, TurningPointError
 from ..has_configuration import HasConfiguration
 from ..motion.buckling import negative_eigenvalues
 from ..motion.spectrum import Spectrum, spectrum
-from ..packing.packing import Floats, Packing
+from ..packing.packing import Packing
 from ..progress import Watch, report_progress, show_progress
 from .edges import Edge, SystemOfLoad, Window
 from .find_windows import WindowsSoFar, check_increasing, find_windows, windows_up_to

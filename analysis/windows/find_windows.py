@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
+from ..arrays import Matrix
 from ..counted import counted
 from ..progress import report_progress
 from .edges import SystemOfLoad, Window
@@ -13,7 +14,7 @@ from .limits import LIMITS, Limits
 from .screens.growth import GrowthScreen
 from .screens.pairs import PairScreen
 from .search import Look, windows_along
-from .system import Operator, System, unit_of
+from .system import System, unit_of
 
 WindowsSoFar = Callable[[tuple[Window, ...], float], None]
 """Takes the windows so far, and the load up to which these are complete."""
@@ -91,7 +92,7 @@ def windows_up_to(
 
 
 def complex_windows(
-    operator: Callable[[float], Operator],
+    operator: Callable[[float], Matrix],
     forces: ArrayLike,
     *,
     narrowest: float | None = None,

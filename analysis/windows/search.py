@@ -20,8 +20,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import Protocol
 
+from ..arrays import Floats
 from ..errors import NoEquilibriumError, TurningPointError
-from ..packing.packing import Floats
 from .between import Few, LoadStep, ModeAtEnds, ModesAtEnds, stretch
 from .edges import DoubtError, Edge, LostPairError, LostTrackError, SystemOfLoad, Window, locate_edge
 from .limits import LIMITS, Limits

@@ -37,8 +37,8 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Floats
 from ..motion.eigenvalues import Complexes, exceeds_rounding, growing
-from ..packing.packing import Floats
 from .limits import LIMITS, Limits
 from .system import Inverse, System, halves
 
@@ -212,9 +212,9 @@ class Space:
         ways = _single_mode(guess, rate, limits) if system.dissipative else _two_modes(self, guess, limits)
         return next((found for found in ways if found is not None and found.like(self)), None)
 
-    def refine(self, rate: complex | None = None, limits: Limits = LIMITS) -> "Space | None":
+    def refine(self, rate: complex) -> "Space | None":
         """The mode next to a guess of one, from a `rate` on; None if the iteration does not converge."""
-        return next(_single_mode(self, rate, limits), None)
+        return next(_single_mode(self, rate, LIMITS), None)
 
     def follow(self, system: System, limits: Limits = LIMITS) -> "Space | None":
         """The same modes at another load, if need be in small steps on the straight line between both systems."""

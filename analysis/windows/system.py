@@ -14,21 +14,20 @@ with right vectors :math:`Z r = s r`, left ones :math:`l^H Z = s\, l^H`. Motion 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, TypeAlias, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 from scipy.sparse import csc_array, csr_array, eye_array
 
+from ..arrays import Floats, Matrix
 from ..factors.sparse_lu import SingularMatrixError, general_lu, symmetric_lu
 from ..has_configuration import HasConfiguration
 from ..motion.eigenvalues import mass_weighted, unit_rounding
 from ..operators.damping import damping_matrix
 from ..operators.stiffness import stiffness_matrix
-from ..packing.packing import Floats
 from .limits import LIMITS, Limits
 
-Operator: TypeAlias = Floats | csr_array
 AnyConfiguration = TypeVar("AnyConfiguration", bound=HasConfiguration)
 
 
@@ -204,12 +203,12 @@ def _sparse_factors(matrix: csc_array) -> Callable[[Any, bool], Any]:
     return lambda b, adjoint: factors.solve(b, trans="H" if adjoint else "N")
 
 
-def entries(matrix: Operator) -> Any:
+def entries(matrix: Matrix) -> Any:
     """The entries of a matrix, without the zeros of a sparse one."""
     return matrix if isinstance(matrix, np.ndarray) else matrix.data
 
 
-def to_dense(matrix: Operator) -> Floats:
+def to_dense(matrix: Matrix) -> Floats:
     """A matrix as an array."""
     return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
 

@@ -22,12 +22,12 @@ import numpy as np
 from scipy.linalg import eig
 from scipy.sparse import csr_array
 
+from ..arrays import Floats, Indices, Matrix
 from ..motion.eigenvalues import Complexes, exceeds_rounding, growing
 from ..motion.energy_norm import EnergyNorm
 from ..motion.modes import Modes
-from ..packing.packing import Floats, Indices
 from .space import Space
-from .system import Operator, System
+from .system import System
 
 Members = tuple[int, int]  # the numbers of the two modes of a pair
 
@@ -74,7 +74,7 @@ class SystemModes(Modes):
         return _with_dissipation(system) if system.dissipative else _without(system)
 
     @classmethod
-    def of_operator(cls, fx: float, matrix: Operator) -> "SystemModes":
+    def of_operator(cls, fx: float, matrix: Matrix) -> "SystemModes":
         """The modes of A at a load, shape (n, n), without dissipation."""
         return cls.of(System(fx, csr_array(matrix)))
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.packing.packing import Floats
+from ...analysis.arrays import Floats
 from ...pywrap.lammps.dynamics import MotionState
 from ..timing import in_turns
 

@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import Packing, dynamical_matrix
-from ...analysis.packing.packing import Floats
+from ...analysis.arrays import Floats
 from .cost_comparison import FEW_TURNS, TURNS, Part, cost_of, same_motion
 from .switches import UndampedRun
 

@@ -24,6 +24,9 @@ ZERO_ABOVE = 0.25
 
 SHADE = "#e9e9e9"
 
+LABEL_WIDTH = 44
+"""Characters of a line of the label of an axis."""
+
 LABEL_OFFSETS = ((-29, -3), (-14, 6), (2, -11), (6, -3))
 """Where the increments of the first arithmetic stand, points, by increasing true error: they lie close together."""
 
@@ -129,10 +132,10 @@ def _limits(study: Study) -> tuple[float, float]:
     return 10.0 ** (np.floor(np.log10(low)) - (1.0 if zeros else 0.5)), 10.0 ** (np.ceil(np.log10(high)) + 0.3)
 
 
-def _label(text: str, width: int = 44) -> str:
+def _label(text: str) -> str:
     """The label of an axis: in two lines if it is long, with symbols in place of their names."""
-    if len(text) > width:
-        cut = text.rfind(" ", 0, width)
+    if len(text) > LABEL_WIDTH:
+        cut = text.rfind(" ", 0, LABEL_WIDTH)
         text = text[:cut] + "\n" + text[cut + 1 :]
     for name, symbol in (("F_x^c", "$F_x^c$"), ("R theta", r"$R\,\theta$")):
         text = text.replace(name, symbol)

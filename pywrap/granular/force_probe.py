@@ -3,8 +3,8 @@
 A displacement is one step of LAMMPS, so slow that dashpots exert nothing: histories of contacts follow as in any step.
 A velocity is a run of zero steps, in which histories do not change.
 
-**Copies.** Where a way there and back restores the forces, one copy goes all ways. Where a history is cut at Coulomb's
-bound, or scaled, each way has a copy of its own.
+**Copies.** One copy goes all ways there and back that restore the forces. Where a history is cut at Coulomb's bound, or
+scaled, each way has a copy of its own.
 
 **Bodies.** Dashpots feel the masses of the bodies of fix rigid. So these bodies stay in the copy, and hold their
 velocities. A body takes its velocity from its particles only when a run begins, so that each step is a run with its
@@ -34,10 +34,6 @@ SUM_OF_RETURN_ERRORS = 1e-3
 
 PROBE_ROUNDING = 1e-13
 """Rounding of forces, as a share of the largest force at rest."""
-
-
-class HistoryChangeError(NotTakenError):
-    """A way there and back changes histories: each displacement needs a copy of its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,26 +134,32 @@ class Probe:
     def each(self, directions: list[Floats]) -> list[Sides]:
         """Forces along each direction Q, from the state in which LAMMPS is.
 
-        In one copy if every way back restores the forces, as it does where no history is cut or scaled; otherwise each
-        way has a copy of its own.
+        Directions share a copy up to the first that changes histories. It has a copy for each of its ways; so have the
+        directions after it, twice as many each time that the next shared copy comes to none.
         """
-        try:
-            return in_a_copy(partial(self.there_and_back, directions))
-        except HistoryChangeError:
-            rest = self._alone(0.0 * directions[0])
-            return [(rest, [(self._alone(s * q), self._alone(-s * q)) for s in self.sizes]) for q in directions]
+        found: list[Sides] = []
+        rest, apart = None, 1
+        while len(found) < len(directions):
+            shared = in_a_copy(partial(self._there_and_back, directions[len(found) :]))
+            found += shared
+            apart = 1 if shared else 2 * apart
+            for q in directions[len(found) :][:apart]:
+                rest = self._alone(0.0 * q) if rest is None else rest
+                found.append((rest, [(self._alone(s * q), self._alone(-s * q)) for s in self.sizes]))
+        return found
 
-    def there_and_back(self, directions: list[Floats]) -> list[Sides]:
-        """Forces along each direction; a HistoryChangeError if a way there and back changes the state."""
+    def _there_and_back(self, directions: list[Floats]) -> list[Sides]:
+        """Forces along the directions before the first of which a way there and back changes the state."""
         first = rest = self._from_rest(0.0 * directions[0])
-        found, place = [], self._positions()
+        found: list[Sides] = []
+        place = self._positions()
         for q in directions:
             sides = []
             for way in (sign * size for size in self.sizes for sign in (1, -1)):
                 there, back = self._go(way * q), self._go(-way * q if self.duration else 0.0 * q)
                 left = np.abs(back - [rest, first]).max(axis=1) - PROBE_ROUNDING * np.abs(first).max()
                 if np.any(left > np.array([RETURN_ERROR, SUM_OF_RETURN_ERRORS]) * np.abs(there - rest).max()):
-                    raise HistoryChangeError("Histories change on a way there and back.")
+                    return found
                 if self.duration:
                     self._put(place)
                 sides.append(there)

@@ -48,10 +48,6 @@ class NotTakenError(FaultgougeError):
     """A packing of LAMMPS cannot be taken as it stands: one sentence with the reason and the way out."""
 
 
-SnapshotError = NotTakenError
-"""The name of `NotTakenError` in earlier states of this version, for scripts that catch it."""
-
-
 class NotLinearisedError(NotTakenError):
     """Contacts cannot be linearised by their laws: K and C by differences of forces may serve."""
 

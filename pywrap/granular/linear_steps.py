@@ -23,6 +23,7 @@ from scipy.sparse import csr_array
 
 from ...analysis import Configuration
 from ...analysis.arrays import Floats, Indices
+from ...analysis.assembly import cross, dot
 
 
 @dataclass
@@ -177,7 +178,7 @@ class ContactForces:
             tangential=tangential,
             coupling=0.5 * (closing + parting),
             rectified=0.5 * (closing - parting),
-            turn=_cross(normal, tangential),
+            turn=cross(normal, tangential),
             slides=slides,
             along=along / np.linalg.norm(along, axis=0),
         )
@@ -211,9 +212,9 @@ class ContactForces:
             opens = np.zeros_like(opening)
         if len(self.slides):
             self._let_slide(tangential, elastic, opening, opens, memory)
-        turned = tangential - _dot(self.tangential, tilt) * self.normal
+        turned = tangential - dot(self.tangential, tilt) * self.normal
         force = normal_force * self.normal + c.normal_force * tilt + turned
-        turn = _cross(tilt, self.tangential) + _cross(self.normal, tangential)
+        turn = cross(tilt, self.tangential) + cross(self.normal, tangential)
         one, other = (-self.lever[p] * turn - self.shrinks[p] * opening * self.turn for p in (0, 1))
         return self._on_coordinates((force, -self.pair * force), (one, other))
 
@@ -221,8 +222,8 @@ class ContactForces:
         """Take from tangential forces by how much they pass the bound, of springs alone or of dashpots, too."""
         c, which = self.configuration.contacts, self.slides
         mu = c.friction[which] / c.normal_force[which]
-        springs = _dot(self.along, elastic) + mu * c.normal_stiffness[which] * opening[which]
-        whole = springs + _dot(self.along, tangential[:, which] - elastic)
+        springs = dot(self.along, elastic) + mu * c.normal_stiffness[which] * opening[which]
+        whole = springs + dot(self.along, tangential[:, which] - elastic)
         whole += mu * c.normal_dashpot[which] * c.viscous_slider[which] * opens[which]
         memory.excess = np.maximum(memory.excess, np.where(c.viscous_slider[which], whole, springs))
         tangential[:, which] -= self.along * (np.maximum(memory.excess, whole) - self._missing)
@@ -233,10 +234,10 @@ class ContactForces:
         # `take` takes a seventh of the time of an index
         (moves_i, moves_j), (turns_i, turns_j) = ([each.take(k, axis=1) for k in self.partner] for each in vectors)
         u = moves_i - self.pair * moves_j
-        opening = _dot(self.normal, u)
+        opening = dot(self.normal, u)
         across = u - opening * self.normal
         rolls = self.slip[0] * turns_i + self.slip[1] * turns_j
-        return opening, across, across + _cross(self.normal, rolls)
+        return opening, across, across + cross(self.normal, rolls)
 
     def _on_coordinates(self, forces: tuple[Floats, Floats], torques: tuple[Floats, Floats]) -> Floats:
         """Sums of the forces, and of the torques over radii, of both partners."""
@@ -272,11 +273,3 @@ class ContactForces:
 def _rate(stiffness: float, damping: float) -> float:
     """The root of s^2 = c s + k."""
     return float(0.5 * (damping + np.sqrt(damping * damping + 4 * stiffness)))
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("kc,kc->c", a, b))
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

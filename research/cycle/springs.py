@@ -27,7 +27,7 @@ import numpy as np
 from faultgouge.analysis import Floats, NoEquilibriumError, Packing, RunFile, Slip, stability
 from faultgouge.pywrap import bring_to_rest
 from faultgouge.pywrap.runs.drive_recorder import slips_in
-from faultgouge.studies.cycle import cycle_state, drawn
+from faultgouge.studies.cycle import cycle_state, with_spring
 from research.cycle.compute import LAWS, run, scene, sizes_of, where
 
 SPRINGS = (3.0, 10.0, 30.0)
@@ -78,7 +78,7 @@ def at_rest(packing: Packing, spring: float) -> dict[str, Any]:
         rest, _ = bring_to_rest(packing)
     except NoEquilibriumError:
         return {"found": False}
-    told = stability(drawn(rest.packing, spring), rise="fx").as_dict()
+    told = stability(with_spring(rest.packing, spring), rise="fx").as_dict()
     before, after = (each.position[packing.top, 0] for each in (packing, rest.packing))
     away = after - before
     if packing.box_length is not None:

@@ -71,7 +71,7 @@ class LinearState:
     alone: int
 
 
-def drawn(packing: HasConfiguration, spring: float) -> Configuration:
+def with_spring(packing: HasConfiguration, spring: float) -> Configuration:
     """A state of a driven run with the stiffness of the spring, force / length on each disk of the layer."""
     return derive_frozen(packing.configuration, spring=spring)
 
@@ -93,7 +93,7 @@ def cycle_state(packing: Packing, spring: float) -> dict[str, Any]:
         (contacts at Coulomb's bound), and of `LinearState` NAME_sticking and NAME_sliding. A smoothed law has one
         derivative at the bound, and the two are the same.
     """
-    configuration = drawn(packing, spring)
+    configuration = with_spring(packing, spring)
     sticking = linear_state(configuration, sliding=False)
     both = configuration.contacts.one_sided.any()
     sliding = linear_state(configuration, sliding=True) if both else sticking

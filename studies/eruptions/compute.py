@@ -32,8 +32,8 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from ...analysis import Packing, mean_square_displacement, nearest_image, spectrum
+from ...analysis.arrays import Floats
 from ...analysis.motion.growth_of_run import unstable_rates
-from ...analysis.packing.packing import Floats
 from ...pywrap import Engine
 from ...pywrap.lammps.dynamics import Dynamics, MotionState
 from ...pywrap.runs.undamped import time_step

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.packing.packing import Floats
+from ...analysis.arrays import Floats
 from ..statistics import median
 
 QUANTITIES = ("share", "growth_rate", "least_q")

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from ...analysis import Growth, Onset, Packing, RunFile, Spectrum, fit_growth, solid_fraction, spectrum
+from ...analysis.arrays import Floats
 from ...analysis.counted import counted
 from ...analysis.motion.growth import growing_range
 from ...analysis.motion.growth_of_run import PLATEAU_SHARE
-from ...analysis.packing.packing import Floats
 from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
 from ...pywrap.onset import ONSET_DISTANCES, onset_run
 from ...pywrap.runs.undamped import perturb, time_step

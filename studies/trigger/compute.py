@@ -27,9 +27,9 @@ from mpi4py import MPI
 from threadpoolctl import threadpool_limits
 
 from ...analysis import Packing, spectrum
+from ...analysis.arrays import Floats
 from ...analysis.motion.forcing import floor_force, impulse_response
 from ...analysis.motion.response import layer_force
-from ...analysis.packing.packing import Floats
 from ...pywrap import Engine, Scene, SceneError
 from ...pywrap.runs.ramp_loads import ramp_loads
 from ...pywrap.runs.undamped import time_step

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from ...analysis.packing.packing import Floats
+from ...analysis.arrays import Floats
 from ...figures.style import INK, styled
 from ..result_rows import row_columns
 

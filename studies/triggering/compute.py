@@ -31,10 +31,10 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import Growth, Onset, Packing, RunFile, fit_growth, spectrum
+from ...analysis.arrays import Floats
 from ...analysis.motion.normal_form import LEAST_CROSSOVER, NormalForm
 from ...analysis.motion.power_law import PowerLaw, fit_power_law
 from ...analysis.motion.response import Response, layer_force, linear_response
-from ...analysis.packing.packing import Floats
 from ...analysis.windows.pair_over_load import normal_forms
 from ...pywrap import Engine, Equilibrium, Sample, Scene
 from ...pywrap.lammps.dynamics import Weakening

@@ -21,8 +21,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import ArrayLike
 
+from ...analysis.arrays import Floats
 from ...analysis.motion.normal_form import NormalForm
-from ...analysis.packing.packing import Floats
 from ...analysis.uncertain_digits import with_uncertainty
 from ...figures.series import draw_series, few_decades, positive, scientific
 from ...figures.style import INK, styled

@@ -229,7 +229,7 @@ def test_any_model_in_a_region(faultgouge_here, tmp_path):
     deck = deck.replace("pair_coeff * *", f"pair_coeff * * {COHESIVE}")
     lines = [line for line in deck.splitlines() if not line.startswith("fix floor")]
     bowl = f"region bowl sphere 0 0 3 3 side in\nfix bowl all wall/gran/region granular {COHESIVE} region bowl"
-    deck = "\n".join(lines).replace("fix drag", f"{bowl}\nfix drag").replace("run 6000", "run 60000")
+    deck = "\n".join(lines).replace("fix drag", f"{bowl}\nfix drag").replace("run 6000", "run 30000")
     (tmp_path / "glue.in").write_text(deck)
     said = faultgouge_here("import", "glue.in", "-o", "glue.h5").stdout
     assert "3 spheres, " in said

@@ -6,11 +6,13 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from reference_layer import LAYER, on_ranks, toml
 
 from faultgouge.analysis import RunFile
+from faultgouge.pywrap import Engine, EngineError
 from fuzz.kills import CommandToKill, start_command
 
 ASKED = {"perturb": {"fx": 2e-5, "time": 1e4}, "eruptions": {"load": [0.02], "time": 1e3}}
@@ -343,25 +345,51 @@ def with_failing_engine(folder, ranks, script, *arguments):
 
 
 @pytest.mark.ranks
-@pytest.mark.parametrize(
-    ("ranks", "rank", "call"),
-    [(1, -1, 1), *(pytest.param(2, *each, marks=pytest.mark.long) for each in ((1, 1), (-1, 30), (0, 30)))],
-)
-@pytest.mark.slow
-def test_its_sentence_reaches_the_command(settled, ranks, rank, call):
-    done = with_failing_engine(settled, ranks, ONCE, call, rank)
+@pytest.mark.parametrize(("rank", "call"), [(1, 1), (-1, 30), (0, 30)])
+@pytest.mark.long
+def test_its_sentence_reaches_the_command_on_two_ranks(settled, rank, call):
+    done = with_failing_engine(settled, 2, ONCE, call, rank)
     assert done.returncode == 1
     says = [line for line in done.stderr.splitlines() if line.startswith("Error:")]
     assert says == [f"Error: LAMMPS stopped: it was told to at call {call}."]
 
 
-@pytest.mark.ranks
-@pytest.mark.parametrize("search", [[], ["--modes", "0:39"]], ids=["all_windows", "slices"])
-@pytest.mark.parametrize(
-    ("ranks", "stride"), [(1, 6), *(pytest.param(n, k, marks=pytest.mark.long) for n, k in ((1, 1), (2, 6)))]
-)
+@pytest.fixture
+def failing(monkeypatch):
+    """Counts the calls of the engine of this process, and has the wanted one fail."""
+    state, try_displacement = SimpleNamespace(calls=0, wanted=0), Engine.try_displacement
+
+    def counted(self, *arguments):
+        state.calls += 1
+        if state.calls == state.wanted:
+            raise EngineError(f"LAMMPS stopped: it was told to at call {state.wanted}.")
+        return try_displacement(self, *arguments)
+
+    monkeypatch.setattr(Engine, "try_displacement", counted)
+    return state
+
+
+SEARCHES = pytest.mark.parametrize("search", [[], ["--modes", "0:39"]], ids=["all_windows", "slices"])
+
+
+@SEARCHES
 @pytest.mark.slow
-def test_no_call_is_taken_for_a_missing_onset(settled, ranks, stride, search):
+def test_no_call_is_taken_for_a_missing_onset(settled, failing, faultgouge_here_in, search):
+    command = "onset", "scene.toml", *search
+    faultgouge_here_in(settled, *command)
+    calls = failing.calls
+    assert calls > 20
+    for wanted in range(1, calls + 1, 6):
+        failing.calls, failing.wanted = 0, wanted
+        said = faultgouge_here_in(settled, *command, code=1).stderr
+        assert said.splitlines()[-1] == f"Error: LAMMPS stopped: it was told to at call {wanted}."
+
+
+@SEARCHES
+@pytest.mark.ranks
+@pytest.mark.parametrize(("ranks", "stride"), [(1, 1), (2, 6)])
+@pytest.mark.long
+def test_no_call_of_a_rank_is_taken_for_a_missing_onset(settled, ranks, stride, search):
     """At every call on one rank; two ranks call the same, and every sixth call shows that both hear of it."""
     done = with_failing_engine(settled, ranks, EVERY_CALL, stride, *search)
     assert done.returncode == 0, done.stderr[-500:]

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 from PIL import Image
-from reference_layer import BIN, LAYER, toml
+from reference_layer import BIN, toml
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene
@@ -42,15 +42,18 @@ def test_films_of_a_run_a_ramp_and_a_mode(beyond, faultgouge_here_in):
 
 
 DRIVE = {
+    "packing": {"disks": 20, "seed": 3},
+    "law": {"kn": 2e5},
+    "load": {"fy": 3.0},
     "damping": {"cn": 60.0, "ct": 17.0},
     "drive": {"spring": 10.0, "velocity": 4e-3, "until": 200.0, "states": 2.0, "slips": 1},
 }
-"""A layer that a fast spring draws until it slips."""
+"""A small layer that a fast spring draws until it slips."""
 
 
 @pytest.mark.slow
 def test_drive_is_a_table_of_slips_pictures_a_film_and_spectra(faultgouge_here, tmp_path):
-    (tmp_path / "scene.toml").write_text(LAYER + toml(DRIVE))
+    (tmp_path / "scene.toml").write_text(toml(DRIVE))
     done = faultgouge_here("drive", "scene.toml", "-o", "drive.h5", "--json")
     result = json.loads(done.stdout)
     (slip,) = result["slips"]

@@ -13,9 +13,13 @@ from faultgouge.pywrap.onset import onset_run
 
 @pytest.fixture(scope="module")
 def run():
-    """The onset on a ramp of 17 loads."""
+    """The first window on a ramp of 17 loads, the loads, and the eigenvalues of its pair."""
     changed = {"packing": SMALL["packing"] | {"seed": 3}, "ramp": {"step": 0.01, "until": 0.16}}
-    return onset_run(Scene.from_mapping(SMALL | changed), mu=1.0)
+    found = onset_run(Scene.from_mapping(SMALL | changed), mu=1.0)
+    first, packings = found.windows[0], [each.packing for each in found.equilibria]
+    pairs = follow_eigenvalues(packings).pairs
+    pair = min(pairs, key=lambda each: np.nanmin(np.abs(each.eigenvalues.real - first.eigenvalue)))
+    return first, np.array([each.fx for each in packings]), pair.eigenvalues
 
 
 @pytest.mark.slow
@@ -23,12 +27,8 @@ def run():
 def test_the_drawn_branches_meet_at_the_onset(run, known):
     """To a pixel of a picture; the onset itself is the root of the discriminant, solved for with equilibria close to
     it."""
-    first = run.windows[0]
-    packings = [each.packing for each in run.equilibria]
-    pairs = follow_eigenvalues(packings).pairs
-    pair = min(pairs, key=lambda each: np.nanmin(np.abs(each.eigenvalues.real - first.eigenvalue)))
-    fx = np.array([each.fx for each in packings])
-    curve = PairCurve(1.0, fx, pair.eigenvalues, first.fx_onset if known else None)
+    first, fx, eigenvalues = run
+    curve = PairCurve(1.0, fx, eigenvalues, first.fx_onset if known else None)
     real, imaginary = draw_pair([curve]).axes[:2]
     for axes in (real, imaginary):
         figure = axes.figure

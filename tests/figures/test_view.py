@@ -26,19 +26,29 @@ def browser():
         yield p.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
 
 
+@pytest.fixture(scope="module")
+def page_of_loads(there_and_back, tmp_path_factory):
+    """The page of packings over their loads."""
+    path = tmp_path_factory.mktemp("page") / "page.html"
+    write_view(there_and_back, path, "some packings")
+    return path
+
+
 @pytest.fixture
 def opened(browser, tmp_path):
-    """Opens a page of packings; at the end nothing went wrong in the browser, and nothing was fetched."""
+    """Opens a page, or that of packings; at the end nothing went wrong in the browser, and nothing was fetched."""
     wrong, asked, pages = [], [], []
 
-    def open_page(packings, viewport=WIDE, scheme="light", **more):
-        write_view(packings, tmp_path / "page.html", "some packings", **more)
+    def open_page(shown, viewport=WIDE, scheme="light", **more):
+        path = shown if isinstance(shown, Path) else tmp_path / "page.html"
+        if path is not shown:
+            write_view(shown, path, "some packings", **more)
         page = browser.new_page(viewport=viewport, color_scheme=scheme)
         pages.append(page)
         page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
         page.on("pageerror", lambda error: wrong.append(str(error)))
         page.on("request", lambda request: asked.append(request.url))
-        page.goto((tmp_path / "page.html").as_uri())
+        page.goto(path.as_uri())
         page.wait_for_function("document.querySelector('#plane circle')")
         return page
 
@@ -81,8 +91,8 @@ def mark(page, plot="growth"):
 
 
 @pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.long)])
-def test_all_plots_are_in_view_on_a_wide_screen(there_and_back, opened, scheme):
-    page = opened(there_and_back, scheme=scheme)
+def test_all_plots_are_in_view_on_a_wide_screen(page_of_loads, opened, scheme):
+    page = opened(page_of_loads, scheme=scheme)
     plots = boxes(page, ".plots .plot svg")
     assert len(plots) == 6
     for box in [*plots, *boxes(page, "#packing")]:
@@ -91,16 +101,16 @@ def test_all_plots_are_in_view_on_a_wide_screen(there_and_back, opened, scheme):
         assert min(box["width"], box["height"]) > 80
 
 
-def test_a_narrow_screen_has_the_verdict_and_the_eigenvalues_at_once(there_and_back, opened):
-    page = opened(there_and_back, NARROW)
+def test_a_narrow_screen_has_the_verdict_and_the_eigenvalues_at_once(page_of_loads, opened):
+    page = opened(page_of_loads, NARROW)
     assert page.evaluate("document.documentElement.scrollWidth") <= NARROW["width"]
     for box in (*boxes(page, "#verdict"), *boxes(page, "#load"), *boxes(page, ".first")):
         assert box["y"] + box["height"] <= NARROW["height"]
     assert all(box["width"] > 300 for box in boxes(page, ".plot svg"))
 
 
-def test_the_page_opens_where_motion_grows_fastest_and_moves_along_the_load(there_and_back, opened):
-    page = opened(there_and_back)
+def test_the_page_opens_where_motion_grows_fastest_and_moves_along_the_load(page_of_loads, opened):
+    page = opened(page_of_loads)
     assert "Unstable: small motion grows, D as exp(" in page.inner_text("#verdict")
     assert "2 pairs of eigenvalues are complex." in page.inner_text("#verdict")
     assert page.inner_text("#where") == "Fₓ = 0.16"
@@ -136,8 +146,8 @@ def test_the_page_opens_at_a_packing_that_rests(there_and_back, opened):
     assert "Not known whether the packing is stable" in page.inner_text("#verdict")
 
 
-def test_a_mode_moves_and_rests(there_and_back, opened):
-    page = opened(there_and_back)
+def test_a_mode_moves_and_rests(page_of_loads, opened):
+    page = opened(page_of_loads)
     first = page.evaluate(PICTURE)
     page.wait_for_timeout(300)
     assert page.evaluate(PICTURE) != first
@@ -147,8 +157,8 @@ def test_a_mode_moves_and_rests(there_and_back, opened):
     assert page.evaluate(PICTURE) == still
 
 
-def test_a_press_on_an_eigenvalue_chooses_its_pair(there_and_back, opened):
-    page = opened(there_and_back)
+def test_a_press_on_an_eigenvalue_chooses_its_pair(page_of_loads, opened):
+    page = opened(page_of_loads)
     before, says = page.input_value("#pair"), page.inner_text("#members")
     other = page.locator("#plane circle.choice").first
     other.click()

@@ -1,6 +1,7 @@
 """No hidden unit: lengths, forces and masses scaled by any factors give the same dimensionless results."""
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -144,7 +145,8 @@ def test_the_middle_of_a_cage_is_the_same_in_any_length(reference_packing):
     assert np.array_equal(middle_of_cage(small, disks), 2.0**-30 * middle_of_cage(one, disks))
 
 
-def onset_in(length=1.0, force=1.0, mass=1.0, damped=False):
+@cache
+def onset_in(length, force, mass, damped):
     sections = SMALL | {
         "packing": SMALL["packing"]
         | {"width": 6.0 * length, "radii": [0.5 * length, 0.7 * length], "mass": mass, "seed": 2},
@@ -170,7 +172,7 @@ TOGETHER = [(1e-6, 1e-3, 1e-15), (1e6, 1e-6, 1e9)]
 @pytest.mark.parametrize("damped", [False, True])
 @pytest.mark.parametrize("units", [pytest.param(each, marks=pytest.mark.long) for each in EXTREME] + TOGETHER)
 def test_an_onset_is_the_same_in_any_units(units, damped):
-    (fx, error, motion), (own, own_error, own_motion) = onset_in(*units, damped), onset_in(damped=damped)
+    (fx, error, motion), (own, own_error, own_motion) = onset_in(*units, damped), onset_in(1.0, 1.0, 1.0, damped)
     assert abs(fx - own) <= error + own_error < 1e-9
     assert motion == pytest.approx(own_motion, rel=1e-6)
 

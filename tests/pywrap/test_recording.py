@@ -115,7 +115,7 @@ def test_a_film_of_an_undamped_run_is_stored_unasked(tmp_path):
     asked = {"all": {"trajectory": True}, "film": {}, "none": {"trajectory": False}}
     kept = {}
     for name, output in asked.items():
-        wanted = Scene.from_mapping(SCENE | {"perturb": {"fx": 1e-3, "time": 3.0}, "output": output})
+        wanted = Scene.from_mapping(SCENE | {"perturb": {"fx": 1e-3, "time": 1.5}, "output": output})
         *_, start = reach(wanted, wanted.perturb.fx)
         with Record(tmp_path / f"{name}.h5", wanted, task="perturb") as record:
             record.append(start)

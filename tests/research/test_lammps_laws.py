@@ -10,9 +10,10 @@ NEVER = ("granular hooke, linear_history", "granular hertz, mindlin/force")
 
 
 @pytest.mark.slow
-def test_the_page_is_what_the_tables_make(tmp_path):
-    assert write_page(tmp_path).read_text() == (HERE / "README.md").read_text()
+def test_the_page_is_what_the_tables_make(tmp_path, monkeypatch):
     found = numbers()
+    monkeypatch.setattr("research.lammps_laws.make.numbers", lambda tables: found)
+    assert write_page(tmp_path).read_text() == (HERE / "README.md").read_text()
     assert found["negative"] == 0
     for cell in found["cells"] + found["others"]:
         if cell["law"] in NEVER:

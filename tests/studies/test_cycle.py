@@ -13,17 +13,17 @@ from faultgouge.analysis.motion.motion import Motion
 from faultgouge.pywrap import Equilibrium, Scene, SceneError
 from faultgouge.pywrap.runs.drive_recorder import SERIES, DriveRecord
 from faultgouge.pywrap.runs.drive_setup import settle_for_drive
-from faultgouge.studies.cycle.compute import cycle_state, drawn, null_vector
+from faultgouge.studies.cycle.compute import cycle_state, null_vector, with_spring
 from faultgouge.studies.cycle.study import CYCLE_COLUMNS, cycle
 
 SPRING = 10.0
 
 
 def make_run(path, **drive):
-    """The file of a driven run of a hundred disks."""
+    """The file of a driven run of forty disks."""
     scene = Scene.from_mapping(
         {
-            "packing": {"seed": 1},
+            "packing": {"disks": 40, "seed": 2},
             "law": {"kn": 2e5, "mu": 1.0},
             "load": {"fy": 3.0},
             "damping": {"cn": 60.0, "ct": 17.0},
@@ -52,7 +52,7 @@ def slow(tmp_path_factory):
 
 def linear_displacement(packing, spring, rate, times):
     """Mean displacement of the layer by linear motion from rest, under a force that rises at a rate on each disk."""
-    motion = Motion.of(drawn(packing, spring))
+    motion = Motion.of(with_spring(packing, spring))
     size = len(motion.active)
     layer = np.zeros(packing.coordinates)
     layer[: len(packing)] = packing.top
@@ -90,7 +90,7 @@ def test_the_layer_moves_as_the_spring_in_the_stiffness_says(tmp_path):
 def test_the_spring_resists_the_mean_displacement_of_the_layer_alone(slow):
     with RunFile(slow) as file:
         packing = file.packing(0)
-    added = stiffness_matrix(drawn(packing, SPRING)) - stiffness_matrix(drawn(packing, 0.0))
+    added = stiffness_matrix(with_spring(packing, SPRING)) - stiffness_matrix(with_spring(packing, 0.0))
     q = np.random.default_rng(0).standard_normal(packing.coordinates)
     expected = np.zeros_like(q)
     expected[: len(packing)] = SPRING * q[: len(packing)][packing.top].mean() * packing.top
@@ -99,9 +99,9 @@ def test_the_spring_resists_the_mean_displacement_of_the_layer_alone(slow):
 
 def test_a_stored_configuration_keeps_its_spring(slow, tmp_path):
     with RunFile(slow) as file:
-        configuration = drawn(file.packing(-1), SPRING)
+        configuration = with_spring(file.packing(-1), SPRING)
     write_configuration(tmp_path / "run.h5", configuration)
-    assert read_configuration(tmp_path / "run.h5") == configuration != drawn(configuration, 0.0)
+    assert read_configuration(tmp_path / "run.h5") == configuration != with_spring(configuration, 0.0)
 
 
 def test_the_states_of_a_run_go_on_where_they_were_cut_off(slow, tmp_path):
@@ -126,7 +126,7 @@ def test_the_states_of_a_run_go_on_where_they_were_cut_off(slow, tmp_path):
 def test_a_state_at_rest_has_the_rates_of_stability(slow):
     with RunFile(slow) as file:
         packing, moving = file.packing(0), file.packing(-1)
-    found, verdict = cycle_state(packing, SPRING), stability(drawn(packing, SPRING))
+    found, verdict = cycle_state(packing, SPRING), stability(with_spring(packing, SPRING))
     assert found["rests"]
     assert found["alone_sticking"] == 0
     assert found["damped_sticking"] == pytest.approx(verdict.growth_rate, rel=1e-6)

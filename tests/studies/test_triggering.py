@@ -41,7 +41,7 @@ def msd_with_jump(height, at, then=0.0):
 STABLE, UNSTABLE = Forecast(1.55e-12, 0.0, 1.2, 0.0), Forecast(1e-16, 9.0, 5.0, 0.1)
 QUIET = Forecast(1e-16, 0.0, 5.0, 0.0)
 CASES = {
-    # the whole jump, after the first twentieth of the run: it was called 13.6 decades of growth
+    # the whole jump, after the first twentieth of the run: no growth over 13.6 decades
     "late jump": (run_of(msd_with_jump(1.5e-12, 265.0), 265.0), STABLE, "jump alone", "shows the jump alone"),
     # nothing but rounding: the first twentieth has a smaller D than the rest
     "noise": (run_of(noise(), None), STABLE, "does not weaken", "friction does not weaken"),

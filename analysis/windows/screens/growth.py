@@ -34,7 +34,7 @@ import numpy as np
 from scipy.linalg import eigh, eigvalsh
 from scipy.sparse import csr_array
 
-from ...packing.packing import Floats, Indices
+from ...arrays import Floats, Indices
 from ..between import Few
 from ..edges import DoubtError
 from ..limits import LIMITS, Limits

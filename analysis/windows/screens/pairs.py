@@ -37,7 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from ...packing.packing import Floats, Indices
+from ...arrays import Floats, Indices
 from ..between import Few
 from ..edges import DoubtError
 from ..limits import LIMITS, Limits

@@ -26,10 +26,10 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import ArpackError, eigsh
 
+from ...arrays import Floats, Indices
 from ...errors import FaultgougeError
 from ...factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
 from ...motion.eigenvalues import Complexes, active_coordinates
-from ...packing.packing import Floats, Indices
 from ..limits import LIMITS
 from ..nearby import drop_duplicates, find_growing_near
 from ..space import Space

@@ -22,8 +22,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...arrays import Floats
 from ...errors import FaultgougeError, NoEquilibriumError
-from ...packing.packing import Floats
 from ...progress import report_progress
 from ..edges import (
     DoubtError,

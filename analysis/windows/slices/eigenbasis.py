@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array
 
+from ...arrays import Floats, Indices
 from ...motion.eigenvalues import active_coordinates
-from ...packing.packing import Floats, Indices
 from ..limits import LIMITS, Limits
 from .ranks import Ranks
 from .store import NEW_PASS, Slice, SlicePass

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from ...packing.packing import Floats
+from ...arrays import Floats
 from ..edges import Increments, SystemOfLoad, Window
 from ..limits import LIMITS, Limits
 from ..system import System, unit_of

@@ -26,9 +26,9 @@ from itertools import chain, pairwise
 import numpy as np
 from scipy.sparse.linalg import ArpackError
 
+from ...arrays import Floats
 from ...errors import FaultgougeError, NoEquilibriumError
 from ...motion.eigenvalues import active_coordinates
-from ...packing.packing import Floats
 from ...progress import report_progress
 from ..edges import DoubtError, Increments, LostPairError, Window, follow_to, track
 from ..limits import LIMITS, Limits

@@ -26,10 +26,10 @@ from scipy.linalg import eigh, qr
 from scipy.sparse import csc_array, csr_array
 from threadpoolctl import threadpool_limits
 
+from ...arrays import Floats, Indices
 from ...errors import FaultgougeError
 from ...factors.inertia import Factorization, Solve, count_places, factor_shifted, places_of_numbers
 from ...factors.sparse_lu import minimum_degree
-from ...packing.packing import Floats, Indices
 from ..limits import LIMITS, Limits
 from .ranks import ALONE, Ranks
 from .store import NEW_PASS, Border, Shift, Slice, SlicePass, Take

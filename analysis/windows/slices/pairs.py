@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import csr_array
 
-from ...packing.packing import Floats
+from ...arrays import Floats
 from ...progress import report_progress
 from ..edges import DoubtError, LostPairError, follow_to
 from ..screens.pairs import PairScreen, may_meet

@@ -25,9 +25,9 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Floats
 from ...errors import BadInputError
 from ...files.atomic_write import make_folder, write_whole
-from ...packing.packing import Floats
 from ..limits import Limits
 from ..system import System
 

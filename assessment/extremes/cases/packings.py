@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....analysis import MindlinLaw, Packing, touching
-from ....analysis.packing.packing import Floats
+from ....analysis.arrays import Floats
 from ....pywrap import Engine, Equilibrium, Scene, equilibrate, settle
 
 KN = 2e5

@@ -20,7 +20,7 @@ from typing import Literal
 import numpy as np
 
 from ....analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
-from ....analysis.packing.packing import Floats
+from ....analysis.arrays import Floats
 from ....analysis.windows import Window
 from ....pywrap import Engine, Equilibrium, Scene, settle
 from ....pywrap.load_path import LoadPath

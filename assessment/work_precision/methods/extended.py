@@ -20,8 +20,8 @@ import numpy as np
 from scipy.linalg import eig
 
 from ....analysis import Packing, dynamical_matrix
+from ....analysis.arrays import Floats
 from ....analysis.motion.eigenvalues import Complexes, unit_rounding
-from ....analysis.packing.packing import Floats
 
 NEWTON_STEPS = 30
 """Newton steps at the most. Near an exceptional point the bordered system is nearly singular and a step gains only a

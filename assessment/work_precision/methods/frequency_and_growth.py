@@ -23,8 +23,8 @@ import numpy as np
 from scipy.linalg import eig
 
 from ....analysis import Packing, discrete_frequency, dynamical_matrix, spectrum, stable_timestep
+from ....analysis.arrays import Floats
 from ....analysis.motion.eigenvalues import Complexes, unit_rounding
-from ....analysis.packing.packing import Floats
 from ....pywrap import Engine, Equilibrium
 from .extended import refine_eigenvalue
 from .work_precision_study import (

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....analysis import Packing, stiffness_matrix
-from ....analysis.packing.packing import Floats
+from ....analysis.arrays import Floats
 from ....pywrap import Engine
 from .work_precision_study import Run, Settings, Study, Theory, best_of, study_of, timed_points
 

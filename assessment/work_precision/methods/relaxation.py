@@ -19,7 +19,7 @@ from functools import partial
 import numpy as np
 
 from ....analysis import Packing, dynamical_matrix
-from ....analysis.packing.packing import Floats
+from ....analysis.arrays import Floats
 from ....pywrap import Engine, Equilibrium, equilibrate
 from ....pywrap.equilibria.quasistatic import rounding_floor
 from .work_precision_study import COMPENSATED_SUFFIX, Run, Settings, Study, Theory, compensate, study_of, timed_points

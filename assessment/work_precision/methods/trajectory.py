@@ -26,7 +26,7 @@ from typing import Literal
 import numpy as np
 
 from ....analysis import MindlinLaw, Packing, touching
-from ....analysis.packing.packing import Floats
+from ....analysis.arrays import Floats
 from ....pywrap import Engine
 from .work_precision_study import Point, Settings, Study, Theory, fit_order, study_of, time_jobs
 

@@ -38,7 +38,7 @@ def search(path):
 
     def make(kind, limits=FEW):
         damped = with_dissipation(path, **KINDS[kind])
-        loads = np.array(path.grid[20:])
+        loads = np.array(path.grid[21:])
 
         def search(watch=None, **how):
             with show_progress(watch):
@@ -54,7 +54,7 @@ def search(path):
     "kind", [pytest.param("weak", marks=pytest.mark.long), pytest.param("medium", marks=pytest.mark.long), "drag"]
 )
 def test_the_window_is_that_among_all_modes(path, search, kind):
-    expected = find_onset(with_dissipation(path, **KINDS[kind]), path.grid[20:], dissipation=True, first=True).windows[
+    expected = find_onset(with_dissipation(path, **KINDS[kind]), path.grid[21:], dissipation=True, first=True).windows[
         0
     ]
     found, doubtful = search(kind)()

@@ -43,20 +43,30 @@ ALMOST_NONE = "1e-12"
 """A dashpot: LAMMPS's walls have forces that are no numbers with one of 0."""
 
 
-TWO = """
+def head(box: str, boundary: str = "f f f", *, kinds: int = 1, dimension: int = 3) -> str:
+    """The first commands of a deck: spheres, or disks, in a box."""
+    return f"""
 units lj
+dimension {dimension}
 atom_style sphere
-boundary f f f
+boundary {boundary}
 newton off
 comm_modify vel yes
-region box block -4 4 -4 4 0 8 units box
-create_box 1 box
+region box {box} units box
+create_box {kinds} box
+"""
+
+
+TWO = (
+    head("block -4 4 -4 4 0 8")
+    + """
 create_atoms 1 single 0 0 0.495 units box
 create_atoms 1 single 0 0.6 1.275 units box
 set group all diameter 1.0
 set group all density 1
 thermo_style custom step
 """
+)
 MOVES = "\nfix move all nve/sphere"
 HERTZ = "gran/hertz/history 1e5 NULL 1 1 0.5 1"
 

@@ -3,21 +3,16 @@ sphere it slides down faster and faster."""
 
 import numpy as np
 import pytest
-from granular_packings import command, of_particle
+from granular_packings import command, head, of_particle
 from pushes import PUSH
 
 from faultgouge.analysis import one_sided_motion, stability
 
 FRICTION = 0.5
 LAW = f"hooke 1e3 5 tangential linear_history 300 1.0 {FRICTION} damping velocity"
-BLOCK = f"""
-units lj
-atom_style sphere
-boundary p p f
-newton off
-comm_modify vel yes
-region box block -2 2 -2 2 0 4 units box
-create_box 1 box
+BLOCK = (
+    head("block -2 2 -2 2 0 4", "p p f")
+    + f"""
 create_atoms 1 single 0 0 0.4995 units box
 set group all diameter 1.0
 set group all density 1.0
@@ -33,6 +28,7 @@ timestep 0.001
 thermo 1000000
 run 5000
 """
+)
 """A sphere that does not turn."""
 
 
@@ -147,14 +143,9 @@ def test_velocities_that_are_left_out_are_named(block, speed):
     assert (says in str(stability(from_lammps(lmp)))) == (speed > 1e-3)
 
 
-HILL = f"""
-units lj
-atom_style sphere
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -3 6 -3 3 0 6 units box
-create_box 2 box
+HILL = (
+    head("block -3 6 -3 3 0 6", kinds=2)
+    + f"""
 create_atoms 1 single 0 0 0.5 units box
 create_atoms 2 single 0 0 1.4995 units box
 set group all diameter 1.0
@@ -174,6 +165,7 @@ unfix pull
 fix pull block addforce $(mass(block)*v_slope) 0 0
 run 5000
 """
+)
 """A sphere that does not turn, on top of another one, and pulled sideways until it nearly slides."""
 
 REPOSE = 0.9978189798742391 * FRICTION

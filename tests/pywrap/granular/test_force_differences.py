@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from granular_packings import LAWS, command, instance
+from granular_packings import LAWS, command, head, instance
+from scipy.spatial import cKDTree
 
 from faultgouge.analysis import damping_matrix, spectrum, stability, stiffness_matrix
 from faultgouge.analysis.arrays import derive_frozen
@@ -44,15 +45,7 @@ def test_a_contact_at_the_bound_is_seen(lammps_with):
     """Its two particles have other derivatives forwards than backwards, and K is the mean of sticking and sliding."""
     from faultgouge.pywrap import from_lammps
 
-    lmp = lammps_with("""
-units lj
-dimension 2
-atom_style sphere
-boundary f f p
-newton off
-comm_modify vel yes
-region box block -4 4 -4 4 -0.5 0.5 units box
-create_box 1 box
+    lmp = lammps_with(head("block -4 4 -4 4 -0.5 0.5", "f f p", dimension=2) + """
 create_atoms 1 single 0 0 0
 create_atoms 1 single 0.99 0 0
 create_atoms 1 single -0.99 0 0
@@ -80,14 +73,9 @@ timestep 1e-3
     assert apart(stiffness_matrix(found), mean) < 1e-6
 
 
-ROW = """
-units lj
-atom_style sphere
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -4 4 -4 4 0 4 units box
-create_box 1 box
+ROW = (
+    head("block -4 4 -4 4 0 4")
+    + """
 create_atoms 1 single -1.5 0 0.4999 units box
 create_atoms 1 single 0.0 0 0.4999 units box
 create_atoms 1 single {x} 0 0.4999 units box
@@ -100,6 +88,7 @@ fix move all nve/sphere
 timestep 1e-3
 run 0
 """
+)
 
 
 def test_dashpots_of_frozen_particles(lammps_with):
@@ -162,14 +151,9 @@ run 0
     assert apart(stiffness_matrix(found), stiffness_matrix(laws)) < 1e-6
 
 
-BOX = """
-units lj
-atom_style sphere
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -10 10 -10 10 -10 10 units box
-create_box 1 box
+BOX = (
+    head("block -10 10 -10 10 -10 10")
+    + """
 {spheres}
 set group all diameter 1 density 1
 pair_style gran/hooke/history 4e3 NULL 100 NULL 0.5 1
@@ -182,6 +166,7 @@ fix drag all viscous 1
 timestep 0.004
 run 20000
 """
+)
 
 
 @pytest.mark.parametrize("kisses", [False, True])
@@ -189,12 +174,13 @@ def test_spheres_in_an_edge_and_in_a_corner_of_a_region(lammps_with, kisses):
     """With friction at two and three faces; or at a face that bears nothing, which is about to open."""
     from faultgouge.pywrap import from_lammps
 
-    spheres = "create_atoms 1 single -5.5 -5.5 -5.5\ncreate_atoms 1 single -4.5 -5.5 -5.5"
+    spheres = "create_atoms 1 single -5.5 -5.5 -5.5"
+    spheres += "" if kisses else "\ncreate_atoms 1 single -4.5 -5.5 -5.5"
     lmp = lammps_with(BOX.format(spheres=spheres, down="0 -0.4 -1" if kisses else "-0.5 -0.4 -1"))
     found = from_lammps(lmp)
     verdict = stability(found)
-    if kisses:  # nothing presses the spheres along x
-        assert list(found.ids[found.one_sided_particles]) == [1, 2]
+    if kisses:  # nothing presses the sphere along x
+        assert list(found.ids[found.one_sided_particles]) == [1]
         assert verdict.stable is None
     else:
         assert found.operator_error < 1e-6
@@ -300,7 +286,7 @@ run 20000
 """
 
 
-@pytest.fixture(scope="module", params=[50, pytest.param(126, marks=pytest.mark.long)])
+@pytest.fixture(scope="module", params=[36, pytest.param(126, marks=pytest.mark.long)])
 def cone(request, tmp_path_factory):
     """Spheres with cohesion, rolling and twisting friction, at rest, and their configuration."""
     from faultgouge import relax
@@ -321,7 +307,9 @@ def test_cohesive_spheres_in_a_cone(cone, tmp_path):
     lmp, found = cone
     assert found.operators == "differences"
     assert "K and C by differences of forces" in repr(found)
-    assert len(found.contacts) > 0.7 * len(found)  # of pairs; the region hands out none
+    pairs = cKDTree(found.position).query_pairs(1.0)  # the region hands out no contacts
+    assert len(pairs) > 0.5 * len(found)
+    assert pairs <= {tuple(sorted(each)) for each in zip(found.contacts.i, found.contacts.j, strict=True)}
     assert found.contacts.normal_force.min() < 0  # cohesion
     assert found.operator_error < 1e-5
     assert found.proof < 1e-5  # steps of Verlet, so that no error of the step is in it

@@ -2,22 +2,16 @@
 
 import numpy as np
 import pytest
-from granular_packings import command, of_particle
+from granular_packings import command, head, of_particle
 
 from faultgouge.analysis import one_sided_motion, stability
 from faultgouge.analysis.operators.gaps import gaps_of
 
 GAP = 1e-6
 LAW = "hooke 1e3 5 tangential linear_history 300 1.0 0.5 damping velocity"
-ROW = f"""
-units lj
-dimension 2
-atom_style sphere
-boundary p f p
-newton off
-comm_modify vel yes
-region box prism -1 {2 + 3 * GAP:.17g} 0 6 -0.5 0.5 0.7 0 0 units box
-create_box 1 box
+ROW = (
+    head(f"prism -1 {2 + 3 * GAP:.17g} 0 6 -0.5 0.5 0.7 0 0", "p f p", dimension=2)
+    + f"""
 create_atoms 1 single -0.5 0.4995 0 units box
 create_atoms 1 single {0.5 + GAP:.17g} 0.4995 0 units box
 create_atoms 1 single {1.5 + 2.5 * GAP:.17g} 0.4995 0 units box
@@ -34,6 +28,7 @@ thermo 1000000
 run 5000
 unfix drag
 """
+)
 """Three disks that do not turn, side by side, the last beside the first: gaps of 1, 1.5 and 0.5."""
 
 

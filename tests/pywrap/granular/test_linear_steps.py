@@ -1,5 +1,7 @@
 """Steps of the linearised packing contact by contact, beside those of the assembled matrices and play operators."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.sparse import csr_array, eye_array
@@ -13,6 +15,14 @@ ROUNDING = 1e-11
 """Of ten steps of some hundred contacts, relative to the largest velocity."""
 
 STEPS = 10
+
+
+@pytest.fixture(scope="module")
+def bed(beds):
+    """The configuration of particles at rest on a slope, by law and dimension; taken once each."""
+    from faultgouge.pywrap import from_lammps
+
+    return cache(lambda law, d: from_lammps(beds(law, d), prove=False, balance=np.inf))
 
 
 def changed(found, kind: str):
@@ -54,12 +64,10 @@ def by_matrices(found, velocity, timestep, *, extrapolates):
 @pytest.mark.parametrize(
     ("law", "d"), [("mindlin", 2), ("mindlin", 3), ("mindlin_rescale", 2), ("mindlin_rescale", 3), ("coulomb", 2)]
 )
-def test_steps_are_those_of_the_matrices(beds, law, d, kind, extrapolates):
+def test_steps_are_those_of_the_matrices(bed, law, d, kind, extrapolates):
     """Of LAMMPS's laws with arms that end in the overlap, with two derivatives, and of ours, with walls; and of
     velocities as large as those that slide."""
-    from faultgouge.pywrap import from_lammps
-
-    found = changed(from_lammps(beds(law, d), prove=False, balance=np.inf), kind)
+    found = changed(bed(law, d), kind)
     assert found.contacts.one_sided.any() == (kind in ("bound", "own slider"))
     assert np.any(found.contacts.closing != found.contacts.parting) == (law != "mindlin")
     forces = linear_forces(found)
@@ -74,12 +82,11 @@ def test_steps_are_those_of_the_matrices(beds, law, d, kind, extrapolates):
 
 
 @pytest.mark.parametrize("law", ["gran/hertz/history", "mindlin/force"])
-def test_no_rate_is_beyond_the_bound(beds, law):
+def test_no_rate_is_beyond_the_bound(bed, law):
     """The largest eigenvalue of K over masses; the bound is at most three times as large, or steps would be short."""
     from faultgouge.analysis import stable_timestep
-    from faultgouge.pywrap import from_lammps
 
-    found = from_lammps(beds(law, 3), prove=False, balance=np.inf)
+    found = bed(law, 3)
     fastest = 2 / stable_timestep(found)
     for forces in (ContactForces.of(found), GivenForces(found, *found.assembled_operators())):
         assert fastest < forces.fastest_rate() < 3 * fastest

@@ -105,7 +105,9 @@ def test_with_two_threads(tmp_path):
 
 
 @pytest.mark.ranks
-@pytest.mark.parametrize(("ranks", "threads"), [(2, 1), (1, 2), (1, 1)])
+@pytest.mark.parametrize(
+    ("ranks", "threads"), [(2, 1), *(pytest.param(1, each, marks=pytest.mark.long) for each in (1, 2))]
+)
 def test_runs_that_end_early_and_restarts(tmp_path, ranks, threads):
     """LAMMPS skips the runs that follow, and the look has its zero steps all the same; no restart loses histories."""
     run_script(tmp_path, threads, script="after_a_look.py", ranks=ranks)

@@ -117,7 +117,7 @@ def stuck(here):
     return derive_frozen(here, contacts=derive_frozen(here.contacts, friction=10 * here.contacts.friction))
 
 
-@pytest.mark.parametrize("law", ["gran/hertz/history", "mindlin/force"])
+@pytest.mark.parametrize("law", [pytest.param("gran/hertz/history", marks=pytest.mark.long), "mindlin/force"])
 def test_what_is_said_to_rest_is_at_rest_in_lammps(small, law):
     """Each push in LAMMPS, twice as long as it was followed: the same amplification, and D does not grow."""
     lmp, here = small(law)
@@ -202,7 +202,7 @@ def test_the_rate_without_contacts_at_the_bound_is_that_of_lammps_over_ten_decad
     assert np.polyfit(times, np.log(found), 1)[0] == pytest.approx(told.growth_rate, rel=0.03)
 
 
-@pytest.mark.parametrize("law", ["gran/hertz/history", "mindlin/force"])
+@pytest.mark.parametrize("law", ["gran/hertz/history", pytest.param("mindlin/force", marks=pytest.mark.long)])
 def test_motion_holds_from_the_push_that_is_said(small, law):
     """Forces that are not balanced move the particles as far as a tenth of that push, and hardly count beyond it."""
     from faultgouge.pywrap import from_lammps

@@ -56,7 +56,7 @@ def test_the_standard_law_after_a_push(layer):
     assert len(layer.contacts) - here.contacts.one_sided.sum() > 100
     push = random_pushes(here, 1)
     push.reshape(here.axes, len(here), -1)[:, layer.rattlers] = 0.0  # the runs of this package hold rattlers
-    times = np.array([0.2, 0.5, 1.0, 2.0, 4.0])
+    times = np.array([0.2, 0.5, 1.0, 2.0])
     for column, velocity in zip(push.T, velocities(here, push), strict=True):
         expected = one_sided_motion(layer, velocity, times=times)
         assert np.any(expected.slid[-1] > 0)

@@ -2,16 +2,11 @@
 
 import numpy as np
 import pytest
-from granular_packings import command
+from granular_packings import command, head
 
-BALL = """
-units lj
-atom_style sphere
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -4 4 -4 4 -2 8 units box
-create_box 1 box
+BALL = (
+    head("block -4 4 -4 4 -2 8")
+    + """
 create_atoms 1 single 0 0 {z:.17g} units box
 {more}
 set group all diameter 1.0 density 1.0
@@ -25,6 +20,7 @@ thermo_style custom step
 thermo_modify lost ignore
 run 0
 """
+)
 REGION = """
 region floor block -4 4 -4 4 0 8 side in open 1 open 2 open 3 open 4 open 6 units box
 fix floor all wall/gran/region hooke/history 1e4 3e3 20 10 0.5 1 region floor

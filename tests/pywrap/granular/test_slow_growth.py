@@ -2,22 +2,16 @@
 
 import numpy as np
 import pytest
-from granular_packings import command, of_particle
+from granular_packings import command, head, of_particle
 
 from faultgouge.analysis import spectrum, stability
 from faultgouge.analysis.motion import rates
 
 SPRING, HALF_SPAN = 1e3, 0.95
 MASS = np.pi / 6
-ARCH = """
-units lj
-dimension 2
-atom_style sphere
-boundary f f p
-newton off
-comm_modify vel yes
-region box block -4 4 -4 4 -0.5 0.5 units box
-create_box 2 box
+ARCH = (
+    head("block -4 4 -4 4 -0.5 0.5", "f f p", kinds=2, dimension=2)
+    + """
 create_atoms 1 single -{span} 0 0 units box
 create_atoms 1 single {span} 0 0 units box
 create_atoms 2 single 0 {height} 0 units box
@@ -32,15 +26,11 @@ timestep {step}
 thermo 1000000
 run 0
 """
+)
 LINEAR = "hooke 500 1 tangential linear_history 200 1.0 0.5 damping velocity"
-STACK = """
-units lj
-atom_style sphere
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -4 4 -4 4 0 8 units box
-create_box 3 box
+STACK = (
+    head("block -4 4 -4 4 0 8", kinds=3)
+    + """
 create_atoms 1 single 0 0 0.5 units box
 create_atoms 2 single 0 0 {top:.17g} units box
 create_atoms 3 single 2 0 {low:.17g} units box
@@ -59,6 +49,7 @@ timestep 5e-4
 thermo 1000000
 run 0
 """
+)
 
 
 @pytest.mark.parametrize(
@@ -113,14 +104,9 @@ def test_a_small_sphere_that_rolls_hides_no_growth_of_others(lammps_with):
     assert 2 * np.log(places[1] / places[0]) / 4 == pytest.approx(verdict.growth_rate, rel=0.01)
 
 
-APART = """
-units lj
-atom_style sphere
-boundary f f f
-newton off
-comm_modify vel yes
-region box block -4 4 -4 4 0 8 units box
-create_box 2 box
+APART = (
+    head("block -4 4 -4 4 0 8", kinds=2)
+    + """
 create_atoms 1 single 0 0 {height:.17g} units box
 create_atoms 2 single 2 0 {height:.17g} units box
 set group all diameter 1.0
@@ -137,6 +123,7 @@ timestep 1e-3
 thermo 1000000
 run 0
 """
+)
 
 
 def test_a_sphere_without_dashpots_bounces_on_beside_one_that_has_them(lammps_with):
