@@ -327,6 +327,19 @@ def test_rerun_after_the_last_run(faultgouge_here, tmp_path):
     assert "'rerun pile.dump dump x y' puts the positions of a dump, which has no tangential histories" in says
 
 
+@pytest.mark.parametrize("command", ["delete_atoms group upper", "reset_atoms id"])
+def test_ids_that_change_after_the_last_run(faultgouge_here, tmp_path, command):
+    """LAMMPS knows histories by the IDs of partners; here the first of six particles is gone before the run."""
+    deck = two_on_three().replace("create_box 1 box", "create_box 1 box\ncreate_atoms 1 single 0 3.3 0 units box")
+    first = "group first id 1\ndelete_atoms group first compress no\n"
+    deck = deck.replace("variable kn", f"{first}group upper id 5\nvariable kn")
+    (tmp_path / "rests.in").write_text(f"{deck}delete_atoms group first compress no\n")
+    assert "5 disks, " in faultgouge_here("import", "rests.in", "-o", "rests.h5").stdout
+    (tmp_path / "other.in").write_text(f"{deck}{command}\n")
+    says = faultgouge_here("import", "other.in", "-o", "other.h5", code=1).stderr
+    assert f"'{command}' after the last run gives particles other IDs" in says
+
+
 def test_deck_of_another_name(faultgouge_here, tmp_path):
     (tmp_path / "pile.lammps").write_text(DECK.format(**FLAT, word="contacts"))
     assert "LAMMPS decks (.in, in.NAME)" in faultgouge_here("import", "pile.lammps", code=2).stderr
