@@ -181,7 +181,7 @@ def _not_proved(configuration: Configuration, difference: float, causes: list[st
         or_slide = f"; or {slide} at Coulomb's bound or just below {SLIDES_ON}" if close.any() else ""
         return NotProvedError(f"{says}; {' and '.join(causes)}{or_slide}.")
     if configuration.operators == "differences":
-        return NotTakenError(f"{says}, though K and C are differences of these forces: do they depend on the time?")
+        return NotTakenError(f"{says}, though K and C are differences of these forces, which may depend on the time.")
     close = close & ~configuration.contacts.at_bound
     if close.any():
         return NotTakenError(

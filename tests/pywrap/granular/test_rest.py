@@ -50,7 +50,7 @@ def test_a_sphere_on_a_region(lammps_with, share, rests):
 
 
 def test_velocities_of_what_is_taken_at_rest(lammps_with):
-    """`fix freeze` leaves a particle its rotation, which contacts feel; and forces may balance while a particle moves."""
+    """`fix freeze` leaves a particle its rotation, which contacts feel; forces may balance while a particle moves."""
     from faultgouge import from_lammps
 
     plane = "fix floor all wall/gran hooke/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL contacts\nfix hold held freeze"
