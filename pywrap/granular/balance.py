@@ -65,8 +65,8 @@ def held_remarks(configuration: Configuration, velocity: Floats, rotation: Float
         return ()
     count = int(drives.sum())
     return (
-        f"{counted(count, 'particle')} that no fix moves {'have' if count > 1 else 'has'} velocities or rotations, up to "
-        f"{speed[drives].max():.3g} at the surface, which drive contacts in LAMMPS, and are zero here: give them "
+        f"{counted(count, 'particle')} that no fix moves {'have' if count > 1 else 'has'} velocities or rotations, up "
+        f"to {speed[drives].max():.3g} at the surface, which drive contacts in LAMMPS, and are zero here: give them "
         "`velocity GROUP set 0 0 0` and `set group GROUP omega 0 0 0`",
     )
 
@@ -141,8 +141,8 @@ def lost_histories(commands: Commands) -> str:
         )
     if after and commands.style != OWN:
         return (
-            f"{after!r} stands after the last run, where LAMMPS forgets tangential histories if its lists of neighbours "
-            "have changed since: have the run itself write the restart, by `restart N FILE` before it"
+            f"{after!r} stands after the last run, where LAMMPS forgets tangential histories if its lists of "
+            "neighbours have changed since: have the run itself write the restart, by `restart N FILE` before it"
         )
     return ""
 

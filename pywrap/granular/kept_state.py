@@ -16,7 +16,6 @@ from .instance_queries import styles_of
 from .look_in_a_copy import INSERTS
 from .relax import relax
 
-
 MDR_HISTORY = "MDR_PARTICLE_HISTORY_VARIABLES"
 """ID of the fix by which LAMMPS keeps what particles of the model mdr remember."""
 
@@ -46,7 +45,8 @@ def take_or_keep(
 def keep_state(lmp: Any, says: str, keep: Path | None, change: str) -> str:
     """A sentence on a deck, and where the state of the deck's runs is kept, if a restart file can be written beside
     `keep`; `change` is what the lines have to have besides."""
-    kept = None if keep is None else _keep(lmp, keep.with_suffix(".restart"))
+    lost = "Lost atoms" in says  # a restart file has no longer what LAMMPS has lost
+    kept = None if keep is None or lost else _keep(lmp, keep.with_suffix(".restart"))
     if kept is None:
         return says
     where = f"{says.rstrip('.')}. The state is kept in {kept}"

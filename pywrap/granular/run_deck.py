@@ -128,7 +128,7 @@ def _carry_out_deck(lmp: Any, path: Path, text: str, log: IO[str]) -> None:
 
 
 def _before_quit(text: str) -> str:
-    """A deck up to the `quit` that ends it, which would end this program, too; all of a deck whose jumps may pass it."""
+    """A deck up to the `quit` that ends it, and would end this program, too; all of a deck whose jumps may pass it."""
     if re.search(r"\bjump\b", text):
         return text
     quits = (each.start() for each in re.finditer(r"(?m)^[ \t]*quit\b", text))
