@@ -86,9 +86,10 @@ def motion_remarks(configuration: Configuration, velocity: Floats) -> tuple[str,
 
 
 LOST = (
-    "have no tangential force, as where histories are lost: LAMMPS reads none from a restart file if another instance "
-    "of a granular style was there before in the process, and not all across a periodic boundary or with newton off; "
-    "read the file in a process of its own, and run on with drag (fix viscous) until the packing rests"
+    "have no tangential force, as where histories are lost: a wall or a pair style that is defined anew has none yet; "
+    "and LAMMPS reads none from a restart file if another instance of a granular style was there before in the "
+    "process, and not all across a periodic boundary or with newton off; read such a file in a process of its own, and "
+    "run on with drag (fix viscous) until the packing rests"
 )
 
 TWICE = "particles touch each other twice, of which LAMMPS mixes the histories: take a box that is wider"
