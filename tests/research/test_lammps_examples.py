@@ -19,5 +19,5 @@ def test_changes_of_a_deck(tmp_path):
     (tmp_path / "in.pour").write_text("units lj\nfix grav all gravity 1 chute 26\nrun\t 100\nrun 5\n")
     deck = Deck("in.pour", replaces={"chute 26": "chute 15"}, until="run 100", adds=("unfix grav",))
     assert deck.text(tmp_path) == "units lj\nfix grav all gravity 1 chute 15\nunfix grav\n"
-    with pytest.raises(ValueError, match="in.pour has no 'chute 30'"):
+    with pytest.raises(ValueError, match=r"in\.pour has no 'chute 30'"):
         Deck("in.pour", replaces={"chute 30": ""}).text(tmp_path)
