@@ -205,6 +205,10 @@ def test_a_line_at_which_lammps_stops(faultgouge_here, tmp_path):
     assert "LAMMPS stopped: Unrecognized compute style 'no/such/style'" in said
     assert "The state is kept in stops.restart: go on by a deck of read_restart stops.restart" in said
     assert (tmp_path / "stops.restart").is_file()
+    (tmp_path / "lost.in").write_text(deck.replace("run 1500", "velocity all set 1e3 0 0\nrun 1500"))
+    said = faultgouge_here("import", "lost.in", "-o", "lost.h5", code=1).stderr
+    assert "Lost atoms: original 3 current 0" in said
+    assert not (tmp_path / "lost.restart").exists()  # nothing is left to keep
 
 
 @pytest.mark.long
