@@ -5,14 +5,18 @@ from typing import Any
 import numpy as np
 
 from ...analysis import BadInputError, Configuration, LinearisedContacts
-from ...analysis.arrays import Indices
+from ...analysis.arrays import Floats, Indices
+from ...analysis.counted import counted
 from .granular_commands import OWN, Commands, NotTakenError, without_suffix
-from .instance_queries import communicator
-from .lammps_arrays import owned_array
 
 BALANCE = 1e-4
 """Share of the mean contact force that may be out of balance. Beyond, the packing moves to another place of rest, and K
 says nothing of this motion."""
+
+
+HELD_SPEED = 1e-12
+"""Speed of a particle that nothing moves, in radii a time step, from which on its contacts are driven: in a million
+steps they slip by a millionth of a radius, a hundredth of a small overlap."""
 
 
 def check_balance(balance: float) -> None:
@@ -53,27 +57,41 @@ def refuse_motion(configuration: Configuration, balance: float, commands: Comman
     )
 
 
-def velocity_remarks(lmp: Any, configuration: Configuration) -> tuple[str, ...]:
-    """A sentence on the fastest particle, if its contacts would stop it with more force than may be out of balance."""
-    world = communicator(lmp)
-    ids, v = (np.concatenate(world.allgather(np.array(owned_array(lmp, name)))) for name in ("id", "v"))
-    order = np.argsort(ids)
-    speed = np.linalg.norm(v[order[np.searchsorted(ids[order], configuration.ids)]], axis=1)
-    stiffness = configuration.assembled_stiffness().diagonal().reshape(configuration.axes, -1)
-    stopping = speed * np.sqrt(configuration.mass * np.abs(stiffness[: configuration.dimension]).max(axis=0))
-    fastest = int(np.argmax(stopping))
-    if not stopping[fastest] > BALANCE * force_scale(configuration):
+def held_remarks(configuration: Configuration, velocity: Floats, rotation: Floats, timestep: float) -> tuple[str, ...]:
+    """A sentence on velocities of particles that no fix moves, as `fix freeze` leaves them; shape (N, 3) both. LAMMPS's
+    contacts feel these velocities for ever, and they are zero here."""
+    c = configuration
+    speed = np.maximum(np.linalg.norm(velocity, axis=1), c.radius * np.linalg.norm(rotation, axis=1))
+    drives = ~c.free & (speed * timestep > HELD_SPEED * c.radius)
+    if not drives.any():
         return ()
+    count = int(drives.sum())
     return (
-        f"velocities are left out: particle {configuration.ids[fastest]} moves at {speed[fastest]:.3g}, and what is "
-        "said is said of pushes from rest",
+        f"{counted(count, 'particle')} that no fix moves {'have' if count > 1 else 'has'} velocities or rotations, up "
+        f"to {speed[drives].max():.3g} at the surface, which drive contacts in LAMMPS, and are zero here: give them "
+        "`velocity GROUP set 0 0 0` and `set group GROUP omega 0 0 0`",
     )
 
 
+def motion_remarks(configuration: Configuration, velocity: Floats) -> tuple[str, ...]:
+    """A sentence on velocities, shape (N, 3), of particles that move, if these are more than what forces out of balance
+    make: v (k m)^(1/2) is a force, with the largest stiffness of a contact and the mean mass."""
+    c, force = configuration, force_scale(configuration)
+    stiffness = c.contacts.normal_stiffness if c.stiffness is None else np.abs(c.stiffness.data)
+    impedance = np.sqrt(stiffness.max(initial=0.0) * c.mass.mean())
+    moves = c.free.copy()
+    moves[c.rattlers] = False
+    speed = float(np.linalg.norm(velocity[moves], axis=1).max(initial=0.0))
+    if not speed * impedance > BALANCE * force:
+        return ()
+    return (f"particles move by up to {speed:.3g} (length / time): this is said of them at rest",)
+
+
 LOST = (
-    "have no tangential force, as where histories are lost: LAMMPS reads none from a restart file if another instance "
-    "of a granular style was there before in the process, and not all across a periodic boundary or with newton off; "
-    "read the file in a process of its own, and run on with drag (fix viscous) until the packing rests"
+    "have no tangential force, as where histories are lost: a wall or a pair style that is defined anew has none yet; "
+    "and LAMMPS reads none from a restart file if another instance of a granular style was there before in the "
+    "process, and not all across a periodic boundary or with newton off; read such a file in a process of its own, and "
+    "run on with drag (fix viscous) until the packing rests"
 )
 
 TWICE = "particles touch each other twice, of which LAMMPS mixes the histories: take a box that is wider"
@@ -114,6 +132,24 @@ def creeping_law(commands: Commands) -> str:
     )
 
 
+def lost_histories(commands: Commands) -> str:
+    """What is said of a command after the last run that takes tangential histories away; empty if there is none."""
+    after = commands.after_run
+    if after.startswith("rerun"):
+        return f"{after!r} puts the positions of a dump, which has no tangential histories: leave it out"
+    if after.startswith(("delete_atoms", "reset_atoms")):
+        return (
+            f"{after!r} after the last run gives particles other IDs, by which LAMMPS knows the tangential histories: "
+            "leave reset_atoms out, write `compress no` behind delete_atoms, and run on until the packing rests"
+        )
+    if after and commands.style != OWN:
+        return (
+            f"{after!r} stands after the last run, where LAMMPS forgets tangential histories if its lists of "
+            "neighbours have changed since: have the run itself write the restart, by `restart N FILE` before it"
+        )
+    return ""
+
+
 def known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
     """Why forces are out of balance though the packing may be at rest; empty if no cause is known."""
     if says := restless_fix(commands):
@@ -122,14 +158,8 @@ def known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
         return says
     if touch_twice(contacts.i[~contacts.wall], contacts.j[~contacts.wall]):
         return TWICE
-    if commands.after_run.startswith("rerun"):
-        return f"{commands.after_run!r} puts the positions of a dump, which has no tangential histories: leave it out"
-    if commands.after_run and commands.style != OWN:
-        return (
-            f"{commands.after_run!r} stands after the last run, where LAMMPS forgets tangential histories if "
-            "its lists of neighbours have changed since: have the run itself write the restart, by `restart N FILE` "
-            "before it"
-        )
+    if says := lost_histories(commands):
+        return says
     has_friction = (contacts.friction > 0) & np.isfinite(contacts.friction)  # infinite where no law is known
     lost = np.count_nonzero(has_friction & ~contacts.tangential_force.any(axis=1))
     return f"{lost} of {len(contacts)} contacts {LOST}" if lost else ""

@@ -27,13 +27,15 @@ class Still(NamedTuple):
     """Particles as they stand, without K and C: both are empty.
 
     `constraint` is P of q = P Q, which the configuration has only where P says more than which particles are free.
-    `commands` and `fixes` are those of the instance.
+    `commands` and `fixes` are those of the instance, and so are `velocity` and `rotation`, shape (N, 3).
     """
 
     configuration: Configuration
     constraint: csr_array
     commands: Commands
     fixes: dict[str, str]
+    velocity: Floats
+    rotation: Floats
 
 
 def configuration_by_differences(lmp: Any, still: Still) -> Configuration:
@@ -85,7 +87,7 @@ def still_particles(lmp: Any, given: Commands | None) -> Still:
     )
     total = np.stack([found["f"], found["torque"]], axis=1)
     load = np.where(made.free[:, None, None], total, 0.0) - made.contact_force
-    return Still(derive_frozen(made, load=load), moved.constraint, commands, fixes)
+    return Still(derive_frozen(made, load=load), moved.constraint, commands, fixes, found["v"], found["omega"])
 
 
 def _forces_of_pairs(found: Arrays, box: Floats, style: str) -> LinearisedContacts:

@@ -13,9 +13,9 @@ from functools import partial
 from typing import Any
 
 from ...analysis import Configuration
-from ...analysis.arrays import derive_frozen
+from ...analysis.arrays import Floats, derive_frozen
 from .acting_fixes import check_holding, drag_remarks
-from .balance import BALANCE, check_balance, force_scale, refuse_motion, velocity_remarks
+from .balance import BALANCE, check_balance, force_scale, held_remarks, lost_histories, motion_remarks, refuse_motion
 from .configuration_by_differences import configuration_by_differences, still_particles
 from .configuration_by_laws import KnownLaws, check_friction, configuration_by_laws
 from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError, read_commands, with_one_rank
@@ -124,9 +124,10 @@ def _by_laws(
     try:
         configuration = configuration_by_laws(lmp, deck, found, laws)
     except ValueError as error:  # numbers that no contact at rest has
-        raise NotTakenError(f"The packing moves: {error}; bring it to rest by faultgouge.relax(lmp).") from error
-    said = (*configuration.remarks, *drag_remarks(fixes), *velocity_remarks(lmp, configuration))
-    configuration = derive_frozen(configuration, remarks=said)
+        advice = lost_histories(deck) or "bring it to rest by faultgouge.relax(lmp), in a command --relax"
+        raise NotTakenError(f"The packing moves: {str(error).rstrip('.')}; {advice}.") from error
+    remarks = _remarks(lmp, configuration, fixes, found["v"], found["omega"])
+    configuration = derive_frozen(configuration, remarks=(*configuration.remarks, *remarks))
     contacts = configuration.contacts
     rests = not configuration.residual > BALANCE * force_scale(configuration)
     proves = prove and can_copy(lmp) and rests
@@ -141,6 +142,14 @@ def _by_laws(
     return configuration
 
 
+def _remarks(
+    lmp: Any, configuration: Configuration, fixes: dict[str, str], velocity: Floats, rotation: Floats
+) -> tuple[str, ...]:
+    """Sentences on what moves, which a packing at rest leaves out; velocities have the shape (N, 3)."""
+    held = held_remarks(configuration, velocity, rotation, float(lmp.extract_global("dt")))
+    return (*held, *motion_remarks(configuration, velocity), *drag_remarks(fixes))
+
+
 def _proved(lmp: Any, configuration: Configuration, commands: Commands, fixes: dict[str, str]) -> Configuration:
     """A Configuration with its proof."""
     return derive_frozen(
@@ -152,7 +161,7 @@ def _by_differences(lmp: Any, given: Commands | None, *, balance: float, prove: 
     """A Configuration whose K and C are differences of LAMMPS's forces, on one rank."""
     still = still_particles(lmp, given)
     made = configuration_by_differences(lmp, still)
-    made = derive_frozen(made, remarks=(*drag_remarks(still.fixes), *velocity_remarks(lmp, made)))
+    made = derive_frozen(made, remarks=_remarks(lmp, made, still.fixes, still.velocity, still.rotation))
     refuse_motion(made, balance, still.commands)
     proves = prove and made.residual <= BALANCE * force_scale(made)
     return _proved(lmp, made, still.commands, still.fixes) if proves else made

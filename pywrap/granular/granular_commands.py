@@ -24,6 +24,9 @@ INTEGRATORS = ("nve/sphere", "nve/disc", "overdamped/disc")
 BODIES = ("rigid", "rigid/nve")
 """Fixes whose bodies may be kept from rotating (:mod:`~faultgouge.pywrap.granular.translating_bodies`)."""
 
+AFTER_RUN = ("write_restart", "rerun", "delete_atoms", "reset_atoms")
+"""Commands that take tangential histories away from particles."""
+
 MOBILE = (
     *INTEGRATORS, *BODIES, "nve", "nve/limit", "freeze", "setforce", "aveforce", "lineforce", "planeforce",
 )  # fmt: skip
@@ -60,7 +63,7 @@ def with_one_rank(reason: NotLinearisedError) -> str:
 @dataclass(frozen=True)
 class Commands:
     """What a deck says of contacts and of motion: pair_style with the pair_coeff that hold, fixes and regions by their
-    IDs; and the write_restart or rerun that comes after the last run."""
+    IDs; and the last command of `AFTER_RUN` that comes after the last run."""
 
     pair: tuple[str, ...]
     fixes: dict[str, str]
@@ -116,8 +119,10 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
             fixes.pop(words[1], None)
         elif words[0] == "region" and len(words) > 2:
             regions[words[1]] = " ".join(words)
-        elif words[0] in ("run", "minimize", "write_restart", "rerun"):
-            after = text.strip() if words[0] in ("write_restart", "rerun") else ""
+        elif words[0] in ("run", "minimize"):
+            after = ""
+        elif words[0] in AFTER_RUN and words[-2:] != ["compress", "no"]:
+            after = text.strip()
     if not style:
         where = "The log of this LAMMPS has" if log else "The commands have"
         if cleared:

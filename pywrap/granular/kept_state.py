@@ -16,6 +16,11 @@ from .instance_queries import styles_of
 from .look_in_a_copy import INSERTS
 from .relax import relax
 
+MDR_HISTORY = "MDR_PARTICLE_HISTORY_VARIABLES"
+"""ID of the fix by which LAMMPS keeps what particles of the model mdr remember."""
+
+MDR_WALLS = "LAMMPS of 22 Jul 2025 crashes where a wall of the model mdr stands behind read_restart"
+
 
 def take_or_keep(
     lmp: Any, commands: Iterable[str], keep: Path | None, *, slides: bool, balance: float, relaxes: bool
@@ -33,19 +38,23 @@ def take_or_keep(
             _relax(lmp, commands)
         return from_lammps(lmp, commands, slides=slides, balance=balance)
     except (NotTakenError, NoEquilibriumError) as error:
-        longer = "" if isinstance(error, NoEquilibriumError) else ", and with a longer run"
+        longer = ", and with a longer run" if str(error).startswith("The packing moves") else ""
         raise NotTakenError(keep_state(lmp, str(error), keep, longer)) from error
 
 
 def keep_state(lmp: Any, says: str, keep: Path | None, change: str) -> str:
     """A sentence on a deck, and where the state of the deck's runs is kept, if a restart file can be written beside
     `keep`; `change` is what the lines have to have besides."""
-    kept = None if keep is None else _keep(lmp, keep.with_suffix(".restart"))
+    lost = "Lost atoms" in says  # a restart file has no longer what LAMMPS has lost
+    kept = None if keep is None or lost else _keep(lmp, keep.with_suffix(".restart"))
     if kept is None:
         return says
+    where = f"{says.rstrip('.')}. The state is kept in {kept}"
+    if MDR_HISTORY in lmp.available_ids("fix") and any("wall/gran" in each for each in styles_of(lmp).fixes.values()):
+        return f"{where}, but {MDR_WALLS}."
     return (
-        f"{says.rstrip('.')}. The state is kept in {kept}: go on by a deck of read_restart {kept} and the lines of this "
-        f"deck from pair_style on, without those that make particles{change}."
+        f"{where}: go on by a deck of read_restart {kept} and the lines of this deck from pair_style on, without those "
+        f"that make particles{change}."
     )
 
 
@@ -63,6 +72,8 @@ def _keep(lmp: Any, file: Path) -> Path | None:
     if file.exists() or lmp.get_natoms() == 0:
         return None
     with suppress(Exception):  # LAMMPS's bindings raise any error, and the first error is told
+        for name in lmp.available_ids("dump"):  # one of which may have filled a disk
+            lmp.command(f"undump {name}")
         lmp.command("timer timeout unlimited")
         lmp.command(f'restart 1 "{file.resolve()}.*"')
         lmp.command("run 1 post no")

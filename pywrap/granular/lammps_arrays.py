@@ -52,15 +52,16 @@ def set_velocity(lmp: Any, configuration: Configuration, velocity: Floats) -> No
 
 def arrays_at_rest(lmp: Any, groups: dict[str, str], walls: list[str], columns: str) -> Arrays:
     """Particles, forces and contacts of this rank after zero steps at rest; who is in the groups of some fixes, and
-    contacts with the walls of others."""
-    for name in ("v", "omega"):
+    contacts with the walls of others. `v` and `omega` are the velocities before."""
+    moves = {name: np.array(owned_array(lmp, name)) for name in ("v", "omega")}
+    for name in moves:
         owned_array(lmp, name)[:] = 0.0
     lmp.command(f"compute faultgouge_c all pair/local {columns} cutoff radius")
     lmp.command("compute faultgouge_i all property/local patom1 patom2 cutoff radius")
     try:
         _run_zero_steps(lmp)
         names = ("id", "type", "x", "f", "torque", "radius", "rmass")
-        found: Arrays = {name: np.array(owned_array(lmp, name)) for name in names}
+        found: Arrays = moves | {name: np.array(owned_array(lmp, name)) for name in names}
         for name, key in (("c", "contacts"), ("i", "partners")):
             local = lmp.numpy.extract_compute(f"faultgouge_{name}", 2, 2)
             found[key] = np.zeros((0, 1)) if local is None else np.array(local)

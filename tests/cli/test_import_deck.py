@@ -205,6 +205,10 @@ def test_a_line_at_which_lammps_stops(faultgouge_here, tmp_path):
     assert "LAMMPS stopped: Unrecognized compute style 'no/such/style'" in said
     assert "The state is kept in stops.restart: go on by a deck of read_restart stops.restart" in said
     assert (tmp_path / "stops.restart").is_file()
+    (tmp_path / "lost.in").write_text(deck.replace("run 1500", "velocity all set 1e3 0 0\nrun 1500"))
+    said = faultgouge_here("import", "lost.in", "-o", "lost.h5", code=1).stderr
+    assert "Lost atoms: original 3 current 0" in said
+    assert not (tmp_path / "lost.restart").exists()  # nothing is left to keep
 
 
 @pytest.mark.long
@@ -325,6 +329,19 @@ def test_rerun_after_the_last_run(faultgouge_here, tmp_path):
     (tmp_path / "again.in").write_text(f"{deck}undump all\nrerun pile.dump dump x y\n")
     says = faultgouge_here("import", "again.in", code=1).stderr
     assert "'rerun pile.dump dump x y' puts the positions of a dump, which has no tangential histories" in says
+
+
+@pytest.mark.parametrize("command", ["delete_atoms group upper", "reset_atoms id"])
+def test_ids_that_change_after_the_last_run(faultgouge_here, tmp_path, command):
+    """LAMMPS knows histories by the IDs of partners; here the first of six particles is gone before the run."""
+    deck = two_on_three().replace("create_box 1 box", "create_box 1 box\ncreate_atoms 1 single 0 3.3 0 units box")
+    first = "group first id 1\ndelete_atoms group first compress no\n"
+    deck = deck.replace("variable kn", f"{first}group upper id 5\nvariable kn")
+    (tmp_path / "rests.in").write_text(f"{deck}delete_atoms group first compress no\n")
+    assert "5 disks, " in faultgouge_here("import", "rests.in", "-o", "rests.h5").stdout
+    (tmp_path / "other.in").write_text(f"{deck}{command}\n")
+    says = faultgouge_here("import", "other.in", "-o", "other.h5", code=1).stderr
+    assert f"'{command}' after the last run gives particles other IDs" in says
 
 
 def test_deck_of_another_name(faultgouge_here, tmp_path):

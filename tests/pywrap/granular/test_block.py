@@ -139,7 +139,7 @@ def test_velocities_that_are_left_out_are_named(block, speed):
 
     lmp = block(0.9)
     of_particle(lmp, "v", 1)[0] = speed
-    says = f"velocities are left out: particle 1 moves at {speed:.3g}, and what is said is said of pushes from rest"
+    says = f"particles move by up to {speed:.3g} (length / time): this is said of them at rest"
     assert (says in str(stability(from_lammps(lmp)))) == (speed > 1e-3)
 
 

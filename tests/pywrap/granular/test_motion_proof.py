@@ -86,6 +86,17 @@ def test_fixes_that_act_as_contacts_do_not_tell(bed, fix, says):
     assert "\n" not in str(refusal.value)
 
 
+def test_a_load_that_follows_the_time(bed):
+    """A gravity that rises by a millionth a step is no force by positions."""
+    from faultgouge.pywrap import NotTakenError
+
+    rises = (
+        "variable now equal step\nvariable rise equal 1+1e-6*(step-${now})\nfix load all gravity v_rise vector 0.1 0 -1"
+    )
+    with pytest.raises(NotTakenError, match=r"^LAMMPS's forces change with the time, though nothing moves: a load or"):
+        look(*bed, rises)
+
+
 def test_a_weak_spring_between_particles(bed):
     """A spring of 0.5 beside contacts of 300: laws of contacts nearly agree, and a common displacement says nothing."""
     spring = "group one id 1\ngroup other id 9\nfix trap one spring couple other 0.5 0.5 0.5 0.5 0.2"

@@ -45,6 +45,26 @@ def test_a_sphere_on_a_region(lammps_with, share, rests):
     assert from_lammps(lmp, balance=2 * share).residual == pytest.approx(share * WEIGHT, rel=1e-3)
 
 
+def test_velocities_of_what_is_taken_at_rest(lammps_with):
+    """`fix freeze` leaves a particle its rotation, which contacts feel; forces may balance while a particle moves."""
+    from faultgouge import from_lammps
+
+    plane = "fix floor all wall/gran hooke/history 1e4 3e3 20 10 0.5 1 zplane 0 NULL contacts\nfix hold held freeze"
+    lmp = lammps_with(
+        BALL.format(z=0.5 - WEIGHT / 1e4, wall=plane, more="create_atoms 1 single 1.1 0 0.5 units box\ngroup held id 2")
+    )
+    assert not any("move" in each for each in from_lammps(lmp).remarks)
+    lmp.command("set group held omega 0 0.02 0")
+    lmp.command("velocity all set 0.1 0 0")
+    for differences in (False, True):
+        held, moves = from_lammps(lmp, differences=differences).remarks[-2:]
+        assert held.startswith("1 particle that no fix moves has velocities or rotations, up to 0.1 at the surface")
+        assert moves == "particles move by up to 0.1 (length / time): this is said of them at rest"
+    lmp.command("velocity all set 0 0 0")
+    lmp.command("set group held omega 0 0 0")
+    assert not any("move" in each for each in from_lammps(lmp).remarks)
+
+
 ENDS = "variable high equal 1\nfix stop all halt 10 v_high > 0 error soft message no\nrun 20"
 
 
