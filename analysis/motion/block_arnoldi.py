@@ -21,6 +21,7 @@ from scipy.linalg import eig, qr, schur
 from scipy.sparse import csc_array, eye_array
 
 from ..arrays import Complexes, Floats
+from ..assignment import assign_columns
 from ..errors import FaultgougeError
 from ..factors.sparse_lu import DIAGONAL_PIVOT, Factors, SingularMatrixError, symmetric_lu
 from .modes import Modes
@@ -132,11 +133,9 @@ class Krylov:
 
     def subspace(self, wanted: Complexes) -> Floats:
         """An orthonormal basis of the invariant subspace of some eigenvalues of H, closed under conjugation."""
-        from scipy.optimize import linear_sum_assignment
-
         every = np.linalg.eigvals(self.square)
         distance = np.abs(wanted[:, None] - every)
-        chosen = every[linear_sum_assignment(distance)[1]]
+        chosen = every[assign_columns(-distance)]
         others = np.setdiff1d(every, chosen)
 
         def is_chosen(real: float, imaginary: float) -> bool:
@@ -271,8 +270,6 @@ class ShiftedDisc:
 
     def _left_space(self, right: Floats, wanted: Complexes, accuracy: float) -> Krylov:
         """The space of the transposed inverse, until it has the eigenvalues that are wanted."""
-        from scipy.optimize import linear_sum_assignment
-
         block = self.krylov.block
         # few left vectors are next to what the right space has
         start = right.T if right.shape[1] <= block else np.random.default_rng(1).standard_normal((block, len(right)))
@@ -284,7 +281,7 @@ class ShiftedDisc:
             values = values[errors <= accuracy * overlap]
             if len(values) >= len(wanted):
                 distance = np.abs(wanted[:, None] - values)
-                near = distance[linear_sum_assignment(distance)]
+                near = distance[np.arange(len(wanted)), assign_columns(-distance)]
                 if near.max(initial=0.0) < np.sqrt(accuracy):
                     return krylov
             if krylov.full:

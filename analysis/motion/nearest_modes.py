@@ -4,6 +4,7 @@ import numpy as np
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
+from ..assignment import assign_columns
 from ..factors.sparse_lu import general_lu
 from ..has_configuration import HasConfiguration
 from .eigenvalues import Complexes
@@ -41,8 +42,6 @@ def nearest_modes(packing: HasConfiguration, near: complex, count: int, toleranc
     scipy.sparse.linalg.ArpackError
         If Arnoldi's iteration does not converge.
     """
-    from scipy.optimize import linear_sum_assignment
-
     matrix, active = dynamical_matrix(packing)
     size = matrix.shape[0]
     if not 1 <= count <= size - 2:
@@ -68,7 +67,7 @@ def nearest_modes(packing: HasConfiguration, near: complex, count: int, toleranc
     order = np.lexsort((values.imag, values.real))
     values, right = values[order], right[:, order]
     # left vectors beside the right vectors of the same eigenvalue
-    _, partner = linear_sum_assignment(np.abs(values[:, None] - mirrored.conj()[None, :]))
+    partner = assign_columns(-np.abs(values[:, None] - mirrored.conj()[None, :]))
     spread = np.zeros((2, packing.coordinates, len(values)), dtype=np.complex128)
     spread[0, active], spread[1, active] = right, left[:, partner]
     return Modes(values, spread[0], spread[1], axes=packing.axes, solves=solves)

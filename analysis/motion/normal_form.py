@@ -48,6 +48,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..bracketed_root import bracketed_root
 from ..packing.packing import Floats
 
 ORTHOGONAL = np.array([1.0, -1.0]) / np.sqrt(2)
@@ -237,13 +238,11 @@ class NormalForm:
         ValueError
             If the undamped amplitude is less than `LEAST_CROSSOVER`.
         """
-        from scipy.optimize import brentq
-
         full = self.amplitude()
         if not LEAST_CROSSOVER <= full < np.inf:
             raise ValueError(f"An amplitude of {full:.3g} shows no crossover: take an epsilon between 0 and 0.1.")
-        bounds = 0.3 * self.tau_d, 10 * self.tau_d
-        return float(brentq(lambda tau: self.amplitude(tau) - 0.5 * full, *bounds, rtol=1e-9))
+        low, high = 0.3 * self.tau_d, 10 * self.tau_d
+        return bracketed_root(lambda tau: self.amplitude(tau) - 0.5 * full, low, high, 1e-9 * low)
 
     @property
     def _split(self) -> complex | float:

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, floats
+from ..arrays import Floats, Indices, floats
 from ..errors import BadInputError
 from .compensated import DoubleDouble, exact_sum, overlap_and_distance, separation
 from .contacts import FLOOR, Contacts
 
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
+FEW = 300
+"""Centres of which all pairs are looked at, in less time than the import of scipy.spatial takes."""
 
 
 class ContactGeometry(NamedTuple):
@@ -124,7 +124,7 @@ def touching(position: ArrayLike, radius: ArrayLike, box_length: float | None = 
     radius = floats("radius", radius, np.shape(radius))
     position = floats("position", position, (len(radius), 2))
     check_box(radius, box_length)
-    i, j = neighbour_tree(position, box_length).query_pairs(2 * radius.max(), output_type="ndarray").T
+    i, j = near_pairs(position, box_length, 2 * radius.max()).T
     branch = separation(position[i], None, position[j], None, box_length)
     near = overlap_and_distance(branch, exact_sum(radius[i], radius[j]))[0][0] > 0
     floor = np.flatnonzero(radius - position[:, 1] > 0)
@@ -135,15 +135,25 @@ def touching(position: ArrayLike, radius: ArrayLike, box_length: float | None = 
     )
 
 
-def neighbour_tree(position: Floats, box_length: float | None) -> cKDTree:
-    """The tree that finds near centres, shape (N, 2), also across the periodic sides."""
+def near_pairs(position: Floats, box_length: float | None, reach: float) -> Indices:
+    """Pairs i < j of centres, shape (N, 2), that are no more than `reach` apart, also across the periodic sides.
+
+    Returns
+    -------
+    ndarray of int, shape (P, 2)
+    """
+    if len(position) <= FEW:
+        pairs = np.column_stack(np.triu_indices(len(position), 1))
+        apart = nearest_image(position[pairs[:, 0]] - position[pairs[:, 1]], box_length)
+        return pairs[np.hypot(*apart.T) <= reach]
     from scipy.spatial import cKDTree
 
     wrapped = position.copy()
     if box_length is not None:
         wrapped[:, 0] %= box_length
         wrapped[wrapped[:, 0] >= box_length, 0] = 0.0  # a tiny negative x modulo L rounds to L
-    return cKDTree(wrapped, boxsize=None if box_length is None else [box_length, 0.0])
+    tree = cKDTree(wrapped, boxsize=None if box_length is None else [box_length, 0.0])
+    return np.asarray(tree.query_pairs(reach, output_type="ndarray"))
 
 
 def check_box(radius: Floats, box_length: float | None) -> None:

@@ -19,6 +19,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from ..bracketed_root import bracketed_root
 from ..errors import FaultgougeError
 from ..packing.packing import Floats
 from .limits import LIMITS, Limits
@@ -237,10 +238,8 @@ def sign_change(value: Callable[[float], float], below: float, above: float, lim
 
 def _smooth_root(value: Callable[[float], float], below: float, above: float, limits: Limits) -> SignChange | None:
     """The root; None if the function does not cross zero along a smooth line at any distance."""
-    from scipy.optimize import brentq
-
     span = above - below
-    root = float(brentq(value, below, above, xtol=limits.root_width * span))
+    root = bracketed_root(value, below, above, limits.root_width * span)
     room = min(root - below, above - root)
     # As near as the noise allows: the function should be straight, and yet stand out of the scatter.
     distance = min(limits.point_distance_share * room, limits.point_distance * limits.root_width * span)

@@ -22,6 +22,7 @@ import numpy as np
 from scipy.linalg import eig
 from scipy.sparse import csr_array
 
+from ..assignment import assign_columns
 from ..motion.eigenvalues import Complexes, exceeds_rounding, growing
 from ..motion.energy_norm import EnergyNorm
 from ..motion.modes import Modes
@@ -236,16 +237,6 @@ def assign_modes(here: SystemModes, there: SystemModes) -> Indices:
         if partner[up] >= 0 and there.partner[partner[up]] == partner[down] and there.values[partner[up]].imag < 0:
             partner[[up, down]] = partner[[down, up]]
     return partner
-
-
-def assign_columns(weight: Floats) -> Indices:
-    """A column for each row, none twice, with the largest sum of weights; -1 where columns are too few."""
-    from scipy.optimize import linear_sum_assignment
-
-    column = np.full(len(weight), -1)
-    rows, columns = linear_sum_assignment(weight, maximize=True)
-    column[rows] = columns
-    return column
 
 
 def products(a: Complexes, b: Complexes) -> Floats:

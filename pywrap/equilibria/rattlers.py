@@ -21,7 +21,7 @@ import numpy as np
 
 from ...analysis import Packing, nearest_image, touching
 from ...analysis.arrays import Floats, Indices
-from ...analysis.packing.geometry import neighbour_tree
+from ...analysis.packing.geometry import near_pairs
 
 TRAVEL = 0.3
 """How far a disk may move along x and along y, in radii: cages are a few tenths wide."""
@@ -78,11 +78,13 @@ def middle_of_cage(packing: Packing, disks: Indices) -> Floats:
     """
     radius, box = packing.radius, packing.box_length
     position = packing.position.copy()
-    tree = neighbour_tree(position, box)
     # both may move, by sqrt(2) TRAVEL
     reach = radius[disks] + (1 + 4 * TRAVEL) * radius.max()
-    for disk, near in zip(disks, tree.query_ball_point(tree.data[disks], reach), strict=True):
-        cage = np.setdiff1d(near, [disk])
+    pairs = near_pairs(position, box, float(reach.max(initial=0.0)))
+    apart = np.hypot(*nearest_image(position[pairs[:, 0]] - position[pairs[:, 1]], box).T)
+    for disk, far in zip(disks, reach, strict=True):
+        own = pairs[(pairs == disk).any(axis=1) & (apart <= far)]
+        cage = np.sort(own[own != disk])
         branch = nearest_image(position[disk] - position[cage], box)
         position[disk] += _to_the_middle(branch, radius[cage] + radius[disk], position[disk, 1], radius[disk])
     return position[disks]

@@ -38,6 +38,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...analysis import MindlinLaw, PackingFileError
+from ...analysis.bracketed_root import bracketed_root
 from .packing_section import GeneratedPacking, StoredPacking
 from .scene_keys import SceneKeys
 from .units_section import Units
@@ -280,13 +281,11 @@ def dashpot(kn: float, wanted: float, mass: float, velocity: float) -> float:
     float
         C_N, force / (velocity length^(1/2)); 0 for the restitution 1.
     """
-    from scipy.optimize import brentq
-
     if wanted == 1:
         return 0.0
     length = (mass * velocity**2 / kn) ** 0.4
     unit = mass * velocity / length**1.5
-    return float(brentq(lambda c: restitution(kn, c * unit, mass, velocity) - wanted, 0.0, 50.0, xtol=1e-10)) * unit
+    return bracketed_root(lambda c: restitution(kn, c * unit, mass, velocity) - wanted, 0.0, 50.0, 1e-10) * unit
 
 
 def quality_factor(rate: complex) -> float:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...arrays import Floats, Indices
 from ...errors import PackingFileError
 from ...packing.contacts import FLOOR, Contacts
-from ...packing.geometry import nearest_image, neighbour_tree, touching
+from ...packing.geometry import near_pairs, nearest_image, touching
 from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
 
@@ -326,8 +326,7 @@ def _check_places(disks: Disks) -> None:
             f"{disks.source}: the centre of disk {disks.id[below][0]} is at y = {disks.position[below][0, 1]:g}, and "
             "the floor is y = 0: say with --floor at which y it is."
         )
-    tree = neighbour_tree(disks.position, disks.box_length)
-    pairs = tree.query_pairs(float(disks.radius.max()), output_type="ndarray")
+    pairs = near_pairs(disks.position, disks.box_length, float(disks.radius.max()))
     apart = nearest_image(disks.position[pairs[:, 0]] - disks.position[pairs[:, 1]], disks.box_length)
     distance = np.hypot(*apart.T)
     inside = distance < np.maximum(*disks.radius[pairs].T)
