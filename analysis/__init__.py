@@ -11,122 +11,108 @@ code with their contacts to first order. The physics is in the docstrings of the
 - `motion`: eigenvalues, the verdict on stability, responses, growth in a run, time step;
 - `windows`: the loads between which a motion grows;
 - `files`: run.h5, dumps, and the formats of other codes.
+
+The names of this package are imported when they are used.
 """
 
-from .arrays import Complexes, Floats, Indices
-from .configuration import Configuration
-from .contacts import LinearisedContacts
-from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
-from .files.dumps import read_dump
-from .files.json_packing import read_packing
-from .files.runfile import RunFile
-from .motion.buckling import negative_eigenvalues
-from .motion.eigenvalues import mass_weighted
-from .motion.fastest_growing import FastestGrowth, fastest_growing
-from .motion.growth import Growth, fit_growth, mean_square_displacement
-from .motion.growth_of_run import growth_of_run
-from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_modes
-from .motion.motion import Motion
-from .motion.nearest_modes import nearest_modes
-from .motion.one_sided_outcome import OneSidedOutcome
-from .motion.power_law import PowerLaw, fit_power_law
-from .motion.pushed_motion import OneSidedMotion, one_sided_motion
-from .motion.response import layer_force, linear_response
-from .motion.rising_load import RisingMotion
-from .motion.signals import Signal
-from .motion.slips import Slip
-from .motion.spectrum import (
-    Spectrum,
-    discrete_frequency,
-    dynamical_matrix,
-    eigenvalues,
-    largest_frequency,
-    spectrum,
-)
-from .motion.stability import Stability, stability
-from .motion.stable_timestep import rayleigh_timestep, stable_timestep
-from .motion.transient import NoGainError, TransientGain, transient_gain
-from .operators.damping import damping_matrix, largest_damping_rate
-from .operators.stiffness import stiffness_matrix
-from .packing.contacts import FLOOR, Contacts
-from .packing.geometry import ContactGeometry, nearest_image, touching
-from .packing.law import MindlinLaw
-from .packing.packing import Packing
-from .packing.solid_fraction import solid_fraction
-from .windows import Onset, OnsetError, Window, complex_windows, find_onset
-from .windows.pair_over_load import pair_eigenvalues
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-Snapshot = Configuration
-"""The name of `Configuration` until version 1."""
+if TYPE_CHECKING:  # what `OFFERS` imports when it is used
+    from .arrays import Complexes, Floats, Indices
+    from .configuration import Configuration, Snapshot
+    from .contacts import LinearisedContacts
+    from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
+    from .files.dumps import read_dump
+    from .files.json_packing import read_packing
+    from .files.runfile import RunFile
+    from .motion.buckling import negative_eigenvalues
+    from .motion.eigenvalues import mass_weighted
+    from .motion.fastest_growing import FastestGrowth, fastest_growing
+    from .motion.growth import Growth, fit_growth, mean_square_displacement
+    from .motion.growth_of_run import growth_of_run
+    from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_modes
+    from .motion.motion import Motion
+    from .motion.nearest_modes import nearest_modes
+    from .motion.one_sided_outcome import OneSidedOutcome
+    from .motion.power_law import PowerLaw, fit_power_law
+    from .motion.pushed_motion import OneSidedMotion, one_sided_motion
+    from .motion.response import layer_force, linear_response
+    from .motion.rising_load import RisingMotion
+    from .motion.signals import Signal
+    from .motion.slips import Slip
+    from .motion.spectrum import (
+        Spectrum,
+        discrete_frequency,
+        dynamical_matrix,
+        eigenvalues,
+        largest_frequency,
+        spectrum,
+    )
+    from .motion.stability import Stability, stability
+    from .motion.stable_timestep import rayleigh_timestep, stable_timestep
+    from .motion.transient import NoGainError, TransientGain, transient_gain
+    from .operators.damping import damping_matrix, largest_damping_rate
+    from .operators.stiffness import stiffness_matrix
+    from .packing.contacts import FLOOR, Contacts
+    from .packing.geometry import ContactGeometry, nearest_image, touching
+    from .packing.law import MindlinLaw
+    from .packing.packing import Packing
+    from .packing.solid_fraction import solid_fraction
+    from .windows import Onset, OnsetError, Window, complex_windows, find_onset
+    from .windows.pair_over_load import pair_eigenvalues
+
+OFFERS = {
+    "Complexes": ".arrays", "Floats": ".arrays", "Indices": ".arrays", "Configuration": ".configuration",
+    "LinearisedContacts": ".contacts", "BadInputError": ".errors", "FaultgougeError": ".errors",
+    "NoEquilibriumError": ".errors", "OutputError": ".errors", "PackingFileError": ".errors",
+    "read_dump": ".files.dumps", "read_packing": ".files.json_packing", "RunFile": ".files.runfile",
+    "negative_eigenvalues": ".motion.buckling", "mass_weighted": ".motion.eigenvalues",
+    "FastestGrowth": ".motion.fastest_growing", "fastest_growing": ".motion.fastest_growing",
+    "Growth": ".motion.growth", "fit_growth": ".motion.growth", "mean_square_displacement": ".motion.growth",
+    "growth_of_run": ".motion.growth_of_run", "Mode": ".motion.modes", "Modes": ".motion.modes",
+    "closest_to_meeting": ".motion.modes", "growth_rate": ".motion.modes", "normal_modes": ".motion.modes",
+    "Motion": ".motion.motion", "nearest_modes": ".motion.nearest_modes",
+    "OneSidedOutcome": ".motion.one_sided_outcome", "PowerLaw": ".motion.power_law",
+    "fit_power_law": ".motion.power_law", "OneSidedMotion": ".motion.pushed_motion",
+    "one_sided_motion": ".motion.pushed_motion", "layer_force": ".motion.response",
+    "linear_response": ".motion.response", "RisingMotion": ".motion.rising_load", "Signal": ".motion.signals",
+    "Slip": ".motion.slips", "Spectrum": ".motion.spectrum", "discrete_frequency": ".motion.spectrum",
+    "dynamical_matrix": ".motion.spectrum", "eigenvalues": ".motion.spectrum",
+    "largest_frequency": ".motion.spectrum", "spectrum": ".motion.spectrum", "Stability": ".motion.stability",
+    "stability": ".motion.stability", "rayleigh_timestep": ".motion.stable_timestep",
+    "stable_timestep": ".motion.stable_timestep", "NoGainError": ".motion.transient",
+    "TransientGain": ".motion.transient", "transient_gain": ".motion.transient",
+    "damping_matrix": ".operators.damping", "largest_damping_rate": ".operators.damping",
+    "stiffness_matrix": ".operators.stiffness", "FLOOR": ".packing.contacts", "Contacts": ".packing.contacts",
+    "ContactGeometry": ".packing.geometry", "nearest_image": ".packing.geometry", "touching": ".packing.geometry",
+    "MindlinLaw": ".packing.law", "Packing": ".packing.packing", "solid_fraction": ".packing.solid_fraction",
+    "Onset": ".windows", "OnsetError": ".windows", "Window": ".windows", "complex_windows": ".windows",
+    "find_onset": ".windows", "pair_eigenvalues": ".windows.pair_over_load", "Snapshot": ".configuration",
+}  # fmt: skip
+"""Names of this package, and the modules that have them."""
 
 __all__ = [
-    "FLOOR",
-    "BadInputError",
-    "Complexes",
-    "Configuration",
-    "ContactGeometry",
-    "Contacts",
-    "FastestGrowth",
-    "FaultgougeError",
-    "Floats",
-    "Growth",
-    "Indices",
-    "LinearisedContacts",
-    "MindlinLaw",
-    "Mode",
-    "Modes",
-    "Motion",
-    "NoEquilibriumError",
-    "NoGainError",
-    "OneSidedMotion",
-    "OneSidedOutcome",
-    "Onset",
-    "OnsetError",
-    "OutputError",
-    "Packing",
-    "PackingFileError",
-    "PowerLaw",
-    "RisingMotion",
-    "RunFile",
-    "Signal",
-    "Slip",
-    "Snapshot",
-    "Spectrum",
-    "Stability",
-    "TransientGain",
-    "Window",
-    "closest_to_meeting",
-    "complex_windows",
-    "damping_matrix",
-    "discrete_frequency",
-    "dynamical_matrix",
-    "eigenvalues",
-    "fastest_growing",
-    "find_onset",
-    "fit_growth",
-    "fit_power_law",
-    "growth_of_run",
-    "growth_rate",
-    "largest_damping_rate",
-    "largest_frequency",
-    "layer_force",
-    "linear_response",
-    "mass_weighted",
-    "mean_square_displacement",
-    "nearest_image",
-    "nearest_modes",
-    "negative_eigenvalues",
-    "normal_modes",
-    "one_sided_motion",
-    "pair_eigenvalues",
-    "rayleigh_timestep",
-    "read_dump",
-    "read_packing",
-    "solid_fraction",
-    "spectrum",
-    "stability",
-    "stable_timestep",
-    "stiffness_matrix",
-    "touching",
-    "transient_gain",
-]
+    "FLOOR", "BadInputError", "Complexes", "Configuration", "ContactGeometry", "Contacts", "FastestGrowth",
+    "FaultgougeError", "Floats", "Growth", "Indices", "LinearisedContacts", "MindlinLaw", "Mode", "Modes", "Motion",
+    "NoEquilibriumError", "NoGainError", "OneSidedMotion", "OneSidedOutcome", "Onset", "OnsetError", "OutputError",
+    "Packing", "PackingFileError", "PowerLaw", "RisingMotion", "RunFile", "Signal", "Slip", "Snapshot", "Spectrum",
+    "Stability", "TransientGain", "Window", "closest_to_meeting", "complex_windows", "damping_matrix",
+    "discrete_frequency", "dynamical_matrix", "eigenvalues", "fastest_growing", "find_onset", "fit_growth",
+    "fit_power_law", "growth_of_run", "growth_rate", "largest_damping_rate", "largest_frequency", "layer_force",
+    "linear_response", "mass_weighted", "mean_square_displacement", "nearest_image", "nearest_modes",
+    "negative_eigenvalues", "normal_modes", "one_sided_motion", "pair_eigenvalues", "rayleigh_timestep",
+    "read_dump", "read_packing", "solid_fraction", "spectrum", "stability", "stable_timestep", "stiffness_matrix",
+    "touching", "transient_gain",
+]  # fmt: skip
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        if name in OFFERS:
+            return getattr(import_module(OFFERS[name], __name__), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *OFFERS})

@@ -371,3 +371,7 @@ def _refuse_forces_across(c: LinearisedContacts) -> None:
     refuse_first(np.abs(c.normal[:, 2]) > UNIT_ERROR, "the normal {} of disks is not in the plane", c.normal)
     outside = np.abs(c.tangential_force[:, 2]) > UNIT_ERROR * scale
     refuse_first(outside, "the tangential force {} on a disk is not in the plane", c.tangential_force)
+
+
+Snapshot = Configuration
+"""The name of `Configuration` until version 1."""

@@ -17,7 +17,7 @@ COLOURS = 64
 """Colours of a GIF: a packing or a mode has some dozens, and shades of lines take the rest."""
 
 PALETTE_FRAMES = 8
-"""Frames whose colours a GIF has: of three, a disk that turns green has its last green alone, and is grey until then."""
+"""Frames whose colours a GIF has: of three, a disk that turns green has its last green only, and is grey before."""
 
 COLOUR_DIFFERENCE = 18
 """A dot stays as it was while each of its three colours is off by no more than this, of 255. Without this a film of 20

@@ -207,7 +207,8 @@ def has_checksum(path: Path) -> bool:
             if header.startswith(HDF5):
                 return False
             if not header.startswith(SEAL):
-                raise PackingFileError(f"{path} is not a readable HDF5 file: it begins like none.")
+                convert = f"a packing of another code is converted by `faultgouge import {path} -o packing.h5`"
+                raise PackingFileError(f"{path} is not a readable HDF5 file, as it begins like none: {convert}.")
             digest, size = hashlib.sha256(), 0
             while block := stream.read(BYTES_AT_A_TIME):
                 digest.update(block)

@@ -9,7 +9,6 @@ from itertools import product
 
 import numpy as np
 from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
 
 from ..arrays import Floats, Indices
 from ..configuration import Configuration
@@ -65,6 +64,8 @@ def _touch(configuration: Configuration, i: Indices, j: Indices) -> np.ndarray:
 
 def _between_particles(c: Configuration, place: Floats, largest: float) -> tuple[Indices, Indices, Floats, Floats]:
     """Pairs of particles, through the sides of the box, too: the larger of two, or the later one, finds the other."""
+    from scipy.spatial import cKDTree  # which takes as long to import as all of `scipy.sparse`
+
     tree, far = cKDTree(place), 2 * c.radius + largest
     low, high = place.min(axis=0) - far.max(), place.max(axis=0) + far.max()
     found = [(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 3)))]

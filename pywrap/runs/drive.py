@@ -21,6 +21,7 @@ from ...analysis import FaultgougeError, Packing
 from ...analysis.arrays import Floats
 from ..lammps.dynamics import Dynamics
 from ..lammps.engine import Engine
+from ..lammps.instance import EngineError
 from ..scenes.scene import Scene
 from ..scenes.validation import require_section
 from .drive_plan import Plan, slip_detector
@@ -74,6 +75,8 @@ def drive(
         slow.
     DilationError
         If the layer leaves the bed.
+    EngineError
+        If disks move through one another.
     """
     settings = require_section(scene.drive, "drive")
     if start is None:
@@ -119,7 +122,11 @@ class DilationError(FaultgougeError):
 def _advance(
     engine: Engine, dynamics: Dynamics, steps: int, time: float, start: Packing
 ) -> tuple[DriveSample, DriveState]:
-    motion = dynamics.advance(steps)
+    try:
+        motion = dynamics.advance(steps)
+    except EngineError as error:
+        slower = "a slower drive, a softer spring or a smaller drive.scale"
+        raise EngineError(f"the run has ended before t = {time:g}: take {slower}, as {error}") from error
     force, displacement = dynamics.drawn
     packing = replace(engine.packing, fx=force)
     sample = DriveSample(

@@ -113,6 +113,8 @@ def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[Section], ..
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return f"{place} is not a section: write [{place}] and its keys below"
     rule = RULES[kind].format(**context) if kind in RULES else error["msg"]
+    if kind == "float_type" and isinstance(error["input"], str):
+        rule += "; a number with a unit needs the section [units]"
     return f"{place} = {reprlib.repr(error['input'])} is refused: {rule}"
 
 

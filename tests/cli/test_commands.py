@@ -161,11 +161,19 @@ def test_dumps_that_are_asked_for_hold_the_equilibria(faultgouge_here, beyond):
         (("draw", "scene.toml"), "scene.toml is a scene, and this command reads a stored packing"),
         (("view", "scene.toml"), "scene.toml is a scene, and this command reads a stored packing"),
         (("onset", "run.h5"), "run.h5 is a stored run, and onset reads a scene: give its .toml file"),
+        (("onset", "disks.csv"), "convert it by `faultgouge import disks.csv -o packing.h5`"),
         (("stability", "run.h5"), "`faultgouge spectrum run.h5` says whether a packing is stable"),
     ],
 )
 def test_a_file_of_the_wrong_kind_is_refused_with_what_to_do(refusal, words, says):
     assert says in refusal(*words)
+
+
+def test_a_packing_of_another_code_is_converted_before_a_command_reads_it(refusal, tmp_path):
+    (tmp_path / "disks.csv").write_text("x,y,radius\n1.25,0.5,0.5\n2.24,0.5,0.5\n")
+    assert f"by `faultgouge import {tmp_path / 'disks.csv'} -o packing.h5`" in refusal(
+        "spectrum", tmp_path / "disks.csv"
+    )
 
 
 @pytest.mark.slow

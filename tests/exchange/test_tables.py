@@ -32,11 +32,13 @@ def read(tmp_path):
         "// tracked\n# x y radius\n1.25 0.5 0.5\n2.24 0.5 0.5\n",
         "\ufeffx;y;radius\n1,25;0,5;0,5\n2,24;0,5;0,5\n",
         "x,y,radius\n1.25,0.5,0.5\n2.24,0.5,0.5\n",
+        "id,pos_x,pos_y,rad\n1,1.25,0.5,0.5\n2,2.24,0.5,0.5\n",
     ],
-    ids=["semicolons", "tabs", "blanks", "comments", "head in a comment", "byte order mark", "plain"],
+    ids=["semicolons", "tabs", "blanks", "comments", "head in a comment", "byte order mark", "plain", "other names"],
 )
-def test_tables_as_others_write_them(read, text):
-    disks = read(text)
+@pytest.mark.parametrize("name", ["lab.csv", "lab.txt"])
+def test_tables_as_others_write_them(read, text, name):
+    disks = read(text, name)
     assert disks.position.tolist() == [[1.25, 0.5], [2.24, 0.5]]
     assert disks.radius.tolist() == [0.5, 0.5]
     assert disks.remark == ""

@@ -161,7 +161,10 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ({"packing.periodic": 1}, "packing.periodic = 1 is refused: give true or false."),
         ({"law.kn": math.nan}, "law.kn = nan is refused: give a finite number."),
         ({"law.kn": -1.0, "law.kt": "2/7 kn"}, "law.kn = -1.0 is refused: give a number above 0."),
-        ({"law.kn": "2e5"}, "law.kn = '2e5' is refused: give a number."),
+        (
+            {"law.kn": "2e5"},
+            "law.kn = '2e5' is refused: give a number; a number with a unit needs the section [units].",
+        ),
         ({"law.kt": -1.0}, "law.kt = -1.0 is refused: give a number of at least 0."),
         ({"law.mu": [1.0, math.nan]}, "law.mu = [1.0, nan] is refused"),
         ({"law.mu": 10**400}, "is refused: give a number of at least 0, or a list"),

@@ -25,9 +25,9 @@ FLATNESS = 1e-6
 """Spread of z up to which disks lie in a plane, in smallest radii: text with seven digits, or float32, leaves less."""
 
 NAMES = {
-    "x": ("x", "xu"),
-    "y": ("y", "yu"),
-    "radius": ("radius", "r"),
+    "x": ("x", "xu", "pos_x"),
+    "y": ("y", "yu", "pos_y"),
+    "radius": ("radius", "r", "rad"),
     "mass": ("mass", "m"),
     "angle": ("angle", "theta", "d_theta"),
     "type": ("type",),
@@ -302,7 +302,7 @@ def _check_numbers(source: str, columns: Mapping[str, Floats], ids: Indices) -> 
         odd = ~np.isfinite(column)
         if odd.any():
             raise PackingFileError(f"{source}: {name} of disk {ids[odd][0]} is {column[odd][0]:g}, which is no number.")
-    for name in ("radius", "r", "diameter", "mass", "density"):
+    for name in (*NAMES["radius"], "diameter", "mass", "density"):
         odd = columns.get(name, np.ones(1)) <= 0
         if odd.any():
             value = f"{columns[name][odd][0]:g}"

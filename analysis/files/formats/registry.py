@@ -75,7 +75,7 @@ FORMATS = (
     DATA,
     DUMP,
     RESTART,
-    Format("CSV", "csv_json", (".csv",), "read_table"),
+    Format("tables", "csv_json", (".csv", ".txt"), "read_table"),
     Format("packing.json", "csv_json", (".json",), "read_json"),
     Format("GSD", "gsd_file", (".gsd",), "read_gsd", "write_gsd", frames=True, text=False, film=True),
     Format("ParaView's list of frames", "vtp", (".pvd",), writer="write_pvd", alone=False, film=True),

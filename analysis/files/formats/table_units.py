@@ -20,7 +20,10 @@ from ...errors import PackingFileError
 UNIT_HEAD = re.compile(r"\s*(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*")
 """A name with a unit behind it in brackets."""
 
-LENGTHS = ("x", "xu", "y", "yu", "z", "zu", "radius", "r", "diameter", "x_low", "y_low", "slip", "slip_low")
+LENGTHS = (
+    "x", "xu", "pos_x", "y", "yu", "pos_y", "z", "zu", "radius", "r", "rad", "diameter", "x_low", "y_low", "slip",
+    "slip_low",
+)  # fmt: skip
 ANGLES = ("angle", "theta", "d_theta")
 NO_UNIT = ("", "-", "1")
 """Texts in brackets that are no unit."""

@@ -70,11 +70,16 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON."
 
 def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
     """The part of a scene file that a command reads; a task that would never end is refused."""
+    from faultgouge.analysis.files.formats.registry import READERS
     from faultgouge.pywrap.scenes.impossible import refuse_endless
     from faultgouge.pywrap.scenes.scene import Scene
 
     if path.suffix == ".h5":
         raise typer.BadParameter(f"{path} is a stored run, and {command} reads a scene: give its .toml file")
+    if path.suffix in READERS:
+        name_it = 'write file = "packing.h5" under [packing] of the scene'
+        convert = f"convert it by `faultgouge import {path} -o packing.h5`, and {name_it}"
+        raise typer.BadParameter(f"{path} is a packing, and {command} reads a scene: {convert}")
     scene = Scene.from_toml(path, command=command)
     if task is not None:
         refuse_endless(scene, task)
