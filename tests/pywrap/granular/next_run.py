@@ -21,7 +21,7 @@ def owned(lmp) -> set[int]:
 
 
 def run(steps: int, looks: int, drag: float) -> tuple[np.ndarray, list[Configuration], int, Configuration]:
-    """Three runs with looks before each.
+    """Six runs with looks before each.
 
     Returns their ends, what was seen, the number of particles that changed their rank in a look, and the last state.
     """
@@ -43,7 +43,7 @@ run {steps}
 """)  # fmt: skip
     found: list[Configuration] = []
     states, moved = [], 0
-    for _ in range(3):
+    for _ in range(6):
         before, there = state(lmp, WORLD), owned(lmp)
         found += [from_lammps(lmp, balance=np.inf) for _ in range(looks)]
         moved += WORLD.allreduce(len(there - owned(lmp)))
