@@ -1,6 +1,6 @@
 """Factors of matrices, for linear solvers: bands, and sparse factors of symmetric and of other matrices.
 
-`linear_solver` chooses for Newton's method, `sparse_lu` makes all sparse factors, `ldlt` those of matrices with a
+`linear_solver` chooses for Newton's method, `sparse_lu` makes all sparse factors, `ldu` those of matrices with a
 symmetric pattern.
 
 May import: `packing`, `operators`.

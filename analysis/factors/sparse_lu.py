@@ -1,6 +1,6 @@
 """Sparse factors of large matrices with a symmetric pattern, such as K, or nearly so. All sparse factors are made here.
 
-**Real matrices** in an order of elimination are factored by :mod:`~faultgouge.analysis.factors.ldlt`, without pivoting.
+**Real matrices** in an order of elimination are factored by :mod:`~faultgouge.analysis.factors.ldu`, without pivoting.
 
 **SuperLU**, which SciPy has, factors all others, and finds orders of elimination of minimum degree on the pattern of
 A + A^T. Pivots are taken from the diagonal. By default SuperLU joins small columns of the elimination tree to
@@ -23,7 +23,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from ..errors import FaultgougeError
 from ..packing.packing import Floats, Indices
-from .ldlt import CompiledFactors, library
+from .ldu import CompiledFactors, library
 
 
 class SingularMatrixError(FaultgougeError):

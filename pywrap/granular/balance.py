@@ -1,6 +1,5 @@
 """Is a packing at rest? Forces that are out of balance, and the reasons if nothing moves all the same."""
 
-
 import numpy as np
 
 from ...analysis import BadInputError, Configuration, LinearisedContacts

@@ -8,7 +8,7 @@ from scipy.sparse import csc_array, diags_array, eye_array, kron
 from scipy.sparse.linalg import splu
 
 from faultgouge.analysis.factors import sparse_lu
-from faultgouge.analysis.factors.ldlt import CompiledFactors
+from faultgouge.analysis.factors.ldu import CompiledFactors
 from faultgouge.analysis.factors.sparse_lu import (
     ReorderedFactors,
     SingularMatrixError,

@@ -1,7 +1,7 @@
 r"""Factors L D U of a sparse matrix without pivoting, and solutions for many right sides.
 
 L and :math:`U^T` have the same pattern, that of the factors of :math:`A + A^T`, and ones on their diagonals. Of a
-symmetric matrix :math:`U = L^T`, so that factors take half of the time and of the memory. The library of `ldlt.cpp` is
+symmetric matrix :math:`U = L^T`, so that factors take half of the time and of the memory. The library of `ldu.cpp` is
 built with the plugin. A solution for four right sides takes a fifth of the time of SuperLU with 1,000 disks, and two
 fifths with 1,000 spheres, whose factors leave the cache.
 
@@ -29,7 +29,7 @@ Integers = NDArray[np.int32]
 def library() -> ctypes.CDLL | None:
     """The compiled library; None where it has not been built."""
     try:
-        found = ctypes.CDLL(str(files("faultgouge") / "lib" / "ldlt.so"))
+        found = ctypes.CDLL(str(files("faultgouge") / "lib" / "ldu.so"))
     except OSError:
         return None
     integer, array = ctypes.c_int32, ctypes.c_void_p
@@ -48,7 +48,7 @@ class CompiledFactors:
     Attributes
     ----------
     library : ctypes.CDLL
-        That of `ldlt.cpp`.
+        That of `ldu.cpp`.
     start, row : ndarray of int64 and int32, shape (n + 1,) and (entries,)
         The pattern of L without its diagonal, in compressed columns.
     lower, upper : ndarray, shape (entries,)
