@@ -15,8 +15,9 @@ code with their contacts to first order. The physics is in the docstrings of the
 The names of this package are imported when they are used.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from .names_on_use import names_on_use
 
 if TYPE_CHECKING:  # what `OFFERS` imports when it is used
     from .arrays import Complexes, Floats, Indices
@@ -107,11 +108,7 @@ __all__ = [
 ]  # fmt: skip
 
 if not TYPE_CHECKING:
-
-    def __getattr__(name: str) -> Any:
-        if name in OFFERS:
-            return getattr(import_module(OFFERS[name], __name__), name)
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    __getattr__ = names_on_use(__name__, OFFERS)
 
 
 def __dir__() -> list[str]:

@@ -7,9 +7,9 @@ load: `scene_path` makes that of a scene, `lammps_path` that of any LAMMPS. To w
 `equilibrate`. The names of this package are imported when they are used.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from ..analysis.names_on_use import names_on_use
 from .lammps.two_mpi_libraries import load_own_mpi
 
 if TYPE_CHECKING:  # what `OFFERS` imports when it is used
@@ -69,11 +69,7 @@ __all__ = [
 ]  # fmt: skip
 
 if not TYPE_CHECKING:
-
-    def __getattr__(name: str) -> Any:
-        if name in OFFERS:
-            return getattr(import_module(OFFERS[name], __name__), name)
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    __getattr__ = names_on_use(__name__, OFFERS)
 
 
 def __dir__() -> list[str]:

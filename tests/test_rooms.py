@@ -32,7 +32,7 @@ FLOORS = {
         ("__main__",),
     ),
     "faultgouge.analysis": (
-        ("counted", "fields_by_name", "uncertain_digits", "errors", "progress", "table_display"),
+        ("counted", "fields_by_name", "names_on_use", "uncertain_digits", "errors", "progress", "table_display"),
         ("arrays",),
         ("contacts",),
         ("assembly",),
