@@ -25,7 +25,7 @@ from ...analysis.files.atomic_write import make_folder, write_text
 from ...figures.pages import render
 from ...figures.style import report_failure, save
 from ...pywrap import Scene, ramp
-from .draw import changing_figure, coverage_figure, figure_of
+from .draw import coverage_figure, figure_of
 from .methods.dumps import dumps
 from .methods.eigenvalues import far, near
 from .methods.frequency_and_growth import frequency, growth
@@ -113,8 +113,6 @@ def report(
                 save(figure_of(found), output / stem(name))
                 if found.covered:
                     save(coverage_figure(found.covered), output / f"{stem(name)}-coverage")
-                if found.changing:
-                    save(changing_figure(found.changing), output / f"{stem(name)}-changing")
     if failed:
         raise ReportError(
             f"{len(failed)} of {len(studies)} studies failed ({', '.join(failed)}): {output}/report.md says why, "

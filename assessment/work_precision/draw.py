@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from ...figures.style import INK, styled
-from .coverage.stated_errors import CoverageCase
 from .methods.work_precision_study import Point, StatedError, Study
 
 MARKERS = "osD^vP"
@@ -159,27 +158,6 @@ def coverage_figure(cases: Sequence[StatedError]) -> Figure:
             axes.plot(*at, MARKERS[number], color=f"C{number}", label=label, clip_on=False)
             aside = LABEL_OFFSETS[place % len(LABEL_OFFSETS)] if number == 0 else (5, -10)
             axes.annotate(f"{case.increment:g}", at, xytext=aside, textcoords="offset points", fontsize="small")
-    axes.legend(loc="lower right")
-    return figure
-
-
-@styled
-def changing_figure(cases: Sequence[CoverageCase]) -> Figure:
-    """Stated over true errors where contacts change before the onset, with a colour for each kind of onset.
-
-    Scenes that were drawn after the rule of the stated errors was made are open markers.
-    """
-    figure = Figure(figsize=(4.6, 3.6), layout="constrained")
-    axes = figure.subplots()
-    smallest = _frame_axes(axes, [(case.true, case.stated or 0.0) for case in cases])
-    for number, kind in enumerate(dict.fromkeys(case.kind for case in cases)):
-        for fresh in (False, True):
-            of_it = [case for case in cases if case.kind == kind and case.fresh == fresh]
-            true = [max(case.true, smallest) for case in of_it]
-            stated = [case.stated or smallest for case in of_it]
-            style: dict[str, Any] = {"color": f"C{number}", "fillstyle": "none" if fresh else "full", "markersize": 4}
-            label = f"{kind}, {'drawn later' if fresh else 'first draws'}"
-            axes.plot(true, stated, MARKERS[number], label=label, clip_on=False, **style)
     axes.legend(loc="lower right")
     return figure
 

@@ -1,5 +1,4 @@
-"""The error of an onset, path and rounding together, covers the onset that the exact path has; also where contacts
-change before it, as a committed table says."""
+"""The error of an onset, path and rounding together, covers the onset that the exact path has."""
 
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,14 +10,12 @@ import pytest
 from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
-from faultgouge.assessment.work_precision.coverage.stated_errors import REFINEMENT, draw_scene, read, restate_case
 from faultgouge.pywrap import Engine, LoadPath, Scene, scene_path, settle
 from faultgouge.pywrap.onset import onset_run
 from faultgouge.pywrap.runs.path_error import PathError, PathErrors, squared_gap, with_path_error
 from faultgouge.studies.sweep.onset import onset
 
 PAPER = Scene.from_toml(files("faultgouge") / "scenes/paper.toml").resolved()
-CASES = [case for case in read() if case.counts]
 HUNDRED = {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
 
 
@@ -168,37 +165,3 @@ def test_the_other_path_has_an_error_that_is_part_of_the_onsets(climbed):
     path, found = climbed
     whole = with_path_error(found, path)
     assert 0 < whole.as_dict()["error_of_path"] <= whole.error
-
-
-@pytest.mark.parametrize("kind", ["undamped", "damped"])
-@pytest.mark.parametrize("fresh", [False, True])
-def test_all_but_a_few_are_covered(kind, fresh):
-    """Of the draws on which the rule was made, and of those that came later."""
-    shares = sorted(case.share for case in CASES if case.kind == kind and case.fresh == fresh)
-    assert len(shares) >= 28
-    assert sum(share > 1 for share in shares) <= 0.05 * len(shares)
-    assert shares[-1] <= 1.5
-    # an error that is stated much too large would cover, too
-    assert shares[len(shares) // 2] > 0.1
-
-
-def test_the_limits_are_known_better_than_the_errors_that_they_judge():
-    """In doubles rounding moves the limit as it moves the onset, by as much as is stated of it."""
-    assert REFINEMENT >= 20
-    assert all(case.uncertain < 0.1 * case.stated for case in CASES if case.precision == "compensated")
-    assert all(case.uncertain < 1.5 * case.stated for case in CASES)
-    # of an independent code
-    named = next(case for case in CASES if case.number == 0)
-    assert named.kind == "damped"
-    assert named.limit == pytest.approx(0.039834, abs=8e-6)
-    assert named.share < 1
-
-
-@pytest.mark.slow
-def test_what_the_table_states_is_stated_today():
-    case = min((case for case in CASES if case.disks == 20 and case.kind == "undamped"), key=lambda case: case.fx_c)
-    again = restate_case(case)
-    assert draw_scene(case.number).packing.disks == 20
-    assert again.changes == case.changes
-    assert again.fx_c == pytest.approx(case.fx_c, abs=case.stated)
-    assert again.holds

@@ -109,8 +109,6 @@ def test_quick_report(faultgouge, tmp_path):
     onset = studies["onset"]
     assert all(case["true"] <= case["stated"] for case in onset["covered"])
     assert "covers the true one in 4 of 4 cases" in (folder / "report.md").read_text()
-    assert all(case["limit"] is not None for case in onset["changing"])
-    assert onset["again"]
     assert "F_x^c = 0.02183305641" in onset["question"]  # that of an independent code
     assert best["onset", "root of the discriminant"] < 1e-8 < best["onset", "scan, Newton"]
     assert best["relaxation", "Newton, compensated"] < 1e-18

@@ -23,7 +23,6 @@ from ....pywrap import Engine, Equilibrium, Scene
 from ....pywrap.load_path import LoadPath
 from ....pywrap.runs.path_error import with_path_error
 from ....pywrap.runs.scene_path import scene_path
-from ..coverage.stated_errors import read, restate_case
 from .work_precision_study import Run, Settings, StatedError, Study, Theory, compensate, study_of, timed_points
 
 OVERDAMPED, SCAN = "scan, overdamped", "scan, Newton"
@@ -34,9 +33,6 @@ DISTANCE_BEYOND = 1e-5
 
 INCREMENTS = (2e-3, 1e-3, 5e-4, 2.5e-4)
 """Increments of the ramps whose stated errors are compared with the true ones."""
-
-RECOMPUTED_DISKS = 20
-"""Disks of the scenes with contacts that change which are computed anew: each takes a second or two."""
 
 
 class OnsetMethods:
@@ -134,9 +130,6 @@ def _study(settings: Settings, ways: OnsetMethods, reference: OnsetMethods) -> S
     resolution = float(np.spacing(exact))
     points = timed_points(runs, settings, lambda found: max(abs(found - exact), resolution))
     lost, overlap = ways.beyond(exact)
-    changing = [case for case in read() if case.counts]
-    small = [case for case in changing if case.disks <= RECOMPUTED_DISKS]
-    few = small[:: max(1, len(small) // (2 if quick else 6))]
     numbers = {
         "exact": exact,
         "disks": len(settings.ramp[0].packing),
@@ -156,8 +149,6 @@ def _study(settings: Settings, ways: OnsetMethods, reference: OnsetMethods) -> S
         covered=_compare_errors(
             {"doubles": ways, "compensated": reference}, INCREMENTS[:2] if quick else INCREMENTS, beyond=guess
         ),
-        changing=tuple(changing),
-        again=tuple(restate_case(case) for case in few),
     )
 
 

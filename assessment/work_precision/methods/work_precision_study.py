@@ -17,7 +17,6 @@ from threadpoolctl import threadpool_limits
 from ....analysis.motion.power_law import fit_power_law
 from ....pywrap import Engine, Equilibrium, Scene, equilibrate
 from ...timing import Progress, in_turns
-from ..coverage.stated_errors import CoverageCase
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -189,10 +188,6 @@ class Study:
         Further remarks for the reader, one sentence each.
     covered : tuple of StatedError
         Stated and true errors, if the result has a stated error.
-    changing : tuple of CoverageCase
-        Stated and true errors of many scenes in which contacts change before the onset.
-    again : tuple of CoverageCase
-        Some of these cases, computed anew.
     """
 
     name: str
@@ -209,8 +204,6 @@ class Study:
     theory: tuple[Theory, ...] = ()
     remarks: tuple[str, ...] = ()
     covered: tuple[StatedError, ...] = ()
-    changing: tuple[CoverageCase, ...] = ()
-    again: tuple[CoverageCase, ...] = ()
 
     def of(self, method: str) -> list[Point]:
         """The points of one method."""

@@ -4,36 +4,30 @@ Scenes are drawn at random: seeds, numbers of disks, friction, stiffness and exp
 both arithmetics. A scene counts if its ramp has an onset and contacts change before the onset. The true onset is the
 onset of a ramp whose increments are `REFINEMENT` times smaller. A ramp with twice these increments shows how accurate
 the true onset is. The search looks for windows in each of these small increments, because between loads farther apart
-the search may miss a window that a change of contacts ends. The rule for the stated errors was chosen with the first
-draws of the table; draws marked `fresh` came later. `research/coverage.py` computes the table.
+the search may miss a window that a change of contacts ends.
 """
 
 from __future__ import annotations
 
-import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
-from ....analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
-from ....analysis.arrays import Floats
-from ....analysis.windows import Window
-from ....pywrap import Engine, Equilibrium, Scene, settle
-from ....pywrap.load_path import LoadPath
-from ....pywrap.runs.path_error import PathErrors, with_path_error
-from ....pywrap.runs.ramp_loads import ramp_loads
-from ....pywrap.runs.scene_path import scene_path
+from faultgouge.analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
+from faultgouge.analysis.windows import Window
+from faultgouge.pywrap import Engine, Equilibrium, LoadPath, Scene, ramp_loads, scene_path, settle
+from faultgouge.pywrap.runs.path_error import PathErrors, with_path_error
+from research.tables import known_rows
 
 Dissipation = Literal["undamped", "damped"]
 
 REFINEMENT = 20
 """How many times smaller the increments of the ramp are on which the true onset is found."""
-
-TABLE = Path(__file__).with_name("table.jsonl")
 
 INCREMENTS_AT_ONCE = 3
 """Increments that are searched at once: an onset far below the ramp's end costs no more than it has to."""
@@ -169,12 +163,12 @@ class FirstOnset:
                     path(float(fx))
             except NoEquilibriumError:
                 return None
-            window = self._window(path, fine) if part[-1] > beyond else None
+            window = self._window(path, fine.tolist()) if part[-1] > beyond else None
             if window is not None:
                 return path, window
         return None
 
-    def _window(self, path: LoadPath[Equilibrium], part: Floats) -> Window | None:
+    def _window(self, path: LoadPath[Equilibrium], part: Sequence[float]) -> Window | None:
         """The first window between some loads."""
 
         def equilibrium(fx: float) -> Packing:
@@ -217,7 +211,45 @@ def restate_case(case: CoverageCase) -> CoverageCase:
         return replace(case, changes=onset.changes(found[0], found[1].fx_onset), fx_c=fx_c, stated=stated)
 
 
-def read(path: Path = TABLE) -> list[CoverageCase]:
-    """The cases of a table, in the order in which they were computed."""
-    lines = path.read_text().splitlines() if path.exists() else []
-    return [CoverageCase(**json.loads(line)) for line in lines]
+def read(path: Path) -> list[CoverageCase]:
+    """The cases of a table, in the order in which they were computed; none where there is no table yet."""
+    return [CoverageCase(**row) for row in known_rows(path)]
+
+
+def compute_cases(number: int) -> list[CoverageCase]:
+    """The undamped and the damped case of a draw."""
+    scene = draw_scene(number)
+    bare = scene.model_copy(update={"damping": None})
+    assert scene.ramp is not None
+    step = scene.ramp.step
+    undamped, damped = (
+        CoverageCase(
+            kind, number, getattr(scene.packing, "disks", 100), scene.law.mus[0], scene.precision, step, fresh=True
+        )
+        for kind in get_args(Dissipation)
+    )
+    try:
+        start = settle(bare)
+    except NoEquilibriumError:
+        return [undamped, damped]
+    with Engine(start.packing) as engine:
+        undamped = _compare_case(FirstOnset(bare, engine, start), undamped)
+        if undamped.changes or number == 0:  # a damped search takes ten times the time, and its onset is near
+            damped = _compare_case(FirstOnset(scene, engine, start), damped)
+    return [undamped, damped]
+
+
+def _compare_case(onset: FirstOnset, case: CoverageCase) -> CoverageCase:
+    """The case with what its onset states and the limit of small increments, if contacts change before the onset."""
+    found = onset.first_window()
+    changes = 0 if found is None else onset.changes(found[0], found[1].fx_onset)
+    if found is None or not changes:
+        return case
+    fx_c, stated = onset.whole(*found)
+    case = replace(case, changes=changes, fx_c=fx_c, stated=stated)
+    before = found[1].fx_onset - INCREMENTS_AT_ONCE * case.increment
+    coarser, finest = (onset.first_window(finer, before) for finer in (REFINEMENT // 2, REFINEMENT))
+    if coarser is None or finest is None:
+        return case
+    limit = finest[1].fx_onset
+    return replace(case, limit=limit, uncertain=abs(coarser[1].fx_onset - limit))

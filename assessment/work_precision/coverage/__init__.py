@@ -1,1 +1,0 @@
-"""Does the stated error of an onset cover its true error?"""

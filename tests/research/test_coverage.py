@@ -1,0 +1,48 @@
+"""Stated errors of onsets cover the true ones where contacts change before them, as a committed table says."""
+
+import pytest
+
+from research.coverage.cases import REFINEMENT, draw_scene, read, restate_case
+from research.coverage.make import HERE, TABLE, cases, stated_over_true, write_page
+
+CASES = [case for case in read(TABLE) if case.counts]
+
+
+def test_the_page_is_that_of_its_table(tmp_path):
+    assert (HERE / "README.md").read_text() == write_page(tmp_path).read_text()
+    assert len(stated_over_true(CASES).axes[0].lines) == 5
+    assert sorted(map(str, cases(TABLE, 60))) == sorted(map(str, read(TABLE)))  # none is computed
+
+
+@pytest.mark.parametrize("kind", ["undamped", "damped"])
+@pytest.mark.parametrize("fresh", [False, True])
+def test_all_but_a_few_are_covered(kind, fresh):
+    """Of the draws on which the rule was made, and of those that came later."""
+    shares = sorted(case.share for case in CASES if case.kind == kind and case.fresh == fresh)
+    assert len(shares) >= 28
+    assert sum(share > 1 for share in shares) <= 0.05 * len(shares)
+    assert shares[-1] <= 1.5
+    # an error that is stated much too large would cover, too
+    assert shares[len(shares) // 2] > 0.1
+
+
+def test_the_limits_are_known_better_than_the_errors_that_they_judge():
+    """In doubles rounding moves the limit as it moves the onset, by as much as is stated of it."""
+    assert REFINEMENT >= 20
+    assert all(case.uncertain < 0.1 * case.stated for case in CASES if case.precision == "compensated")
+    assert all(case.uncertain < 1.5 * case.stated for case in CASES)
+    # of an independent code
+    named = next(case for case in CASES if case.number == 0)
+    assert named.kind == "damped"
+    assert named.limit == pytest.approx(0.039834, abs=8e-6)
+    assert named.share < 1
+
+
+@pytest.mark.slow
+def test_what_the_table_states_is_stated_today():
+    case = min((case for case in CASES if case.disks == 20 and case.kind == "undamped"), key=lambda case: case.fx_c)
+    again = restate_case(case)
+    assert draw_scene(case.number).packing.disks == 20
+    assert again.changes == case.changes
+    assert again.fx_c == pytest.approx(case.fx_c, abs=case.stated)
+    assert again.holds
