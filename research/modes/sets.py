@@ -22,6 +22,9 @@ from faultgouge.studies.sweep import TASKS, Sweep
 SIZES = {50: 100, 100: 100, 200: 50, 400: 30, 1000: 15}
 """Packings by number of disks, with a fixed force on each disk of the layer and mu = 1."""
 
+SWITCHED = 100
+"""Disks of the packings of `SIZES` whose pairs are also counted with parts of b."""
+
 FEWER = {50: 40, 100: 40, 200: 20, 400: 8}
 """The same for mu = 0.5, and for a fixed pressure."""
 
@@ -75,7 +78,8 @@ def sets(share: float = 1.0) -> dict[str, Sweep]:
     """The sweeps by name, each with a share of its packings, at least one."""
     found = {}
     for disks, most in SIZES.items():
-        found[f"force {disks}"] = _sweep(disks, _first(most, share), {})
+        task = "research.modes.parts_of_b:parts_of_b" if disks == SWITCHED else "modes"
+        found[f"force {disks}"] = _sweep(disks, _first(most, share), {}, task)
     for disks, most in FEWER.items():
         found[f"friction {disks}"] = _sweep(disks, _first(most, share), {"law": {"mu": 0.5}})
         if disks != 100:

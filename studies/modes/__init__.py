@@ -1,6 +1,6 @@
 """Complex modes over the load: their number, their growth rates, and the loss of a contact that stops them."""
 
-from .count_pairs import PairCounts, along_ramp, antisymmetric_norm, count_pairs
+from .count_pairs import PairCounts, along_ramp, antisymmetric_norm, count_pairs, load_row
 from .table import QUANTITIES, Table, medians_over_load
 
 __all__ = [
@@ -10,5 +10,6 @@ __all__ = [
     "along_ramp",
     "antisymmetric_norm",
     "count_pairs",
+    "load_row",
     "medians_over_load",
 ]

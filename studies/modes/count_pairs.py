@@ -23,12 +23,6 @@ point").
 \lambda| \le |(A - A^T)/2|_2` with A the mass-weighted operator (Bendixson, Acta Math. 25, 359 (1902)): the key bound. A
 contact couples only two disks, so that the norm does not grow with the number of disks unless contacts become stiffer
 or more loaded: growth rates cannot grow without limit with the number of disks.
-
-**Where b matters.** A tangential force that depends on the overlap, :math:`b = \partial f_t/\partial\delta`, makes K
-non-symmetric. For packings of up to `SWITCH_DISKS` disks pairs are also counted with b of sticking contacts alone, of
-sliding contacts alone, and of none, at the same equilibria. (The rotation of the tangent, which is non-symmetric too,
-is kept.) With rescaled slips b is the mean of its values for closing and for opening contacts, and the key while has
-the pairs with either (:mod:`~faultgouge.analysis.packing.law`).
 """
 
 from __future__ import annotations
@@ -38,8 +32,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigsh
 
@@ -52,14 +44,11 @@ from ...analysis import (
     nearest_modes,
     negative_eigenvalues,
     spectrum,
-    stiffness_matrix,
 )
 from ...analysis.motion.eigenvalues import (
     SAFETY,
     Complexes,
-    active_coordinates,
     exceeds_rounding,
-    mass_weighted,
     unit_rounding,
 )
 from ...analysis.motion.rates import SLICED
@@ -68,9 +57,6 @@ from ...pywrap.load_path import LoadPath
 from ...pywrap.scenes.study_sections import ModesSection
 from ...pywrap.scenes.validation import require_section
 from ..packing_tools import Start, path_from
-
-SWITCH_DISKS = 300
-"""Disks up to which b is switched: three more decompositions a load."""
 
 SHIFT_OFFSET = 1e-9
 """Distance of a shift from the eigenvalue whose vectors are wanted, in units of the eigenvalue."""
@@ -159,33 +145,6 @@ def antisymmetric_norm(packing: Packing) -> float:
     return float(np.sqrt(largest[0]))
 
 
-def count_with_part_of_b(packing: Packing) -> dict[str, dict[str, Any]]:
-    """The complex pairs with b of sticking contacts alone, of sliding contacts alone, and of none."""
-    slides = packing.sliding
-    return {
-        name: PairCounts.of(_values(packing, coupled)).as_dict()
-        for name, coupled in (("sticking", ~slides), ("sliding", slides), ("none", np.zeros_like(slides)))
-    }
-
-
-def pairs_by_branch(packing: Packing) -> dict[str, dict[str, Any]]:
-    """The complex pairs of a law with rescaled slips while all contacts close, and while all part."""
-    return {
-        name: PairCounts.of(_values(packing, parting=share)).as_dict()
-        for name, share in (("closing", 0.0), ("parting", 1.0))
-    }
-
-
-def _values(packing: Packing, coupled: NDArray[np.bool_] | None = None, parting: float = 0.5) -> Complexes:
-    """Eigenvalues of K in which b counts for some contacts; pairs within the bound of rounding are made real."""
-    matrix = mass_weighted(stiffness_matrix(packing, coupled=coupled, parting=parting), packing)
-    active = active_coordinates(matrix)
-    dense = matrix[active][:, active].toarray()
-    values = np.asarray(eigvals(dense, check_finite=False), dtype=np.complex128)
-    surely = np.sqrt(SAFETY * unit_rounding(dense) * np.abs(values).max(initial=0.0))
-    return np.where(np.abs(values.imag) > surely, values, values.real)
-
-
 def modes(scene: Scene, start: Start) -> dict[str, Any]:
     """The complex pairs of a scene at the loads of its section [modes], as a row of a sweep: the task "modes".
 
@@ -196,7 +155,7 @@ def modes(scene: Scene, start: Start) -> dict[str, Any]:
     NoEquilibriumError
         If the packing does not settle.
     """
-    return along_ramp(scene, start(scene.law.mus[0]), _load)
+    return along_ramp(scene, start(scene.law.mus[0]), load_row)
 
 
 def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[str, Any]]) -> dict[str, Any]:
@@ -236,8 +195,8 @@ def _climb_to(path: LoadPath[Equilibrium], fx: float, step: float) -> Packing:
     return path(fx)
 
 
-def _load(packing: Packing) -> dict[str, Any]:
-    """The numbers of one load."""
+def load_row(packing: Packing) -> dict[str, Any]:
+    """The numbers of one load of the task "modes"."""
     found = count_pairs(packing)
     row = found.as_dict() | {
         "modes": found.modes,
@@ -250,10 +209,6 @@ def _load(packing: Packing) -> dict[str, Any]:
         value = found.omega[0] ** 2
         pair = nearest_modes(packing, value * (1 + SHIFT_OFFSET), 1)
         row |= {"participation": float(pair.participation[0]), "rotation": float(pair.rotation[0])}
-    if len(packing) <= SWITCH_DISKS:
-        row["b_of"] = count_with_part_of_b(packing)
-        if packing.law.rescales:
-            row["while"] = pairs_by_branch(packing)
     digits = [
         [float(f"{w.real:.{FREQUENCY_DIGITS}g}"), float(f"{w.imag:.{FREQUENCY_DIGITS}g}")] for w in found.omega.tolist()
     ]

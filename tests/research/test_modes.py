@@ -11,6 +11,7 @@ import pytest
 from reference_layer import SMALL, parted
 from scipy.stats import mannwhitneyu
 
+from faultgouge.analysis import stiffness_matrix
 from faultgouge.analysis.windows import LIMITS
 from faultgouge.pywrap import Engine, Scene, equilibrate, settle
 from faultgouge.pywrap.scenes.units import real_units
@@ -23,6 +24,7 @@ from research.modes.count_in_slices import count_in_slices
 from research.modes.make import different
 from research.modes.packing_rows import computed_again, read_known
 from research.modes.page import critical, part, write_page
+from research.modes.parts_of_b import switched
 from research.modes.random_matrices import weak_share
 from research.modes.sets import quartz, sets
 from research.statistics import exponent, interval
@@ -42,6 +44,25 @@ def test_the_page_comes_out_of_the_tables(tmp_path):
     (words, numbers), (stored, expected) = (parted(each / "modes.json") for each in (tmp_path, DOCS))
     assert words == stored
     assert numbers == pytest.approx(expected, rel=1e-12)
+
+
+def test_without_b_no_pair_is_complex():
+    """What is left is the turning of the tangent; b of all contacts is K itself."""
+    scene = Scene.from_mapping(SMALL | {"packing": {"disks": 60, "width": 9.2, "seed": 77}})
+    state = settle(scene)
+    with Engine(state.packing) as engine:
+        for fx in (0.06, 0.3, 0.6):
+            state = equilibrate(engine, state, fx=fx)
+    packing = state.packing
+    every = np.ones(len(packing.contacts), dtype=bool)
+    same = stiffness_matrix(packing, coupled=every) - stiffness_matrix(packing)
+    assert abs(same).max() == 0
+    # the law is flat at its bound: what is within 1e-9 of the slip limit has the bound's force but for a rounding
+    np.testing.assert_array_equal(packing.sliding, packing.mobilised > 1 - 1e-13)
+    found = switched(packing)["b_of"]
+    assert found["none"]["pairs"] == 0
+    assert found["sticking"]["pairs"] > 0
+    assert count_pairs(packing).as_dict()["pairs"] >= found["sticking"]["pairs"]
 
 
 @pytest.mark.slow

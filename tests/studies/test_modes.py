@@ -1,4 +1,4 @@
-"""Complex modes over the load: counts against NumPy's, what is left in the folder, and where b matters."""
+"""Complex modes over the load: counts against NumPy's, and what is left in the folder."""
 
 import csv
 import json
@@ -11,7 +11,7 @@ from reference_layer import SMALL, toml
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, eigenvalues, spectrum, stiffness_matrix
 from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, settle
 from faultgouge.studies.modes import PairCounts
-from faultgouge.studies.modes.count_pairs import antisymmetric_norm, count_pairs, count_with_part_of_b, modes
+from faultgouge.studies.modes.count_pairs import antisymmetric_norm, count_pairs, modes
 from research.modes.sets import sets
 
 SCENE = SMALL | {
@@ -68,20 +68,6 @@ def test_a_packing_that_buckles_ends_its_branch_and_counts():
     there = Equilibrium(replace(column, fx=0.02 * 3.0), 0.0, 1e-11, 1)
     row = modes(Scene.from_mapping(SCENE), lambda mu: there)
     assert (row["ends"], row["loads"]) == ("turning point", [])
-
-
-def test_without_b_no_pair_is_complex(loaded):
-    """What is left is the turning of the tangent; b of all contacts is K itself."""
-    packing = loaded[-1]
-    every = np.ones(len(packing.contacts), dtype=bool)
-    same = stiffness_matrix(packing, coupled=every) - stiffness_matrix(packing)
-    assert abs(same).max() == 0
-    # the law is flat at its bound: what is within 1e-9 of the slip limit has the bound's force but for a rounding
-    np.testing.assert_array_equal(packing.sliding, packing.mobilised > 1 - 1e-13)
-    found = count_with_part_of_b(packing)
-    assert found["none"]["pairs"] == 0
-    assert found["sticking"]["pairs"] > 0
-    assert count_pairs(packing).as_dict()["pairs"] >= found["sticking"]["pairs"]
 
 
 @pytest.mark.long
