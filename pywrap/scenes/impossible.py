@@ -1,13 +1,8 @@
-r"""Refuse scenes that no computation can complete, before any work starts.
+"""Refuse scenes that no computation can complete, before any work starts.
 
-`refuse_impossible` finds impossible numbers in a scene: overlaps beyond the contact law, forces below the rounding of
-the coordinates, a settling that never ends. `refuse_endless` finds a command that would take years, more memory than
-there is, or a file that no disk holds. The progress line of a command tells how long it takes.
-
-A contact that carries the force f has :math:`\delta = (f/k_n)^{1/p}` and the stiffness :math:`k = p\, k_n
-\delta^{p-1}`, with p = 3/2 for Hertz. A time step is a share of :math:`(m/k)^{1/2}`, a disk falls under :math:`F_y`
-through the medium at the speed :math:`(F_y d/m)^{1/2}`, d its diameter. The number of steps of a settling is
-proportional to their ratio, :math:`(k_n d^{3/2}/F_y)^{1/3}` for Hertz.
+`refuse_impossible` finds impossible numbers in a scene: overlaps beyond the contact law, forces near the rounding of
+the coordinates. `refuse_endless` finds a command that would take years, more memory than there is, or a file that no
+disk holds. The progress line of a command tells how long it takes.
 """
 
 from __future__ import annotations
@@ -26,9 +21,6 @@ Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "reproduce"]
 DOUBLE_ROUNDING = 2.3e-16
 """Relative rounding of a double, rounded up."""
 
-FORCE_CHAINS = 10.0
-"""The largest contact force, in units of F_y, for which LAMMPS's time steps are made."""
-
 STEPS_OF_A_YEAR = 1e13
 """A year of LAMMPS's steps: 2e-6 s each and more, on a core of 2020."""
 LARGEST_FILE = 1e13
@@ -37,25 +29,9 @@ BYTES_IN_MEMORY = 4000
 """Bytes for each disk, at the least: LAMMPS, the matrices and their factors."""
 BYTES_WRITTEN = 150
 """Bytes of one equilibrium in run.h5, for each disk."""
-
-SETTLING_STEPS = 100.0
-"""Steps to rest, in units of the time step that F_y's own time has: 26,000 at k_n = 2e5, F_y = 3, as many for 30 disks
-as for 100, and growing with (k_n/F_y)^(1/3) from 26,000 to 665,000."""
-SETTLING_WITH_FRICTION = 25.0
-"""Steps to rest with packing.settle_friction, in units of the overdamped time step: between 11 and 33 for 30 disks,
-Hertz with k_n = 2e5 and 2e6 and harmonic with 2e4."""
-OVERDAMPED_STEPS = 16_000
-"""Steps of the default length in one increment of overdamped dynamics."""
-STAGED_DISKS = 300
-"""Disks beyond which a packing settles in stages."""
-STEPS_TO_REST = 10_000_000
-"""Steps after which the decks give up on a packing of up to `STAGED_DISKS` disks: 10,000 looks of 1000 steps."""
-SINKING_STEPS = 400_000
-"""Steps after which they give up on a stage of a larger one."""
-LEAST_SETTLING_SHARE = 0.4
-"""Share of `SETTLING_STEPS`, or `SETTLING_WITH_FRICTION`, that the first stage of a larger packing takes at least."""
-ROUNDING_LIMIT = 5e-5
-"""Rounding of a force, in units of F_y, beyond which a bed never comes to the 1e-3 F_y that the first stage asks."""
+ROUNDING_LIMIT = 1e-6
+"""Rounding of a force, in units of F_y, beyond which no bed comes to rest: 30 disks do at 1e-7, and fly apart at
+5e-7."""
 
 
 def refuse_endless(scene: SceneKeys, task: Task) -> None:
@@ -114,33 +90,7 @@ def refuse_impossible(scene: SceneKeys) -> tuple[str, str] | None:
             f"= {law.kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is {rounding:.1g} of F_y, "
             "and no packing comes to rest: lower it, or raise load.fy"
         )
-    return _refuse_long_settling(scene, packing) or _refuse_long_ramp(scene)
-
-
-def _refuse_long_settling(scene: SceneKeys, packing: GeneratedPacking) -> tuple[str, str] | None:
-    steps = _settling_steps(scene)
-    if packing.settle_friction:
-        ends = LEAST_SETTLING_SHARE * steps < STEPS_TO_REST
-    else:
-        ends = steps < STEPS_TO_REST if packing.disks <= STAGED_DISKS else LEAST_SETTLING_SHARE * steps < SINKING_STEPS
-    if ends:
-        return None
-    return "law.kn", (
-        f"= {scene.law.kn:g} is too stiff for load.fy = {scene.load.fy:g}: settling takes about {_count(steps)} time "
-        "steps, more than are made: lower it, or raise load.fy"
-    )
-
-
-def _refuse_long_ramp(scene: SceneKeys) -> tuple[str, str] | None:
-    if scene.ramp is None or scene.ramp.method != "overdamped":
-        return None
-    steps = _overdamped_steps(scene)
-    if steps < STEPS_TO_REST:
-        return None
-    return "relax.time_step", (
-        f"= {scene.relax.time_step:g} needs about {_count(steps)} steps to an equilibrium, more than are made: "
-        f"raise it, or leave it out for {_overdamped_step(scene):.2g}"
-    )
+    return None
 
 
 def _at_settling(scene: SceneKeys, at: SettlingLoad) -> SceneKeys:
@@ -161,23 +111,6 @@ def _law(scene: SceneKeys) -> MindlinLaw:
     return MindlinLaw(scene.law.kn, kt=0.0, mu=0.0, exponent=scene.law.exponent)
 
 
-def _settling_steps(scene: SceneKeys) -> float:
-    assert isinstance(scene.packing, GeneratedPacking)
-    stiff = _stiffness(scene, FORCE_CHAINS * scene.load.fy) * 2 * min(scene.packing.radii) / scene.load.fy
-    if scene.packing.settle_friction:
-        return SETTLING_WITH_FRICTION * 4 * stiff  # overdamped
-    return SETTLING_STEPS * math.sqrt(8 * stiff) / 0.8
-
-
-def _overdamped_step(scene: SceneKeys) -> float:
-    return scene.relax.damping / (4 * _stiffness(scene, FORCE_CHAINS * scene.load.fy))
-
-
-def _overdamped_steps(scene: SceneKeys) -> float:
-    step = scene.relax.time_step
-    return OVERDAMPED_STEPS if step is None else OVERDAMPED_STEPS * _overdamped_step(scene) / step
-
-
 def _undamped_step(scene: SceneKeys) -> float:
     packing = scene.packing
     lightest = min(1.0, scene.inertia_factor) * ((isinstance(packing, GeneratedPacking) and packing.mass) or 1.0)
@@ -186,7 +119,3 @@ def _undamped_step(scene: SceneKeys) -> float:
 
 def _installed_memory() -> float:
     return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
-
-
-def _count(number: float) -> str:
-    return f"{number:.2g}" if number >= 1e5 else f"{number:.0f}"
