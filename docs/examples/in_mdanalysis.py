@@ -3,8 +3,9 @@
 from pathlib import Path
 
 import MDAnalysis
+import numpy as np
 
-from faultgouge.analysis.files.mdanalysis import MeanSquareDisplacement
+import faultgouge.analysis.files.mdanalysis
 from faultgouge.pywrap import Record, Scene, ramp
 
 scene = Scene.from_mapping(
@@ -22,6 +23,7 @@ with Record(Path("run.h5"), scene) as record:
 
 universe = MDAnalysis.Universe("run.h5")
 layer = universe.select_atoms("type top")
-motion = MeanSquareDisplacement(layer).run()
+place = np.array([ts.data["position"][layer.indices, :2] for ts in universe.trajectory])
+moved = faultgouge.analysis.mean_square_displacement(place, place[0], faultgouge.load("run.h5").box_length)
 print(f"{len(universe.atoms)} disks, {len(layer)} of them in the upper layer, {len(universe.trajectory)} equilibria")
-print("sqrt(D) of the layer:", *(f"{each**0.5:.3e}" for each in motion.results.msd))
+print("sqrt(D) of the layer:", *(f"{each**0.5:.3e}" for each in moved))

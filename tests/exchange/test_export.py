@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from reference_layer import LAYER, toml
 
-from faultgouge.analysis import Contacts, MindlinLaw, PackingFileError, RunFile, nearest_image, normal_modes
+from faultgouge.analysis import Contacts, MindlinLaw, RunFile, nearest_image, normal_modes
 from faultgouge.analysis.files.formats import (
     ModeVectors,
     choose_frames,
@@ -262,32 +262,6 @@ def test_mdanalysis_steps_through_it_as_h5md_and_as_a_universe_with_radii_masses
             np.testing.assert_array_equal(exact.data["position_low"], series["position_low"][k - 1])
 
 
-@pytest.mark.long
-def test_d_of_t_in_mdanalysis_is_that_of_the_run(run, mdanalysis, ours):
-    path, packing, _ = run
-    universe = mdanalysis.Universe(str(path))
-    everything = ours.MeanSquareDisplacement(universe.atoms).run()
-    with RunFile(path) as file:
-        sampled = file.series("undamped")
-    np.testing.assert_array_equal(everything.times[1:], sampled["time"])
-    # sums over the disks are rounded; LAMMPS's positions are those of the file to the bit
-    np.testing.assert_allclose(everything.results.msd[1:], sampled["msd"], rtol=1e-13)
-    layer = ours.MeanSquareDisplacement(universe.select_atoms("type top")).run()
-    bed = ours.MeanSquareDisplacement(universe.select_atoms("type bed")).run()
-    share = packing.top.mean()
-    weighted = share * layer.results.msd + (1 - share) * bed.results.msd
-    np.testing.assert_allclose(weighted, everything.results.msd, rtol=1e-13)
-
-
-@pytest.mark.slow
-def test_d_of_a_file_without_a_trajectory_is_refused(tmp_path, reference_packing, mdanalysis, ours):
-    with RunFile.create(tmp_path / "still.h5", reference_packing(1.0)) as file:
-        file.append(reference_packing(1.0))
-    universe = mdanalysis.Universe(str(tmp_path / "still.h5"))
-    with pytest.raises(PackingFileError, match="trajectory = true under"):
-        ours.MeanSquareDisplacement(universe.atoms)
-
-
 @pytest.mark.slow
 def test_no_equilibrium_follows_a_trajectory(run):
     path, packing, _ = run
@@ -310,7 +284,7 @@ def test_positions_are_an_observable_too_and_a_file_without_that_link_is_continu
 
 def test_without_mdanalysis_the_import_says_the_one_command(monkeypatch):
     monkeypatch.delitem(sys.modules, "faultgouge.analysis.files.mdanalysis", raising=False)
-    monkeypatch.setitem(sys.modules, "MDAnalysis.analysis.base", None)
+    monkeypatch.setitem(sys.modules, "MDAnalysis.coordinates.H5MD", None)
     with pytest.raises(ImportError, match=r"pip install MDAnalysis"):
         import_module("faultgouge.analysis.files.mdanalysis")
 
