@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from .names_on_use import names_on_use
 
-if TYPE_CHECKING:  # what `OFFERS` imports when it is used
+if TYPE_CHECKING:  # each is imported when it is used
     from .arrays import Complexes, Floats, Indices
     from .configuration import Configuration, Snapshot
     from .contacts import LinearisedContacts
@@ -63,36 +63,6 @@ if TYPE_CHECKING:  # what `OFFERS` imports when it is used
     from .windows import Onset, OnsetError, Window, complex_windows, find_onset
     from .windows.pair_over_load import pair_eigenvalues
 
-OFFERS = {
-    "Complexes": ".arrays", "Floats": ".arrays", "Indices": ".arrays", "Configuration": ".configuration",
-    "LinearisedContacts": ".contacts", "BadInputError": ".errors", "FaultgougeError": ".errors",
-    "NoEquilibriumError": ".errors", "OutputError": ".errors", "PackingFileError": ".errors",
-    "read_dump": ".files.dumps", "read_packing": ".files.json_packing", "RunFile": ".files.runfile",
-    "negative_eigenvalues": ".motion.buckling", "mass_weighted": ".motion.eigenvalues",
-    "FastestGrowth": ".motion.fastest_growing", "fastest_growing": ".motion.fastest_growing",
-    "Growth": ".motion.growth", "fit_growth": ".motion.growth", "mean_square_displacement": ".motion.growth",
-    "growth_of_run": ".motion.growth_of_run", "Mode": ".motion.modes", "Modes": ".motion.modes",
-    "closest_to_meeting": ".motion.modes", "growth_rate": ".motion.modes", "normal_modes": ".motion.modes",
-    "Motion": ".motion.motion", "nearest_modes": ".motion.nearest_modes",
-    "OneSidedOutcome": ".motion.one_sided_outcome", "PowerLaw": ".motion.power_law",
-    "fit_power_law": ".motion.power_law", "OneSidedMotion": ".motion.pushed_motion",
-    "one_sided_motion": ".motion.pushed_motion", "layer_force": ".motion.response",
-    "linear_response": ".motion.response", "RisingMotion": ".motion.rising_load", "Signal": ".motion.signals",
-    "Slip": ".motion.slips", "Spectrum": ".motion.spectrum", "discrete_frequency": ".motion.spectrum",
-    "dynamical_matrix": ".motion.spectrum", "eigenvalues": ".motion.spectrum",
-    "largest_frequency": ".motion.spectrum", "spectrum": ".motion.spectrum", "Stability": ".motion.stability",
-    "stability": ".motion.stability", "rayleigh_timestep": ".motion.stable_timestep",
-    "stable_timestep": ".motion.stable_timestep", "NoGainError": ".motion.transient",
-    "TransientGain": ".motion.transient", "transient_gain": ".motion.transient",
-    "damping_matrix": ".operators.damping", "largest_damping_rate": ".operators.damping",
-    "stiffness_matrix": ".operators.stiffness", "FLOOR": ".packing.contacts", "Contacts": ".packing.contacts",
-    "ContactGeometry": ".packing.geometry", "nearest_image": ".packing.geometry", "touching": ".packing.geometry",
-    "MindlinLaw": ".packing.law", "Packing": ".packing.packing", "solid_fraction": ".packing.solid_fraction",
-    "Onset": ".windows", "OnsetError": ".windows", "Window": ".windows", "complex_windows": ".windows",
-    "find_onset": ".windows", "pair_eigenvalues": ".windows.pair_over_load", "Snapshot": ".configuration",
-}  # fmt: skip
-"""Names of this package, and the modules that have them."""
-
 __all__ = [
     "FLOOR", "BadInputError", "Complexes", "Configuration", "ContactGeometry", "Contacts", "FastestGrowth",
     "FaultgougeError", "Floats", "Growth", "Indices", "LinearisedContacts", "MindlinLaw", "Mode", "Modes", "Motion",
@@ -108,8 +78,4 @@ __all__ = [
 ]  # fmt: skip
 
 if not TYPE_CHECKING:
-    __getattr__ = names_on_use(__name__, OFFERS)
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *OFFERS})
+    __getattr__, __dir__ = names_on_use(__name__, __file__)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ..analysis.names_on_use import names_on_use
 from .lammps.two_mpi_libraries import load_own_mpi
 
-if TYPE_CHECKING:  # what `OFFERS` imports when it is used
+if TYPE_CHECKING:  # each is imported when it is used
     from ..analysis import NoEquilibriumError
     from .equilibria.quasistatic import Equilibrium, equilibrate
     from .granular.compare_motion import MotionComparison, compare_motion
@@ -42,24 +42,6 @@ if TYPE_CHECKING:  # what `OFFERS` imports when it is used
 
 load_own_mpi()  # before mpi4py.MPI is imported
 
-OFFERS = {
-    "NoEquilibriumError": "..analysis", "Equilibrium": ".equilibria.quasistatic",
-    "equilibrate": ".equilibria.quasistatic", "MotionComparison": ".granular.compare_motion",
-    "compare_motion": ".granular.compare_motion", "from_lammps": ".granular.from_lammps",
-    "NotTakenError": ".granular.granular_commands", "lammps_path": ".granular.lammps_path",
-    "in_a_copy": ".granular.look_in_a_copy", "relax": ".granular.relax", "Dynamics": ".lammps.dynamics",
-    "Engine": ".lammps.engine", "EngineError": ".lammps.instance", "lammps_instance": ".lammps.instance",
-    "LoadPath": ".load_path", "onset_run": ".onset", "DriveCheckpoint": ".runs.drive_states",
-    "DriveSample": ".runs.drive_states", "DriveStep": ".runs.drive_states", "drive": ".runs.drive",
-    "settle_for_drive": ".runs.drive_setup", "ramp": ".runs.ramp", "reach": ".runs.ramp",
-    "ramp_loads": ".runs.ramp_loads", "Record": ".runs.run_recorder", "scene_path": ".runs.scene_path",
-    "Checkpoint": ".runs.undamped", "Sample": ".runs.undamped", "perturb": ".runs.undamped",
-    "time_step": ".runs.undamped", "Scene": ".scenes.scene", "dashpot": ".scenes.units",
-    "real_units": ".scenes.units", "restitution": ".scenes.units", "SceneError": ".scenes.validation",
-    "bring_to_rest": ".settling.relax", "settle": ".settling.settle",
-}  # fmt: skip
-"""Names of this package, and the modules that have them."""
-
 __all__ = [
     "Checkpoint", "DriveCheckpoint", "DriveSample", "DriveStep", "Dynamics", "Engine", "EngineError", "Equilibrium",
     "LoadPath", "MotionComparison", "NoEquilibriumError", "NotTakenError", "Record", "Sample", "Scene", "SceneError",
@@ -69,8 +51,4 @@ __all__ = [
 ]  # fmt: skip
 
 if not TYPE_CHECKING:
-    __getattr__ = names_on_use(__name__, OFFERS)
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *OFFERS})
+    __getattr__, __dir__ = names_on_use(__name__, __file__)

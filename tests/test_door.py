@@ -11,34 +11,24 @@ import numpy as np
 import pytest
 
 import faultgouge
-from faultgouge import pywrap
+from faultgouge import analysis, pywrap
 from faultgouge.analysis import BadInputError, FaultgougeError, MindlinLaw, Packing, PackingFileError, RunFile
 from faultgouge.pywrap import Equilibrium, settle_for_drive
 
 
-@pytest.mark.parametrize("package", [faultgouge, pywrap])
-def test_every_name_that_is_offered_is_there(package):
-    for name, module in package.OFFERS.items():
-        place = importlib.import_module(f".{module.lstrip('.')}", _package_of(package, module))
-        assert getattr(package, name) is getattr(place, name)
-        assert name in dir(package)
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        _ = package.nothing
-
-
-def _package_of(package, module):
-    return "faultgouge" if module.startswith("..") else package.__name__
-
-
-@pytest.mark.parametrize("package", [faultgouge, pywrap])
-def test_type_checkers_and_a_star_see_what_is_offered(package):
+@pytest.mark.parametrize("package", [faultgouge, analysis, pywrap])
+def test_every_name_that_is_offered_is_there_for_type_checkers_and_a_star_too(package):
     """A type checker runs no `__getattr__`: what it imports instead is from the same modules."""
     text = ast.parse(Path(package.__file__).read_text())
     [block] = [each for each in text.body if isinstance(each, ast.If) and ast.unparse(each.test) == "TYPE_CHECKING"]
     imports = [each for each in block.body if isinstance(each, ast.ImportFrom)]
-    places = {name.lstrip("."): name for name in package.OFFERS.values()}
-    assert {alias.name: places[each.module] for each in imports for alias in each.names} == package.OFFERS
-    assert set(package.__all__) - {"__version__"} == set(package.OFFERS)
+    places = {alias.name: "." * each.level + each.module for each in imports for alias in each.names}
+    assert set(package.__all__) - {"__version__"} == places.keys()
+    for name, module in places.items():
+        assert getattr(package, name) is getattr(importlib.import_module(module, package.__name__), name)
+        assert name in dir(package)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = package.nothing
 
 
 def test_driver_imports_what_is_used():

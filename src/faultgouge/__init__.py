@@ -7,10 +7,11 @@ run time and limits.
 """
 
 import sys
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:  # what `OFFERS` imports when it is used
+from .analysis.names_on_use import names_on_use
+
+if TYPE_CHECKING:  # each is imported when it is used
     from .browser_view import view
     from .drawing import draw
     from .merging_pair import pair
@@ -27,30 +28,18 @@ if "IPython" in sys.modules:
 
     show_pictures()
 
-OFFERS = {
-    "Scene": "pywrap", "settle": "pywrap", "ramp": "pywrap", "perturb": "pywrap", "drive": "pywrap.runs.drive",
-    "onset": "pywrap.onset", "from_lammps": "pywrap", "relax": "pywrap", "load": "stored_files",
-    "stability": "stored_files", "spectrum": "stored_files", "draw": "drawing", "view": "browser_view",
-    "pair": "merging_pair", "sweep": "studies.sweep.run_sweep",
-}  # fmt: skip
-"""Names of this package, and the modules that have them."""
-
 __all__ = [
     "Scene", "__version__", "draw", "drive", "from_lammps", "load", "onset", "pair", "perturb", "ramp", "relax",
     "settle", "spectrum", "stability", "sweep", "view",
 ]  # fmt: skip
 
+_get, __dir__ = names_on_use(__name__, __file__)
+
 
 def __getattr__(name: str) -> Any:
-    if name in OFFERS:
-        return getattr(import_module(f"{__name__}.{OFFERS[name]}"), name)
+    if name != "__version__":
+        return _get(name)
     # the version when it is asked for: importlib.metadata takes as long to import as all that --help needs
-    if name == "__version__":
-        from importlib.metadata import version
+    from importlib.metadata import version
 
-        return version("faultgouge")
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def __dir__() -> list[str]:
-    return sorted([*globals(), *OFFERS, "__version__"])
+    return version("faultgouge")
