@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -16,12 +16,8 @@ from .terminal import (
     lock_output,
     print_line,
     progress,
-    stored_configuration,
     stored_packing,
 )
-
-if TYPE_CHECKING:
-    pass
 
 app = typer.Typer()
 
@@ -66,12 +62,11 @@ def export(
             raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")
         _export_frames(file, frames, output)
         return
-    configuration = stored_configuration(file, frame)
-    if configuration is None:
-        check_writer(output, mode is not None)
-    else:
+    packing = stored_packing(file, frame)
+    if isinstance(packing, Configuration):
         check_configuration_writer(output)
-    packing = configuration or stored_packing(file, frame)
+    else:
+        check_writer(output, mode is not None)
     if not is_root():
         return
     modes = [] if mode is None else modes_of(packing, mode)[0]

@@ -22,7 +22,6 @@ from .terminal import (
     progress,
     refuse_scene,
     say,
-    stored_configuration,
     stored_drive,
     stored_packing,
     stored_series,
@@ -93,11 +92,12 @@ def draw(
     """
     if output.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise typer.BadParameter(f"-o {output}: a picture is a .png, a .svg or a .pdf")
+    from faultgouge.analysis import Packing
+
     lock_output(context, output, file)
     number, series, cycle, driven = frame_at(file, -1 if frame is None else frame, time), None, [], None
-    configuration = stored_configuration(file, number)
-    packing = configuration or stored_packing(file, number)
-    if configuration is None and frame is None and time is None and mode is None:
+    packing = stored_packing(file, number)
+    if isinstance(packing, Packing) and frame is None and time is None and mode is None:
         driven = stored_drive(file)
         series, cycle = stored_series(file), [] if driven else _cycle(file)
     if not is_root():
@@ -167,20 +167,18 @@ def movie(
     pip install 'faultgouge[movie]'. A mode of spheres is written as frames for OVITO
     (.xyz) or ParaView (.pvd).
     """
-    from faultgouge.analysis import PackingFileError
+    from faultgouge.analysis import Configuration
     from faultgouge.figures.film import DOTS
     from faultgouge.figures.writers import check_name, usual_suffix, write_film
 
     output = output or Path("film").with_suffix(usual_suffix())
     if dots is None and output.suffix.lower() == ".gif":
         dots = DOTS
-    configuration = stored_configuration(file)
-    if configuration is not None and mode is None:
-        raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
+    packing = None if mode is None else stored_packing(file, frame)
     count = max(2, round(seconds * rate))
     periods = max(1, round(seconds / 2))
-    if configuration is not None and configuration.dimension == 3:
-        _frames_of_spheres(context, configuration, str(mode), output, count, periods)
+    if isinstance(packing, Configuration) and packing.dimension == 3:
+        _frames_of_spheres(context, packing, str(mode), output, count, periods)
         return
     check_name(output)
     lock_output(context, output, file)
@@ -189,8 +187,7 @@ def movie(
     from faultgouge.figures.mode_film import ModeFilm
 
     film: Film
-    if mode:
-        packing = configuration or stored_packing(file, frame)
+    if mode is not None and packing is not None:
         modes, what = modes_of(packing, mode)
         film = ModeFilm(packing, modes, what, count, periods=periods, dots=dots)
     else:
@@ -284,11 +281,12 @@ def _cycle(file: Path) -> list[Packing]:
 def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] | None, dots: int | None) -> Film:
     """The run if the file has its trajectory, else its drive or its ramp."""
     from faultgouge.analysis import PackingFileError, RunFile
+    from faultgouge.analysis.files.configuration_file import holds_configuration
     from faultgouge.figures.drive import course_of
     from faultgouge.figures.ramp_film import RampFilm
     from faultgouge.figures.run_film import RunFilm, RunMotion
 
-    if file.suffix == ".disks":
+    if file.suffix == ".disks" or holds_configuration(file):
         raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
     driven, course, times = stored_drive(file), None, list[float]()
     with RunFile(file) as run:

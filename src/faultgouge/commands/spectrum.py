@@ -17,7 +17,6 @@ from .terminal import (
     print_json,
     say,
     status,
-    stored_configuration,
     stored_packing,
 )
 
@@ -69,7 +68,7 @@ def spectrum(
     if values and (gain or rise or verbose):
         raise typer.BadParameter("--values computes nothing but eigenvalues: leave --gain, --rise and --verbose out")
     number = frame_at(file, frame, time)
-    packing = stored_configuration(file, number) or stored_packing(file, number)
+    packing = stored_packing(file, number)
     if rise and not packing.configuration.top.any():
         raise typer.BadParameter(f"--rise: {file} has no upper layer that a load could push; leave it out")
     if not is_root():

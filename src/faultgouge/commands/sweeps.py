@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
+KEPT = "{}/results.jsonl has the scenes that have ended; the same command continues from there"
+"""What is said of an interrupted sweep in a folder."""
+
 Shard = Annotated[
     str, typer.Option(metavar="K/N", help="Only part K of N, for job arrays; each part needs its own folder.")
 ]
@@ -45,21 +48,16 @@ def sweep(
     cores busy.
     """
     from faultgouge.studies.sweep.draw import draw_sweep
-    from faultgouge.studies.sweep.run_sweep import RESULTS_FILE, missing_points, read_results, require_result, run_sweep
+    from faultgouge.studies.sweep.run_sweep import require_result, run_sweep
     from faultgouge.studies.sweep.sweep_plan import Sweep
-    from faultgouge.studies.sweep.sweep_plan import shard as part_of
-    from faultgouge.studies.sweep.tasks import TASKS, remaining_work
+    from faultgouge.studies.sweep.tasks import TASKS
 
     wanted, part = Sweep.from_toml(file, TASKS), _shard(shard)
     _warn_of_seeds(wanted)
     if dry_run:
-        if is_root():
-            known = read_results(output / RESULTS_FILE)
-            missing = missing_points(part_of(wanted.points, part), known)
-            for line in remaining_work(missing, known.values()):
-                print_line(line)
+        _print_rest(wanted, part, output)
         return
-    keeps(f"{output}/{RESULTS_FILE} has the scenes that have ended; the same command continues from there", output)
+    keeps(KEPT.format(output), output)
     rows = run_sweep(wanted, output, part, say, lambda ended, count: progress(ended, "scenes", count), workers)
     if is_root():
         failed = sum(row["says"] is not None for row in rows)
@@ -102,6 +100,18 @@ def _summarise(task: str, rows: list[dict[str, Any]], output: Path) -> None:
     write_json(output / "summary.json", numbers)
     for line in in_words(numbers):
         print_line(line)
+
+
+def _print_rest(sweep: Sweep, part: tuple[int, int], output: Path) -> None:
+    """The work that is left of a part, and how long it takes."""
+    from faultgouge.studies.sweep.run_sweep import RESULTS_FILE, missing_points, read_results
+    from faultgouge.studies.sweep.sweep_plan import shard
+    from faultgouge.studies.sweep.tasks import remaining_work
+
+    if is_root():
+        known = read_results(output / RESULTS_FILE)
+        for line in remaining_work(missing_points(shard(sweep.points, part), known), known.values()):
+            print_line(line)
 
 
 def _warn_of_seeds(sweep: Sweep) -> None:
@@ -151,9 +161,7 @@ def modes(
     from faultgouge.studies.cycle.study import holds_drive
     from faultgouge.studies.modes.study import modes as count_modes
     from faultgouge.studies.modes.study import read_modes_sweep
-    from faultgouge.studies.sweep.run_sweep import RESULTS_FILE, missing_points, read_results, require_result
-    from faultgouge.studies.sweep.sweep_plan import shard as part_of
-    from faultgouge.studies.sweep.tasks import remaining_work
+    from faultgouge.studies.sweep.run_sweep import require_result
 
     if holds_drive(file):
         _along_cycles(file, output)
@@ -161,12 +169,9 @@ def modes(
     wanted, part = read_modes_sweep(file), _shard(shard)
     _warn_of_seeds(wanted)
     if dry_run:
-        if is_root():
-            known = read_results(output / RESULTS_FILE)
-            for line in remaining_work(missing_points(part_of(wanted.points, part), known), known.values()):
-                print_line(line)
+        _print_rest(wanted, part, output)
         return
-    keeps(f"{output}/{RESULTS_FILE} has the scenes that have ended; the same command continues from there", output)
+    keeps(KEPT.format(output), output)
     result = count_modes(wanted, output, part, say, lambda rows, count: progress(rows, "scenes", count), workers)
     if is_root() and not result:
         print_line("this part of the sweep has no scenes")

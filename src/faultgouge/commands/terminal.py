@@ -86,18 +86,6 @@ def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
     return scene
 
 
-def stored_configuration(file: Path, frame: int = -1) -> Configuration | None:
-    """The configuration of a run.h5 that holds one; None of all other files. It is the file's only frame."""
-    from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.files.configuration_file import holds_configuration, read_configuration
-
-    if not holds_configuration(file):
-        return None
-    if frame not in (-1, 0):
-        raise BadInputError(f"{file} has one packing, and no frame {frame}: leave --frame out.")
-    return read_configuration(file)
-
-
 def stored_files(scene: Scene) -> list[Path]:
     """The files that a scene names: of its packing, and of the signal that forces it."""
     signals = [section.signal for section in (scene.perturb, scene.drive) if section is not None]
@@ -111,11 +99,16 @@ def counted(number: int, noun: str, plural: str | None = None) -> str:
     return counted.counted(number, noun, plural)
 
 
-def stored_packing(file: Path, frame: int = -1) -> Packing:
-    """A packing of a run.h5, or of the dumps that decks write."""
-    from faultgouge.analysis import RunFile, read_dump
+def stored_packing(file: Path, frame: int = -1) -> Packing | Configuration:
+    """A packing of a run.h5, or of the dumps that decks write; a run.h5 that holds a configuration has no other."""
+    from faultgouge.analysis import BadInputError, RunFile, read_dump
+    from faultgouge.analysis.files.configuration_file import holds_configuration, read_configuration
     from faultgouge.stored_files import packing_in
 
+    if holds_configuration(file):
+        if frame not in (-1, 0):
+            raise BadInputError(f"{file} has one packing, and no frame {frame}: leave --frame out.")
+        return read_configuration(file)
     if file.suffix == ".disks":
         return read_dump(file, frame=frame)
     with RunFile(file) as run:
