@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from faultgouge.analysis.arrays import Floats
@@ -37,20 +38,26 @@ def draw_drive(series: Mapping[str, Floats], slips: Sequence[Slip]) -> Figure:
         (risen, "dilation", "C0"),
         (series["at_bound"], "at the bound", "C0"),
     )
+    draw_slips(panels, slips)
     for axes, (values, label, color) in zip(panels, rows, strict=True):
-        for slip in slips:
-            axes.axvspan(slip.begins, slip.ends, color="0.85", linewidth=0)
         axes.plot(time, values, color=color, linewidth=0.8)
         axes.set_ylabel(label)
         axes.margins(x=0)
-    for number, slip in enumerate(slips, 1):
-        panels[0].annotate(
-            str(number), (slip.begins, slip.force_before), (0, 3), textcoords="offset points", ha="center", fontsize=7
-        )
     panels[0].margins(y=0.12)
     panels[-1].set_xlabel("$t$")
     figure.align_ylabels()
     return figure
+
+
+def draw_slips(panels: Sequence[Axes], slips: Sequence[Slip]) -> None:
+    """A band for each slip in panels over time, and its number in the first panel, which shows the force."""
+    for axes in panels:
+        for slip in slips:
+            axes.axvspan(slip.begins, slip.ends, color="0.85", linewidth=0)
+    for number, slip in enumerate(slips, 1):
+        panels[0].annotate(
+            str(number), (slip.begins, slip.force_before), (0, 3), textcoords="offset points", ha="center", fontsize=7
+        )
 
 
 def course_of(

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from ...analysis.arrays import Floats
 from ...analysis.motion.slips import Slip
+from ...figures.drive import draw_slips
 from ...figures.style import styled
 
 LINEAR_UP_TO = 1.0
@@ -38,11 +39,12 @@ def draw_cycle_spectrum(
     """
     figure = Figure(figsize=(5.6, 6.2), layout="constrained")
     force, pairs, growth, lowest = panels = figure.subplots(4, 1, sharex=True, height_ratios=(1.3, 1, 1.3, 1))
+    draw_slips(panels, slips)
     for axes in panels:
-        for slip in slips:
-            axes.axvspan(slip.begins, slip.ends, color="0.85", linewidth=0)
         axes.margins(x=0)
-    _draw_force(force, series, slips)
+    force.plot(series["time"], series["force"], color="C1", linewidth=0.8)
+    force.set_ylabel("force $F$")
+    force.margins(y=0.12)
     two = any(state["damped_sticking"] != state["damped_sliding"] for state in states)
     alone, other = ("all sticking", "all sliding") if two else (None, None)
     _draw_states(pairs, states, "pairs_sticking", "C0")
@@ -64,17 +66,6 @@ def draw_cycle_spectrum(
     lowest.set_xlabel("$t$")
     figure.align_ylabels()
     return figure
-
-
-def _draw_force(axes: Axes, series: Mapping[str, Floats], slips: Sequence[Slip]) -> None:
-    """The force over time, with the numbers of the slips."""
-    axes.plot(series["time"], series["force"], color="C1", linewidth=0.8)
-    axes.set_ylabel("force $F$")
-    axes.margins(y=0.12)
-    for number, slip in enumerate(slips, 1):
-        axes.annotate(
-            str(number), (slip.begins, slip.force_before), (0, 3), textcoords="offset points", ha="center", fontsize=7
-        )
 
 
 def _draw_states(
