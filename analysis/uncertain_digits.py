@@ -13,8 +13,6 @@ def with_uncertainty(value: float, error: float) -> str:
 
     Parameters
     ----------
-    value : float
-        The number.
     error : float
         Its uncertainty, in the same unit. Where it is 0 the number has all its digits.
     """

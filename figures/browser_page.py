@@ -93,14 +93,8 @@ def write_view(
     ----------
     packings : sequence of Packing or Configuration
         Equilibria along their path, all with the same particles.
-    path : Path
-        The page to write.
-    title : str
-        What the file is.
     series : dict, optional
         Columns time and msd of an undamped run from the last equilibrium.
-    progress : callable
-        Wraps the packings while their eigenvalues are computed.
     axis : Axis, optional
         What changes from packing to packing; the load by default.
     """
@@ -206,18 +200,7 @@ def _frame(packing: HasConfiguration, axis: Axis, images: Images, followed: Ramp
 
 
 def sentences_of(verdict: Stability) -> list[str]:
-    """Sentences of a page: the verdict, the eigenvalues without dissipation, and contacts at Coulomb's bound.
-
-    Parameters
-    ----------
-    verdict : Stability
-        Of one packing.
-
-    Returns
-    -------
-    list of str
-        Sentences for the page, the verdict first.
-    """
+    """Sentences of a page: the verdict, the eigenvalues without dissipation, and contacts at Coulomb's bound."""
     undamped, contacts = verdict.undamped, verdict.at_bound
     kinds = (
         (undamped.pairs, "pair of eigenvalues", "pairs of eigenvalues", "complex"),

@@ -23,10 +23,6 @@ def draw_drive(series: Mapping[str, Floats], slips: Sequence[Slip]) -> Figure:
         Columns time, force, displacement, thickness and at_bound of a driven run.
     slips : sequence of Slip
         Its slips, each a band from its beginning to its end.
-
-    Returns
-    -------
-    Figure
     """
     figure = Figure(figsize=(5.2, 4.6), layout="constrained")
     panels = figure.subplots(4, 1, sharex=True, height_ratios=(2, 1, 1, 1))

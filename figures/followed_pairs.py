@@ -103,8 +103,6 @@ def follow_eigenvalues(packings: Sequence[HasConfiguration], progress: Progress 
     ----------
     packings : sequence of Packing or Configuration
         The equilibria, all with the same particles.
-    progress : callable
-        Wraps the packings while their eigenvalues are computed.
     """
     followed = _Followed(packings)
     values, verdicts = [], []

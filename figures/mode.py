@@ -132,10 +132,6 @@ def unstable_pair(packing: HasConfiguration, modes: Modes, believed: Sequence[co
 
     Parameters
     ----------
-    packing : Packing or Configuration
-        The packing.
-    modes : Modes
-        All its modes.
     believed : sequence of complex
         Eigenvalues of the complex pairs that are no rounding noise, fastest growing first, as of
         :func:`~faultgouge.analysis.motion.spectrum`.
@@ -175,12 +171,6 @@ class ModeArtist:
 
     Parameters
     ----------
-    axes : Axes
-        Where.
-    packing : Packing or Configuration
-        The packing at rest.
-    mode : ModeShape
-        The mode.
     points : float, optional
         Points per unit of length; as the axes stand now by default.
     moves : bool
@@ -240,10 +230,7 @@ def _arrow_scale(packing: HasConfiguration, mode: ModeShape) -> float:
 def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list[ModeShape], str]:
     """A mode of a packing by its number, or the modes of `unstable_pair`; with a description.
 
-    Raises
-    ------
-    ModeError
-        If the packing has no such mode.
+    Raises ModeError if the packing has no such mode.
     """
     modes = normal_modes(packing)
     if number is None:
@@ -285,12 +272,8 @@ def draw_modes(packing: HasConfiguration, modes: Sequence[ModeShape], words: str
 
     Parameters
     ----------
-    packing : Packing or Configuration
-        The packing.
     modes : sequence of ModeShape
         One or two.
-    words : str
-        What they are, a line above.
 
     Returns
     -------

@@ -12,19 +12,7 @@ from .style import styled
 
 
 class ModeFilm(Film):
-    """The motion of one or two modes, growth left out, a whole number of periods.
-
-    Parameters
-    ----------
-    packing : Packing or Configuration
-        The packing.
-    modes : sequence of ModeShape
-        Which.
-    words : str
-        What they are.
-    frames, periods : int
-        How many.
-    """
+    """The motion of one or two modes, growth left out, a whole number of periods."""
 
     @styled
     def __init__(

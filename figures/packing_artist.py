@@ -20,10 +20,6 @@ class PackingArtist:
 
     Parameters
     ----------
-    axes : Axes
-        Where.
-    packing : Packing
-        What.
     color : str
         A key of `COLOURS`, or "none".
     view : View, optional

@@ -59,8 +59,6 @@ class RampFilm(Film):
 
     Parameters
     ----------
-    packings : sequence of Packing
-        Equilibria of the same disks.
     frames : int
         How many frames; each equilibrium is shown for about as long as the others.
     color : str

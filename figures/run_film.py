@@ -63,13 +63,7 @@ class RunMotion:
         return cls.of(packing, time, position, low)
 
     def between(self, first: float, last: float) -> "RunMotion":
-        """A part of the run.
-
-        Raises
-        ------
-        PackingFileError
-            If the run has fewer than two samples there.
-        """
+        """A part of the run. Raises PackingFileError if the run has fewer than two samples there."""
         part = (self.time >= first) & (self.time <= last)
         if part.sum() < 2:
             raise PackingFileError(
@@ -98,8 +92,6 @@ class RunFilm(Film):
 
     Parameters
     ----------
-    motion : RunMotion
-        The run.
     frames : int
         How many frames; the samples of the run are taken at even intervals of time.
     """

@@ -121,10 +121,6 @@ class SpheresArtist:
 
     Parameters
     ----------
-    axes : Axes
-        Where.
-    configuration : Configuration
-        The spheres.
     faces : array_like, shape (N, 3), optional
         Their colours; by default grey, and red of those that are held.
     """

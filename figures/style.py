@@ -35,15 +35,7 @@ def figure_of(axes: Axes) -> Figure:
 
 @contextmanager
 def report_failure(what: str, say: Callable[[str], None]) -> Iterator[None]:
-    """Print the failure of a picture as one sentence, and go on: no computed number is lost.
-
-    Parameters
-    ----------
-    what : str
-        What is drawn here, as the sentence begins.
-    say : callable
-        Takes the sentence.
-    """
+    """Print the failure of a picture as one sentence, and go on: no computed number is lost."""
     try:
         yield
     except Exception as error:  # whatever it is: the numbers are worth more than their picture

@@ -43,14 +43,10 @@ def write_film(film: Film, path: Path, rate: float = 10.0, progress: Progress = 
 
     Parameters
     ----------
-    film : Film
-        What to write.
     path : Path
         A name that ends in .gif or .mp4.
     rate : float
         Frames a second. A GIF counts in hundredths of a second, so that 100 must be a multiple of it.
-    progress : callable
-        Wraps the numbers of the frames, whose count is given, to show how far it is.
 
     Raises
     ------

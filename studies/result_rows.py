@@ -19,12 +19,8 @@ from ..pywrap import Scene, SceneError
 def read_keyed_rows(path: Path, key: str, what: str) -> list[dict[str, Any]]:
     """The rows of a file, each with a key; none if there is no file. The file stays as it is.
 
-    A last line without its end, which a kill has cut or another process is writing, is no row.
-
-    Raises
-    ------
-    SceneError
-        If a line is no such row.
+    A last line without its end, which a kill has cut or another process is writing, is no row. Raises SceneError if a
+    line is no such row.
     """
     if not path.exists():
         return []

@@ -123,12 +123,7 @@ def general_lu(matrix: csc_array) -> SuperLUFactors:
 
     The pivot is the diagonal entry unless another one of its column is larger than a hundred of it: so the order of
     elimination, that of a symmetric pattern, remains. It takes half of the time of SuperLU's default, and gives the
-    same digits.
-
-    Raises
-    ------
-    SingularMatrixError
-        If a pivot is zero.
+    same digits. Raises SingularMatrixError if a pivot is zero.
     """
     return SuperLUFactors(_superlu(matrix, "MMD_AT_PLUS_A", DIAGONAL_PIVOT))
 
@@ -136,10 +131,7 @@ def general_lu(matrix: csc_array) -> SuperLUFactors:
 def accurate_lu(matrix: csc_array) -> "SuperLUFactors | CompiledFactors":
     """The factors of a real matrix in the order of elimination, without pivoting where the solutions are accurate.
 
-    Raises
-    ------
-    SingularMatrixError
-        If a pivot is zero.
+    Raises SingularMatrixError if a pivot is zero.
     """
     right = np.random.default_rng(2).standard_normal(matrix.shape[0])
     try:

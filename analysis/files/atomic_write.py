@@ -93,13 +93,6 @@ def write_json(path: Path, value: object) -> None:
 def check_output(path: Path, *inputs: Path) -> None:
     """Refuse a file that cannot be written, before work starts whose result goes there.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    *inputs : Path
-        Files that the work reads, and that its result must not replace.
-
     Raises
     ------
     OutputError
@@ -135,11 +128,7 @@ def lock_output(path: Path) -> Iterator[Path | None]:
     """Keep other processes from writing a file, or into a folder: they find a lock, which goes with this process.
 
     The lock is a file beside the file, or in the folder, which is yielded and removed in the end. A device has none.
-
-    Raises
-    ------
-    OutputError
-        If another process has it.
+    Raises OutputError if another process has it.
     """
     target = Path(os.path.realpath(path))
     if target.exists() and not (target.is_file() or target.is_dir()):

@@ -39,13 +39,6 @@ SHARE_OF_SAVING = 0.05
 class SealedFile:
     """A run.h5 as a file: opened, checked whole, changed and saved; a context manager.
 
-    Parameters
-    ----------
-    path : path
-        The file.
-    mode : {"r", "a"}
-        Read, or read and change.
-
     Raises
     ------
     PackingFileError

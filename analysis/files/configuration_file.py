@@ -50,10 +50,6 @@ def write_configuration(
 
     Parameters
     ----------
-    path : Path
-        The file.
-    configuration : Configuration
-        What it is to hold.
     attributes : mapping, optional
         Attributes of the root, such as the deck.
 
@@ -98,10 +94,7 @@ def write_configuration(
 def holds_configuration(path: Path) -> bool:
     """Whether a file is an HDF5 file with a configuration; False for any other kind of file.
 
-    Raises
-    ------
-    PackingFileError
-        If the file has changed since it was sealed.
+    Raises PackingFileError if the file has changed since it was sealed.
     """
     import h5py
 
@@ -120,13 +113,7 @@ def holds_configuration(path: Path) -> bool:
 
 
 def read_configuration(path: Path) -> Configuration:
-    """The configuration of a file.
-
-    Raises
-    ------
-    PackingFileError
-        If the file is missing, damaged, or holds none.
-    """
+    """The configuration of a file. Raises PackingFileError if the file is missing, damaged, or holds none."""
     if not path.is_file():
         raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
     has_checksum(path)  # refuses what has changed

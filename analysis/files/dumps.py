@@ -206,19 +206,8 @@ def _find_contacts(
 def dump_frames(path: str | PathLike[str]) -> Iterator[DumpFrame]:
     """The snapshots of a LAMMPS text dump, one after the other.
 
-    Parameters
-    ----------
-    path : path
-        A file of ``dump custom`` or ``dump local``.
-
-    Yields
-    ------
-    DumpFrame
-
-    Raises
-    ------
-    PackingFileError
-        If the file is missing, or breaks off or is malformed before the snapshot asked for is complete.
+    Raises PackingFileError if the file is missing, or breaks off or is malformed before the snapshot asked for is
+    complete.
     """
     try:
         with open_text(path) as file:

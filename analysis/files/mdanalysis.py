@@ -44,10 +44,7 @@ class RunFileParser(TopologyReaderBase):
     def parse(self, **_: Any) -> Topology:
         """The disks of the file, which is checked whole.
 
-        Raises
-        ------
-        PackingFileError
-            If the file is damaged, or not a run of faultgouge.
+        Raises PackingFileError if the file is damaged, or not a run of faultgouge.
         """
         with RunFile(self.filename) as file:
             packing = file.packing(0)
@@ -69,12 +66,8 @@ class RunFileReader(H5MDReader):
 
     Parameters
     ----------
-    filename : path
-        The file.
     convert_units : bool
         As of MDAnalysis's reader of H5MD, but False by default.
-    **more
-        As of MDAnalysis's reader of H5MD.
     """
 
     format = FORMAT

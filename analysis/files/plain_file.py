@@ -19,15 +19,7 @@ GZIP = b"\x1f\x8b"
 def open_plain(path: str | Path) -> BinaryIO:
     """A plain file, opened for reading its bytes.
 
-    Parameters
-    ----------
-    path : path
-        The file, or a link to it.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be read, or is a folder, a pipe, a socket or a device.
+    Raises OSError if the file cannot be read, or is a folder, a pipe, a socket or a device.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)  # a pipe without a writer opens at once
     kind = os.fstat(descriptor).st_mode

@@ -28,10 +28,6 @@ def read_signal(path: str | Path, channel: str | None = None) -> Signal:
     channel : str, optional
         Which trace of a record with several: its id, as in BW.RJOB..EHZ, or the end of that.
 
-    Returns
-    -------
-    Signal
-
     Raises
     ------
     SignalError

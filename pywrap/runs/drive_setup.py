@@ -86,10 +86,7 @@ def settle_for_drive(scene: Scene, communicator: MPI.Comm | None = None, watch: 
 def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = None) -> list[str]:
     """Warnings about a drive that may not stick and slip.
 
-    Raises
-    ------
-    SceneError
-        If the drive is not slow against the vibrations of the layer, or time steps do not follow it.
+    Raises SceneError if the drive is not slow against the vibrations of the layer, or time steps do not follow it.
     """
     settings, warnings = require_section(scene.drive, "drive"), list[str]()
     with driven(settings, start, communicator) as (_, dynamics):

@@ -130,8 +130,6 @@ class PendingStates:
             At the row that the detector was given last.
         slip : Slip or None
             The slip that this row ends.
-        is_over : bool
-            Whether the run ends here.
         """
         under_way = self._detector.so_far if self._detector else None
         self._wanted |= {slip.begins, slip.ends} if slip else set()

@@ -234,10 +234,7 @@ class PathErrors:
     def changes(self, fx: float) -> NDArray[np.bool_]:
         """In which increments of the ramp up to fx contacts close, open, or reach or leave the Coulomb bound.
 
-        Raises
-        ------
-        NoEquilibriumError
-            If the ramp has no equilibrium at fx.
+        Raises NoEquilibriumError if the ramp has no equilibrium at fx.
         """
         before = self._states[: sum(each.fx < fx for each in self.path.equilibria)]
         states = [*before, bearing_contacts(self.path(fx))]

@@ -57,10 +57,7 @@ def way_to(begin: float, end: float, step: float) -> Floats:
 def count_behind(settings: Ramp, reached: Floats) -> int:
     """How many loads of a ramp lie behind a run that reached these; F_x of its equilibria, force.
 
-    Raises
-    ------
-    SceneError
-        If the run went another way.
+    Raises SceneError if the run went another way.
     """
     wanted = all_loads(settings)
     count = min(len(wanted), len(reached))

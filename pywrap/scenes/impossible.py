@@ -37,17 +37,7 @@ ROUNDING_LIMIT = 1e-6
 def refuse_endless(scene: SceneKeys, task: Task) -> None:
     """Refuse a scene with which a command would not come to an end.
 
-    Parameters
-    ----------
-    scene : Scene
-        What is wanted.
-    task : {"settle", "ramp", "perturb", "onset", "reproduce"}
-        The command.
-
-    Raises
-    ------
-    SceneError
-        If it takes a year, more memory than there is, or a file of more than `LARGEST_FILE`.
+    Raises SceneError if it takes a year, more memory than there is, or a file of more than `LARGEST_FILE`.
     """
     disks, ramp, perturb = scene.packing.disks, scene.ramp, scene.perturb
     equilibria = 1.0 + (ramp.length / ramp.step if ramp is not None and task not in ("settle", "perturb") else 0.0)

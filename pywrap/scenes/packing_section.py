@@ -184,12 +184,7 @@ class StoredPacking(Section):
         """The packing of the file under a law; `more` are its fy, inertia_factor and drag_time.
 
         Contacts of which the file has no slips begin without, by definition of the scene. Slips that the file itself
-        calls unknown remain unknown.
-
-        Raises
-        ------
-        PackingFileError
-            If the file has no equilibrium, or no packing.
+        calls unknown remain unknown. Raises PackingFileError if the file has no equilibrium, or no packing.
         """
         if not is_hdf5(self.file):
             disks = read_disks(self.file, self.frame)

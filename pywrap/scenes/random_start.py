@@ -33,12 +33,8 @@ def layer_size(disks: int, radii: tuple[float, ...], width: float) -> int:
 
     Parameters
     ----------
-    disks : int
-        Number of disks, the upper layer included.
     radii : tuple of float
         Radii, length, each of an equal share of the disks.
-    width : float
-        Width of the box, length.
     """
     side_by_side = width / (2 * float(np.mean(radii)))
     return min(disks, max(1, round(max(LAYER * disks, side_by_side))))

@@ -233,8 +233,6 @@ def scene_of(scene: object, command: str) -> Scene:
 
     Parameters
     ----------
-    scene : object
-        What the caller gave.
     command : str
         The function, which reads of a file what the command of its name reads.
 

@@ -139,10 +139,7 @@ class SignalKeys(Section):
     def check_samples(self, dt: float) -> None:
         """Refuse a signal from a file that a run with the time step dt cannot follow.
 
-        Raises
-        ------
-        SignalError
-            If rows of the file are closer than the time step, or the whole signal is.
+        Raises SignalError if rows of the file are closer than the time step, or the whole signal is.
         """
         signal = self.forcing() if self._from_file else None
         if signal is not None and signal.shortest < dt:

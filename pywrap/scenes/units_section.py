@@ -25,10 +25,7 @@ DIMENSIONS = {
 def to_si(text: str, unit: str) -> float:
     """A quantity such as "100 um" as a number of SI units.
 
-    Raises
-    ------
-    ValueError
-        If it is no quantity, or one of another dimension: half a sentence with the reason.
+    Raises ValueError if it is no quantity, or one of another dimension: half a sentence with the reason.
     """
     from pint import PintError
 

@@ -84,8 +84,6 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
 
     Parameters
     ----------
-    engine : Engine
-        LAMMPS with the loose start.
     loose : Packing
         The start: no contacts, at F_x = 0.
     bed : bool

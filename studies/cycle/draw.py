@@ -32,10 +32,6 @@ def draw_cycle_spectrum(
         Its slips, each a band from its beginning to its end.
     states : sequence of mapping
         Rows of `cycle_state` with the key time; a state within a slip is a pale dot.
-
-    Returns
-    -------
-    Figure
     """
     figure = Figure(figsize=(5.6, 6.2), layout="constrained")
     force, pairs, growth, lowest = panels = figure.subplots(4, 1, sharex=True, height_ratios=(1.3, 1, 1.3, 1))

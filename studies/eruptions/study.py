@@ -88,10 +88,7 @@ def _page(result: Result) -> Result:
 def eruptions_of(scene: Scene, _: object) -> Result:
     """The task "eruptions" of a sweep: size and end of the eruption at each load of [eruptions], without time series.
 
-    Raises
-    ------
-    SceneError
-        If the scene has no section [ramp] or [eruptions].
+    Raises SceneError if the scene has no section [ramp] or [eruptions].
     """
     settings = _check_section(scene)
     starts, flows_beyond = _starts(scene, sorted(settings.load), settings.time)

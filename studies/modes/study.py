@@ -43,10 +43,7 @@ FRAMES_A_SECOND = 2.0
 def read_modes_sweep(path: Path) -> Sweep:
     """The sweep of a file that has a sweep of the task "modes", or a scene, which is a sweep of one point.
 
-    Raises
-    ------
-    SceneError
-        If the file has neither.
+    Raises SceneError if the file has neither.
     """
     try:
         has_task = "task" in read_toml(path, "sweep")

@@ -88,10 +88,7 @@ def locate(task: str, folder: Path) -> str:
 def user_function(name: str) -> UserFunction:
     """The function of a located name.
 
-    Raises
-    ------
-    SceneError
-        If there is no such file, module or function, or it cannot be called with a scene.
+    Raises SceneError if there is no such file, module or function, or it cannot be called with a scene.
     """
     place, _, wanted = name.rpartition(":")
     module = _module(place, name)

@@ -72,13 +72,7 @@ def middle(below: float, above: float) -> float:
 
 
 def threshold(scene: Scene) -> float:
-    """v_0 of the scene.
-
-    Raises
-    ------
-    SceneError
-        If the scene does not say it.
-    """
+    """v_0 of the scene. Raises SceneError if the scene does not say it."""
     if scene.friction is None:
         raise SceneError("the scene has no section [friction]: add it, with v0, the velocity at which friction weakens")
     v0 = scene.friction.v0

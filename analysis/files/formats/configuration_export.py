@@ -57,8 +57,6 @@ def write_mode_frames(
     ----------
     path : Path
         An .xyz of many frames, or a .pvd, beside which a folder of .vtp is made.
-    configuration, mode : Configuration, ModeVectors
-        The particles, and the mode that moves them.
     count, periods : int
         Frames, and whole periods of the mode in them.
 

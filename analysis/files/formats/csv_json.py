@@ -85,8 +85,6 @@ def read_slips(path: Path, length: str = "") -> Slips:
 
     Parameters
     ----------
-    path : Path
-        The file.
     length : str
         The unit of the disks' lengths, where their table has one.
     """

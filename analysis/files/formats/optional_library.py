@@ -8,13 +8,7 @@ from ...errors import BadInputError
 
 
 def needed_library(module: str, path: Path) -> Any:
-    """A module of a dependency, or of the extra `export`.
-
-    Raises
-    ------
-    BadInputError
-        If it is not installed.
-    """
+    """A module of a dependency, or of the extra `export`. Raises BadInputError if it is not installed."""
     try:
         return import_module(module)
     except ImportError:

@@ -40,10 +40,7 @@ def registry() -> Any:
 def unit_factor(source: str, name: str, unit: str, into: str) -> float:
     """Factor of the numbers of a column.
 
-    Raises
-    ------
-    PackingFileError
-        If there is no such unit, or no way from one to the other.
+    Raises PackingFileError if there is no such unit, or no way from one to the other.
     """
     from pint import PintError
 
@@ -71,8 +68,6 @@ def in_one_unit(
 
     Parameters
     ----------
-    source : str
-        The file, for messages.
     columns : mapping of ndarray
         By name.
     units : mapping of str

@@ -57,8 +57,6 @@ def columns_of(
 
     Parameters
     ----------
-    path : Path
-        The file, for messages.
     lines : iterable of (int, list of str)
         Number and words of each line.
     names : sequence of str or None
@@ -97,8 +95,6 @@ def block_of_frame(
 
     Parameters
     ----------
-    path, lines : Path, list of str
-        The file.
     head : int
         Lines before the disks of each frame.
     count_at : callable

@@ -36,17 +36,7 @@ INCREMENTS = (2e-3, 1e-3, 5e-4, 2.5e-4)
 
 
 class OnsetMethods:
-    """The methods that find the onset of one settled packing.
-
-    Parameters
-    ----------
-    engine : Engine
-        LAMMPS with the packing.
-    start : Equilibrium
-        The packing at F_x = 0.
-    scene : Scene
-        Scene of the ramp.
-    """
+    """The methods that find the onset of one settled packing."""
 
     def __init__(self, engine: Engine, start: Equilibrium, scene: Scene) -> None:
         self._engine, self._start, self._scene = engine, start, scene
