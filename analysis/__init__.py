@@ -25,7 +25,6 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .contacts import LinearisedContacts
     from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
     from .files.dumps import read_dump
-    from .files.json_packing import read_packing
     from .files.runfile import RunFile
     from .motion.buckling import negative_eigenvalues
     from .motion.eigenvalues import mass_weighted
@@ -73,7 +72,7 @@ __all__ = [
     "fit_power_law", "growth_of_run", "growth_rate", "largest_damping_rate", "largest_frequency", "layer_force",
     "linear_response", "mass_weighted", "mean_square_displacement", "nearest_image", "nearest_modes",
     "negative_eigenvalues", "normal_modes", "one_sided_motion", "pair_eigenvalues", "rayleigh_timestep",
-    "read_dump", "read_packing", "solid_fraction", "spectrum", "stability", "stable_timestep", "stiffness_matrix",
+    "read_dump", "solid_fraction", "spectrum", "stability", "stable_timestep", "stiffness_matrix",
     "touching", "transient_gain",
 ]  # fmt: skip
 

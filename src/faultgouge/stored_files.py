@@ -8,6 +8,8 @@ from functools import wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
+import numpy as np
+
 from .analysis import BadInputError, Configuration, MindlinLaw, Packing, RunFile, read_dump
 from .analysis import spectrum as spectrum_of_packing
 from .analysis import stability as stability_of_packing
@@ -41,8 +43,8 @@ def load(
     fy, fx : float, optional
         Their load on each disk of the upper layer, force; that of the file by default, and fx = 0.
     top : str or int, optional
-        Their upper layer, where the file does not say which it is: the number of its disks, or as `faultgouge import
-        --top` has it.
+        Their upper layer, where the file does not say which it is: the number of its disks, 0 for none, or as
+        `faultgouge import --top` has it.
     width : float, optional
         Their period along x, length, where the file does not say it; open sides by default.
 
@@ -84,7 +86,10 @@ def load(
         )
     inertia_factor, drag_time = given.get("inertia_factor", 1.0), given.get("tau")
     load = {"fx": given.get("fx", 0.0) if fx is None else fx, "fy": fy, "inertia_factor": inertia_factor}
-    layer = disks.top if top is None and disks.top is not None else upper_layer(disks, top)
+    if top == 0:
+        layer = np.zeros(len(disks), dtype=np.bool_)
+    else:
+        layer = disks.top if top is None and disks.top is not None else upper_layer(disks, top)
     return packing_of(disks, law, layer, drag_time=drag_time, **load)
 
 

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from faultgouge.analysis import MindlinLaw, read_packing
+from faultgouge import load
+from faultgouge.analysis import MindlinLaw
 from faultgouge.analysis.files.formats import write_packing
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.scenes.quantities import DIMENSIONS
@@ -50,7 +51,7 @@ def test_units_are_those_of_hertz_and_of_the_grains():
 def test_units_of_a_file_are_those_of_its_smallest_disk_whatever_the_format(tmp_path):
     disks = {"x": [1.0, 3.0], "y": [0.49, 0.69], "radius": [0.5, 0.7], "top": [1], "box_length": 4.0}
     (tmp_path / "disks.json").write_text(json.dumps(disks))
-    write_packing(tmp_path / "disks.xyz", read_packing(tmp_path / "disks.json", MindlinLaw(2e5, 0.0, 0.0)))
+    write_packing(tmp_path / "disks.xyz", load(tmp_path / "disks.json", law=MindlinLaw(2e5, 0.0, 0.0), fy=0.0))
     scenes = [LEAST | {"packing": {"file": name}, "units": QUARTZ} for name in ("disks.json", "disks.xyz")]
     own, other = (real_units(Scene.from_mapping(each, tmp_path)) for each in scenes)
     assert own.length == pytest.approx(1e-4, rel=1e-12)

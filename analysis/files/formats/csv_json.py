@@ -4,16 +4,18 @@ contact. JSON: packing.json."""
 from __future__ import annotations
 
 import csv
+import json
 import re
+import zlib
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Floats
 from ...errors import PackingFileError
-from ...packing.law import MindlinLaw
 from ..dumps import CONTACT, dump_frames
-from ..json_packing import read_packing
+from ..plain_file import open_text
 from .disks import Disks, Slips, of_columns
 from .table_units import decimal_point, in_one_unit, is_number, mass_unit, split_unit
 from .text_columns import columns_of, lines_of
@@ -65,19 +67,46 @@ def _is_comment(line: str) -> bool:
 
 
 def read_json(path: Path) -> Disks:
-    """Disks of a packing.json, which came to rest without friction: no contact has a slip."""
-    packing = read_packing(path, MindlinLaw(kn=1.0, kt=0.0, mu=0.0))  # the file says nothing about forces
-    none = np.zeros(0)
-    return Disks(
-        str(path),
-        packing.position,
-        packing.radius,
-        np.arange(1, len(packing) + 1),
-        packing.mass,
-        top=packing.top if packing.top.any() else None,
-        box_length=packing.box_length,
-        slips=Slips(none.astype(np.int64), none.astype(np.int64), none),
-    )
+    """Disks of a packing.json, which came to rest without friction: no contact has a slip.
+
+    It has the lists x, y, radius, and may have top (indices from 0, or true and false for each disk), mass (of each
+    disk, or of all) and box_length (period along x). Other keys are ignored.
+    """
+    try:
+        with open_text(path) as stream:
+            data = json.load(stream)
+        numbers = np.array([data["x"], data["y"], data["radius"]], dtype=np.float64)
+        columns, disks = dict(zip(("x", "y", "radius"), numbers, strict=True)), len(numbers[0])
+        if data.get("mass") is not None:
+            columns["mass"] = np.broadcast_to(np.asarray(data["mass"], dtype=np.float64), disks)
+        if (top := _upper_layer(data.get("top", []), disks)).any():
+            columns["top"] = top.astype(np.float64)
+        box_length = None if data.get("box_length") is None else float(data["box_length"])
+    except (OSError, EOFError, zlib.error) as error:
+        raise PackingFileError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}.") from error
+    except KeyError as error:
+        raise PackingFileError(
+            f"{path} lacks the key {error}; a packing file has x, y, radius, top, box_length."
+        ) from error
+    except (TypeError, AttributeError, ValueError, OverflowError) as error:
+        raise PackingFileError(f"{path} is not a packing file: {error}") from error
+    except RecursionError as error:
+        raise PackingFileError(f"{path} is not a packing file: its brackets are nested too deeply") from error
+    none = np.zeros(0, dtype=np.int64)
+    slips = Slips(none, none, np.zeros(0))
+    return of_columns(str(path), columns, box_length=box_length, slips=slips)
+
+
+def _upper_layer(listed: object, disks: int) -> NDArray[np.bool_]:
+    """The upper layer from indices of disks, or from true and false for each, shape (N,)."""
+    says = np.asarray(listed)
+    if says.dtype == np.bool_ and says.shape == (disks,):
+        return says
+    if says.size and (not np.issubdtype(says.dtype, np.integer) or says.min() < 0 or says.max() >= disks):
+        raise ValueError("top must hold indices of disks, counted from 0, or true and false for each disk.")
+    top = np.zeros(disks, dtype=np.bool_)
+    top[says.astype(np.int64)] = True
+    return top
 
 
 def read_slips(path: Path, length: str = "") -> Slips:

@@ -231,8 +231,8 @@ def packing_of(
     PackingFileError
         If disks lie below the floor or inside one another, or form no packing.
     """
-    _check_places(disks)
     try:
+        _check_places(disks)
         contacts = _contacts(disks, law)
         return Packing(
             position=disks.position,
@@ -250,6 +250,8 @@ def packing_of(
             drag_time=drag_time,
             slips_known=disks.slips_known or not law.frictional or len(contacts) == 0,
         )
+    except PackingFileError:
+        raise
     except ValueError as error:
         raise PackingFileError(f"{disks.source} describes no possible packing: {error}") from error
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from faultgouge.analysis import PackingFileError, read_dump, read_packing
+from faultgouge import load
+from faultgouge.analysis import PackingFileError, read_dump
 from faultgouge.analysis.files.dumps import dump_frames
 
 DISK_COLUMNS = "id type x y radius mass d_theta fx fy tqz floor_slip floor_overlap"
@@ -125,10 +126,10 @@ def test_packing_from_json(tmp_path, reference, reference_packing, cluster):
     path = tmp_path / "packing.json"
     path.write_text(json.dumps(reference))
     law = reference_packing(0.8).law
-    assert read_packing(path, law, fy=3.0) == reference_packing(0.8)
+    assert load(path, law=law, fy=3.0) == reference_packing(0.8)
     plain = {"x": [0.0, 1.0], "y": [1.0, 1.5], "radius": [0.5, 0.7]}
     path.write_text(json.dumps(plain))
-    packing = read_packing(path, law)
+    packing = load(path, law=law, fy=0.0, top=0)
     assert packing.box_length is None
     assert not packing.top.any()
     assert len(packing.contacts) == 1
@@ -141,7 +142,7 @@ def test_packing_from_json(tmp_path, reference, reference_packing, cluster):
         ("[1, 2]", "not a packing file"),
         ('{"x": [0], "y": [1]}', "lacks the key 'radius'"),
         ('{"x": [0], "y": [1, 2], "radius": [1]}', "not a packing file"),
-        ('{"x": [0], "y": [1], "radius": [-1]}', "positive"),
+        ('{"x": [0], "y": [1], "radius": [-1]}', "above 0"),
         ('{"x": ["a"], "y": [1], "radius": [1]}', "not a packing file"),
         ('{"x": [0], "y": [1], "radius": [1], "top": [1]}', "top"),
         ('{"x": [0], "y": [1], "radius": [1], "box_length": 1}', "two largest"),
@@ -151,5 +152,5 @@ def test_json_that_is_no_packing(tmp_path, cluster, content, says):
     path = tmp_path / "packing.json"
     path.write_text(content)
     with pytest.raises(PackingFileError, match=says) as error:
-        read_packing(path, cluster.law)
+        load(path, law=cluster.law, fy=0.0, top=0)
     assert "packing.json" in str(error.value)
