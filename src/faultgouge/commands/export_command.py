@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
+from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from .pictures import modes_of
 from .terminal import (
     Frame,
     PackingFile,
-    counted,
     lock_output,
     print_line,
     progress,

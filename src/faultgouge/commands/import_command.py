@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
-from .terminal import counted, lock_output, print_line, say, status
+from .terminal import lock_output, print_line, say, status
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
 from .terminal import (
     AsJson,
     ScenePath,
-    counted,
     lock_output,
     print_json,
     print_line,

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from .terminal import (
     Frame,
     PackingFile,
     Time,
-    counted,
     frame_at,
     growth_in,
     lock_output,

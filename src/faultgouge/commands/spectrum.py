@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from .terminal import (
     AsJson,
     Frame,
     PackingFile,
     Time,
-    counted,
     frame_at,
     print_json,
     say,

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
-from .terminal import Folder, Workers, counted, lock_folder, print_line, progress, say, table_of
+from .terminal import Folder, Workers, lock_folder, print_line, progress, say, table_of
 
 if TYPE_CHECKING:
     from faultgouge.studies.sweep.sweep_plan import Sweep

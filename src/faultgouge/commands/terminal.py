@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from ..signal_guard import holds
 
@@ -90,13 +91,6 @@ def stored_files(scene: Scene) -> list[Path]:
     """The files that a scene names: of its packing, and of the signal that forces it."""
     signals = [section.signal for section in (scene.perturb, scene.drive) if section is not None]
     return [Path(each) for each in (getattr(scene.packing, "file", None), *signals) if each is not None]
-
-
-def counted(number: int, noun: str, plural: str | None = None) -> str:
-    """A number with its noun, see `faultgouge.analysis.counted`, which is imported with all of the analysis."""
-    from faultgouge.analysis import counted
-
-    return counted.counted(number, noun, plural)
 
 
 def stored_packing(file: Path, frame: int = -1) -> Packing | Configuration:
