@@ -1,8 +1,7 @@
 """Damaged run.h5: flipped bytes, truncations, zeroed blocks, and edits of datasets and attributes through HDF5.
 
 A damaged file is refused in one sentence, for reading and for appending, or nothing has changed. Each is opened in a
-process of its own, so that a crash or a hang is seen. Files without a checksum, as version 0.1.0 wrote them, are edited
-as well: what makes no sense is refused. (Whether a number that makes sense is the right one, only a checksum can tell.)
+process of its own, so that a crash or a hang is seen.
 """
 
 import random
@@ -15,7 +14,6 @@ import h5py
 import numpy as np
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, PackingFileError, RunFile
-from faultgouge.analysis.files.atomic_write import HEADER_SIZE
 
 LONGEST = 20.0
 """Seconds that opening a file may take."""
@@ -132,10 +130,6 @@ def _zero_bytes(data: bytes, chance: random.Random, damaged: Path) -> str:
     return f"{size} bytes zeroed from {place}"
 
 
-def _edited_without_checksum(data: bytes, chance: random.Random, damaged: Path) -> str:
-    return "without checksum, " + _edit(data[HEADER_SIZE:], chance, damaged)
-
-
 def _edit(data: bytes, chance: random.Random, damaged: Path) -> str:
     damaged.write_bytes(data)
     with h5py.File(damaged, "r+") as file:
@@ -221,5 +215,4 @@ DAMAGES: tuple[Callable[[bytes, random.Random, Path], str], ...] = (
     _truncate,
     _zero_bytes,
     _edit,
-    _edited_without_checksum,
 )

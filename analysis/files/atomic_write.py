@@ -30,7 +30,7 @@ HEADER_SIZE = 512
 SEAL = b"faultgouge run file, sealed\n"
 HDF5 = b"\x89HDF\r\n\x1a\n"
 BEGINNINGS = HDF5, SEAL
-"""How a run.h5 begins: without a seal, as version 0.1.0 wrote it, and with one."""
+"""How files of HDF5 begin: those of others, and those of this program."""
 
 LONGEST_NAME = 200
 """Letters of a name that other names beside it begin with: file systems take 255 bytes."""
@@ -177,24 +177,15 @@ def add_checksum(content: bytes) -> bytes:
     return _header(hashlib.sha256(content).hexdigest(), len(content))
 
 
-def has_checksum(path: Path) -> bool:
-    """Whether a file has a header, and the checksum in the header is that of the content.
-
-    Returns
-    -------
-    bool
-        False for an HDF5 file without a header: whether it is whole is not known.
-
-    Raises
-    ------
-    PackingFileError
-        If the file cannot be read, or has changed since it was sealed.
-    """
+def check_checksum(path: Path) -> None:
+    """Refuse a file without a header, or whose content has not the checksum of the header, with a PackingFileError."""
     try:
         with open_plain(path) as stream:
             header = stream.read(HEADER_SIZE)
             if header.startswith(HDF5):
-                return False
+                raise PackingFileError(
+                    f"{path} is an HDF5 file, and no run of faultgouge: it lacks the lines with which these begin."
+                )
             if not header.startswith(SEAL):
                 convert = f"a packing of another code is converted by `faultgouge import {path} -o packing.h5`"
                 raise PackingFileError(f"{path} is not a readable HDF5 file, as it begins like none: {convert}.")
@@ -209,7 +200,6 @@ def has_checksum(path: Path) -> bool:
             f"{path} is damaged: its {size} bytes do not have the checksum that was written with them; take a copy of "
             "the file, or make it again."
         )
-    return True
 
 
 def _header(digest: str, size: int) -> bytes:

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from numpy.typing import NDArray
 
 from ..errors import PackingFileError
-from .atomic_write import HEADER_SIZE, add_checksum, has_checksum, write_whole
+from .atomic_write import HEADER_SIZE, add_checksum, check_checksum, write_whole
 from .plain_file import read_plain
-from .runfile_validation import check
+from .runfile_validation import check_places
 
 if TYPE_CHECKING:
     import h5py
@@ -42,7 +42,7 @@ class SealedFile:
     Raises
     ------
     PackingFileError
-        If the file is missing, damaged, or not what it should be; for changes, if it has no checksum.
+        If the file is missing or damaged, or no run of this program.
     """
 
     def __init__(self, path: str | PathLike[str], mode: Literal["r", "a"] = "r") -> None:
@@ -50,18 +50,20 @@ class SealedFile:
         self._unsaved, self._sound, self._next_save = False, True, 0.0
         if not self.path.is_file():
             raise PackingFileError(f"{self.path} {'is no file' if self.path.exists() else 'does not exist'}.")
-        sealed, self._writable = has_checksum(self.path), mode == "a"
-        self._file = _image(self.path) if sealed and self._writable else open_checksummed(self.path)
+        check_checksum(self.path)
+        self._writable = mode == "a"
+        self._file = _image(self.path) if self._writable else open_checksummed(self.path)
         try:
-            check(self._file, self.path, self.path.stat().st_size)
-            if self._writable and not sealed:
-                raise PackingFileError(
-                    f"{self.path} has no checksum, as files of version 0.1.0, and is not continued: give another name, "
-                    "or delete it."
-                )
-        except PackingFileError:
+            check_places(self._file)
+        except PackingFileError as error:
             self._file.close()
-            raise
+            raise PackingFileError(f"{self.path} is refused: {error}.") from error
+        if "snapshot" in self._file:
+            self._file.close()
+            raise PackingFileError(
+                f"{self.path} holds a packing as LAMMPS left it, and no run of this program's own: the commands "
+                "spectrum, draw, movie, view and export take it."
+            )
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -75,8 +77,8 @@ class SealedFile:
 
     @property
     def complete(self) -> bool:
-        """Whether the run has come to its end; a file of version 0.1.0 does not say, and counts as complete."""
-        return bool(self._file.attrs.get("complete", True))
+        """Whether the run has come to its end."""
+        return bool(self._file.attrs["complete"])
 
     @complete.setter
     def complete(self, value: bool) -> None:

@@ -20,11 +20,11 @@ from scipy.sparse import csr_array
 from ..configuration import Configuration
 from ..contacts import PER_CONTACT, LinearisedContacts
 from ..errors import PackingFileError
-from .atomic_write import BEGINNINGS, has_checksum
+from .atomic_write import SEAL, check_checksum
 from .checksummed_file import new_file, open_checksummed, write
 from .plain_file import open_plain
 from .runfile_header import CHECKSUM, CREATOR, program_version
-from .runfile_validation import check_places, dataset
+from .runfile_validation import check_places
 
 if TYPE_CHECKING:
     import h5py
@@ -96,45 +96,33 @@ def holds_configuration(path: Path) -> bool:
 
     Raises PackingFileError if the file has changed since it was sealed.
     """
-    import h5py
-
     try:
         with open_plain(path) as stream:
-            if not stream.read(max(map(len, BEGINNINGS))).startswith(BEGINNINGS):
+            if stream.read(len(SEAL)) != SEAL:
                 return False
     except OSError:
         return False
-    has_checksum(path)  # before HDF5 sees what has changed
-    try:
-        with h5py.File(path, "r", locking=False) as file:
-            return "snapshot" in file
-    except (OSError, RuntimeError):  # a damaged file without a checksum, which the reader of a run refuses
-        return False
+    check_checksum(path)  # before HDF5 sees what has changed
+    with open_checksummed(path) as file:
+        return "snapshot" in file
 
 
 def read_configuration(path: Path) -> Configuration:
     """The configuration of a file. Raises PackingFileError if the file is missing, damaged, or holds none."""
     if not path.is_file():
         raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
-    has_checksum(path)  # refuses what has changed
+    check_checksum(path)
     with open_checksummed(path) as file:
         try:
             check_places(file)
-            group, size = file["snapshot"], path.stat().st_size
-            given = group["contacts"]
+            group, given = file["snapshot"], file["snapshot/contacts"]
             contacts = LinearisedContacts(
-                **{
-                    name: dataset(given, name, size)[()]
-                    for name in PER_CONTACT
-                    if name in given or name not in LATER_KEYS
-                }
+                **{name: given[name][()] for name in PER_CONTACT if name in given or name not in LATER_KEYS}
             )
-            arrays = {
-                name: dataset(group, name, size)[()] for name in ARRAYS if name in group or name not in LATER_KEYS
-            }
+            arrays = {name: group[name][()] for name in ARRAYS if name in group or name not in LATER_KEYS}
             stored = [name for name in SCALARS if name in group.attrs or name not in LATER_KEYS]
             numbers = {name: group.attrs[name].item() for name in stored}
-            matrices = {name: _matrix(group[name], size) for name in MATRICES if name in group}
+            matrices = {name: _matrix(group[name]) for name in MATRICES if name in group}
             proof = group.attrs["proof"].item() if "proof" in group.attrs else None
             remarks = [str(each) for each in group.attrs.get("remarks", ())]
             return Configuration(contacts=contacts, **arrays, **numbers, **matrices, proof=proof, remarks=remarks)
@@ -143,9 +131,9 @@ def read_configuration(path: Path) -> Configuration:
             raise PackingFileError(f"{path} holds no configuration that can be read: {said}.") from error
 
 
-def _matrix(group: "h5py.Group", size: int) -> csr_array:
+def _matrix(group: "h5py.Group") -> csr_array:
     """A square sparse matrix; an error if it is none."""
-    data, indices, indptr = (dataset(group, name, size)[()] for name in MATRIX_PARTS)
+    data, indices, indptr = (group[name][()] for name in MATRIX_PARTS)
     matrix = csr_array((data, indices, indptr), shape=(len(indptr) - 1,) * 2)
     matrix.check_format()
     return matrix

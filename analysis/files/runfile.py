@@ -26,7 +26,7 @@ parts of its positions.
 
 The stored file is complete at any moment and has a checksum over all its bytes (:mod:`.checksummed_file`). The
 attribute ``complete`` of the root is false until the run has ended; until then, an undamped run continues from the
-state in ``/checkpoint``. The whole file is checked when it is opened (:mod:`.runfile_validation`).
+state in ``/checkpoint``.
 
 Datasets depend on the scene alone. The circumstances of the run (resolved scene, versions, seed, ranks) are attributes
 of the root. One file contains one set of disks and one law.
@@ -49,7 +49,6 @@ from ..packing.contacts import Contacts
 from ..packing.packing import Packing
 from .checksummed_file import SealedFile, new_file, write
 from .runfile_header import CHECKSUM, COMPACT, law_of_parameters, parameters_of, write_header
-from .runfile_validation import equilibria
 
 if TYPE_CHECKING:
     import h5py
@@ -118,7 +117,8 @@ class RunFile(SealedFile):
 
     def __len__(self) -> int:
         """Number of equilibria; frames of a trajectory do not count."""
-        return equilibria(self._file)
+        trajectory = self._file.get("faultgouge/trajectory/time", ())
+        return int(self._step.shape[0]) - len(trajectory)
 
     @property
     def fx(self) -> Floats:
@@ -347,7 +347,7 @@ class RunFile(SealedFile):
         if group is None:
             raise PackingFileError(f"{self.path} has no series {name}.")
         columns = {column: group[column][: _rows(group)] for column in group}
-        if name == "trajectory" and "position" not in columns:
+        if name == "trajectory":
             columns["position"] = self._file["particles/disks/position/value"][len(self) :, :, :2]
         return columns
 

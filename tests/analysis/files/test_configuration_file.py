@@ -81,7 +81,7 @@ def huge(file):
     [
         (elsewhere, "numbers in another file"),
         (replace_by_link, "link to another file"),
-        (huge, "more than its 0 bytes hold"),
+        (huge, "has the shape"),
     ],
 )
 def test_what_the_checksum_does_not_cover_is_refused(tmp_path, change, says):
