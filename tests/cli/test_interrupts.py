@@ -236,7 +236,7 @@ guarded(work)
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_long_call_of_a_library_does_not_hold_the_signal(tmp_path):
     command = [sys.executable, "-c", IN_A_LIBRARY]
     running = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True)
