@@ -70,7 +70,7 @@ def equilibria(path):
     [
         pytest.param("ramp", 1, 4, False, marks=pytest.mark.long, id="one rank"),
         pytest.param("ramp", 2, 4, False, id="two ranks"),
-        pytest.param("perturb", 1, 1, True, id="all processes, as a terminal does"),
+        pytest.param("perturb", 1, 1, True, marks=pytest.mark.long, id="all processes, as a terminal does"),
     ],
 )
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])

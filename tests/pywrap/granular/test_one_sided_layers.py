@@ -96,6 +96,7 @@ def test_vibration_carries_particles_on_whose_contacts_wear_down(far_from_the_bo
     assert np.sqrt(found[-1]) / 12 == pytest.approx(verdict.creep.velocity, rel=0.3)
 
 
+@pytest.mark.long
 def test_with_loss_particles_stay_displaced(far_from_the_bound):
     """Every linear motion decays, and D rises."""
     packing = far_from_the_bound(20.0)
