@@ -25,10 +25,6 @@ def draw_cycle(packings: Sequence[Packing], axes: Axes | None = None) -> Figure:
         Equilibria one after the other, all of the same disks.
     axes : Axes, optional
         Where to draw; a figure of its own by default.
-
-    Returns
-    -------
-    Figure
     """
     axes = Figure(layout="constrained").add_subplot() if axes is None else axes
     moved, label = in_powers_of_ten(layer_displacement(packings)[:, 0])

@@ -43,10 +43,6 @@ def draw_series(
         Name in the legend.
     color : str
         Colour of the line.
-
-    Returns
-    -------
-    Figure
     """
     alone, axes = axes is None, Figure(layout="constrained").add_subplot() if axes is None else axes
     time, values = positive(time, values, log_x=False)

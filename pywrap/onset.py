@@ -120,10 +120,6 @@ def onset_run(
         Folder in which the search of a large packing stores its slices, and from which the search continues, see
         :func:`~faultgouge.analysis.find_onset`.
 
-    Returns
-    -------
-    Onset
-
     Raises
     ------
     SceneError

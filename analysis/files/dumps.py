@@ -114,10 +114,6 @@ def read_dump(
         As in :class:`~faultgouge.analysis.Packing`; by default those of the file ``.params``; without this file, no
         load and inertia factor 1. The law then has no default.
 
-    Returns
-    -------
-    Packing
-
     Raises
     ------
     PackingFileError

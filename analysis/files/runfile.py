@@ -216,10 +216,6 @@ class RunFile(SealedFile):
         frame : int
             Number of the frame; negative ones count from the end.
 
-        Returns
-        -------
-        Packing
-
         Raises
         ------
         PackingFileError

@@ -101,14 +101,8 @@ def explain(scene: Scene, timed: bool = False) -> Explanation:
 
     Parameters
     ----------
-    scene : Scene
-        Any.
     timed : bool
         Whether to measure what each part costs, and whether two ranks move as one does: several times as long.
-
-    Returns
-    -------
-    Explanation
 
     Raises
     ------

@@ -51,12 +51,6 @@ def extremes(
         The folder, made if need be.
     quick : bool
         Only the small part of the cases.
-    say : callable
-        Takes a line of progress.
-    progress : callable
-        Wraps the cases to show how far it is.
-    cases : sequence of Case
-        What to try.
 
     Returns
     -------

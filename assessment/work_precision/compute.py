@@ -73,17 +73,8 @@ def report(
         The folder, made if need be.
     quick : bool
         Whether to compute fewer points, in a minute instead of ten.
-    say : callable
-        Called with each line of progress.
     progress : callable
         Called with the name of a list of runs and the list; returns an iterable that shows how far it is.
-    studies : dict
-        Name to function.
-
-    Returns
-    -------
-    dict
-        What report.json holds.
 
     Raises
     ------

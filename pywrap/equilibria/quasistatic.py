@@ -137,10 +137,6 @@ def equilibrate(
         Whether to try the methods in `ATTEMPTS` if halving the increment fails. By default the branch of equilibria
         ends there.
 
-    Returns
-    -------
-    Equilibrium
-
     Raises
     ------
     NoEquilibriumError

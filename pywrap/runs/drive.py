@@ -59,10 +59,6 @@ def drive(
     communicator : mpi4py.MPI.Comm, optional
         The ranks that share the packing; all by default.
 
-    Yields
-    ------
-    DriveStep
-
     Warns
     -----
     UserWarning

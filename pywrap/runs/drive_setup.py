@@ -56,10 +56,6 @@ def settle_for_drive(scene: Scene, communicator: MPI.Comm | None = None, watch: 
     watch : callable, optional
         Told in words what is under way.
 
-    Returns
-    -------
-    Packing
-
     Raises
     ------
     NoEquilibriumError

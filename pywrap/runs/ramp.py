@@ -48,10 +48,6 @@ def ramp(
         Number of loads of the ramp, the first of them 0, before `start`, see `count_behind`; by default the loads up to
         its F_x on the way to the first turning point.
 
-    Yields
-    ------
-    Equilibrium
-
     Raises
     ------
     SceneError
@@ -86,10 +82,6 @@ def reach(scene: Scene, fx: float, communicator: MPI.Comm | None = None) -> Iter
         The last F_x, force on each disk of the upper layer.
     communicator : mpi4py.MPI.Comm, optional
         The ranks that share the packing; all by default.
-
-    Yields
-    ------
-    Equilibrium
 
     Raises
     ------

@@ -123,10 +123,6 @@ class Scene(SceneKeys):
             The command, or the task of a sweep, that reads the scene: the scene then has the sections that it reads
             (:mod:`faultgouge.pywrap.scenes.command_sections`). By default all.
 
-        Returns
-        -------
-        Scene
-
         Raises
         ------
         SceneError
@@ -149,10 +145,6 @@ class Scene(SceneKeys):
             The folder to which a relative packing.file refers.
         command : str, optional
             As in `from_toml`.
-
-        Returns
-        -------
-        Scene
 
         Raises
         ------

@@ -44,10 +44,7 @@ def _magnitude(text: str, unit: str) -> float:
 def quantity(place: str, text: str, unit: str) -> float:
     """A quantity somewhere in a scene as a number of SI units; a frequency in hertz as an angular frequency.
 
-    Raises
-    ------
-    ValueError
-        If it is no quantity, or one of another dimension: a sentence without its full stop.
+    Raises ValueError if it is no quantity, or one of another dimension: a sentence without its full stop.
     """
     try:
         number = to_si(text, unit)

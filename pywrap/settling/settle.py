@@ -74,10 +74,6 @@ def settle(
         Result of `settle_bed` for a scene that settles to the same packing. The packing is then not settled again, and
         the equilibrium is bitwise the same.
 
-    Returns
-    -------
-    Equilibrium
-
     Raises
     ------
     SceneError

@@ -21,10 +21,7 @@ from .onset import onset
 def trigger(scene: Scene, start: Start) -> Row:
     """The map of one scene, with the bisections that [trigger] asks for.
 
-    Raises
-    ------
-    SceneError
-        If the scene has no section [ramp], or no v_0.
+    Raises SceneError if the scene has no section [ramp], or no v_0.
     """
     threshold(scene)
     wave, first = settings(scene), onset(scene, start)
