@@ -1,4 +1,4 @@
-"""Damaged run.h5: flipped bytes, truncations, zeroed blocks, and edits of datasets and attributes through HDF5.
+"""Damaged run.h5: flipped bytes, truncations, zeroed blocks.
 
 A damaged file is refused in one sentence, for reading and for appending, or nothing has changed. Each is opened in a
 process of its own, so that a crash or a hang is seen.
@@ -10,7 +10,6 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Literal
 
-import h5py
 import numpy as np
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, PackingFileError, RunFile
@@ -19,8 +18,6 @@ LONGEST = 20.0
 """Seconds that opening a file may take."""
 
 FORKED = get_context("fork")
-
-Edit = Callable[[h5py.File, str, random.Random], None]
 
 
 def sound_file(path: Path) -> None:
@@ -130,89 +127,9 @@ def _zero_bytes(data: bytes, chance: random.Random, damaged: Path) -> str:
     return f"{size} bytes zeroed from {place}"
 
 
-def _edit(data: bytes, chance: random.Random, damaged: Path) -> str:
-    damaged.write_bytes(data)
-    with h5py.File(damaged, "r+") as file:
-        names: list[str] = []
-        file.visit(names.append)
-        name = chance.choice(names)
-        kind = chance.choice([*EDITS])
-        EDITS[kind](file, name, chance)
-    return f"{kind}: {name}"
-
-
-def _delete(file: h5py.File, name: str, chance: random.Random) -> None:
-    del file[name]
-
-
-def _replace(value: object) -> Edit:
-    def edit(file: h5py.File, name: str, chance: random.Random) -> None:
-        del file[name]
-        file[name] = value
-
-    return edit
-
-
-def _retype(file: h5py.File, name: str, chance: random.Random) -> None:
-    if isinstance(file[name], h5py.Dataset):
-        value = file[name][()]
-        del file[name]
-        file[name] = np.asarray(value).astype(chance.choice(["f4", "i2", "S8", "c16", "?"]))
-
-
-def _reshape(file: h5py.File, name: str, chance: random.Random) -> None:
-    if isinstance(file[name], h5py.Dataset):
-        value = np.asarray(file[name][()])
-        del file[name]
-        file[name] = chance.choice([value.ravel(), value[..., None], value.ravel()[: value.size // 2], value.T])
-
-
-def _put(number: float) -> Edit:
-    def edit(file: h5py.File, name: str, chance: random.Random) -> None:
-        item = file[name]
-        if isinstance(item, h5py.Dataset) and item.size and item.dtype.kind == "f":
-            item[tuple(chance.randrange(extent) for extent in item.shape)] = number
-
-    return edit
-
-
-def _huge(file: h5py.File, name: str, chance: random.Random) -> None:
-    if isinstance(file[name], h5py.Dataset):
-        shape = tuple(10 ** chance.choice([7, 12]) for _ in file[name].shape) or (10**12,)
-        del file[name]
-        file.create_dataset(name, shape[:1], "f8", chunks=(1000,))
-
-
-def _attributes(file: h5py.File, name: str, chance: random.Random) -> None:
-    item = file[name] if len(file[name].attrs) else file
-    for key in list(item.attrs):
-        item.attrs[key] = chance.choice([np.nan, "other", np.arange(5), 1e300])
-
-
-def _link(file: h5py.File, name: str, chance: random.Random) -> None:
-    del file[name]
-    file[name] = h5py.SoftLink(chance.choice(["/", "/nowhere", f"/{name}"]))
-
-
-EDITS: dict[str, Edit] = {
-    "deleted": _delete,
-    "made a number": _replace(1.0),
-    "made a text": _replace("text"),
-    "made empty": _replace(h5py.Empty("f8")),
-    "another type": _retype,
-    "another shape": _reshape,
-    "a nan": _put(np.nan),
-    "an infinite number": _put(np.inf),
-    "a huge number": _put(1e300),
-    "a huge shape": _huge,
-    "other attributes": _attributes,
-    "a link": _link,
-}
-
 DAMAGES: tuple[Callable[[bytes, random.Random, Path], str], ...] = (
     _flip_bits,
     _flip_bits,
     _truncate,
     _zero_bytes,
-    _edit,
 )
