@@ -149,7 +149,13 @@ def coverage_figure(cases: Sequence[StatedError]) -> Figure:
     """
     figure = Figure(figsize=(4.6, 3.6), layout="constrained")
     axes = figure.subplots()
-    smallest = _frame_axes(axes, [(case.true, case.stated) for case in cases])
+    errors = [each for case in cases for each in (case.true, case.stated)]
+    smallest, largest = 0.3 * min(each for each in errors if each > 0), 3 * max(errors)
+    axes.plot([smallest, largest], [smallest, largest], color=INK, linewidth=0.8)
+    axes.fill_between([smallest, largest], [smallest, largest], largest, color=INK, alpha=0.06, linewidth=0)
+    axes.text(0.06, 0.94, "covered", transform=axes.transAxes, va="top")
+    axes.set(xscale="log", yscale="log", xlim=(smallest, largest), ylim=(smallest, largest))
+    axes.set(xlabel="true error of $F_x^c$", ylabel="stated error of $F_x^c$", aspect="equal")
     for number, arithmetic in enumerate(dict.fromkeys(case.arithmetic for case in cases)):
         of_it = sorted((case for case in cases if case.arithmetic == arithmetic), key=lambda case: case.true)
         for place, case in enumerate(of_it):
@@ -160,15 +166,3 @@ def coverage_figure(cases: Sequence[StatedError]) -> Figure:
             axes.annotate(f"{case.increment:g}", at, xytext=aside, textcoords="offset points", fontsize="small")
     axes.legend(loc="lower right")
     return figure
-
-
-def _frame_axes(axes: Axes, errors: Sequence[tuple[float, float]]) -> float:
-    """Draw the line of equal errors and shade the covered side; return the smallest value on the axes."""
-    smallest = 0.3 * min(each for pair in errors for each in pair if each > 0)
-    largest = 3 * max(each for pair in errors for each in pair)
-    axes.plot([smallest, largest], [smallest, largest], color=INK, linewidth=0.8)
-    axes.fill_between([smallest, largest], [smallest, largest], largest, color=INK, alpha=0.06, linewidth=0)
-    axes.text(0.06, 0.94, "covered", transform=axes.transAxes, va="top")
-    axes.set(xscale="log", yscale="log", xlim=(smallest, largest), ylim=(smallest, largest))
-    axes.set(xlabel="true error of $F_x^c$", ylabel="stated error of $F_x^c$", aspect="equal")
-    return smallest

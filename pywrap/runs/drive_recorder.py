@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from mpi4py import MPI
 from scipy.special import stdtrit
 
 from ...analysis import RunFile
@@ -42,7 +41,7 @@ COMPARABLE = 0.5
 
 
 class DriveRecord(Record):
-    """The drive.h5 of a scene, created or continued after an interruption; parameters as of `Record`.
+    """The drive.h5 of a scene, created or continued after an interruption; parameters as of `Record`, on all ranks.
 
     Its frames are states of the run, with the observables `time` and `displacement`. F_x of a frame is the force of the
     spring.
@@ -52,10 +51,9 @@ class DriveRecord(Record):
         self,
         path: Path,
         scene: Scene,
-        communicator: MPI.Comm | None = None,
         saved: Callable[[str, Path], object] = lambda words, path: None,
     ) -> None:
-        super().__init__(path, scene, communicator, "drive", saved)
+        super().__init__(path, scene, task="drive", saved=saved)
         self._others: Mapping[Path, Scene] = {}
         self._step, self._decided = 0, 1
 
