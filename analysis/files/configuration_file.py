@@ -34,6 +34,11 @@ ARRAYS = (
     "position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind", "top", "jump",
     "wall_force",
 )  # fmt: skip
+LATER_KEYS = (
+    "slider", "viscous_slider", "top", "drag_rate", "spring", "operator_error", "jump", "wall_force", "slips_known",
+)  # fmt: skip
+"""Keys that files of version 1 do not have."""
+
 MATRICES = ("stiffness", "damping", "constraint")
 MATRIX_PARTS = ("data", "indices", "indptr")
 
@@ -111,9 +116,12 @@ def read_configuration(path: Path) -> Configuration:
         try:
             check_places(file)
             group, given = file["snapshot"], file["snapshot/contacts"]
-            contacts = LinearisedContacts(**{name: given[name][()] for name in PER_CONTACT})
-            arrays = {name: group[name][()] for name in ARRAYS}
-            numbers = {name: group.attrs[name].item() for name in SCALARS}
+            contacts = LinearisedContacts(
+                **{name: given[name][()] for name in PER_CONTACT if name in given or name not in LATER_KEYS}
+            )
+            arrays = {name: group[name][()] for name in ARRAYS if name in group or name not in LATER_KEYS}
+            stored = [name for name in SCALARS if name in group.attrs or name not in LATER_KEYS]
+            numbers = {name: group.attrs[name].item() for name in stored}
             matrices = {name: _matrix(group[name]) for name in MATRICES if name in group}
             proof = group.attrs["proof"].item() if "proof" in group.attrs else None
             remarks = [str(each) for each in group.attrs.get("remarks", ())]

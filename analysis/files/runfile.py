@@ -54,6 +54,10 @@ if TYPE_CHECKING:
     import h5py
 
 
+NONE_GIVEN = "none were given"
+"""The attribute tangential_forces of older files, where slips are not known."""
+
+
 class RunFile(SealedFile):
     """A run.h5, open for reading or for appending; a context manager.
 
@@ -254,7 +258,7 @@ class RunFile(SealedFile):
             fy=self._file["observables/fy/value"][frame],
             position_low=low["value"][frame] if low is not None else None,
             spring=parameters.get("spring", 0.0),
-            slips_known="slips_known" not in parameters,
+            slips_known="slips_known" not in parameters and self.attributes.get("tangential_forces") != NONE_GIVEN,
         )
 
     def append_trajectory(self, time: ArrayLike, position: ArrayLike, position_low: ArrayLike | None = None) -> None:
