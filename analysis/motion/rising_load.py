@@ -18,7 +18,7 @@ One vibration was steady for ten windows and then grew to another one. So at lea
 two starts: with a drag on all coordinates, and with a drag that leaves rotations alone. A packing may vibrate in two
 ways, one from each start.
 
-**Range.** While the load rises the drift takes sticking contacts to Coulomb's bound and opens others
+**Range.** While the load rises the drift takes sticking contacts to Coulomb's bound, and opens or closes others
 (:mod:`~faultgouge.analysis.motion.next_change`). From then on the packing is another one. A contact that counts as at
 the bound may lack a little force, and slides once the load has risen enough. The residual forces move the packing, too,
 and count until the load has moved the packing ten times as far. If another contact reaches the bound or opens before,
@@ -137,9 +137,9 @@ class RisingMotion(DriftAndVibration):
         Increase of the load from which on contacts that count as at Coulomb's bound have reached the bound, and the
         load has moved the packing ten times as far as the residual forces do.
     next_change : float or None
-        Increase of the load, to first order, at which the first other contact reaches the bound or opens.
+        Increase of the load at which the first other contact changes.
     next_event : str or None
-        Which of the two.
+        What this contact does: it reaches the bound, opens, closes, or turns its force at the bound.
     """
 
     time: float | None = None

@@ -44,14 +44,15 @@ def block(lammps_with):
     return make
 
 
-def moved(lmp, velocity: float, steps: int, which: int = 1) -> float:
-    """By how much a block moves ahead in some steps of 0.001 without drag, over the velocity of the push."""
+def moved(lmp, velocity: float, steps: int, which: int = 1, axis: int = 0) -> float:
+    """By how much a block moves ahead in some steps of 0.001 without drag, over the velocity of the push along an
+    axis."""
     from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy, quieten
 
     def follow():
         quieten(lmp, drag=True)
         before = float(of_particle(lmp, "x", which)[0])
-        of_particle(lmp, "v", which)[0] = velocity
+        of_particle(lmp, "v", which)[axis] = velocity
         lmp.command(f"run {steps} post no")
         return (float(of_particle(lmp, "x", which)[0]) - before) / abs(velocity)
 
@@ -123,6 +124,28 @@ def test_a_push_back_may_be_so_large_that_the_block_slides_back(block, share):
     assert of_small == pytest.approx(motion.displacement[-1, 0, 0], rel=0.01)  # of LAMMPS's time steps
     assert near == pytest.approx(of_small, rel=1e-6)
     assert abs(beyond - of_small) > 0.1 * abs(of_small)
+
+
+def test_a_push_sideways_turns_the_force_at_the_bound_and_the_block_slides_ahead(block):
+    """To first order it vibrates sideways alone. As its force a turns, what is left along the slope is a^2/(2 mu f_n),
+    which accelerates it ahead; and nothing stops it. A load that rises sideways does so for ever."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = block(1.0)
+    here, times = from_lammps(lmp), np.linspace(0.02, 2.0, 100)
+    motion = one_sided_motion(here, [[0.0, 1.0, 0.0]], times=times)
+    assert np.all(motion.displacement[..., 0] == 0)
+    allowed = 0.1 * np.abs(motion.displacement[..., 1]).max()
+    assert moved(lmp, motion.scales[1], 2000, axis=1) == pytest.approx(0.9 * allowed, rel=0.1)
+    verdict = stability(here, rise=[[0.0, 1.0, 0.0]], time=0.1)
+    assert "the load turns the forces of contacts at Coulomb's bound, and nothing holds" in verdict.not_followed
+    rate, time = 0.01 * here.contacts.friction[0], 2.0
+    command(lmp, f"unfix drag\nreset_timestep 0\nvariable rise equal {rate}*step*dt\nfix rise all addforce 0 v_rise 0")
+    before = np.array(of_particle(lmp, "x", 1)[:2])
+    command(lmp, f"run {round(time / 0.001)} post no")
+    ahead, sideways = of_particle(lmp, "x", 1)[:2] - before
+    assert sideways == pytest.approx(rate * time / 300, rel=0.05)  # the slip ahead is turned, too
+    assert ahead == pytest.approx((rate * time**2) ** 2 / (24 * here.contacts.friction[0] * here.mass[0]), rel=0.05)
 
 
 def test_of_a_block_that_slides_the_load_alone_is_not_accused(block):
