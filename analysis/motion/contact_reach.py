@@ -9,8 +9,9 @@ of the bound: contact c lacks a force :math:`m_c`, and slides by
 
 A motion s times as large is the motion with :math:`m_c / s`. Where sliding contacts make motion grow, the missing
 forces may turn a small motion back before it has begun to grow. `ContactReach` follows the motion with missing forces
-for larger and larger s, until it is the motion of contacts at the bound. A contact at the bound that is displaced sideways by a force
-:math:`a_c` slides ahead, since then its force has the length :math:`\mu f_n` and another direction: to second order by
+for larger and larger s, until it is the motion of contacts at the bound. A contact at the bound that is displaced
+sideways by a force :math:`a_c` slides ahead, since then its force has the length :math:`\mu f_n` and another direction:
+to second order by
 
 .. math:: p_c(t) = \max_{t' \le t} \left(Y_c q + Z_c \dot q + \frac{s\, a_c^2}{2 \mu f_n}\right)_+ .
 
