@@ -167,6 +167,39 @@ def test_velocities_that_are_left_out_are_named(block, speed):
     assert (says in str(stability(from_lammps(lmp)))) == (speed > 1e-3)
 
 
+SPHERE = np.pi / 6
+UNEQUAL = (
+    head("block -2 2 -2 2 0 4", "p p f", kinds=2)
+    + f"""
+create_atoms 1 single -1 0 {0.5 - SPHERE / 1e3:.17g} units box
+create_atoms 2 single 1 0 {0.05 - 1e-3 * SPHERE / 1e3:.17g} units box
+set type 1 diameter 1.0
+set type 2 diameter 0.1
+set group all density 1.0
+pair_style granular
+pair_coeff * * {LAW}
+fix floor all wall/gran granular {LAW} zplane 0 NULL contacts
+fix load all gravity 1.0 vector 0 0 -1
+fix move all nve/sphere
+timestep 1e-4
+thermo 1000000
+run 0
+"""
+)
+"""A sphere, and one of a thousandth of its mass."""
+
+
+@pytest.mark.parametrize(("which", "named"), [(1, True), (2, False)])
+@pytest.mark.parametrize(("name", "radius"), [("v", (1.0, 1.0)), ("omega", (0.5, 0.05))])
+def test_the_mass_of_what_moves_decides_whether_its_velocity_is_named(lammps_with, which, named, name, radius):
+    """A velocity of 2e-5 becomes a force of 2e-5 (k m)^(1/2): 17e-4 of the mean force, or 0.5e-4; 1e-4 may be left."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = lammps_with(UNEQUAL)
+    of_particle(lmp, name, which)[1] = 2e-5 / radius[which - 1]
+    assert any("particles move by up to 2e-05 " in each for each in from_lammps(lmp).remarks) is named
+
+
 HILL = (
     head("block -3 6 -3 3 0 6", kinds=2)
     + f"""
