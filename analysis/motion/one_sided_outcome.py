@@ -9,7 +9,8 @@ odd. A motion
   slips in four spans of time fall about as fast as this vibration, and little slip is still to come;
 - *has not settled* otherwise.
 
-A motion is followed in chunks of `STEPS_OF_CHUNK` stable time steps, up to `WORK` multiplications.
+A motion is followed in chunks of `STEPS_OF_CHUNK` stable time steps, up to `WORK` multiplications; of small packings up
+to `MOST_CHUNKS`, or longer if D gains at a steady rate, by which it may gain `DECADES` in the end.
 
 Under a law of two derivatives vibration wears tangential forces down (:mod:`~faultgouge.analysis.motion.creep`), at a
 rate that falls with the vibration, so that sliders may slide again after they have come to rest. Such a motion rests as
@@ -27,6 +28,7 @@ from ..configuration import Configuration
 from ..fields_by_name import FieldsByName
 from ..progress import report_progress
 from .contact_reach import ContactReach
+from .fastest_growing import CHANCE
 from .one_sided import OneSidedState, OneSidedSystem
 
 PUSHES = 2
@@ -48,9 +50,15 @@ LOOKS_PER_CHUNK = 10
 WORK = 2e11
 """Multiplications with entries of the operators that one motion may take: three minutes."""
 
+MOST_CHUNKS, CHUNKS_OF_GROWTH = 40, 120
+"""Chunks that small packings are followed at the most, and those in which D gains at a steady rate."""
+
 DECADES = 8.0
 """Growth of D that no packing at rest was seen to reach without growing for ever: transient amplification of packings
 at Coulomb's bound went up to 6e5."""
+
+FOLDS_OF_GROWTH = float(DECADES * np.log(10) - 2 * np.log(CHANCE))
+"""E-folds of D after which growth is seen, but for the probability `CHANCE` that a push has less of the motion."""
 
 MOST_DECADES = 25.0
 """Growth of D at which a motion has grown enough."""
@@ -97,7 +105,10 @@ class OneSidedOutcome(FieldsByName):
     error : float or None
         Error of the growth rate of a motion that grows.
     searched : float
-        Growth rate of D, 1 / time, below which growth would not have been seen; 0 where `grows` is known.
+        Growth rate of D, 1 / time, below which growth may not have been seen; 0 where `grows` is known.
+    needed : float or None
+        After which time `grows` may be known: as D gains at its rate, or at that with sticking contacts; or as contacts
+        slide while the slowest vibration decays. None where `grows` is known, or this time is over.
     amplification : float
         Largest D, while contacts slid, over the mean square velocity of the push along an axis, time^2: motion that
         goes on may take D further.
@@ -121,6 +132,7 @@ class OneSidedOutcome(FieldsByName):
     growth_rate: float | None
     error: float | None
     searched: float
+    needed: float | None
     amplification: float
     slip_left: float | None
     wears: bool
@@ -155,13 +167,15 @@ class _Looks:
         return np.array(self.sizes)
 
 
-def window_and_most(system: OneSidedSystem, columns: int, time: float | None) -> tuple[float, int]:
-    """Time of a window, and how many there are at most."""
+def window_and_most(
+    system: OneSidedSystem, columns: int, time: float | None, chunks: int = MOST_CHUNKS
+) -> tuple[float, int]:
+    """Time of a window, and how many there are at most; up to so many chunks if no time is given."""
     chunk = STEPS_OF_CHUNK * system.time_step / system.step_share
     if time is not None:
         return time / WINDOWS_OF_TIME, WINDOWS_OF_TIME
     entries = (system.motion.stiffness.nnz + system.motion.damping.nnz) * columns
-    return chunk, int(np.clip(WORK / (entries * chunk / system.time_step), 4, 40))
+    return chunk, int(np.clip(WORK / (entries * chunk / system.time_step), 4, chunks))
 
 
 def follow_pushes(
@@ -182,14 +196,15 @@ def follow_pushes(
     """
     state = system.start(random_pushes(system.motion.configuration, pushes))
     chunk, most = window_and_most(system, 2 * pushes, None)
+    longest = window_and_most(system, 2 * pushes, None, CHUNKS_OF_GROWTH)[1]
     if time is not None:  # whoever gives more time sees what a shorter run sees, too
         most = max(WINDOWS_OF_TIME, int(np.ceil(time / chunk)))
-        chunk = time / most
+        chunk, longest = time / most, most
     reach = ContactReach(system)
     reach.look_closely(state)
     seen = _Looks([], [], [state.p.copy()], wears=bool(len(state.r)))
     grows, left = None, np.inf
-    for number in range(most):
+    for number in range(longest):
         for look in range(LOOKS_PER_CHUNK):
             system.advance(state, chunk * (number + (look + 1) / LOOKS_PER_CHUNK))
             seen.look(system, state)
@@ -198,12 +213,15 @@ def follow_pushes(
         grows, left = _outcome_and_slip_left(seen, sticking, sticking_grows, rested=grows is False)
         if (time is None and grows is not None) or not np.all(np.isfinite(seen.size[-1])):
             break
+        if number + 1 >= most and not _gains(seen, DECADES * most / longest):
+            break
     rate, error = _rate(seen.time, seen.size) if grows else (sticking if grows is False else None, None)
     found = OneSidedOutcome(
         grows=grows,
         growth_rate=rate,
         error=error,
-        searched=float(DECADES * np.log(10) / seen.time[-1]) if grows is None else 0.0,
+        searched=float(FOLDS_OF_GROWTH / seen.time[-1]) if grows is None else 0.0,
+        needed=_needed(seen, sticking) if grows is None else None,
         amplification=float(seen.size.max()),
         slip_left=left if grows is False and np.isfinite(left) else None,
         wears=seen.wears,
@@ -212,6 +230,16 @@ def follow_pushes(
         scales=(reach.least_scale, reach.largest_scale),
     )
     return found, reach
+
+
+def _needed(seen: _Looks, sticking: float) -> float | None:
+    """After which time it may be known whether the motion grows; None if this time is over, or no number is known."""
+    now, gained = float(seen.time[-1]), _gained(seen.size)
+    if _gains(seen, 0.0) and (rate := _rate(seen.time, seen.size)[0]) > 0:
+        return now + float((DECADES - gained[-1]) * np.log(10) / rate)
+    folds = FOLDS_OF_GROWTH if sticking > 0 else 2 * np.log(SLIP_LEFT_SHARE)
+    wanted = folds / sticking if sticking else 0.0
+    return float(wanted) if wanted > now else None
 
 
 def random_pushes(configuration: Configuration, pushes: int) -> Floats:
@@ -252,7 +280,7 @@ def _outcome(seen: _Looks, sticking_grows: bool) -> bool | None:
     each of them, or late all of them together, as of thousands one or the other slips a last time.
     """
     gained, slid = _gained(seen.size), seen.slid
-    if gained[-1] > MOST_DECADES or (gained[-1] > DECADES and _still_grows(seen.time, gained)):
+    if gained[-1] > MOST_DECADES or _gains(seen, DECADES):
         return True
     if sticking_grows or len(slid) <= 2 * LOOKS_PER_CHUNK:
         return None
@@ -298,6 +326,12 @@ def _slip_left(slid: list[Floats], decay: float) -> float:
     slowest = np.maximum(ratios.max(axis=0), decay)
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(np.nan_to_num(steps[-1] * slowest / (1 - slowest) / whole[-1], nan=0.0).max())
+
+
+def _gains(seen: _Looks, decades: float) -> bool:
+    """Whether D has gained some decades, and gains at a steady rate."""
+    gained = _gained(seen.size)
+    return bool(gained[-1] > decades and _still_grows(seen.time, gained))
 
 
 def _still_grows(time: Floats, gained: Floats) -> bool:

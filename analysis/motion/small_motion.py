@@ -170,7 +170,8 @@ def _after_pushes(sticks: SmallMotion, found: OneSidedOutcome, reach: ContactRea
         reasons.append(
             f"the motion of contacts at Coulomb's bound has not settled within t = {found.time:.4g}, where D is "
             f"{found.amplification:.3g} times the mean square velocity of the push, and D that grows more slowly "
-            f"than exp({found.searched:.2g} t) would not have been seen"
+            f"than exp({found.searched:.2g} t) may not have been seen"
+            + (f"; `time` = {found.needed:.2g} may do" if found.needed else "")
         )
     elif not found.grows and np.isinf(least):
         reasons.append(UNSETTLED if reach.unsettled else NOT_REACHED)
