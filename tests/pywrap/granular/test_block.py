@@ -250,3 +250,6 @@ def test_a_block_on_top_of_a_sphere_slides_down_from_the_push_on_that_is_said(la
     expected = one_sided_motion(here, [[0, 0, 0], [1, 0, 0]], times=[6.0]).displacement[0, 1, 0]
     assert moved(lmp, least, 6000, which=2) == pytest.approx(expected, rel=0.1)
     assert abs(moved(lmp, 0.01 * least, 6000, which=2)) < 1e-3 * expected
+    short = stability(here, time=4.0)
+    assert f"`time` = {short.one_sided.needed:.2g} may do" in str(short)
+    assert verdict.one_sided.time == pytest.approx(short.one_sided.needed, rel=0.4)  # a chunk of time
