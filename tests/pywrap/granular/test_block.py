@@ -252,4 +252,4 @@ def test_a_block_on_top_of_a_sphere_slides_down_from_the_push_on_that_is_said(la
     assert abs(moved(lmp, 0.01 * least, 6000, which=2)) < 1e-3 * expected
     short = stability(here, time=4.0)
     assert f"`time` = {short.one_sided.needed:.2g} may do" in str(short)
-    assert verdict.one_sided.time == pytest.approx(short.one_sided.needed, rel=0.4)  # a chunk of time
+    assert 4.0 < short.one_sided.needed < verdict.one_sided.time
