@@ -76,6 +76,8 @@ class ContactReach:
     reaching : float
         Multiple of the motion from which on contacts that count as at Coulomb's bound reach the bound so soon that the
         motion is the same.
+    time : float
+        How long the motion was looked at closely.
     by_residual : ContactReach or None
         The reach of the motion by the residual forces, which nothing pushes.
     """
@@ -85,6 +87,7 @@ class ContactReach:
     waiting: list[OneSidedState] = field(default_factory=list)
     smallest: float = np.inf
     reaching: float = 0.0
+    time: float = 0.0
     by_residual: "ContactReach | None" = None
 
     def look(self, state: OneSidedState) -> None:
@@ -116,6 +119,7 @@ class ContactReach:
         system, self.by_residual = self.system, ContactReach(self.system)
         step = LOOK_STEP / system.step_share * system.time_step
         count = int(min(FIRST_LOOKS, np.ceil((time - start.time) / step)))
+        self.time = count * step
         load = None if rise is None else system.on_active(rise)
         state, compared = start.copy(), min(count, COMPARED_STEPS)
         seen = _follow(system, state, step, compared, load, look=self.look)

@@ -96,6 +96,7 @@ class SmallMotion:
     one_sided: OneSidedOutcome | None = None
     creep: Creep | None = None
     largest_push: float | None = None
+    push_time: float = 0.0
     residual_push: float = 0.0
     residual_displacement: float = 0.0
     decay: Decay | None = None
@@ -151,7 +152,7 @@ def _as_contacts_part(linear: SmallMotion, system: OneSidedSystem, time: float |
     most, reasons = reach.largest_scale, [UNSETTLED] if np.isinf(reach.least_scale) else []
     # with a K that is given the bounds of contacts are not known
     largest = most if np.isfinite(most) and configuration.stiffness is None else None
-    found = replace(linear.beside_residual_forces(reach), largest_push=largest, reasons=reasons)
+    found = replace(linear.beside_residual_forces(reach), largest_push=largest, push_time=reach.time, reasons=reasons)
     if system.remembers_nothing:
         return found
     creep = follow_creep(system, pushes, time, decay=max(-0.5 * linear.growth_rate, 0.0))

@@ -71,11 +71,11 @@ def held_remarks(configuration: Configuration, velocity: Floats, rotation: Float
     )
 
 
-def motion_remarks(configuration: Configuration, velocity: Floats, rotation: Floats) -> tuple[str, ...]:
-    """A sentence on velocities and rotations, shape (N, 3), of particles that move, if these are more than what forces
-    out of balance make: v (k m)^(1/2) is a force, with the largest stiffness k at a particle and its mass m."""
-    c = configuration
-    speed = np.maximum(np.linalg.norm(velocity, axis=1), c.radius * np.linalg.norm(rotation, axis=1))
+def motion_remarks(configuration: Configuration, velocity: Floats) -> tuple[str, ...]:
+    """A sentence on velocities, shape (N, 3), of particles that move, if these are more than what forces out of balance
+    make: v (k m)^(1/2) is a force, with the largest stiffness k at a particle and its mass m. Rotations do not count,
+    as spheres may spin on a plane."""
+    c, speed = configuration, np.linalg.norm(velocity, axis=1)
     moves = c.free & (speed * np.sqrt(_largest_stiffness(c) * c.mass) > BALANCE * force_scale(c))
     moves[c.rattlers] = False
     if not moves.any():

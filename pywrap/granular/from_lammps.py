@@ -147,7 +147,7 @@ def _remarks(
 ) -> tuple[str, ...]:
     """Sentences on what moves, which a packing at rest leaves out; velocities have the shape (N, 3)."""
     held = held_remarks(configuration, velocity, rotation, float(lmp.extract_global("dt")))
-    return (*held, *motion_remarks(configuration, velocity, rotation), *drag_remarks(fixes))
+    return (*held, *motion_remarks(configuration, velocity), *drag_remarks(fixes))
 
 
 def _proved(lmp: Any, configuration: Configuration, commands: Commands, fixes: dict[str, str]) -> Configuration:
