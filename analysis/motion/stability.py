@@ -123,8 +123,8 @@ def _stability(
     return Stability(
         stable=not outcome.grows if known else None, growth_rate=outcome.growth_rate, at_least=outcome.at_least,
         undamped=linear.undamped, at_bound=int(contacts.at_bound.sum()), one_sided=outcome.one_sided,
-        creep=outcome.creep, largest_push=outcome.largest_push, push_time=outcome.push_time, residual_push=outcome.residual_push,
-        decay=outcome.decay, rising=rising,
+        creep=outcome.creep, largest_push=outcome.largest_push, push_time=outcome.push_time,
+        residual_push=outcome.residual_push, decay=outcome.decay, rising=rising,
         sticking=outcome.sticking, sliding=LinearNeighbour.of(linear.sliding) if linear.one_sided else outcome.sticking,
         asymmetry={} if given else asymmetry(configuration), dissipative=configuration.damped,
         free=outcome.free, searched=outcome.sticking.searched, contacts=contact_count,
