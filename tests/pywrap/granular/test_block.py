@@ -148,6 +148,7 @@ def test_a_push_sideways_turns_the_force_at_the_bound_and_the_block_slides_ahead
     assert ahead == pytest.approx((rate * time**2) ** 2 / (24 * here.contacts.friction[0] * here.mass[0]), rel=0.05)
 
 
+@pytest.mark.long
 def test_of_a_block_that_slides_the_load_alone_is_not_accused(block):
     """The slope is 4e-6 beyond the angle of repose: less is out of balance than is allowed, but nothing stops it."""
     from faultgouge.pywrap import from_lammps
