@@ -130,7 +130,7 @@ def follow_small_motion(system: OneSidedSystem, linear: LinearRates, time: float
 
 def _after_decay(outcome: SmallMotion, decay: Decay) -> SmallMotion:
     """The outcome where a random state says whether sticking contacts grow."""
-    says = f"{'with sticking contacts ' if outcome.one_sided else ''}{decay}"
+    says = f"{'with sticking contacts, ' if outcome.one_sided else ''}{decay}"
     return replace(
         outcome,
         grows=decay.grows if outcome.grows is False else outcome.grows,

@@ -188,7 +188,7 @@ class Stability:
         left = outcome.slip_left
         until = "until the contacts have stopped sliding" if left == 0 else "while contacts slide"
         on = f", and they slide on by {left:.1%} at most as vibration decays" if left else ""
-        sticks = f"; with sticking contacts {self.decay}" if self.decay else ""
+        sticks = f"; with sticking contacts, {self.decay}" if self.decay else ""
         ends = "comes to rest" if self.growth_rate < 0 else "ends in vibration that goes on, but does not grow"
         return (
             f"each of {outcome.pushes} pushes {ends}{free}; D reaches {outcome.amplification:.3g} times the "
