@@ -142,7 +142,7 @@ class OneSidedOutcome(FieldsByName):
 
 
 @dataclass(frozen=True)
-class _Looks:
+class Looks:
     """Looks at P motions: times; D, shape (P,) each; and p of sliders, shape (B, P) each, from the start on."""
 
     times: list[float]
@@ -202,7 +202,7 @@ def follow_pushes(
         chunk, longest = time / most, most
     reach = ContactReach(system)
     reach.look_closely(state)
-    seen = _Looks([], [], [state.p.copy()], wears=bool(len(state.r)))
+    seen = Looks([], [], [state.p.copy()], wears=bool(len(state.r)))
     grows, left = None, np.inf
     for number in range(longest):
         for look in range(LOOKS_PER_CHUNK):
@@ -210,7 +210,7 @@ def follow_pushes(
             seen.look(system, state)
             reach.look(state)
         report_progress(f"one-sided motion: t = {state.time:.4g}, D = {seen.size[-1].max():.3g} push^2")
-        grows, left = _outcome_and_slip_left(seen, sticking, sticking_grows, rested=grows is False)
+        grows, left = outcome_and_slip_left(seen, sticking, sticking_grows, rested=grows is False)
         if (time is None and grows is not None) or not np.all(np.isfinite(seen.size[-1])):
             break
         if number + 1 >= most and not _gains(seen, DECADES * most / longest):
@@ -232,7 +232,7 @@ def follow_pushes(
     return found, reach
 
 
-def _needed(seen: _Looks, sticking: float) -> float | None:
+def _needed(seen: Looks, sticking: float) -> float | None:
     """After which time it may be known whether the motion grows; None if this time is over, or no number is known."""
     now, gained = float(seen.time[-1]), _gained(seen.size)
     if _gains(seen, 0.0) and (rate := _rate(seen.time, seen.size)[0]) > 0:
@@ -251,14 +251,14 @@ def random_pushes(configuration: Configuration, pushes: int) -> Floats:
     return np.hstack([push, -push])
 
 
-def _outcome_and_slip_left(
-    seen: _Looks, sticking: float, sticking_grows: bool, rested: bool
+def outcome_and_slip_left(
+    seen: Looks, sticking: float, sticking_grows: bool, rested: bool
 ) -> tuple[bool | None, float]:
     """Whether the motion grows, rests (False) or has not settled; and the share of slip that is still to come.
 
     Parameters
     ----------
-    seen : _Looks
+    seen : Looks
         All looks at the motion.
     sticking, sticking_grows : float, bool
         Growth rate with sticking contacts, 1 / time, and whether they are known to grow.
@@ -273,7 +273,7 @@ def _outcome_and_slip_left(
     return (False if left < SLIP_LEFT_SHARE or creeps else None), left
 
 
-def _outcome(seen: _Looks, sticking_grows: bool) -> bool | None:
+def _outcome(seen: Looks, sticking_grows: bool) -> bool | None:
     """Whether the motion grows, rests (False), or has not settled.
 
     Sliders rest if they moved little in the third quarter of the time, and less by half, or not at all, in the fourth:
@@ -328,7 +328,7 @@ def _slip_left(slid: list[Floats], decay: float) -> float:
         return float(np.nan_to_num(steps[-1] * slowest / (1 - slowest) / whole[-1], nan=0.0).max())
 
 
-def _gains(seen: _Looks, decades: float) -> bool:
+def _gains(seen: Looks, decades: float) -> bool:
     """Whether D has gained some decades, and gains at a steady rate."""
     gained = _gained(seen.size)
     return bool(gained[-1] > decades and _still_grows(seen.time, gained))
