@@ -74,9 +74,9 @@ VIBRATION_ROUNDING = 1e-6
 LEAST_WINDOWS = 8
 """Windows of a span whose halves and quarters can be compared."""
 
-ACCELERATION_RATIO = 3.0
-"""Ratio of the mean velocities of the last and the first quarter of the time from which on a motion has no constant
-drift: 4 for a velocity that rises as the time after the drag has faded, and 17 for one that rises as its square."""
+ACCELERATION_POWER = 0.5
+"""Power of the time, as which the mean velocity rises, from which on a motion has no constant drift. Half of the power
+1 of particles whose dashpots alone bear a load that rises; particles that nothing bears have 2."""
 
 LARGEST_GROWTH = 1e12
 """Growth of the vibration of a motion that has no drift."""
@@ -256,10 +256,12 @@ def follow_load(
 
 def _refuse_acceleration(system: OneSidedSystem, windows: list[Span], length: float) -> None:
     """Refuse a motion whose mean velocity rises on, as of contacts that slide on and on."""
-    quarters, time = _parts(system, windows[FADE_WINDOWS:] or windows)[0, 3:, 0], length * len(windows)
+    span = windows[FADE_WINDOWS:] or windows
+    quarters, time = _parts(system, span)[0, 3:, 0], length * len(windows)
     if time < WINDOWS_OF_TIME * window_and_most(system, 1, None)[0]:
         return  # a slow vibration begins like that
-    if np.all(np.diff(quarters) > 0) and quarters[-1] > ACCELERATION_RATIO * quarters[0]:
+    first, last = len(windows) - np.array([0.875, 0.125]) * len(span)  # the middles of two quarters
+    if np.all(np.diff(quarters) > 0) and quarters[-1] > (last / first) ** ACCELERATION_POWER * quarters[0]:
         raise NotFollowedError(
             f"no constant drift is seen: the mean velocity over the rate rises from {quarters[0]:.3g} to "
             f"{quarters[-1]:.3g} within t = {time:.4g}, as where the load accelerates particles whose contacts slide "

@@ -28,7 +28,7 @@ from .linearised_contacts import contact_rows, tangential_rows
 
 TURN = 0.2
 """Angle, radian, by which the force of a contact at Coulomb's bound may turn: half of it is the share of a sideways
-displacement that the contact then slips."""
+displacement that the contact then slips, a tenth, so that D is right to a fifth."""
 
 
 class Multiples(NamedTuple):
