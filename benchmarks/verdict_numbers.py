@@ -1,11 +1,11 @@
 """How the verdict on contacts at Coulomb's bound depends on the numbers by which it is made, beside LAMMPS's motion.
 
 Small packings of LAMMPS's own laws come to rest on slopes. Of those with contacts at the bound, one-sided motion is
-followed for `MOST_CHUNKS`, and the verdict is made of it as `stability` makes it: with its numbers, and with each of
-them halved and doubled. Beside it LAMMPS is followed after the same pushes, for 60 units of time or more. The table
-`tables/verdict_numbers.csv` has a row a packing. `time` is when the verdict is made, and D is over the square of the
-push. `lammps` is the largest D in the last fifth of LAMMPS's motion over that in its first half. The last column says
-which verdicts are others: "DECADES x 2: unknown" for instance.
+followed for `MOST_CHUNKS`, and the verdict is made of it as `stability` makes it within this time: with its numbers,
+and with each of them halved and doubled. Beside it LAMMPS is followed after the same pushes, for 60 units of time or
+more. The table `tables/verdict_numbers.csv` has a row a packing. `time` is when the verdict is made, and D is over the
+square of the push. `lammps` is the largest D in the last fifth of LAMMPS's motion over that in its first half. The last
+column says which verdicts are others: "DECADES x 2: unknown" for instance.
 
     nice python benchmarks/verdict_numbers.py [--packings 100:180] [--keep FOLDER]
 """

@@ -46,6 +46,8 @@ class LinearNeighbour:
     def __str__(self) -> str:
         if self.searched and self.growth_rate <= 0:
             return f"no growth of D faster than exp({self.searched:.2g} t)"
+        if self.growth_rate == 0:
+            return "D neither grows nor decays"
         return exponential(self.growth_rate, 4, self.at_least)
 
 
