@@ -9,7 +9,14 @@ of the bound: contact c lacks a force :math:`m_c`, and slides by
 
 A motion s times as large is the motion with :math:`m_c / s`. Where sliding contacts make motion grow, the missing
 forces may turn a small motion back before it has begun to grow. `ContactReach` follows the motion with missing forces
-for larger and larger s, until it is the motion of contacts at the bound. The residual forces of a packing move the
+for larger and larger s, until it is the motion of contacts at the bound. A contact at the bound that is displaced
+sideways by a force :math:`a_c` slides ahead, since then its force has the length :math:`\mu f_n` and another direction:
+to second order by
+
+.. math:: p_c(t) = \max_{t' \le t} \left(Y_c q + Z_c \dot q + \frac{s\, a_c^2}{2 \mu f_n}\right)_+ .
+
+Where little holds the particles back ahead, this slip goes on and on, and the motion is followed for smaller and
+smaller s until it is the motion to first order. The residual forces of a packing move the
 particles, too. The motion counts if it goes much farther than they do.
 """
 
@@ -69,6 +76,8 @@ class ContactReach:
     reaching : float
         Multiple of the motion from which on contacts that count as at Coulomb's bound reach the bound so soon that the
         motion is the same.
+    time : float
+        How long the motion was looked at closely.
     by_residual : ContactReach or None
         The reach of the motion by the residual forces, which nothing pushes.
     """
@@ -78,6 +87,7 @@ class ContactReach:
     largest: Floats | float = 0.0
     smallest: float = np.inf
     reaching: float = 0.0
+    time: float = 0.0
     by_residual: "ContactReach | None" = None
 
     def look(self, state: OneSidedState) -> None:
@@ -117,13 +127,34 @@ class ContactReach:
         system, self.by_residual = self.system, ContactReach(self.system)
         step = LOOK_STEP / system.step_share * system.time_step
         count = int(min(FIRST_LOOKS, np.ceil((time - start.time) / step)))
+        self.time = count * step
         load = None if rise is None else system.on_active(rise)
         state, compared = start.copy(), min(count, COMPARED_STEPS)
         seen = _follow(system, state, step, compared, load, look=self.look)
         self.reaching = _reaching_scale(system, start, seen, step, load)
-        system.take_steps(state, step, count - compared, rise=load, look=self.look)
+        later = _follow(system, state, step, count - compared, load, look=self.look)
+        if system.sliders[1].shape[0] and system.motion.configuration.dimension == 3:
+            self._look_sideways(start, [*seen, *later], step, load)
         still = system.start(np.zeros((system.motion.configuration.coordinates, 1)))
         system.take_steps(still, step, count, constant=system.residual_force, look=self.by_residual.look)
+
+    def _look_sideways(self, start: OneSidedState, seen: list[OneSidedState], step: float, load: Floats | None) -> None:
+        """Reduce `smallest` until forces of contacts at Coulomb's bound that turn do not change the motion that was
+        seen, in steps of this length under a load, shape (E, P), that rises."""
+        system, size = self.system, self.largest_scale
+        if self.size is None or not np.isfinite(size) or system.motion.configuration.coordinates > COMPARED_UP_TO:
+            return
+        for _ in range(COMPARED_SIZES):
+            state, apart = start.copy(), np.zeros_like(self.size)
+            state.size = size
+            for each in seen:
+                system.take_steps(state, step, round((each.time - state.time) / step), rise=load)
+                apart = np.maximum(apart, system.mean_square_displacement(state.z - each.z))
+            change = float(np.sqrt((apart / np.maximum(self.size, np.finfo(float).tiny)).max()))
+            if change <= SAME_WAY:
+                break
+            size *= 0.9 * SAME_WAY / change if np.isfinite(change) else 0.1
+        self.smallest = size
 
     @property
     def residual_displacement(self) -> float:

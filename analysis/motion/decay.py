@@ -15,6 +15,9 @@ grow unseen as exp(g t) with
 This holds for every :math:`\omega_0`. With a low :math:`\omega_0` :math:`|u|` falls soonest, since slow motions decay
 last.
 
+**One state serves best.** Of n states each may miss :math:`\delta^{1/n}`. The time until one has fallen so far is in
+proportion to :math:`\ln |u(0)| + \frac1n \ln \frac1\delta`, and n states cost n times that.
+
 **Slow motions** decay last, because dashpots take little energy from them, and motion that no force opposes never
 decays. Both are first found one by one (:mod:`~faultgouge.analysis.motion.slow_motions`). The state is then followed
 orthogonally to their space, so that all other eigenvalues decide how fast the state decays. For packings too large for
@@ -96,10 +99,17 @@ class Decay:
         state = f"a random state{' without these' if len(self.slow) else ''}"
         told = f"of {known} the slowest decays with D as exp({self.slowest:.6g} t); " if len(self.slow) else ""
         if self.grows is False:
-            return f"{told}motion from {state} decayed in t = {self.time:.4g} so far that any growth would be seen"
+            late = (
+                f", at last as exp({self.growth_rate:.2g} t)"
+                if len(self.slow) and self.growth_rate > self.slowest
+                else ""
+            )
+            return (
+                f"{told}motion from {state} decayed in t = {self.time:.4g} so far that any growth would be seen{late}"
+            )
         told += (
-            f"no motion was found to grow, and D that grows more slowly than exp({self.searched:.2g} t) would not have "
-            f"been seen within t = {self.time:.4g}"
+            f"no motion was found to grow, and D grows no faster than exp({self.searched:.2g} t), as motion from "
+            f"{state} shows within t = {self.time:.4g}"
         )
         if self.needed is None:
             return f"{told}, in which motion did not decay"

@@ -16,7 +16,8 @@ def no_verdict(configuration: Configuration) -> Iterator[str]:
         named = ", ".join(map(str, configuration.ids[sided[:5]])) + (", ..." if len(sided) > 5 else "")
         yield (
             f"the forces on {counted(len(sided), 'particle')} ({named}) have other derivatives forwards than "
-            "backwards, and K by differences of forces is the mean of both"
+            "backwards, as where sliding, rolling or twisting friction is at its bound or a contact is about to open, "
+            "and K by differences of forces is the mean of both"
         )
     if not in_balance(configuration):
         yield (

@@ -59,7 +59,8 @@ DENSE_ENTRIES = 150**2
 class OneSidedState:
     """Several motions at one time, in columns: mass-weighted displacement z and velocity v, shape (E, P), and what
     contacts remember: p of sliders, shape (B, P), and r, shape (R, P), of contacts with two derivatives. Sliders may
-    lack some force to the bound, which is `missing`, shape (B, P)."""
+    lack some force to the bound, which is `missing`, shape (B, P). The `size` of the motion counts where forces at the
+    bound turn; it is zero to first order."""
 
     time: float
     z: Floats
@@ -67,11 +68,12 @@ class OneSidedState:
     p: Floats
     r: Floats
     missing: Floats | float = 0.0
+    size: float = 0.0
 
     def copy(self) -> "OneSidedState":
         """The same state, which changes by itself."""
         z, v, p, r = (each.copy() for each in (self.z, self.v, self.p, self.r))
-        return OneSidedState(self.time, z, v, p, r, self.missing)
+        return OneSidedState(self.time, z, v, p, r, self.missing, self.size)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +152,15 @@ class OneSidedSystem:
         return replace(changes, rows=rows, viscous=viscous)
 
     @cached_property
+    def sideways(self) -> tuple[Matrix, Matrix]:
+        """Forces of sliders across f_t, by displacements and by velocities, over the roots of twice the bounds, shape
+        (B, E). Their squares are forces by which sliders pass the bound, of second order."""
+        changes = self.contact_changes
+        rows, weight = len(changes.bound) + changes.slides, 1 / np.sqrt(2 * changes.bound[changes.slides])
+        springs, dashpots = (_for_products(csr_array(weight * each[rows])) for each in (changes.rows, changes.viscous))
+        return springs, dashpots
+
+    @cached_property
     def rescaled(self) -> tuple[Matrix, Matrix, Matrix]:
         """N, shape (R, E), and B, shape (E, R), of the R contacts with two derivatives; h selects, shape (B, R)."""
         rates, forces = rescaling_operators(self.motion.configuration)
@@ -173,8 +184,8 @@ class OneSidedSystem:
         """At rest in the equilibrium, but for velocities of all coordinates, shape (coordinates, P)."""
         v = np.asfortranarray(self.motion.root_mass[:, None] * velocity[self.motion.active])
         count = v.shape[1]
-        remembered = [np.zeros((matrix.shape[0], count)) for matrix in (self.sliders[1], self.rescaled[0])]
-        return OneSidedState(0.0, np.zeros_like(v), v, *remembered)
+        p, r = (np.zeros((matrix.shape[0], count)) for matrix in (self.sliders[1], self.rescaled[0]))
+        return OneSidedState(0.0, np.zeros_like(v), v, p, r)
 
     def advance(self, state: OneSidedState, time: float, rise: Floats | None = None) -> None:
         """Go on to a time, in equal steps no longer than `time_step`.
@@ -273,6 +284,9 @@ class OneSidedSystem:
             if len(state.r):
                 springs += rectified * (self.rescaled[2] @ state.r)
             springs = springs - state.missing
+            if state.size:
+                across, viscous_across = self.sideways
+                springs += state.size * np.square(across @ state.z + viscous_across @ velocity)
             whole = springs if damping is None else springs + viscous_excess @ velocity
             np.maximum(state.p, np.where(viscous, whole, springs), out=state.p)
             force -= grip @ np.maximum(state.p, whole)

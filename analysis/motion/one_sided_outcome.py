@@ -9,11 +9,17 @@ odd. A motion
   slips in four spans of time fall about as fast as this vibration, and little slip is still to come;
 - *has not settled* otherwise.
 
-A motion is followed in chunks of `STEPS_OF_CHUNK` stable time steps, up to `WORK` multiplications.
+A motion is followed in chunks of `STEPS_OF_CHUNK` stable time steps, up to `WORK` multiplications; of small packings up
+to `MOST_CHUNKS`, or longer if D gains at a steady rate, by which it may gain `DECADES` in the end.
 
 Under a law of two derivatives vibration wears tangential forces down (:mod:`~faultgouge.analysis.motion.creep`), at a
 rate that falls with the vibration, so that sliders may slide again after they have come to rest. Such a motion rests as
 long as D does not gain at a steady rate afterwards.
+
+**The numbers below.** `benchmarks/verdict_numbers.py` makes the verdict on 40 small packings with contacts at the
+bound, within `MOST_CHUNKS`: 24 rest, 12 grow, and 4 have not settled. All 36 do so in LAMMPS. None of these 36 verdicts
+turns into its opposite if any of seven numbers is halved or doubled. Half of `DECADES` decides two more packings, which
+grow in LAMMPS as well, and are followed for longer; twice `DECADES` leaves two others open.
 """
 
 from collections.abc import Callable
@@ -27,6 +33,7 @@ from ..configuration import Configuration
 from ..fields_by_name import FieldsByName
 from ..progress import report_progress
 from .contact_reach import ContactReach
+from .fastest_growing import CHANCE
 from .one_sided import OneSidedState, OneSidedSystem
 
 PUSHES = 2
@@ -48,9 +55,15 @@ LOOKS_PER_CHUNK = 10
 WORK = 2e11
 """Multiplications with entries of the operators that one motion may take: three minutes."""
 
+MOST_CHUNKS, CHUNKS_OF_GROWTH = 40, 120
+"""Chunks that small packings are followed at the most, and those in which D gains at a steady rate."""
+
 DECADES = 8.0
 """Growth of D that no packing at rest was seen to reach without growing for ever: transient amplification of packings
 at Coulomb's bound went up to 6e5."""
+
+FOLDS_OF_GROWTH = float(DECADES * np.log(10) - 2 * np.log(CHANCE))
+"""E-folds of D after which growth is seen, but for the probability `CHANCE` that a push has less of the motion."""
 
 MOST_DECADES = 25.0
 """Growth of D at which a motion has grown enough."""
@@ -97,7 +110,10 @@ class OneSidedOutcome(FieldsByName):
     error : float or None
         Error of the growth rate of a motion that grows.
     searched : float
-        Growth rate of D, 1 / time, below which growth would not have been seen; 0 where `grows` is known.
+        Growth rate of D, 1 / time, below which growth may not have been seen; 0 where `grows` is known.
+    needed : float or None
+        After which time `grows` may be known: as D gains at its rate, or at that with sticking contacts; or as contacts
+        slide while the slowest vibration decays. None where `grows` is known, or this time is over.
     amplification : float
         Largest D, while contacts slid, over the mean square velocity of the push along an axis, time^2: motion that
         goes on may take D further.
@@ -121,6 +137,7 @@ class OneSidedOutcome(FieldsByName):
     growth_rate: float | None
     error: float | None
     searched: float
+    needed: float | None
     amplification: float
     slip_left: float | None
     wears: bool
@@ -130,7 +147,7 @@ class OneSidedOutcome(FieldsByName):
 
 
 @dataclass(frozen=True)
-class _Looks:
+class Looks:
     """Looks at P motions: times; D, shape (P,) each; and p of sliders, shape (B, P) each, from the start on."""
 
     times: list[float]
@@ -155,13 +172,15 @@ class _Looks:
         return np.array(self.sizes)
 
 
-def window_and_most(system: OneSidedSystem, columns: int, time: float | None) -> tuple[float, int]:
-    """Time of a window, and how many there are at most."""
+def window_and_most(
+    system: OneSidedSystem, columns: int, time: float | None, chunks: int = MOST_CHUNKS
+) -> tuple[float, int]:
+    """Time of a window, and how many there are at most; up to so many chunks if no time is given."""
     chunk = STEPS_OF_CHUNK * system.time_step / system.step_share
     if time is not None:
         return time / WINDOWS_OF_TIME, WINDOWS_OF_TIME
     entries = (system.motion.stiffness.nnz + system.motion.damping.nnz) * columns
-    return chunk, int(np.clip(WORK / (entries * chunk / system.time_step), 4, 40))
+    return chunk, int(np.clip(WORK / (entries * chunk / system.time_step), 4, chunks))
 
 
 def follow_pushes(
@@ -182,28 +201,32 @@ def follow_pushes(
     """
     state = system.start(random_pushes(system.motion.configuration, pushes))
     chunk, most = window_and_most(system, 2 * pushes, None)
+    longest = window_and_most(system, 2 * pushes, None, CHUNKS_OF_GROWTH)[1]
     if time is not None:  # whoever gives more time sees what a shorter run sees, too
         most = max(WINDOWS_OF_TIME, int(np.ceil(time / chunk)))
-        chunk = time / most
+        chunk, longest = time / most, most
     reach = ContactReach(system)
     reach.look_closely(state)
-    seen = _Looks([], [], [state.p.copy()], wears=bool(len(state.r)))
+    seen = Looks([], [], [state.p.copy()], wears=bool(len(state.r)))
     grows, left = None, np.inf
-    for number in range(most):
+    for number in range(longest):
         for look in range(LOOKS_PER_CHUNK):
             system.advance(state, chunk * (number + (look + 1) / LOOKS_PER_CHUNK))
             seen.look(system, state)
             reach.look(state)
         report_progress(f"one-sided motion: t = {state.time:.4g}, D = {seen.size[-1].max():.3g} push^2")
-        grows, left = _outcome_and_slip_left(seen, sticking, sticking_grows, rested=grows is False)
+        grows, left = outcome_and_slip_left(seen, sticking, sticking_grows, rested=grows is False)
         if (time is None and grows is not None) or not np.all(np.isfinite(seen.size[-1])):
+            break
+        if number + 1 >= most and not _gains(seen, DECADES * most / longest):
             break
     rate, error = _rate(seen.time, seen.size) if grows else (sticking if grows is False else None, None)
     found = OneSidedOutcome(
         grows=grows,
         growth_rate=rate,
         error=error,
-        searched=float(DECADES * np.log(10) / seen.time[-1]) if grows is None else 0.0,
+        searched=float(FOLDS_OF_GROWTH / seen.time[-1]) if grows is None else 0.0,
+        needed=_needed(seen, sticking) if grows is None else None,
         amplification=float(seen.size.max()),
         slip_left=left if grows is False and np.isfinite(left) else None,
         wears=seen.wears,
@@ -212,6 +235,16 @@ def follow_pushes(
         scales=(reach.least_scale, reach.largest_scale),
     )
     return found, reach
+
+
+def _needed(seen: Looks, sticking: float) -> float | None:
+    """After which time it may be known whether the motion grows; None if this time is over, or no number is known."""
+    now, gained = float(seen.time[-1]), _gained(seen.size)
+    if _gains(seen, 0.0) and (rate := _rate(seen.time, seen.size)[0]) > 0:
+        return now + float((DECADES - gained[-1]) * np.log(10) / rate)
+    folds = FOLDS_OF_GROWTH if sticking > 0 else 2 * np.log(SLIP_LEFT_SHARE)
+    wanted = folds / sticking if sticking else 0.0
+    return float(wanted) if wanted > now else None
 
 
 def random_pushes(configuration: Configuration, pushes: int) -> Floats:
@@ -223,14 +256,14 @@ def random_pushes(configuration: Configuration, pushes: int) -> Floats:
     return np.hstack([push, -push])
 
 
-def _outcome_and_slip_left(
-    seen: _Looks, sticking: float, sticking_grows: bool, rested: bool
+def outcome_and_slip_left(
+    seen: Looks, sticking: float, sticking_grows: bool, rested: bool
 ) -> tuple[bool | None, float]:
     """Whether the motion grows, rests (False) or has not settled; and the share of slip that is still to come.
 
     Parameters
     ----------
-    seen : _Looks
+    seen : Looks
         All looks at the motion.
     sticking, sticking_grows : float, bool
         Growth rate with sticking contacts, 1 / time, and whether they are known to grow.
@@ -245,14 +278,14 @@ def _outcome_and_slip_left(
     return (False if left < SLIP_LEFT_SHARE or creeps else None), left
 
 
-def _outcome(seen: _Looks, sticking_grows: bool) -> bool | None:
+def _outcome(seen: Looks, sticking_grows: bool) -> bool | None:
     """Whether the motion grows, rests (False), or has not settled.
 
     Sliders rest if they moved little in the third quarter of the time, and less by half, or not at all, in the fourth:
     each of them, or late all of them together, as of thousands one or the other slips a last time.
     """
     gained, slid = _gained(seen.size), seen.slid
-    if gained[-1] > MOST_DECADES or (gained[-1] > DECADES and _still_grows(seen.time, gained)):
+    if gained[-1] > MOST_DECADES or _gains(seen, DECADES):
         return True
     if sticking_grows or len(slid) <= 2 * LOOKS_PER_CHUNK:
         return None
@@ -298,6 +331,12 @@ def _slip_left(slid: list[Floats], decay: float) -> float:
     slowest = np.maximum(ratios.max(axis=0), decay)
     with np.errstate(divide="ignore", invalid="ignore"):
         return float(np.nan_to_num(steps[-1] * slowest / (1 - slowest) / whole[-1], nan=0.0).max())
+
+
+def _gains(seen: Looks, decades: float) -> bool:
+    """Whether D has gained some decades, and gains at a steady rate."""
+    gained = _gained(seen.size)
+    return bool(gained[-1] > decades and _still_grows(seen.time, gained))
 
 
 def _still_grows(time: Floats, gained: Floats) -> bool:

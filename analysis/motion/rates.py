@@ -44,7 +44,7 @@ PERIODS_OF_LARGE = 2e6
 vector. It takes three seconds without dissipation, fourteen with it, and 35 where many motions grow alike and none
 converges."""
 
-STRONG = 4.0
+LARGEST_LOSS = 4.0
 """Loss of dashpots over the fastest frequency beyond which no fast growth is sought: the search takes short steps, and
 strong dashpots leave slow growth alone. Both are bounds, by sums of rows."""
 
@@ -55,7 +55,7 @@ FREE_SHARE = 1e-6
 """Eigenvalues s below this share of the largest may be those of motions that no force opposes: rounding leaves sqrt(u)
 of a double zero. Motions that strong dashpots hold up are as slow."""
 
-RESISTS = 10.0
+SLOW_SAFETY = 10.0
 """Safety of the estimate that a slow eigenvalue is none of a motion that a force opposes."""
 
 
@@ -137,7 +137,7 @@ def rates_of(motion: Motion, *, decides: bool = True) -> Rates:
 def _fastest(motion: Motion, first: float, longest: float) -> Rates:
     """Of motions that surely grow, looked for in so many periods; the others are not known."""
     fastest, loss = (float(abs(each).sum(axis=1).max(initial=0.0)) for each in (motion.stiffness, motion.damping))
-    if loss > STRONG * np.sqrt(fastest):  # nothing grows faster than K alone would have it
+    if loss > LARGEST_LOSS * np.sqrt(fastest):  # nothing grows faster than K alone would have it
         return Rates(np.zeros(0, complex), np.zeros(0, bool), 0, 2 * float(np.sqrt(fastest)))
     damping = motion.in_blocks(motion.damping) if motion.dissipative else None
     found = fastest_growing(motion.in_blocks(motion.stiffness), damping, count=1, periods=(first, longest))
@@ -213,7 +213,7 @@ def _may_resist(motion: Motion, slow: Floats, softest: float) -> bool:
     """
     largest_damping = float(abs(motion.damping).sum(axis=1).max(initial=0.0))
     size = float(slow.max(initial=0.0))
-    return RESISTS * size * (size + largest_damping) >= softest
+    return SLOW_SAFETY * size * (size + largest_damping) >= softest
 
 
 def _feels_no_force(motion: Motion, rounding: float, left: Complexes, right: Complexes) -> NDArray[np.bool_]:

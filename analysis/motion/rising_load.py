@@ -18,7 +18,7 @@ One vibration was steady for ten windows and then grew to another one. So at lea
 two starts: with a drag on all coordinates, and with a drag that leaves rotations alone. A packing may vibrate in two
 ways, one from each start.
 
-**Range.** While the load rises the drift takes sticking contacts to Coulomb's bound and opens others
+**Range.** While the load rises the drift takes sticking contacts to Coulomb's bound, and opens or closes others
 (:mod:`~faultgouge.analysis.motion.next_change`). From then on the packing is another one. A contact that counts as at
 the bound may lack a little force, and slides once the load has risen enough. The residual forces move the packing, too,
 and count until the load has moved the packing ten times as far. If another contact reaches the bound or opens before,
@@ -74,9 +74,9 @@ VIBRATION_ROUNDING = 1e-6
 LEAST_WINDOWS = 8
 """Windows of a span whose halves and quarters can be compared."""
 
-ACCELERATION_RATIO = 3.0
-"""Ratio of the mean velocities of the last and the first quarter of the time from which on a motion has no constant
-drift: 4 for a velocity that rises as the time after the drag has faded, and 17 for one that rises as its square."""
+ACCELERATION_POWER = 0.5
+"""Power of the time, as which the mean velocity rises, from which on a motion has no constant drift. Half of the power
+1 of particles whose dashpots alone bear a load that rises; particles that nothing bears have 2."""
 
 LARGEST_GROWTH = 1e12
 """Growth of the vibration of a motion that has no drift."""
@@ -137,9 +137,9 @@ class RisingMotion(DriftAndVibration):
         Increase of the load from which on contacts that count as at Coulomb's bound have reached the bound, and the
         load has moved the packing ten times as far as the residual forces do.
     next_change : float or None
-        Increase of the load, to first order, at which the first other contact reaches the bound or opens.
+        Increase of the load at which the first other contact changes.
     next_event : str or None
-        Which of the two.
+        What this contact does: it reaches the bound, opens, closes, or turns its force at the bound.
     """
 
     time: float | None = None
@@ -256,10 +256,12 @@ def follow_load(
 
 def _refuse_acceleration(system: OneSidedSystem, windows: list[Span], length: float) -> None:
     """Refuse a motion whose mean velocity rises on, as of contacts that slide on and on."""
-    quarters, time = _parts(system, windows[FADE_WINDOWS:] or windows)[0, 3:, 0], length * len(windows)
+    span = windows[FADE_WINDOWS:] or windows
+    quarters, time = _parts(system, span)[0, 3:, 0], length * len(windows)
     if time < WINDOWS_OF_TIME * window_and_most(system, 1, None)[0]:
         return  # a slow vibration begins like that
-    if np.all(np.diff(quarters) > 0) and quarters[-1] > ACCELERATION_RATIO * quarters[0]:
+    first, last = len(windows) - np.array([0.875, 0.125]) * len(span)  # the middles of two quarters
+    if np.all(np.diff(quarters) > 0) and quarters[-1] > (last / first) ** ACCELERATION_POWER * quarters[0]:
         raise NotFollowedError(
             f"no constant drift is seen: the mean velocity over the rate rises from {quarters[0]:.3g} to "
             f"{quarters[-1]:.3g} within t = {time:.4g}, as where the load accelerates particles whose contacts slide "

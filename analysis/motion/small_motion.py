@@ -96,6 +96,7 @@ class SmallMotion:
     one_sided: OneSidedOutcome | None = None
     creep: Creep | None = None
     largest_push: float | None = None
+    push_time: float = 0.0
     residual_push: float = 0.0
     residual_displacement: float = 0.0
     decay: Decay | None = None
@@ -129,7 +130,7 @@ def follow_small_motion(system: OneSidedSystem, linear: LinearRates, time: float
 
 def _after_decay(outcome: SmallMotion, decay: Decay) -> SmallMotion:
     """The outcome where a random state says whether sticking contacts grow."""
-    says = f"{'with sticking contacts ' if outcome.one_sided else ''}{decay}"
+    says = f"{'with sticking contacts, ' if outcome.one_sided else ''}{decay}"
     return replace(
         outcome,
         grows=decay.grows if outcome.grows is False else outcome.grows,
@@ -151,7 +152,7 @@ def _as_contacts_part(linear: SmallMotion, system: OneSidedSystem, time: float |
     most, reasons = reach.largest_scale, [UNSETTLED] if np.isinf(reach.least_scale) else []
     # with a K that is given the bounds of contacts are not known
     largest = most if np.isfinite(most) and configuration.stiffness is None else None
-    found = replace(linear.beside_residual_forces(reach), largest_push=largest, reasons=reasons)
+    found = replace(linear.beside_residual_forces(reach), largest_push=largest, push_time=reach.time, reasons=reasons)
     if system.remembers_nothing:
         return found
     creep = follow_creep(system, pushes, time, decay=max(-0.5 * linear.growth_rate, 0.0))
@@ -170,7 +171,8 @@ def _after_pushes(sticks: SmallMotion, found: OneSidedOutcome, reach: ContactRea
         reasons.append(
             f"the motion of contacts at Coulomb's bound has not settled within t = {found.time:.4g}, where D is "
             f"{found.amplification:.3g} times the mean square velocity of the push, and D that grows more slowly "
-            f"than exp({found.searched:.2g} t) would not have been seen"
+            f"than exp({found.searched:.2g} t) may not have been seen"
+            + (f"; `time` = {found.needed:.2g} may do" if found.needed else "")
         )
     elif not found.grows and np.isinf(least):
         reasons.append(UNSETTLED if reach.unsettled else NOT_REACHED)

@@ -118,16 +118,16 @@ def _stability(
     """The verdict on the outcome."""
     contacts, given = configuration.contacts, configuration.stiffness is not None
     # where K is given, contacts, as far as they are known, have no derivatives
-    touching = max(len(contacts), len(configuration) - len(configuration.rattlers)) if given else len(contacts)
-    known = outcome.grows is not None and not outcome.reasons and touching > 0
+    contact_count = max(len(contacts), len(configuration) - len(configuration.rattlers)) if given else len(contacts)
+    known = outcome.grows is not None and not outcome.reasons and contact_count > 0
     return Stability(
         stable=not outcome.grows if known else None, growth_rate=outcome.growth_rate, at_least=outcome.at_least,
         undamped=linear.undamped, at_bound=int(contacts.at_bound.sum()), one_sided=outcome.one_sided,
-        creep=outcome.creep, largest_push=outcome.largest_push, residual_push=outcome.residual_push,
-        decay=outcome.decay, rising=rising,
+        creep=outcome.creep, largest_push=outcome.largest_push, push_time=outcome.push_time,
+        residual_push=outcome.residual_push, decay=outcome.decay, rising=rising,
         sticking=outcome.sticking, sliding=LinearNeighbour.of(linear.sliding) if linear.one_sided else outcome.sticking,
         asymmetry={} if given else asymmetry(configuration), dissipative=configuration.damped,
-        free=outcome.free, searched=outcome.sticking.searched, contacts=touching,
+        free=outcome.free, searched=outcome.sticking.searched, contacts=contact_count,
         reasons=tuple(outcome.reasons), not_followed=not_followed, remarks=configuration.remarks,
     )  # fmt: skip
 

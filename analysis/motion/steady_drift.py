@@ -9,12 +9,14 @@ there is no drift.
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, diags_array, eye_array
 
 from ..arrays import Floats
 from ..counted import counted
 from ..errors import FaultgougeError
 from ..factors.sparse_lu import general_lu
+from .contact_reach import SAME_WAY
 from .eigenvalues import operator_rounding, zero_uncertainty
 from .motion import Motion
 from .one_sided import OneSidedSystem
@@ -61,7 +63,7 @@ def steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Flo
     way = np.zeros(rates.shape[0])
     for _ in range(WAY_CHANGES):
         stiffness = csr_array(motion.stiffness - forces @ diags_array(way) @ rates) if len(way) else motion.stiffness
-        velocity = _solution(replace(motion, stiffness=stiffness), load, free)
+        velocity = static_response(replace(motion, stiffness=stiffness), load, free)
         before, way = way, np.sign(rates @ velocity)[:, 0]
         if np.array_equal(before, way):
             break
@@ -72,6 +74,39 @@ def steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Flo
         if found.searched or found.grows.any():
             return None
     return velocity
+
+
+def change_by_turning(system: OneSidedSystem, velocity: Floats, turns: NDArray[np.bool_]) -> float:
+    r"""Increase of the load at which contacts that slide on, since their forces have turned, change the drift.
+
+    A force across f_t that is :math:`x\, a_c` after an increase x lets the contact pass the bound by
+    :math:`x^2 a_c^2 / (2 \mu f_n)`. The packing, in which these contacts slide, moves until other contacts bear this.
+
+    Parameters
+    ----------
+    system : OneSidedSystem
+        Of a configuration in three dimensions.
+    velocity : ndarray, shape (E, 1)
+        The drift, mass-weighted.
+    turns : ndarray of bool, shape (B,)
+        Contacts at the bound whose forces turn.
+
+    Raises
+    ------
+    NotFollowedError
+        If no other contacts bear it.
+    """
+    grip, excess = (csr_array(each) for each in system.sliders[:2])
+    sideways = np.where(turns[:, None], system.sideways[0] @ velocity, 0.0)
+    stiffness = csr_array(system.motion.stiffness + grip[:, turns] @ excess[turns])
+    try:
+        moves = static_response(replace(system.motion, stiffness=stiffness), grip @ sideways**2, 1)
+    except NotFollowedError:
+        raise NotFollowedError(
+            "the load turns the forces of contacts at Coulomb's bound, and nothing holds the particles that slide then"
+        ) from None
+    size, change = (system.mean_square_displacement(each)[0] for each in (velocity, moves))
+    return float(SAME_WAY * np.sqrt(size / change)) if change else np.inf
 
 
 def refuse_flight(system: OneSidedSystem, direction: Floats) -> None:
@@ -92,8 +127,23 @@ def refuse_flight(system: OneSidedSystem, direction: Floats) -> None:
         )
 
 
-def _solution(motion: Motion, load: Floats, free: int) -> Floats:
-    """v of A v = load, without the motions that no force opposes."""
+def static_response(motion: Motion, load: Floats, free: int) -> Floats:
+    """v of A v = load, without the motions that no force opposes, shape (E, 1).
+
+    Parameters
+    ----------
+    motion : Motion
+        A.
+    load : ndarray, shape (E, 1)
+        Mass-weighted forces.
+    free : int
+        Motions that no force opposes.
+
+    Raises
+    ------
+    NotFollowedError
+        If the load accelerates such a motion.
+    """
     matrix = motion.stiffness
     shift = DIAGONAL_SHIFT * float(np.abs(matrix.data).max(initial=0.0))
     if free:

@@ -46,6 +46,8 @@ class LinearNeighbour:
     def __str__(self) -> str:
         if self.searched and self.growth_rate <= 0:
             return f"no growth of D faster than exp({self.searched:.2g} t)"
+        if self.growth_rate == 0:
+            return "D neither grows nor decays"
         return exponential(self.growth_rate, 4, self.at_least)
 
 
@@ -94,6 +96,8 @@ class Stability:
     largest_push : float or None
         Where motion does not grow, and no contact slides on one side: velocity of a push along an axis up to which
         contacts neither reach the bound nor open, and no others close. None where K is given.
+    push_time : float
+        Within which time; other motion than that which no force opposes has gone farthest by then.
     residual_push : float
         Velocity of a push along an axis that moves the particles as far as the residual forces do; 0 where no motion
         was followed.
@@ -130,6 +134,7 @@ class Stability:
     one_sided: OneSidedOutcome | None
     creep: Creep | None
     largest_push: float | None
+    push_time: float
     residual_push: float
     decay: Decay | None
     rising: RisingMotion | None
@@ -185,7 +190,7 @@ class Stability:
         left = outcome.slip_left
         until = "until the contacts have stopped sliding" if left == 0 else "while contacts slide"
         on = f", and they slide on by {left:.1%} at most as vibration decays" if left else ""
-        sticks = f"; with sticking contacts {self.decay}" if self.decay else ""
+        sticks = f"; with sticking contacts, {self.decay}" if self.decay else ""
         ends = "comes to rest" if self.growth_rate < 0 else "ends in vibration that goes on, but does not grow"
         return (
             f"each of {outcome.pushes} pushes {ends}{free}; D reaches {outcome.amplification:.3g} times the "
@@ -266,16 +271,22 @@ class Stability:
     @property
     def _scales_of_linear_motion(self) -> Iterator[str]:
         least, most = PUSH_OVER_RESIDUAL * self.residual_push, self.largest_push
-        if most is None:
-            if least:
-                yield (
-                    f"holds for pushes above {least:.1g} (velocity along an axis), if small: below, residual forces "
-                    "count"
-                )
-        elif least < most:
+        if most is None and not self.asymmetry:  # K is given
+            above = (
+                f"above {least:.1g} (velocity along an axis), if small: below, residual forces count; " if least else ""
+            )
             yield (
-                f"holds for pushes of {least:.1g} to {most:.1g} (velocity along an axis): below, residual forces "
-                "count; above, contacts open, close or slide"
+                f"holds for {'pushes ' + above if above else 'small pushes: '}from which push on contacts open, close, "
+                "slide or roll, K by differences of forces does not say"
+            )
+        elif most is None:
+            if least:
+                yield f"holds for pushes above {least:.1g} (velocity along an axis): below, residual forces count"
+        elif least < most:
+            within = f", for t = {self.push_time:.2g} as motions that no force opposes go on" if self.free else ""
+            yield (
+                f"holds for pushes of {least:.1g} to {most:.1g} (velocity along an axis){within}: below, residual "
+                "forces count; above, contacts open, close or slide"
             )
         else:
             yield (
@@ -311,6 +322,7 @@ class Stability:
             "one_sided": None if self.one_sided is None else self.one_sided.as_dict(),
             "creep": None if self.creep is None else vars(self.creep),
             "largest_push": self.largest_push,
+            "push_time": self.push_time,
             "residual_push": self.residual_push,
             "decay": None if self.decay is None else self.decay.as_dict(),
             "rising": None if self.rising is None else self.rising.as_dict(),

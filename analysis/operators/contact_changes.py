@@ -28,16 +28,18 @@ from .linearised_contacts import contact_rows, tangential_rows
 
 TURN = 0.2
 """Angle, radian, by which the force of a contact at Coulomb's bound may turn: half of it is the share of a sideways
-displacement that the contact then slips."""
+displacement that the contact then slips, a tenth, so that D is right to a fifth."""
 
 
 class Multiples(NamedTuple):
     """Multiples of displacements, infinite where none changes anything: shape (C, P) of the contacts that reach the
-    bound and of those that open, (G, P) of the gaps that close."""
+    bound and of those that open, (G, P) of the gaps that close, (B, P) of the contacts at the bound whose forces
+    turn."""
 
     reaches: Floats
     opens: Floats
     closes: Floats
+    turns: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,31 +128,30 @@ class ContactChanges:
         along[self.wears] += self.worn[0] * paths
         across[self.wears] += self.worn[1] * paths
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            reaches = self._reaches(along, across, bound)
+            reaches, turns = self._reaches_and_turns(along, across, bound)
             opens = np.where((closing < 0) & (self.overlap > 0), -self.overlap / closing, np.inf)
             gains = products[3 * count :]
             closes = np.where(gains > 0, self.gap / gains, np.inf)
-        return Multiples(reaches, opens, closes)
+        return Multiples(reaches, opens, closes, turns)
 
     def first(self, displacement: Floats, velocity: Floats, slid: Floats, paths: Floats) -> float:
         """The smallest of all these multiples."""
         return min(float(each.min(initial=np.inf)) for each in self.multiples(displacement, velocity, slid, paths))
 
-    def _reaches(self, along: Floats, across: Floats, bound: Floats) -> Floats:
-        """Where |f_t + x g| = mu f_n + x h."""
+    def _reaches_and_turns(self, along: Floats, across: Floats, bound: Floats) -> tuple[Floats, Floats]:
+        """Where |f_t + x g| = mu f_n + x h, and where the force of a contact at the bound turns."""
         # a x^2 + 2 b x + slack = 0; of sticking contacts the slack is negative
         a = along**2 + across**2 - bound**2
         b = self.tangential * along - self.bound * bound
         slack = self.tangential**2 - self.bound**2
         root = b + np.sqrt(np.maximum(b * b - a * slack, 0.0))
-        found = np.where(self.sticks & (b * b >= a * slack) & (root > 0), -slack / root, np.inf)
+        reaches = np.where(self.sticks & (b * b >= a * slack) & (root > 0), -slack / root, np.inf)
         here = self.slides
-        back, most = np.maximum(bound - along, 0.0)[here], self.bound[here]
-        again = np.where(a[here] > 0, 2 * most * back / a[here], np.inf)
-        sideways = np.abs(across[here])
-        turns = np.where(sideways > 0, TURN * most / sideways, np.inf)
-        found[here] = np.where(2 * back > TURN * sideways, again, turns)
-        return found
+        back, most, sideways = np.maximum(bound - along, 0.0)[here], self.bound[here], np.abs(across[here])
+        goes_back = 2 * back > TURN * sideways
+        reaches[here] = np.where(goes_back & (a[here] > 0), 2 * most * back / a[here], np.inf)
+        turns = np.where(~goes_back & (sideways > 0), TURN * most / sideways, np.inf)
+        return reaches, turns
 
 
 def _directions(force: Floats, normal: Floats) -> Floats:

@@ -73,16 +73,27 @@ def held_remarks(configuration: Configuration, velocity: Floats, rotation: Float
 
 def motion_remarks(configuration: Configuration, velocity: Floats) -> tuple[str, ...]:
     """A sentence on velocities, shape (N, 3), of particles that move, if these are more than what forces out of balance
-    make: v (k m)^(1/2) is a force, with the largest stiffness of a contact and the mean mass."""
-    c, force = configuration, force_scale(configuration)
-    stiffness = c.contacts.normal_stiffness if c.stiffness is None else np.abs(c.stiffness.data)
-    impedance = np.sqrt(stiffness.max(initial=0.0) * c.mass.mean())
-    moves = c.free.copy()
+    make: v (k m)^(1/2) is a force, with the largest stiffness k at a particle and its mass m. Rotations do not count,
+    as spheres may spin on a plane."""
+    c, speed = configuration, np.linalg.norm(velocity, axis=1)
+    moves = c.free & (speed * np.sqrt(_largest_stiffness(c) * c.mass) > BALANCE * force_scale(c))
     moves[c.rattlers] = False
-    speed = float(np.linalg.norm(velocity[moves], axis=1).max(initial=0.0))
-    if not speed * impedance > BALANCE * force:
+    if not moves.any():
         return ()
-    return (f"particles move by up to {speed:.3g} (length / time): this is said of them at rest",)
+    return (f"particles move by up to {speed[moves].max():.3g} (length / time): this is said of them at rest",)
+
+
+def _largest_stiffness(configuration: Configuration) -> Floats:
+    """The largest normal stiffness of a contact of each particle, or the largest entry of K, shape (N,)."""
+    c, found = configuration.contacts, np.zeros(len(configuration))
+    if configuration.stiffness is not None:
+        rows = abs(configuration.stiffness).max(axis=1).toarray().ravel()
+        if configuration.constraint is not None:
+            rows = (configuration.constraint != 0) @ rows
+        return np.asarray(rows.reshape(configuration.axes, -1).max(axis=0))
+    for partner, touches in ((c.i, np.ones(len(c), bool)), (c.j, ~c.wall)):
+        np.maximum.at(found, partner[touches], c.normal_stiffness[touches])
+    return found
 
 
 LOST = (

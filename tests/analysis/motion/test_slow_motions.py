@@ -124,6 +124,20 @@ def test_rates_of_a_packing_beyond_lapack_have_its_slowest_decay(damped, monkeyp
     assert found.searched == 0
 
 
+@pytest.mark.parametrize(("pressed", "grows"), [(0.0, False), (2.0, True)])
+def test_rates_that_do_not_decide_are_those_of_fast_growth_alone(monkeypatch, pressed, grows):
+    """Whether all other motion decays is not found out. Spheres that are pressed together buckle."""
+    motion = Motion.of(row_of_spheres(4, pressed, dashpot=4.0))
+    expected = rates_of(motion)
+    assert bool(expected.grows.any()) is grows
+    monkeypatch.setattr(module, "DENSE_DAMPED", 0)
+    found = rates_of(motion, decides=False)
+    assert found.decay is None
+    assert bool(found.grows.any()) is grows
+    assert found.growth_rate == pytest.approx(expected.growth_rate if grows else 0.0, rel=1e-6)
+    assert expected.growth_rate > found.searched if grows else found.searched > 0
+
+
 @pytest.mark.long
 def test_dashpots_too_weak_for_the_time_leave_a_rate_below_which_growth_may_hide(reference_packing, monkeypatch):
     monkeypatch.setattr(module, "DENSE_DAMPED", 100)

@@ -44,14 +44,15 @@ def block(lammps_with):
     return make
 
 
-def moved(lmp, velocity: float, steps: int, which: int = 1) -> float:
-    """By how much a block moves ahead in some steps of 0.001 without drag, over the velocity of the push."""
+def moved(lmp, velocity: float, steps: int, which: int = 1, axis: int = 0) -> float:
+    """By how much a block moves ahead in some steps of 0.001 without drag, over the velocity of the push along an
+    axis."""
     from faultgouge.pywrap.granular.look_in_a_copy import in_a_copy, quieten
 
     def follow():
         quieten(lmp, drag=True)
         before = float(of_particle(lmp, "x", which)[0])
-        of_particle(lmp, "v", which)[0] = velocity
+        of_particle(lmp, "v", which)[axis] = velocity
         lmp.command(f"run {steps} post no")
         return (float(of_particle(lmp, "x", which)[0]) - before) / abs(velocity)
 
@@ -125,6 +126,28 @@ def test_a_push_back_may_be_so_large_that_the_block_slides_back(block, share):
     assert abs(beyond - of_small) > 0.1 * abs(of_small)
 
 
+def test_a_push_sideways_turns_the_force_at_the_bound_and_the_block_slides_ahead(block):
+    """To first order it vibrates sideways alone. As its force a turns, what is left along the slope is a^2/(2 mu f_n),
+    which accelerates it ahead; and nothing stops it. A load that rises sideways does so for ever."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = block(1.0)
+    here, times = from_lammps(lmp), np.linspace(0.02, 2.0, 100)
+    motion = one_sided_motion(here, [[0.0, 1.0, 0.0]], times=times)
+    assert np.all(motion.displacement[..., 0] == 0)
+    allowed = 0.1 * np.abs(motion.displacement[..., 1]).max()
+    assert moved(lmp, motion.scales[1], 2000, axis=1) == pytest.approx(0.9 * allowed, rel=0.1)
+    verdict = stability(here, rise=[[0.0, 1.0, 0.0]], time=0.1)
+    assert "the load turns the forces of contacts at Coulomb's bound, and nothing holds" in verdict.not_followed
+    rate, time = 0.01 * here.contacts.friction[0], 2.0
+    command(lmp, f"unfix drag\nreset_timestep 0\nvariable rise equal {rate}*step*dt\nfix rise all addforce 0 v_rise 0")
+    before = np.array(of_particle(lmp, "x", 1)[:2])
+    command(lmp, f"run {round(time / 0.001)} post no")
+    ahead, sideways = of_particle(lmp, "x", 1)[:2] - before
+    assert sideways == pytest.approx(rate * time / 300, rel=0.05)  # the slip ahead is turned, too
+    assert ahead == pytest.approx((rate * time**2) ** 2 / (24 * here.contacts.friction[0] * here.mass[0]), rel=0.05)
+
+
 @pytest.mark.long
 def test_of_a_block_that_slides_the_load_alone_is_not_accused(block):
     """The slope is 4e-6 beyond the angle of repose: less is out of balance than is allowed, but nothing stops it."""
@@ -143,6 +166,38 @@ def test_velocities_that_are_left_out_are_named(block, speed):
     of_particle(lmp, "v", 1)[0] = speed
     says = f"particles move by up to {speed:.3g} (length / time): this is said of them at rest"
     assert (says in str(stability(from_lammps(lmp)))) == (speed > 1e-3)
+
+
+SPHERE = np.pi / 6
+UNEQUAL = (
+    head("block -2 2 -2 2 0 4", "p p f", kinds=2)
+    + f"""
+create_atoms 1 single -1 0 {0.5 - SPHERE / 1e3:.17g} units box
+create_atoms 2 single 1 0 {0.05 - 1e-3 * SPHERE / 1e3:.17g} units box
+set type 1 diameter 1.0
+set type 2 diameter 0.1
+set group all density 1.0
+pair_style granular
+pair_coeff * * {LAW}
+fix floor all wall/gran granular {LAW} zplane 0 NULL contacts
+fix load all gravity 1.0 vector 0 0 -1
+fix move all nve/sphere
+timestep 1e-4
+thermo 1000000
+run 0
+"""
+)
+"""A sphere, and one of a thousandth of its mass."""
+
+
+@pytest.mark.parametrize(("which", "named"), [(1, True), (2, False)])
+def test_the_mass_of_what_moves_decides_whether_its_velocity_is_named(lammps_with, which, named):
+    """A velocity of 2e-5 becomes a force of 2e-5 (k m)^(1/2): 17e-4 of the mean force, or 0.5e-4; 1e-4 may be left."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = lammps_with(UNEQUAL)
+    of_particle(lmp, "v", which)[1] = 2e-5
+    assert any("particles move by up to 2e-05 " in each for each in from_lammps(lmp).remarks) is named
 
 
 HILL = (
@@ -195,3 +250,6 @@ def test_a_block_on_top_of_a_sphere_slides_down_from_the_push_on_that_is_said(la
     expected = one_sided_motion(here, [[0, 0, 0], [1, 0, 0]], times=[6.0]).displacement[0, 1, 0]
     assert moved(lmp, least, 6000, which=2) == pytest.approx(expected, rel=0.1)
     assert abs(moved(lmp, 0.01 * least, 6000, which=2)) < 1e-3 * expected
+    short = stability(here, time=4.0)
+    assert f"`time` = {short.one_sided.needed:.2g} may do" in str(short)
+    assert 4.0 < short.one_sided.needed < verdict.one_sided.time
