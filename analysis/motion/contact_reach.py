@@ -142,7 +142,7 @@ class ContactReach:
         """Reduce `smallest` until forces of contacts at Coulomb's bound that turn do not change the motion that was
         seen, in steps of this length under a load, shape (E, P), that rises."""
         system, size = self.system, self.largest_scale
-        if self.size is None or not np.isfinite(size) or system.motion.configuration.coordinates > COMPARED_UP_TO:
+        if not np.isfinite(size) or system.motion.configuration.coordinates > COMPARED_UP_TO:
             return
         for _ in range(COMPARED_SIZES):
             state, apart = start.copy(), np.zeros_like(self.size)
