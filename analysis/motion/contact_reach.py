@@ -28,7 +28,7 @@ FIRST_LOOKS = 1000
 """Looks in steps of `LOOK_STEP`, over some ten periods of a slow mode. Contacts go farthest at the beginning."""
 
 LOOKS_TOGETHER = 50
-"""States whose contacts are looked at together."""
+"""States that are looked at together."""
 
 PUSH_OVER_RESIDUAL = 10.0
 """Displacement by a push over that by the residual forces, from which on the push counts: D then is right to a fifth,
@@ -60,10 +60,10 @@ class ContactReach:
     ----------
     system : OneSidedSystem
         Of the configuration.
-    size : ndarray, shape (P,), or None
-        Largest D that was seen.
     waiting : list of OneSidedState
-        States that were looked at, and whose contacts were not: some together take less time than one by one.
+        States that are looked at later: some together take less time than one by one.
+    largest : ndarray, shape (P,), or zero
+        Largest D among the states that do not wait.
     smallest : float
         Smallest multiple seen so far that takes a contact to another state.
     reaching : float
@@ -74,25 +74,33 @@ class ContactReach:
     """
 
     system: OneSidedSystem
-    size: Floats | None = None
     waiting: list[OneSidedState] = field(default_factory=list)
+    largest: Floats | float = 0.0
     smallest: float = np.inf
     reaching: float = 0.0
     by_residual: "ContactReach | None" = None
 
     def look(self, state: OneSidedState) -> None:
         """Look at the motion once more."""
-        size = self.system.mean_square_displacement(state.z)
-        self.size = size if self.size is None else np.maximum(self.size, size)
         self.waiting.append(state.copy())
         if len(self.waiting) == LOOKS_TOGETHER:
-            self._look_at_contacts()
+            self._look_at_waiting()
 
-    def _look_at_contacts(self) -> None:
-        """At the contacts of the states that wait."""
+    def _look_at_waiting(self) -> None:
+        """At the sizes and contacts of the states that wait."""
+        if not self.waiting:
+            return
         together = [np.hstack([getattr(state, name) for state in self.waiting]) for name in ("z", "v", "p", "r")]
+        sizes = self.system.mean_square_displacement(together[0]).reshape(len(self.waiting), -1)
         self.waiting.clear()
+        self.largest = np.maximum(self.largest, sizes.max(axis=0))
         self.smallest = min(self.smallest, self.system.contact_changes.first(*together))
+
+    @property
+    def size(self) -> Floats:
+        """Largest D of each motion that was seen, shape (P,), or a zero."""
+        self._look_at_waiting()
+        return np.asarray(self.largest)
 
     def look_closely(self, start: OneSidedState, time: float = np.inf, rise: Floats | None = None) -> None:
         """Look at the beginning of a motion step by step, and at the motion by the residual forces.
@@ -120,13 +128,12 @@ class ContactReach:
     @property
     def residual_displacement(self) -> float:
         """The root of the largest D to which the residual forces alone move the packing, length."""
-        seen = None if self.by_residual is None else self.by_residual.size
-        return 0.0 if seen is None else float(np.sqrt(seen.max(initial=0.0)))
+        return 0.0 if self.by_residual is None else float(np.sqrt(self.by_residual.size.max(initial=0.0)))
 
     @property
     def residual_scale(self) -> float:
         """The multiple of the motion that goes as far as the residual forces move the packing."""
-        if self.size is None or self.by_residual is None or self.by_residual.size is None:
+        if self.by_residual is None:
             return 0.0
         with np.errstate(divide="ignore", invalid="ignore"):
             return float(np.nan_to_num(np.sqrt(self.by_residual.size / self.size), nan=0.0).max(initial=0.0))
@@ -148,8 +155,7 @@ class ContactReach:
     def largest_scale(self) -> float:
         """The multiple up to which no contact that is not at the bound reaches the bound, opens or closes, and none at
         the bound reaches it on the way back, or turns its force."""
-        if self.waiting:
-            self._look_at_contacts()
+        self._look_at_waiting()
         return self.smallest
 
 

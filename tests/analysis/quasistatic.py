@@ -1,9 +1,9 @@
-"""A slow, readable quasi-static solver: the reference that the analysis is tested on.
+"""A readable quasi-static solver: the reference that the analysis is tested on.
 
 An increment of the load is one unknown displacement q from the last equilibrium. Slips advance from their
 values there, never from an iterate, with the tangent at the midpoint (along r_old + r_new); then they are
-clamped. A new contact starts with s = 0 at the end of its first increment. Forces are summed contact by
-contact from the formulas; only Newton's matrix is borrowed from the package, and a wrong one would cost
+clamped. A new contact starts with s = 0 at the end of its first increment. The forces of each contact are
+those of the formulas; only Newton's matrix is borrowed from the package, and a wrong one would cost
 iterations, not digits.
 """
 
@@ -33,53 +33,56 @@ def moved(old: Packing, q: np.ndarray, fx: float) -> Packing:
     shift, du = q[: 2 * len(old)].reshape(2, -1).T, q[2 * len(old) :]
     position = old.position + shift
     now = touching(position, old.radius, old.box_length)
+    before, after = (branches(place, old.box_length, now.i, now.j) for place in (old.position, position))
+    tangent = turned(lengths_one(before + after))
+    floor = now.j == FLOOR
+    relative = shift[now.i] - np.where(floor[:, None], 0.0, shift[now.j])
+    advance = np.sum(tangent * relative, axis=1) - du[now.i] - np.where(floor, 0.0, du[now.j])
     remembered = {(i, j): s for i, j, s in zip(old.contacts.i, old.contacts.j, old.contacts.slip, strict=True)}
-    slips = []
-    for i, j in zip(now.i, now.j, strict=True):
-        before, after = (branch(place, old.box_length, i, j) for place in (old.position, position))
-        tangent = turned((before + after) / np.hypot(*(before + after)))
-        disks = [i] if j == FLOOR else [i, j]
-        relative, turning = (shift[i], 0.0) if j == FLOOR else (shift[i] - shift[j], du[j])
-        start = remembered.get((i, j))
-        slip = 0.0 if start is None else start + (tangent @ relative - du[i] - turning)
-        overlap = old.radius[disks].sum() - np.hypot(*after)
-        limit = old.law.mu * old.law.kn / old.law.kt * overlap if old.law.frictional else 0.0
-        slips.append(min(max(slip, -limit), limit))
+    start = np.array([remembered.get(pair, np.nan) for pair in zip(now.i, now.j, strict=True)])
+    reach = old.radius[now.i] + np.where(floor, 0.0, old.radius[now.j])
+    overlap = reach - np.linalg.norm(after, axis=1)
+    limit = old.law.mu * old.law.kn / old.law.kt * overlap if old.law.frictional else 0.0 * overlap
+    slip = np.clip(np.where(np.isnan(start), 0.0, start + advance), -limit, limit)
     angle = old.angle + du / old.radius
-    return replace(old, position=position, angle=angle, contacts=Contacts(now.i, now.j, np.array(slips)), fx=fx)
+    return replace(old, position=position, angle=angle, contacts=Contacts(now.i, now.j, slip), fx=fx)
 
 
-def branch(position: np.ndarray, box_length: float | None, i: int, j: int) -> np.ndarray:
-    """r_i - r_j, nearest image along x; from the floor, the height."""
-    if j == FLOOR:
-        return np.array([0.0, position[i, 1]])
+def branches(position: np.ndarray, box_length: float | None, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+    """r_i - r_j of pairs, nearest image along x; from the floor, the height. Shape (pairs, 2)."""
+    floor = j == FLOOR
     difference = position[i] - position[j]
     if box_length is not None:
-        difference[0] -= box_length * round(difference[0] / box_length)
-    return difference
+        difference[:, 0] -= box_length * np.round(difference[:, 0] / box_length)
+    height = np.column_stack([np.zeros(len(i)), position[i, 1]])
+    return np.where(floor[:, None], height, difference)
+
+
+def lengths_one(vectors: np.ndarray) -> np.ndarray:
+    """The vectors in rows, each over its length."""
+    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
 
 
 def turned(normal: np.ndarray) -> np.ndarray:
-    """The tangent of a normal."""
-    return np.array([-normal[1], normal[0]])
+    """The tangents of normals in rows."""
+    return np.column_stack([-normal[:, 1], normal[:, 0]])
 
 
 def forces(packing: Packing) -> np.ndarray:
-    """Net forces (Fx.., Fy.., T/R..), contact by contact."""
-    law, total = packing.law, np.zeros((3, len(packing)))
+    """Net forces (Fx.., Fy.., T/R..), each contact's by the formulas."""
+    law, c, total = packing.law, packing.contacts, np.zeros((3, len(packing)))
     total[0, packing.top] += packing.fx
     total[1, packing.top] -= packing.fy
-    for i, j, slip in zip(packing.contacts.i, packing.contacts.j, packing.contacts.slip, strict=True):
-        disks = [i] if j == FLOOR else [i, j]
-        between = branch(packing.position, packing.box_length, i, j)
-        distance = np.hypot(*between)
-        normal, overlap = between / distance, packing.radius[disks].sum() - distance
-        fn, ft = plain_force(law.kn, law.kt, law.mu, overlap, slip, law.exponent)
-        force = fn * normal + ft * turned(normal)
-        total[:2, i] += force
-        if j != FLOOR:
-            total[:2, j] -= force
-        total[2, disks] -= ft
+    between, floor = branches(packing.position, packing.box_length, c.i, c.j), c.j == FLOOR
+    normal = lengths_one(between)
+    overlap = packing.radius[c.i] + np.where(floor, 0.0, packing.radius[c.j]) - np.linalg.norm(between, axis=1)
+    each = [
+        plain_force(law.kn, law.kt, law.mu, gap, slip, law.exponent) for gap, slip in zip(overlap, c.slip, strict=True)
+    ]
+    fn, ft = np.array(each, dtype=float).reshape(-1, 2).T
+    force = np.column_stack([fn[:, None] * normal + ft[:, None] * turned(normal), -ft]).T
+    np.add.at(total, (slice(None), c.i), force)
+    np.subtract.at(total, (slice(None), c.j[~floor]), force[:, ~floor] * np.array([[1.0], [1.0], [-1.0]]))
     return total.ravel()
 
 

@@ -325,6 +325,7 @@ def test_onset_of_a_family_of_snapshots():
     assert onset.as_dict()["error_of_path"] is None
 
 
+@pytest.mark.long
 def test_gain_of_a_snapshot(path):
     packing = path(0.0215)
     one, other = transient_gain(packing), transient_gain(snapshot_of(packing))

@@ -147,7 +147,7 @@ def test_solid_fraction_is_the_share_of_points_below_the_layer_that_lie_in_disks
 
 @given(seed=st.integers(0, 2**32 - 1), periodic=st.booleans())
 @settings(max_examples=50)
-def test_touching_finds_what_a_double_loop_finds(seed, periodic):
+def test_touching_finds_what_all_pairs_have(seed, periodic):
     rng = np.random.default_rng(seed)
     length, n = 6.0, 25
     position = rng.uniform([-2 * length, 0.2], [2 * length, 4], (n, 2))
@@ -155,10 +155,9 @@ def test_touching_finds_what_a_double_loop_finds(seed, periodic):
     radius = rng.uniform(0.2, 0.7, n)
     box_length = length if periodic else None
     expected = [(i, -1) for i in range(n) if position[i, 1] < radius[i]]
-    for i in range(n):
-        for j in range(i + 1, n):
-            if np.hypot(*quasistatic.branch(position, box_length, i, j)) < radius[i] + radius[j]:
-                expected.append((i, j))
+    i, j = np.triu_indices(n, 1)
+    touch = np.linalg.norm(quasistatic.branches(position, box_length, i, j), axis=1) < radius[i] + radius[j]
+    expected += zip(i[touch].tolist(), j[touch].tolist(), strict=True)
     contacts = touching(position, radius, box_length)
     assert sorted(expected) == sorted(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True))
     assert not contacts.slip.any()

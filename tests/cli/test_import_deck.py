@@ -189,6 +189,7 @@ def test_regions_that_move(faultgouge_here, tmp_path):
         (tmp_path / "packing.restart").unlink()
 
 
+@pytest.mark.long
 def test_a_region_that_comes_to_rest(faultgouge_here, tmp_path):
     """A variable of time that a later line makes a constant."""
     deck = POUR.format(law=LAW.format(g=1), rise="1e-6*elapsed", steps=2000).replace("pour 5", "pour 1")

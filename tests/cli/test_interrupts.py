@@ -70,7 +70,7 @@ def equilibria(path):
     [
         pytest.param("ramp", 1, 4, False, marks=pytest.mark.long, id="one rank"),
         pytest.param("ramp", 2, 4, False, id="two ranks"),
-        pytest.param("perturb", 1, 1, True, id="all processes, as a terminal does"),
+        pytest.param("perturb", 1, 1, True, marks=pytest.mark.long, id="all processes, as a terminal does"),
     ],
 )
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
@@ -236,7 +236,7 @@ guarded(work)
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_long_call_of_a_library_does_not_hold_the_signal(tmp_path):
     command = [sys.executable, "-c", IN_A_LIBRARY]
     running = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True)

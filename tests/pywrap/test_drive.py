@@ -330,6 +330,7 @@ states = 0.2
 SIGNAL = {"signal": "pulse", "at": 0.06, "omega": 200.0, "scale": 5.0}
 
 
+@pytest.mark.long
 def test_runs_that_differ_in_the_signal_share_what_is_before_it(scene, tmp_path):
     """Each goes on from a file of the run with the signal, and ends as one that has run from the beginning. Up to the
     signal all are equal to the bit."""
@@ -392,8 +393,8 @@ def test_clock_advance_is_the_time_between_comparable_slips(scene, tmp_path):
     assert clock_advance(tmp_path / "with.h5", tmp_path / "none.h5") is None
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("scale", [pytest.param(0.0, marks=pytest.mark.long), 1e-11])
+@pytest.mark.parametrize("scale", [0.0, 1e-11])
+@pytest.mark.long
 def test_signal_that_does_nothing_has_no_clock_advance_beyond_its_error(faultgouge_here, tmp_path, scale):
     """A small layer with the standard law, shortly before its first slip; without a force runs are the same."""
     text = f"""[packing]

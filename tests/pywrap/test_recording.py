@@ -109,7 +109,7 @@ def perturbed_scene(kind):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_film_of_an_undamped_run_is_stored_unasked(tmp_path):
     """Its states are those of the whole trajectory, at equal intervals up to the end; none where a scene wants none."""
     asked = {"all": {"trajectory": True}, "film": {}, "none": {"trajectory": False}}

@@ -54,7 +54,7 @@ def test_weak_normal_dashpots_lower_the_onset_and_drag_raises_it_to_its_crossove
     assert dragged["onset"] == pytest.approx(dragged["predicted"], rel=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_limit_of_weak_dashpots_is_predicted(ramp):
     """One ratio of one packing anew, tangential dashpots alone, and it is that of the table."""
     known = {(each["cn"], each["ct"]): each for each in table("weak") if each["seed"] == 1}

@@ -54,6 +54,7 @@ def test_the_sweep_that_ships_is_that_of_the_study():
     assert [point.key for point in shipped.points] == [point.key for point in sets(1.0)["onsets"].points]
 
 
+@pytest.mark.long
 def test_the_page_is_what_the_tables_make(tmp_path, monkeypatch):
     monkeypatch.setattr("research.genericity.make.draw_all", lambda *_: None)  # pictures depend on fonts
     written = write_page(tmp_path)

@@ -18,6 +18,7 @@ def test_a_share_of_runs_that_differ_is_less_certain_than_one_of_single_values()
     assert count_of(share_over_runs([[], []])) == "-"
 
 
+@pytest.mark.long
 def test_the_interval_of_runs_covers_the_truth_where_that_of_values_does_not():
     """Runs with a level of their own, many values each: 95 % of the intervals contain the level of all, or few less."""
     rng = np.random.default_rng(0)

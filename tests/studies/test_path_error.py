@@ -88,7 +88,7 @@ def test_a_contact_that_slides_before_the_onset_is_covered():
     assert all(covers(onset, truth) for onset in found.values())
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_onsets_with_dissipation_state_the_whole_error():
     """Beside them stands the undamped onset, with its whole error."""
     found = {}

@@ -64,7 +64,7 @@ def test_all_windows_of_each_friction_coefficient_are_where_its_ramp_has_complex
         assert any(w["kind"] != "start" for w in windows)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_perturb_and_trigger(faultgouge_here, refusal, pairs):
     assert f"the packing is unstable ({pairs[0]} complex pairs" in faultgouge_here("perturb", "scene.toml").stdout
     done = faultgouge_here("trigger", "scene.toml", code=2)

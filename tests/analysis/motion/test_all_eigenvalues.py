@@ -74,7 +74,10 @@ def test_vectors_are_those_of_lapack():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("copies", "others", "sizes"), [(5, 300, SMALL), (20, 300, SMALL), (20, 150, SliceSizes())])
+@pytest.mark.parametrize(
+    ("copies", "others", "sizes"),
+    [(5, 300, SMALL), pytest.param(20, 300, SMALL, marks=pytest.mark.long), (20, 150, SliceSizes())],
+)
 def test_more_equal_eigenvalues_than_a_block_has_vectors(copies, others, sizes):
     """As of spheres that spin without a force. A slice that lacks some is found again with larger blocks."""
     rng = np.random.default_rng(copies)

@@ -39,6 +39,7 @@ def test_strong_dashpots_end_it(wearing):
     assert longer.amplification == pytest.approx(told.creep.amplification, rel=(1 + REMAINING_SHARE) ** 2 - 1)
 
 
+@pytest.mark.long
 def test_weak_dashpots_leave_a_limit_that_holds(wearing, monkeypatch):
     monkeypatch.setattr(creep, "MOST_SPANS", 1)
     here = wearing(0.5, 100.0)

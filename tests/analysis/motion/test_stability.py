@@ -124,6 +124,7 @@ def like_a_large_one(monkeypatch):
         monkeypatch.setattr(rates_module, name, value)
 
 
+@pytest.mark.long
 def test_a_large_packing_is_stable_if_a_push_decays_so_far_that_growth_would_be_seen(monkeypatch):
     at_rest = stuck_at_rest(cn=0.02)
     slowest = stability(at_rest).growth_rate

@@ -67,7 +67,7 @@ def test_the_gain_is_the_largest_singular_value(near):
         assert np.sum(pushed**2) >= found.gain * np.sum(found.start.reshape(3, -1)[:2, found.disk] ** 2) * (1 - 1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_energy_counts_velocities_as_well(near):
     """The start has energy 1/2, and what it becomes has the gain times as much; no less than a start at rest."""
     found = transient_gain(near[0], "energy")

@@ -125,6 +125,7 @@ def test_a_push_back_may_be_so_large_that_the_block_slides_back(block, share):
     assert abs(beyond - of_small) > 0.1 * abs(of_small)
 
 
+@pytest.mark.long
 def test_of_a_block_that_slides_the_load_alone_is_not_accused(block):
     """The slope is 4e-6 beyond the angle of repose: less is out of balance than is allowed, but nothing stops it."""
     from faultgouge.pywrap import from_lammps

@@ -96,6 +96,7 @@ def test_ctrl_c_ends_the_copy(tmp_path, at_the_fork):
     assert lines_of(tmp_path, f"\nat_the_fork = {at_the_fork}\n{MOTION}")[-1] == "no copy is left"
 
 
+@pytest.mark.long
 def test_ctrl_c_ends_a_relaxation_and_leaves_the_path(tmp_path):
     """Loads that were reached stay."""
     assert lines_of(tmp_path, PATH)[-3:] == ["True", "True True", "[]"]

@@ -292,7 +292,7 @@ def test_a_law_that_the_load_changes_is_measured_again(layer):
     assert factors[1] == pytest.approx(3.3e4, rel=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_copy_that_relaxes_ends_with_the_path(layer, tmp_path):
     """However the program ends; a relaxation may take minutes."""
     from faultgouge.pywrap import lammps_path

@@ -219,6 +219,7 @@ def test_a_spring_of_each_sphere_is_in_the_operator(cell):
     assert np.abs(added.toarray() - np.diag(expected)).max() < 1e-5 * abs(laws.contacts.normal_stiffness).max()
 
 
+@pytest.mark.long
 def test_a_spring_of_a_lid_is_in_the_operator(cell):
     """fix spring pulls at the centre of mass of spheres that move as one: its constant is in one entry of K, and LAMMPS
     moves so."""

@@ -86,10 +86,9 @@ def run_script(folder: Path, *arguments: object, script: str = "next_run.py", ra
 @pytest.mark.parametrize(
     ("law", "ranks"),
     [
-        pytest.param("gran/hertz/history", 2, marks=pytest.mark.slow),
         pytest.param("coulomb", 2, marks=pytest.mark.slow),
         *(pytest.param(law, 2, marks=pytest.mark.long) for law in ("mindlin_rescale/force", "total", "rescaled")),
-        pytest.param("gran/hertz/history", 4, marks=pytest.mark.long),
+        *(pytest.param("gran/hertz/history", ranks, marks=pytest.mark.long) for ranks in (2, 4)),
     ],
 )
 def test_on_several_ranks(tmp_path, law, ranks):
@@ -98,7 +97,7 @@ def test_on_several_ranks(tmp_path, law, ranks):
 
 
 @pytest.mark.ranks
-@pytest.mark.slow
+@pytest.mark.long
 def test_with_two_threads(tmp_path):
     """With the styles of LAMMPS's package OPENMP, for which a process with threads cannot be copied."""
     run_script(tmp_path, "gran/hertz/history", 2)

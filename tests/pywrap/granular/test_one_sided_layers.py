@@ -96,6 +96,7 @@ def test_vibration_carries_particles_on_whose_contacts_wear_down(far_from_the_bo
     assert np.sqrt(found[-1]) / 12 == pytest.approx(verdict.creep.velocity, rel=0.3)
 
 
+@pytest.mark.long
 def test_with_loss_particles_stay_displaced(far_from_the_bound):
     """Every linear motion decays, and D rises."""
     packing = far_from_the_bound(20.0)
@@ -111,6 +112,7 @@ def test_with_loss_particles_stay_displaced(far_from_the_bound):
     assert stability(packing, time=10.0).creep.amplification == pytest.approx(found[1], rel=0.5)
 
 
+@pytest.mark.long
 def test_a_push_beyond_the_stated_size_moves_otherwise(far_from_the_bound):
     """The size does not depend on when the motion is looked at, as contacts go farthest at the beginning."""
     packing = far_from_the_bound(20.0)
@@ -125,6 +127,7 @@ def test_a_push_beyond_the_stated_size_moves_otherwise(far_from_the_bound):
     assert np.any(np.abs(pushed_layer(packing, push, times, size=20 * most) / d - 1) > 0.5)
 
 
+@pytest.mark.long
 def test_a_longer_run_knows_no_less():
     """Sliders at rest slide again where vibration wears contacts down; the packing rests all the same."""
     from faultgouge.pywrap import Scene, ramp

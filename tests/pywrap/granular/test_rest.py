@@ -142,6 +142,7 @@ def test_friction_that_holds_nothing_is_named(lammps_with, pair, wall, style):
         relax(lmp, steps=10_000)
 
 
+@pytest.mark.long
 def test_a_packing_so_stiff_that_rounding_moves_it(lammps_with):
     """An overlap of 5e-11 at a coordinate of 4: the rounding of the force is 1e-5 of the weight."""
     from faultgouge import relax
