@@ -108,6 +108,9 @@ class Limits:
     packings of 100 disks and increments of 1e-3 it is 1.3e-3 in the median, and grows with the increment."""
     few_modes: int = 16
     """Modes that are sought in clusters; where more are named, a decomposition of all modes costs no more."""
+    cluster_residual: float = 1e5
+    """As `residual_factor`, of a cluster: eigenvalues err by its square over the distance of other levels, which is
+    rounding if they are farther away than 1e-6 |A|_F."""
     isolation: float = 0.6
     """Half the width of a cluster of few modes over the distance of other levels from its middle: the convergence of
     its subspace, which ten digits leave within `steps`."""

@@ -32,6 +32,7 @@ are taken to stay within `Limits.slack` of the straight line.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +112,7 @@ class PairScreen:
 
     def __init__(self, limits: Limits = LIMITS) -> None:
         self.limits = limits
+        self._of_clusters = replace(limits, residual_factor=limits.cluster_residual)
         self._base: csr_array | None = None
         self._basis: Basis | None = None
         self._named = 0  # modes, when the basis was new
@@ -139,8 +141,8 @@ class PairScreen:
         below = self._reached.get(cluster)
         if below is None or below.system is not here:
             vectors = self._basis.lift(list(cluster))
-            below = Space(here, vectors, vectors).at(here, self.limits)
-        above = None if below is None else below.at(there, self.limits)
+            below = Space(here, vectors, vectors).at(here, self._of_clusters)
+        above = None if below is None else below.at(there, self._of_clusters)
         if below is None or above is None:
             return None
         self._reached[cluster] = above
