@@ -12,12 +12,12 @@ eigenvalues lie within c/2 of -c/2, where Arnoldi's iteration with that shift fi
 """
 
 import numpy as np
-from scipy.sparse import csc_array, diags_array
+from scipy.sparse import csc_array, csr_array, diags_array
 
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
 from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats
-from .eigenvalues import SAFETY, imbalance, is_negative, operator_rounding, zero_uncertainties
+from .eigenvalues import SAFETY, active_coordinates, imbalance, is_negative, operator_rounding, zero_uncertainties
 from .nearest_modes import nearest_modes
 from .spectrum import DENSE_LARGEST, dynamical_matrix, spectrum
 
@@ -64,6 +64,19 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
         count *= 2
     zero = zero_uncertainties(packing, rounding, particle, found.left[active], found.right[active])
     return np.sort(found.values[is_negative(found.values, found.overlap, rounding, zero)].real)
+
+
+def surely_positive(matrix: csr_array) -> bool:
+    """Whether no eigenvalue of an operator is negative, as its symmetric part is positive definite.
+
+    Parameters
+    ----------
+    matrix : scipy.sparse.csr_array, shape (n, n)
+        Zero rows are left out.
+    """
+    active = active_coordinates(matrix)
+    inner = matrix[active][:, active]
+    return _is_positive(csc_array(0.5 * (inner + inner.T)), 0.0)
 
 
 def _is_positive(symmetric: csc_array, shift: Floats | float) -> bool:

@@ -35,6 +35,10 @@ ModeAtEnds = tuple[Space | None, Space | None]
 """A motion at the lower and at the upper load, where it is known."""
 
 
+ModesOfLoads = tuple[SystemModes, SystemModes]
+"""The modes of the lower and of the upper load among which motions may begin or cease to grow."""
+
+
 class Few(NamedTuple):
     """The few motions that may change on an increment.
 

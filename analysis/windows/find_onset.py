@@ -12,7 +12,7 @@ from scipy.sparse import csr_array
 from ..arrays import Floats
 from ..errors import NoEquilibriumError, TurningPointError
 from ..has_configuration import HasConfiguration
-from ..motion.buckling import negative_eigenvalues
+from ..motion.buckling import negative_eigenvalues, surely_positive
 from ..motion.spectrum import Spectrum, spectrum
 from ..packing.packing import Packing
 from ..progress import Watch, report_progress, show_progress
@@ -266,13 +266,20 @@ class _Branch:
 
     def __call__(self, fx: float) -> System:
         packing = self._start if fx == self._first else self._equilibrium(fx)
-        if fx in self._given and len(negative_eigenvalues(force_bearing(packing, self._limits))):
+        system = System.of(packing, limits=self._limits)
+        if fx in self._given and self._buckles(packing, system):
             self.ends = fx if self.ends is None else min(self.ends, fx)
             raise TurningPointError(
                 f"no pair of eigenvalues becomes complex before F_x = {fx:.10g}, where one is negative: the branch of "
                 "stable equilibria ends before, at a turning point, and the packing leaves it without oscillation"
             )
-        return System.of(packing, limits=self._limits)
+        return system
+
+    def _buckles(self, packing: HasConfiguration, system: System) -> bool:
+        """Whether an eigenvalue is negative."""
+        return not surely_positive(system.stiffness) and bool(
+            len(negative_eigenvalues(force_bearing(packing, self._limits)))
+        )
 
 
 def _complex_at_start(start: HasConfiguration, limits: Limits) -> Spectrum | None:

@@ -106,8 +106,14 @@ class Limits:
     slack: float = 0.05
     """How far levels and couplings may leave the straight line between two loads, in units of their change. In
     packings of 100 disks and increments of 1e-3 it is 1.3e-3 in the median, and grows with the increment."""
-    few_pairs: int = 3
-    """Pairs that are examined one by one; where more are named, a decomposition costs no more."""
+    few_modes: int = 16
+    """Modes that are sought in clusters; where more are named, a decomposition of all modes costs no more."""
+    cluster_residual: float = 1e5
+    """As `residual_factor`, of a cluster: eigenvalues err by its square over the distance of other levels, which is
+    rounding if they are farther away than 1e-6 |A|_F."""
+    isolation: float = 0.6
+    """Half the width of a cluster of few modes over the distance of other levels from its middle: the convergence of
+    its subspace, which ten digits leave within `steps`."""
     core: int = 20
     """Modes that a cluster owns."""
     margin: int = 20

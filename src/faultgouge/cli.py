@@ -20,6 +20,8 @@ def main() -> NoReturn:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     # threads of a deck's `package omp` sleep while they wait: where other processes want the cores, they wait long
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+    # pydantic would look for plugins of its own in the metadata of all installed packages
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     if os.name == "nt":
         raise SystemExit("Error: faultgouge does not run on Windows itself: install Linux's wheel in WSL.")
     _open_streams()

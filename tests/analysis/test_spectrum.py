@@ -29,6 +29,7 @@ from faultgouge.analysis import (
     stable_timestep,
     touching,
 )
+from faultgouge.analysis.motion.buckling import surely_positive
 from faultgouge.analysis.operators.damping import coordinate_mass
 
 
@@ -229,6 +230,14 @@ def test_forces_out_of_balance_on_light_disks_do_not_free_a_heavy_one():
     assert np.sum(np.abs(found.eigenvalues) < force / (0.5 * 1e-3)) == 5
     assert found.free == 3
     assert json.loads(json.dumps(stability(packing).as_dict()))["free"] == 3
+
+
+def test_what_is_surely_positive():
+    """The symmetric part decides, without zero rows; an operator of positive eigenvalues may be in doubt."""
+    turning, shearing, negative = ([[1.0, b], [c, d]] for b, c, d in ((9.0, -9.0, 1.0), (3.0, 0.0, 1.0), (0, 0, -1)))
+    expected = (turning, True), (np.pad(turning, 1), True), (shearing, False), (negative, False)
+    for matrix, positive in expected:
+        assert surely_positive(csr_array(np.array(matrix))) == positive
 
 
 def test_negative_eigenvalues_of_more_disks_than_the_dense_solver_takes():

@@ -32,18 +32,21 @@ are taken to stay within `Limits.slack` of the straight line.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from ...arrays import Floats, Indices
-from ..between import Few
+from ..between import Few, ModesOfLoads
 from ..edges import DoubtError
 from ..limits import LIMITS, Limits
 from ..slices.eigenbasis import Basis, Levels
 from ..space import Space
 from ..system import System
+from ..system_modes import SystemModes
 
 
 def may_meet(here: Levels, there: Levels, slack: float) -> Indices:
@@ -105,50 +108,59 @@ def _others(rows: Floats, pairs: tuple[Indices, Indices]) -> Floats:
 
 
 class PairScreen:
-    """Pairs that may meet along a ramp, from one basis for as many increments as it serves."""
+    """The modes that may meet along a ramp, in clusters, from one basis for as many increments as it serves."""
 
     def __init__(self, limits: Limits = LIMITS) -> None:
         self.limits = limits
+        self._of_clusters = replace(limits, residual_factor=limits.cluster_residual)
         self._base: csr_array | None = None
         self._basis: Basis | None = None
+        self._named = 0  # modes, when the basis was new
         self._seen: tuple[csr_array, Levels] | None = None
-        self._reached: list[Space] = []
+        self._reached: dict[tuple[int, ...], Space] = {}
 
-    def __call__(self, here: System, there: System, growing: Sequence[Space], depth: int) -> Few | None:
-        """The pairs at both loads; None if they are more than `Limits.few_pairs`, or one is a pair to within
-        rounding."""
-        planes = self._planes(here.stiffness, there.stiffness, len(growing))
-        reached = [*growing, *(each for each in self._reached if each.system is here)]
-        self._reached = []
-        pairs: list[tuple[Space, Space]] = []
-        for plane in planes or []:
-            guess = Space(here, plane, plane)
-            below = guess.closest(reached) or guess.at(here, self.limits)
-            above = None if below is None else below.at(there, self.limits)
-            if below is None or above is None or any(before.like(below) for before, _ in pairs):
-                raise DoubtError
-            if not (below.definite and above.definite):
-                return None
-            pairs.append((below, above))
-        if planes is None:
-            return None
-        self._reached = [above for _, above in pairs]
-        return Few(pairs, len(pairs))
+    def __call__(self, here: System, there: System, growing: Sequence[Space], depth: int) -> Few | ModesOfLoads | None:
+        """The modes of all clusters at both loads; None if they are more than `Limits.few_modes`, or not isolated.
 
-    def _planes(self, here: csr_array, there: csr_array, complex_pairs: int) -> list[Floats] | None:
-        """Orthonormal bases of the pairs, shape (n, 2); None if they are too many, or if the coordinates change.
-
-        The basis is renewed where it names more pairs than those that are complex_pairs to be complex.
+        A DoubtError is raised in place of None where a part of the increment may show the first pair sooner.
         """
-        if complex_pairs > self.limits.few_pairs:
+        clusters = self._clusters(here.stiffness, there.stiffness)
+        if clusters is not None and not clusters:
+            return Few([], 0)
+        ends = [self._at_both(cluster, here, there) for cluster in clusters or []]
+        if ends and None not in ends:
+            below, above = zip(*ends, strict=True)
+            return SystemModes.of_spaces(here, below), SystemModes.of_spaces(there, above)
+        if not growing and depth < self.limits.change_divisions:
+            raise DoubtError
+        return None
+
+    def _at_both(self, cluster: tuple[int, ...], here: System, there: System) -> tuple[Space, Space] | None:
+        """The subspace of a cluster at both loads."""
+        assert self._basis is not None
+        below = self._reached.get(cluster)
+        if below is None or below.system is not here:
+            vectors = self._basis.lift(list(cluster))
+            below = Space(here, vectors, vectors).at(here, self._of_clusters)
+        above = None if below is None else below.at(there, self._of_clusters)
+        if below is None or above is None:
             return None
+        self._reached[cluster] = above
+        return below, above
+
+    def _clusters(self, here: csr_array, there: csr_array) -> list[tuple[int, ...]] | None:
+        """Modes of the basis that may meet, by clusters; None if they are too many, or if the coordinates change.
+
+        The basis is renewed where it names more than it did when it was new.
+        """
         found = None if self._basis is None else self._look(self._basis, here, there)
-        if (found is None or len(found) > complex_pairs) and self._base is not here:
-            self._base, self._basis, self._seen = here, Basis.of(here, self.limits), None
+        if self._base is not here and (found is None or sum(map(len, found)) > self._named):
+            self._base, self._basis, self._seen, self._reached = here, Basis.of(here, self.limits), None, {}
             found = self._look(self._basis, here, there)
+            self._named = sum(map(len, found or []))
         return found
 
-    def _look(self, basis: Basis, here: csr_array, there: csr_array) -> list[Floats] | None:
+    def _look(self, basis: Basis, here: csr_array, there: csr_array) -> list[tuple[int, ...]] | None:
         if not (basis.covers(here) and basis.covers(there)):
             return None
         matrix, before = self._seen or (here, basis.levels(here))
@@ -156,5 +168,23 @@ class PairScreen:
             before = basis.change(before, here - matrix)
         after = basis.change(before, there - here)
         self._seen = there, after
-        pairs = may_meet(before, after, self.limits.slack)
-        return [basis.lift(pair) for pair in pairs] if len(pairs) <= self.limits.few_pairs else None
+        clusters = clusters_of(may_meet(before, after, self.limits.slack))
+        few = sum(map(len, clusters)) <= self.limits.few_modes
+        isolated = all(isolation(after.diagonal, list(each)) < self.limits.isolation for each in clusters)
+        return clusters if few and isolated else None
+
+
+def isolation(levels: Floats, cluster: list[int]) -> float:
+    """Half the width of a cluster of levels over the distance of its middle from the nearest level outside."""
+    inside = levels[cluster]
+    middle, half = 0.5 * (inside.max() + inside.min()), 0.5 * np.ptp(inside)
+    return float(half / np.abs(np.delete(levels, cluster) - middle).min(initial=np.inf))
+
+
+def clusters_of(pairs: Indices) -> list[tuple[int, ...]]:
+    """The modes that are connected by pairs, shape (P, 2)."""
+    named, places = np.unique(pairs, return_inverse=True)
+    i, j = places.reshape(-1, 2).T
+    links = csr_array((np.ones(len(i)), (i, j)), shape=(len(named),) * 2)
+    count, label = connected_components(links, directed=False)
+    return [tuple(named[label == k].tolist()) for k in range(count)]

@@ -147,10 +147,11 @@ class Basis(Slice):
         blocks = ((symmetric[each.modes, each.modes], self.values[each.modes]) for each in self.clusters)
         return [width_and_mixing(block, values)[1] for block, values in blocks]
 
-    def lift(self, modes: slice | Indices, vectors: Floats | None = None) -> Floats:
+    def lift(self, modes: slice | Indices | list[int], vectors: Floats | None = None) -> Floats:
         """Modes of the basis, or combinations of them in columns, as vectors in the coordinates of the operator."""
-        full = np.zeros((self.size, 2))
-        full[self.active] = self.vectors[:, modes] if vectors is None else self.vectors[:, modes] @ vectors
+        inner = self.vectors[:, modes] if vectors is None else self.vectors[:, modes] @ vectors
+        full = np.zeros((self.size, inner.shape[1]))
+        full[self.active] = inner
         return full
 
 

@@ -8,7 +8,7 @@ from scipy.linalg import eigvals
 from scipy.sparse import csr_array
 
 from faultgouge.analysis.windows import LIMITS, Limits, System, SystemModes, full_operator
-from faultgouge.analysis.windows.screens.pairs import may_meet
+from faultgouge.analysis.windows.screens.pairs import PairScreen, may_meet
 from faultgouge.analysis.windows.slices.eigenbasis import Basis
 
 SLACK = LIMITS.slack
@@ -171,3 +171,18 @@ def test_meetings_of_crossing_levels_between_two_loads():
     )
     assert may_meet(here, crossed, SLACK).tolist() == [[0, 1]]
     assert may_meet(here, close, SLACK).tolist() == []
+
+
+def test_modes_of_clusters_are_those_of_lapack(path):
+    """With complex and with real ones; modes beside the clusters are real."""
+    systems = at(path, 0.0219), at(path, 0.022)
+    for system, modes in zip(systems, PairScreen()(*systems, [], 1), strict=True):
+        everything = SystemModes.of(system)
+        assert 2 <= len(modes) <= LIMITS.few_modes
+        assert len(modes.complex_pairs) == len(everything.complex_pairs) == 1
+        nearest = np.abs(modes.values[:, None] - everything.values).argmin(axis=1)
+        error = np.abs(modes.values - everything.values[nearest])
+        assert np.all(error * modes.overlap < 50 * system.rounding)
+        for side in ("right", "left"):
+            both = getattr(modes, side), getattr(everything, side)[:, nearest]
+            np.testing.assert_allclose(np.abs(np.sum(both[0].conj() * both[1], axis=0)), 1, atol=1e-6)
