@@ -21,8 +21,7 @@ from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import splu
 
 from faultgouge import from_lammps, relax
-from faultgouge.analysis import Configuration
-from faultgouge.analysis.motion.motion import Motion
+from faultgouge.analysis import Configuration, damping_matrix, mass_weighted, stiffness_matrix
 from research.lammps_examples.compute import DECKS, POUR, SLOPE
 
 VALUE = 0.0008436357 + 5.4478188j
@@ -32,11 +31,11 @@ PUSH, UNITS = 1e-7, 60
 """Largest velocity at first, and the time that LAMMPS runs."""
 
 
-def mode(motion: Motion) -> tuple[Any, Any]:
+def mode(stiffness: Any, damping: Any) -> tuple[Any, Any]:
     """Right and left vector, by inverse iteration."""
-    shifted = csc_array(motion.stiffness + VALUE * motion.damping + (VALUE**2 + 1e-7) * eye_array(len(motion.active)))
+    shifted = csc_array(stiffness + VALUE * damping + (VALUE**2 + 1e-7) * eye_array(stiffness.shape[0]))
     factors = splu(shifted)
-    x = y = np.random.default_rng(0).standard_normal(len(motion.active)) + 0j
+    x = y = np.random.default_rng(0).standard_normal(stiffness.shape[0]) + 0j
     for _ in range(6):
         x, y = factors.solve(x), factors.solve(y, "H")
         x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
@@ -60,10 +59,10 @@ def main(folder: Path) -> None:
     given = [line for line in lines.replace("&\n", " ").splitlines() if line.startswith(("pair_", "fix"))]
     relax(lmp, given)
     packing = from_lammps(lmp, given)
-    motion = Motion.of(packing)
-    x, y = mode(motion)
-    start = np.zeros(packing.coordinates)
-    start[motion.active] = PUSH * x.real / motion.root_mass
+    matrix, damping = (mass_weighted(each(packing), packing) for each in (stiffness_matrix, damping_matrix))
+    x, y = mode(matrix, damping)
+    root = np.sqrt(packing.coordinate_mass)
+    start = PUSH * x.real / root
     rows = lmp.numpy.extract_atom("id")[: len(packing)] - 1
     velocity, spin = packing.vectors(start)
     lmp.numpy.extract_atom("v")[: len(packing)] = velocity[rows]
@@ -72,9 +71,9 @@ def main(folder: Path) -> None:
     logs = []
     for _ in range(UNITS):
         lmp.command(f"run {steps} post no")
-        speed = motion.root_mass * of_particles(lmp, packing, ("v", "omega"), 1)[motion.active]
-        force = of_particles(lmp, packing, ("f", "torque"), -1)[motion.active] / motion.root_mass
-        logs.append(np.log(abs(np.vdot(y, VALUE * speed + motion.damping @ speed + force))))
+        speed = root * of_particles(lmp, packing, ("v", "omega"), 1)
+        force = of_particles(lmp, packing, ("f", "torque"), -1) / root
+        logs.append(np.log(abs(np.vdot(y, VALUE * speed + damping @ speed + force))))
     print(f"D as exp({2 * np.polyfit(np.arange(UNITS), logs, 1)[0]:.6f} t) in LAMMPS, by the mode {2 * VALUE.real:.6f}")
 
 
