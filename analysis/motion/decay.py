@@ -125,7 +125,7 @@ class Decay:
         return vars(self) | {"slow": len(self.slow)}
 
 
-def follow_decay(motion: Motion, time: float | None = None) -> Decay:
+def follow_decay(motion: Motion, time: float | None = None, work: float = WORK_OF_DECAY) -> Decay:
     """Find slow motions, and follow all other motion from a random state until it has decayed, or grows.
 
     Parameters
@@ -133,14 +133,16 @@ def follow_decay(motion: Motion, time: float | None = None) -> Decay:
     motion : Motion
         A and G.
     time : float, optional
-        How long at the most; some minutes by default.
+        How long at the most; by default as long as `work` allows.
+    work : float
+        Multiplications; three minutes by default.
     """
     limit = float(stable_timestep(motion.configuration))
     reference = REFERENCE * 2 / limit
     slow = _slow_motions(motion, reference, limit)
     if slow is not None and slow.grows.any():
         return Decay(True, 2 * float(slow.values[0].real), 0.0, 0.0, None, slow.values, slow.free)
-    found = _follow(_steps(motion, reference, slow, limit), time)
+    found = _follow(_steps(motion, reference, slow, limit), time, work)
     if slow is None:
         return found
     found = replace(found, slow=slow.values, free=slow.free)
@@ -191,10 +193,10 @@ def _steps(motion: Motion, reference: float, slow: SlowMotions | None, limit: fl
     return ExplicitSteps.of(motion, reference, slow, limit)
 
 
-def _follow(steps: ExplicitSteps | ImplicitSteps, time: float | None) -> Decay:
+def _follow(steps: ExplicitSteps | ImplicitSteps, time: float | None, work: float) -> Decay:
     """Follow the motion from a random state until it has decayed, or grows."""
     span = steps.time_of_look
-    most = WORK_OF_DECAY / steps.work_of_look if time is None else time / span
+    most = work / steps.work_of_look if time is None else time / span
     wanted, now, logs = 2 * np.log(CHANCE), 0.0, [float(np.log(steps.square))]
     for look in range(max(int(np.ceil(most)), 8)):
         logs.append(steps.look())

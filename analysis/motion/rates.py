@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eig, eigvals
 
 from ..arrays import Complexes, Floats
-from .decay import Decay, follow_decay
+from .decay import WORK_OF_DECAY, Decay, follow_decay
 from .eigenvalues import (
     SAFETY,
     growing,
@@ -34,6 +34,14 @@ growing motions alone. Of 870 coordinates of disks LAPACK takes 0.8 of the time 
 DENSE_DAMPED = 1000
 """Coordinates up to which all eigenvalues s with dissipation are computed by LAPACK, some seconds; of more those
 of the fastest growing motions, and of slow ones."""
+
+DENSE_AFTER_DECAY = 2000
+"""Coordinates up to which LAPACK computes all eigenvalues s where a random state has not decayed in the same time: 20 s
+and 0.5 GB. Motion that is fast and hardly damped decays too slowly in any steps."""
+
+WORK_OF_LAPACK = 3.0
+"""Multiplications of sparse steps that take as long as all eigenvalues s, over the cube of the coordinates: those of
+1,272 coordinates take 5 s."""
 
 DECAY_UP_TO = 6000
 """Coordinates up to which `rates_of` finds out whether all other motion decays; of more, who wants to know calls
@@ -127,7 +135,10 @@ def rates_of(motion: Motion, *, decides: bool = True) -> Rates:
     if found.grows.any() and not found.at_least:
         return found
     # that all motion decays is more than a search says, and takes less time than a long one
-    decay = None if found.grows.any() else follow_decay(motion)
+    dense = WORK_OF_LAPACK * size**3 if size <= DENSE_AFTER_DECAY else np.inf
+    decay = None if found.grows.any() else follow_decay(motion, work=min(dense, WORK_OF_DECAY))
+    if decay is not None and decay.grows is None and dense < WORK_OF_DECAY:
+        return _damped_rates(motion)
     seen = found.searched * FIRST_SEARCH / longest  # what grows faster is seen by a long search
     if decay is None or decay.grows is None or (decay.grows and decay.growth_rate > seen):
         found = _fastest(motion, FIRST_SEARCH, longest)

@@ -47,6 +47,12 @@ TANGENTIAL = (
 )  # fmt: skip
 
 
+PRINT = re.compile(
+    r"""(?sm)^[ \t]*print[ \t]+(?:(?P<quote>\"{3}|["'])(?P<text>.*?)(?P=quote)|(?P<word>\S+))(?P<more>[^\n]*)\n"""
+)
+"""The command `print` in a log. LAMMPS writes the text into the lines that follow."""
+
+
 class NotTakenError(FaultgougeError):
     """A packing of LAMMPS cannot be taken as it stands: one sentence with the reason and the way out."""
 
@@ -94,8 +100,8 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
     coefficients: list[str] = []
     fixes: dict[str, str] = {}
     regions: dict[str, str] = {}
-    whole = re.sub(r"&[ \t]*\n", " ", lines if isinstance(lines, str) else "\n".join(lines))
-    for line in whole.splitlines():
+    whole = lines if isinstance(lines, str) else "\n".join(lines)
+    for line in re.sub(r"&[ \t]*\n", " ", _without_prints(whole) if log else whole).splitlines():
         text = line.split("#")[0]
         words = text.split()
         if not words:
@@ -144,9 +150,22 @@ def logged_text(text: str, folder: Path) -> str:
     return whole
 
 
+def _without_prints(text: str) -> str:
+    """A log without the commands `print` and their output, which may read as a command."""
+    kept, at = "", 0
+    for each in PRINT.finditer(text):
+        if each.start() < at:
+            continue
+        kept += text[at : each.start()]
+        says = re.sub(r"\\\$.*", ".*", re.escape(each["text"] or each["word"] or ""))  # variables have other values
+        output = None if "screen no" in each["more"] else re.compile(rf"{says}(?:\n|\Z)").match(text, each.end())
+        at = each.end() if output is None else output.end()
+    return kept + text[at:]
+
+
 def commands_in(text: str) -> list[str]:
     """The commands of a log with variables filled in; a NotTakenError if no pair_style is among them."""
-    lines = [line.split("#")[0] for line in re.sub(r"&[ \t]*\n", " ", text).splitlines()]
+    lines = [line.split("#")[0] for line in re.sub(r"&[ \t]*\n", " ", _without_prints(text)).splitlines()]
     lines = [line for line in lines if "$" not in line]
     if not any(line.split()[:1] == ["pair_style"] for line in lines):
         raise NotTakenError(

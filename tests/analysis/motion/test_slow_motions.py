@@ -11,7 +11,6 @@ from scipy.sparse import csr_array
 from faultgouge.analysis import Configuration, LinearisedContacts
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.contacts import PER_CONTACT
-from faultgouge.analysis.motion import decay as decay_module
 from faultgouge.analysis.motion import rates as module
 from faultgouge.analysis.motion.decay import follow_decay
 from faultgouge.analysis.motion.decay_steps import ExplicitSteps, ImplicitSteps, slope
@@ -141,11 +140,22 @@ def test_rates_that_do_not_decide_are_those_of_fast_growth_alone(monkeypatch, pr
 @pytest.mark.long
 def test_dashpots_too_weak_for_the_time_leave_a_rate_below_which_growth_may_hide(reference_packing, monkeypatch):
     monkeypatch.setattr(module, "DENSE_DAMPED", 100)
-    monkeypatch.setattr(decay_module, "WORK_OF_DECAY", 1e8)
+    monkeypatch.setattr(module, "DENSE_AFTER_DECAY", 0)
+    monkeypatch.setattr(module, "WORK_OF_DECAY", 1e8)
     found = rates_of(Motion.of(dissipative(reference_packing(1.0), 0.002, 0.001, None)))
     assert not found.grows.any()
     assert found.decay.grows is None
     assert found.searched > -found.growth_rate > 0
+
+
+@pytest.mark.long
+def test_dashpots_too_weak_for_the_time_leave_all_eigenvalues_to_lapack(reference_packing, monkeypatch):
+    motion = Motion.of(dissipative(reference_packing(1.0), 0.002, 0.001, None))
+    expected = rates_of(motion)
+    monkeypatch.setattr(module, "DENSE_DAMPED", 100)
+    found = rates_of(motion)
+    assert found.searched == 0
+    np.testing.assert_array_equal(found.values, expected.values)
 
 
 @pytest.mark.slow

@@ -74,6 +74,28 @@ def test_commands_of_a_log_that_a_deck_has_begun(two, tmp_path):
     assert len(from_lammps(lmp, balance=np.inf).contacts) == 1
 
 
+PRINTS = '''print "pair_style gran/hooke/history 1 1 1 1 1 1"
+variable word index clear
+print "${word}"
+print "${word}" screen no
+pair_coeff * *
+print clear
+print """
+clear
+fix move all nve/limit 1
+"""
+'''
+
+
+def test_what_a_deck_prints_is_no_command(two, tmp_path):
+    from faultgouge.pywrap import from_lammps
+
+    lmp, told = two(HERTZ, "* *", MOVES.strip())
+    (tmp_path / "deck.in").write_text("\n".join([f"log {tmp_path}/own.log", told[0], *told[2:], PRINTS]))
+    lmp.file(str(tmp_path / "deck.in"))
+    assert from_lammps(lmp, balance=np.inf) == from_lammps(lmp, told, balance=np.inf)
+
+
 def test_a_log_that_two_instances_write(two, lammps_with, tmp_path):
     """The commands in it may be those of the other one."""
     from faultgouge.pywrap import NotTakenError, from_lammps
