@@ -217,10 +217,9 @@ def test_a_fix_is_not_accused_without_which_the_motion_is_no_other(sliding):
     [
         pytest.param(("echo none", "echo both"), id="echo none"),
         pytest.param(("log none", 'log "{log}" append'), id="log none"),
-        pytest.param(("", 'print "pair_style gran/hertz/history 3e3 2e3 40 40 0.5 1"'), id="print"),
     ],
 )
-def test_logs_that_lack_commands_or_have_others(tmp_path, around):
+def test_logs_that_lack_commands(tmp_path, around):
     from faultgouge.pywrap import NotTakenError, from_lammps
 
     log = tmp_path / "log.lammps"
