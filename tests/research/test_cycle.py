@@ -14,6 +14,7 @@ CYCLE = Path(__file__).parents[2] / "research" / "cycle"
 ROWS, LARGE = (read_rows(CYCLE / "tables" / name) for name in (TABLE, MANY_TABLE))
 
 
+@pytest.mark.long
 def test_the_page_of_cycles_is_that_of_its_table(tmp_path):
     shutil.copytree(CYCLE / "tables", tmp_path / "tables")
     assert (CYCLE / "README.md").read_text() == write_page(tmp_path).read_text()

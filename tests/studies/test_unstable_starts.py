@@ -72,7 +72,7 @@ def test_perturb_and_trigger(faultgouge_here, refusal, pairs):
     assert "before any shear is added the packing is unstable already" in done.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_sweep_infers_nothing_of_weakening():
     """With mu = 0.4 the sweep finds no equilibrium at the next load, which is no sign of a flow."""
     scene = Scene.from_mapping({name: UNSTABLE[name] for name in ("packing", "law", "load", "ramp")})

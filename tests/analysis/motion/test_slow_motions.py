@@ -104,10 +104,8 @@ def test_the_space_of_slow_motions_is_invariant(damped):
     assert np.abs(image - v @ (v.T @ image)).max() < 1e-6 * largest
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "damped", [STRONG, *(pytest.param(each, marks=pytest.mark.long) for each in (WEAKER, WITH_DRAG))], indirect=True
-)
+@pytest.mark.parametrize("damped", [STRONG, WEAKER, WITH_DRAG], indirect=True)
+@pytest.mark.long
 def test_rates_of_a_packing_beyond_lapack_have_its_slowest_decay(damped, monkeypatch):
     expected = rates_of(Motion.of(damped))
     assert not expected.grows.any()
@@ -123,7 +121,7 @@ def test_rates_of_a_packing_beyond_lapack_have_its_slowest_decay(damped, monkeyp
     assert found.searched == 0
 
 
-@pytest.mark.parametrize(("pressed", "grows"), [(0.0, False), (2.0, True)])
+@pytest.mark.parametrize(("pressed", "grows"), [pytest.param(0.0, False, marks=pytest.mark.long), (2.0, True)])
 def test_rates_that_do_not_decide_are_those_of_fast_growth_alone(monkeypatch, pressed, grows):
     """Whether all other motion decays is not found out. Spheres that are pressed together buckle."""
     motion = Motion.of(row_of_spheres(4, pressed, dashpot=4.0))

@@ -73,6 +73,7 @@ def test_nothing_grows_where_levels_repel():
     assert find_windows(family(block, (1e-3, 1e-4)), [0.0, 1.0]) == ()
 
 
+@pytest.mark.long
 def test_a_steady_loss_of_stability_is_no_hopf_point():
     """A restoring force that vanishes: s = 0."""
 

@@ -204,7 +204,7 @@ def test_what_cannot_be_followed_back_is_in_doubt_and_ends_the_search():
     assert asked
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_modes_near_a_frequency_are_those_of_all(path):
     damped = with_dissipation(path, cn=0.1)
     modes = SystemModes.of(System.of(damped(0.023), dissipation=True))

@@ -164,7 +164,7 @@ def test_first_window_of_the_reference(ramp, mu, expected, last):
     assert window.fx_onset == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_first_window_of_hundreds_of_disks(path):
     """Against all eigenvalues by LAPACK, at the loads before it, just below and just above it.
 

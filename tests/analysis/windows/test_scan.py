@@ -57,29 +57,25 @@ def look_inside(windows):
     return lambda below, above: [fx for fx in inside if below < fx < above]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("increments", "dissipation"),
+    ("increments", "dissipation", "seeds"),
     [
-        (3, 0.3),
-        *(
-            pytest.param(*each, marks=pytest.mark.long)
-            for each in ((1, 1e-4), (3, 1e-4), (1, 1e-2), (3, 1e-2), (1, 0.3))
-        ),
+        (3, 0.3, 3),
+        *(pytest.param(*each, 6, marks=pytest.mark.long) for each in product((1, 3), (1e-4, 1e-2, 0.3))),
     ],
 )
-def test_as_many_windows_are_open_at_each_load_as_motions_grow(increments, dissipation):
+def test_as_many_windows_are_open_at_each_load_as_motions_grow(increments, dissipation, seeds):
     """Windows that begin and end within an increment, several of them, and gaps between two windows of one motion;
     without dissipation and with it."""
     found = Counter()
-    for seed, feed in product(range(6), (0.05, 0.3, 1.0)):
+    for seed, feed in product(range(seeds), (0.05, 0.3, 1.0)):
         size, loads = 4 + seed, np.linspace(0.0, 1.0, increments + 1)
         undamped = find_windows(family(seed, size, feed, 0.0), loads)
         damped = find_windows(family(seed, size, feed, dissipation), loads, look=look_inside(undamped))
         for windows, loss in ((undamped, 0.0), (damped, dissipation)):
             check_open_windows(windows, growing_at_loads(seed, size, feed, loss))
             found[loss] += len(windows)
-    assert min(found.values()) >= 10
+    assert min(found.values()) >= (10 if seeds == 6 else 3)
 
 
 def check_open_windows(windows, growing_at_loads):

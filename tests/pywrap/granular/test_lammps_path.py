@@ -236,7 +236,7 @@ def test_histories_that_a_restart_file_has_lost_are_named(periodic, lammps_with,
         from_lammps(again)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_moduli_along_a_path_of_strain_are_those_of_a_run(periodic):
     """By the function of the how-to: as LAMMPS's own slow run with fix deform. By change_box they are others."""
     from faultgouge.pywrap import from_lammps, lammps_path
