@@ -1,6 +1,6 @@
 # make reproduce   sets everything up and runs the paper's protocol into results/
-# make test        sets everything up and runs the tests (seven minutes on two cores)
-# make long        runs the tests that take longest: kills, odd scenes, research tables, reproduce (a quarter of an hour)
+# make test        sets everything up and runs the tests (five minutes on two cores)
+# make long        runs the tests that take longest: kills, odd scenes, research tables, reproduce (half an hour)
 # make readers     reads exports by OVITO and VTK, in tests
 # make fuzz        a thousand odd scenes, 300 damaged files, 60 kills; says what went wrong (an hour)
 # make plugin      builds the C++ plugin anew, after an edit of it

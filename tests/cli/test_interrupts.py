@@ -369,7 +369,10 @@ def failing(monkeypatch):
     return state
 
 
-SEARCHES = pytest.mark.parametrize("search", [[], ["--modes", "0:39"]], ids=["all_windows", "slices"])
+SEARCHES = pytest.mark.parametrize(
+    "search",
+    [pytest.param([], id="all_windows"), pytest.param(["--modes", "0:39"], marks=pytest.mark.long, id="slices")],
+)
 
 
 @SEARCHES

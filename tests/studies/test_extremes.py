@@ -113,7 +113,7 @@ def test_quick_cases_hold_with_the_same_table_on_two_ranks(faultgouge, tmp_path)
 
 
 @pytest.mark.ranks
-@pytest.mark.slow
+@pytest.mark.long
 def test_error_of_one_rank_ends_the_others(faultgouge, tmp_path):
     """A contact that the law does not cover is found by the rank that owns it; the other one waits for its forces."""
     (tmp_path / "scene.toml").write_text(

@@ -338,7 +338,7 @@ def test_one_table_after_kills_on_workers_and_in_shards(faultgouge, tmp_path):
     assert {"onset", "until"} <= set(ends)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_trigger_and_eruptions_as_tasks(tmp_path):
     """Rows of both studies, which come to the sections of their own in the swept scene."""
     more = {"friction": {"v0": 1e-6, "v_ss": "10 v0"}, "trigger": {"distance": [0.1], "omega": [5.0], "runs": 0}}

@@ -225,7 +225,7 @@ def test_spectrum_of_a_packing(request):
     same_spectrum(spectrum(packing), expected)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_spectrum_where_slices_fail(request, losing):
     """LAPACK then serves."""
     packing = request.getfixturevalue("path")(0.022)

@@ -141,7 +141,7 @@ def dashpot_on_all(fx):
     return System(fx, csr_array(stiffness), csr_array(damping))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_where_dashpots_couple_all_modes_what_grows_is_followed_back_to_its_onset():
     """The motion is seen at the last load, and begins before it; all eigenvalues tell where."""
     loads = np.array([0.5, 0.55, 0.575, 0.62, 0.65])
