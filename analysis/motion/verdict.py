@@ -283,10 +283,10 @@ class Stability:
             if least:
                 yield f"holds for pushes above {least:.1g} (velocity along an axis): below, residual forces count"
         elif least < most:
-            within = f", for t = {self.push_time:.2g} as motions that no force opposes go on" if self.free else ""
+            within, later = (f", up to t = {self.push_time:.2g}", " or later") if self.free else ("", "")
             yield (
                 f"holds for pushes of {least:.1g} to {most:.1g} (velocity along an axis){within}: below, residual "
-                "forces count; above, contacts open, close or slide"
+                f"forces count; above{later}, contacts open, close or slide"
             )
         else:
             yield (
