@@ -16,8 +16,8 @@ to second order by
 .. math:: p_c(t) = \max_{t' \le t} \left(Y_c q + Z_c \dot q + \frac{s\, a_c^2}{2 \mu f_n}\right)_+ .
 
 Where little holds the particles back ahead, this slip goes on and on, and the motion is followed for smaller and
-smaller s until it is the motion to first order. The residual forces of a packing move the
-particles, too. The motion counts if it goes much farther than they do.
+smaller s until it is the motion to first order. The residual forces of a packing move the particles, too. The motion
+counts if it goes much farther than they do.
 """
 
 from collections.abc import Callable
@@ -154,6 +154,8 @@ class ContactReach:
             if change <= SAME_WAY:
                 break
             size *= 0.9 * SAME_WAY / change if np.isfinite(change) else 0.1
+        else:
+            size = 0.0  # no size is known for which the motion is that to first order
         self.smallest = size
 
     @property
