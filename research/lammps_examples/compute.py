@@ -87,8 +87,6 @@ FUNNEL, MIXER, CHUTE, DRUM, FLAT, HEAT, TRIAXIAL, POUR = (
 
 POURED = "the pouring ends"
 
-SHORTER = "the pouring ends, and then the time step is 0.0005"
-
 STILL_DRUM = DAMPED | {"equal 2*PI*elapsed/20000.0": "equal 0"}
 
 STILL_AND_SHORTER = "damping mass_velocity, the drum does not turn, and in the end the time step is 0.0005"
@@ -108,8 +106,6 @@ DECKS = (
     Deck(DRUM, "the same, and the drum does not turn", STILL_DRUM),
     Deck(FLAT, POURED, adds=("unfix ins1", "unfix ins2")),
     Deck(HEAT, POURED, adds=("unfix ins1", "unfix ins2")),
-    Deck(FLAT, SHORTER, adds=("unfix ins1", "unfix ins2", "timestep 0.0005")),
-    Deck(HEAT, SHORTER, adds=("unfix ins1", "unfix ins2", "timestep 0.0005")),
     Deck(DRUM, STILL_AND_SHORTER, STILL_DRUM, adds=("timestep 0.0005",)),
     Deck("examples/granular/in.restitution"),
     Deck("examples/granular/in.tableting.200"),

@@ -143,7 +143,7 @@ def test_a_large_packing_is_stable_if_a_push_decays_so_far_that_growth_would_be_
     assert short.stable is None
     assert 0 < short.searched == short.decay.searched
     assert short.decay.needed == pytest.approx(found.decay.time, rel=0.3)
-    assert "D that grows more slowly than exp(" in str(short)
+    assert "D grows no faster than exp(" in str(short)
     assert "would do" in str(short)
 
 
