@@ -95,7 +95,7 @@ class ContactChanges:
         slope = np.divide(bound * c.normal_stiffness, c.normal_force, out=np.zeros(len(c)), where=bears)
         none = np.zeros(len(c))
         viscous = [tangential_rows(configuration, each, c.tangential_dashpot, none) for each in (along, across)]
-        of_bound = np.divide(bound * c.normal_dashpot * c.viscous_slider, c.normal_force, out=none, where=bears)
+        of_bound = np.divide(bound * c.normal_dashpot * c.viscous_slider, c.normal_force, out=none.copy(), where=bears)
         dashpots = vstack([*viscous, diags_array(of_bound) @ overlaps])
         wears = np.flatnonzero(c.two_derivatives)
         difference = 0.5 * (c.closing - c.parting)[wears]
