@@ -237,7 +237,7 @@ INSIDE = {
     "analysis.windows.slices.slices": "the bases of a way of counting pairs that a page compares with all eigenvalues",
     "pywrap.granular.lammps_arrays": "velocities of a live LAMMPS are set in a unit that the Configuration has",
     "pywrap.runs.path_error": "the stated errors that a page compares with true ones, at the windows of its own search",
-    "pywrap.runs.drive_recorder": "slips and clock advances from the rows of a drive.h5",
+    "pywrap.runs.drive": "slips and clock advances from the rows of a drive.h5",
     "pywrap.scenes.drive_section": "the scale of the probe that a page states",
     "pywrap.scenes.validation": "read_toml, as Python 3.10 has no reader; require_section",
     "studies.modes.draw": "the page goes on with curves of that study",
