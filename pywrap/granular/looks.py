@@ -51,7 +51,7 @@ def look_at_contacts(
     styles = styles_of(lmp)
     check_instance(lmp, styles, given)
     plain = {name: without_suffix(style) for name, style in styles.fixes.items()}
-    groups = {name: given.fixes[name].split()[2] for name in plain if plain[name] in MOBILE}
+    groups = _groups(lmp, {name: given.fixes[name] for name in plain if plain[name] in MOBILE})
     walls = [name for name in plain if plain[name] in WALLS]
     columns = "dx dy dz force p3" if given.style == OWN else "dx dy dz force p1 p2 p3"
     if copied:
@@ -72,6 +72,16 @@ def look_at_contacts(
     found = {name: _join_ranks([each[name] for each in every]) for name in mine}
     order = np.argsort(found["id"], kind="stable")
     return given, styles.fixes, {name: rows if name in BY_CONTACT else rows[order] for name, rows in found.items()}
+
+
+def _groups(lmp: Any, lines: dict[str, str]) -> dict[str, str]:
+    """The groups of fixes by their IDs; and those of the bodies of a fix rigid, by the ID and the group."""
+    groups = {name: line.split()[2] for name, line in lines.items()}
+    for name, line in lines.items():
+        if without_suffix(line.split()[3]) in BODIES:
+            bodies = translating_bodies(line, lmp.extract_setting("dimension"))
+            groups |= {f"{name} {body.group}": body.group for body in bodies}
+    return groups
 
 
 def _logged_commands(lines: list[str] | None) -> Commands:
@@ -108,11 +118,7 @@ def look_at_forces(
             raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINE}.")
     if moves := moving_region(lmp, given):
         raise NotTakenError(moves)
-    groups = {name: line.split()[2] for name, line in given.fixes.items() if name in moving}
-    for name in list(groups):
-        if without_suffix(styles.fixes[name]) in BODIES:
-            bodies = translating_bodies(given.fixes[name], lmp.extract_setting("dimension"))
-            groups |= {f"{name} {body.group}": body.group for body in bodies}
+    groups = _groups(lmp, {name: line for name, line in given.fixes.items() if name in moving})
     quieten(lmp, drag=True)
     found = arrays_at_rest(lmp, groups, [], columns)
     found["at walls"] = _forces_of_walls(lmp, styles, given, found)
