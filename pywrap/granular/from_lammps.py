@@ -21,7 +21,7 @@ from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError,
 from .instance_queries import open_files, require_instance
 from .look_in_a_copy import can_copy, in_a_copy
 from .looks import look_at_contacts
-from .motion_proof import CAUSE_SHARE, LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError, OtherStiffnessError
+from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError, OtherStiffnessError
 from .motion_proof import prove as prove_motion
 
 
@@ -104,9 +104,6 @@ def _instead_of_laws(
 ) -> Configuration:
     """A Configuration by differences, with the reason among its remarks; or that by laws, where it is as close."""
     why = str(reason).rstrip(".")
-    laws = reason.stands if isinstance(reason, NotProvedError) else None
-    if laws is not None and slides:
-        return laws
     if not can_copy(lmp):
         raise NotLinearisedError(with_one_rank(reason)) from reason
     if slides:
@@ -117,8 +114,6 @@ def _instead_of_laws(
     try:
         found = _by_differences(lmp, given, balance=balance, prove=prove)
     except NotTakenError:
-        if laws is not None:
-            return laws
         if isinstance(reason, NotProvedError):
             raise reason from None
         raise
@@ -126,14 +121,12 @@ def _instead_of_laws(
     if not isinstance(reason, NotProvedError):
         return found
     # differences lack forces on velocities, or between particles far apart, too, and these have been named
-    most = LARGEST_DIFFERENCE if laws is None or laws.proof is None else CAUSE_SHARE * laws.proof
-    if found.proof is not None and found.proof <= most and found.operator_error <= SMALL_DIFFERENCE:
+    close = found.proof is not None and found.proof <= LARGEST_DIFFERENCE
+    if close and found.operator_error <= SMALL_DIFFERENCE:
         return found
     # contacts that slide on one side have no linear motion, and no verdict is given
     if isinstance(reason, OtherStiffnessError) and len(found.one_sided_particles):
         return found
-    if laws is not None:
-        return laws
     raise reason
 
 
@@ -155,14 +148,7 @@ def _by_laws(lmp: Any, given: Commands | None, laws: KnownLaws, *, balance: floa
         check_holding(fixes)
     check_friction(contacts, rests=rests)
     refuse_motion(configuration, balance, deck)
-    if not proves:
-        return configuration
-    try:
-        return _proved(lmp, configuration, deck, fixes)
-    except NotProvedError as error:
-        if error.difference is not None:
-            error.stands = derive_frozen(configuration, proof=error.difference)
-        raise
+    return _proved(lmp, configuration, deck, fixes) if proves else configuration
 
 
 def _remarks(

@@ -17,9 +17,10 @@ and no linear motion is LAMMPS's: the difference is told, and the packing is not
 
 **Forces by position.** A force that depends on the position and belongs to no contact may be weak beside the contacts,
 and strong beside the lowest eigenvalues of K. So all particles are also displaced alike. No contact between particles
-then changes, and only particles at walls may feel other forces. (K by differences contains such forces.) Where a fix
-acts of which the laws know nothing, they have to agree to `SMALL_DIFFERENCE`, or K is found by differences, too, and
-the closer of both is taken (:mod:`~faultgouge.pywrap.granular.from_lammps`).
+then changes, and only particles at walls may feel other forces. (K by differences contains such forces.)
+
+**Causes.** The laws of contacts hold with any constant forces besides. So a fix is the cause of a difference if LAMMPS
+moves as K says once the forces which the fix exerts at rest are given to the particles as constants in its place.
 """
 
 from collections.abc import Callable
@@ -38,7 +39,7 @@ from .acting_fixes import acting_fixes
 from .balance import force_scale
 from .granular_commands import GIVE_LINES, NotLinearisedError, NotTakenError
 from .instance_queries import styles_of
-from .lammps_arrays import STILL_STEP, has_bodies, owned_array, rows_of, set_up_run, set_velocity
+from .lammps_arrays import STILL_STEP, forces_in_order, has_bodies, owned_array, rows_of, set_up_run, set_velocity
 from .look_in_a_copy import in_a_copy, quieten
 
 LARGEST_DIFFERENCE = 1e-3
@@ -78,26 +79,14 @@ USUAL_OVERLAP = 1e-4
 """Overlap as a share of the mean radius where no contact is known."""
 
 CAUSE_SHARE = 0.1
-"""Share of the difference that is left without a fix that is its cause."""
-
-CHANGE_SHARE = 0.5
-"""Share of the difference, or its inverse, up to which the difference without all fixes is the same, and none is the
-cause. Where a packing creeps 0.87 of the difference is left without two constant forces. Without rhok, which also keeps
-the balance, the difference is 3.7 times as large."""
+"""Share of the difference that is left where constant forces stand in the place of a fix that is its cause."""
 
 COMMON_MULTIPLE = 2**12 * 5**9 * 3**4 * 7 * 11 * 13
 """A time step that is a multiple of the intervals that people write: some fixes act every so many steps alone."""
 
 
 class NotProvedError(NotLinearisedError):
-    """LAMMPS's motion shows, or may show, a force on particles besides those of the contacts.
-
-    `difference` is that of the laws where they agree well enough to stand if K by differences is no closer, and
-    `stands` is the Configuration with these laws.
-    """
-
-    difference: float | None = None
-    stands: Configuration | None = None
+    """LAMMPS's motion shows a force on particles besides those of the contacts."""
 
 
 class OtherStiffnessError(NotProvedError):
@@ -130,37 +119,34 @@ def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extr
         return None
     others, moves = acting_fixes(fixes), comparison.least_difference
     difference, other_stiffness = moves()
-    by_laws = configuration.operators == "laws"
     if other_stiffness > OTHER_STIFFNESS:
         if comparison.other_stiffness(np.zeros(3)) > OTHER_STIFFNESS:
             raise NotTakenError(
                 "LAMMPS's forces change with the time, though nothing moves: a load or a wall follows a variable of "
                 "the step or the time; give it a constant, and run on until the packing rests."
             )
-        causes = [says for name, says in others.items() if moves((name,))[1] < OTHER_STIFFNESS]
-        if not causes and moves(tuple(others))[1] < OTHER_STIFFNESS:
-            causes = list(others.values())
+        causes = _causes(others, lambda names: moves(names)[1] < OTHER_STIFFNESS)
         raise OtherStiffnessError(
             "LAMMPS's forces do not change as K says: where all particles are displaced alike, forces change that no "
             f"contact has; {' and '.join(causes or ['something acts on particles by their positions'])}."
         )
     if len(configuration.one_sided_particles):
         return difference  # no linear motion is LAMMPS's, and no verdict is given
-    if difference > LARGEST_DIFFERENCE and not by_laws:
+    if difference > LARGEST_DIFFERENCE and configuration.operators == "differences":
         shorter = _Comparison(lmp, configuration, extrapolates, SHORTER_STEPS)
         difference = min(difference, shorter.least_difference()[0])
     if difference <= SMALL_DIFFERENCE:
         return difference
-    causes = [says for name, says in others.items() if moves((name,))[0] < CAUSE_SHARE * difference]
+    causes = _causes(others, lambda names: moves(names)[0] < CAUSE_SHARE * difference)
     if difference <= LARGEST_DIFFERENCE and not causes:
-        if not others or not by_laws:
-            return difference
-        unproved = NotProvedError(f"{_differs(difference)}; {' and '.join(others.values())}.")
-        unproved.difference = difference
-        raise unproved
-    if not causes and others and not CHANGE_SHARE < moves(tuple(others))[0] / difference < 1 / CHANGE_SHARE:
-        causes = list(others.values())  # which of them is not known, but without them the motion is another one
+        return difference
     raise _not_proved(configuration, difference, causes)
+
+
+def _causes(others: dict[str, str], serves: Callable[[tuple[str, ...]], bool]) -> list[str]:
+    """What is said of the fixes that are the cause: each, or all together, with constants in their place."""
+    causes = [says for name, says in others.items() if serves((name,))]
+    return causes or (list(others.values()) if len(others) > 1 and serves(tuple(others)) else [])
 
 
 def _differs(difference: float) -> str:
@@ -253,7 +239,7 @@ class _Comparison:
 
     def least_difference(self, without: tuple[str, ...] = ()) -> tuple[float, float]:
         """Relative difference of LAMMPS's steps from the linear ones, at the amplitude where it is least, and the
-        stiffness that no contact has; some fixes are left out.
+        stiffness that no contact has; constant forces stand in the place of some fixes.
 
         A K that is not LAMMPS's disagrees at every amplitude: contacts open or begin to slide with large ones, and
         `granular` does not turn a history that has left its plane by less than 1e-10 of Coulomb's bound.
@@ -365,7 +351,7 @@ def steps_in_a_copy(
     from_step: int | None = None,
 ) -> Floats:
     """Velocities of the coordinates, shape (axes N,), after some steps of LAMMPS from others, in a copy of the process:
-    without drag and some fixes, and from another number of the step, if given."""
+    without drag, with constant forces in the place of some fixes, and from another number of the step, if given."""
 
     def take() -> Floats:
         _leave_out(lmp, configuration, without)
@@ -421,8 +407,8 @@ def _on_coordinates(lmp: Any, c: Configuration, along: str, around: str) -> Floa
 
 
 def _leave_out(lmp: Any, configuration: Configuration, without: tuple[str, ...]) -> None:
-    """Close the log and all that writes, and leave out drag and some fixes; what moves particles by drag alone moves
-    them by their inertia. The instance is a copy."""
+    """Close the log and all that writes, leave out drag, and put constant forces in the place of some fixes; what moves
+    particles by drag alone moves them by their inertia. The instance is a copy."""
     lmp.command("log none")
     styles = styles_of(lmp)
     quieten(lmp, drag=True)
@@ -430,5 +416,17 @@ def _leave_out(lmp: Any, configuration: Configuration, without: tuple[str, ...])
     for name, style in styles.fixes.items():
         if style == "overdamped/disc":
             lmp.command(f"fix {name} {styles.groups[name]} nve/disc {factor:.17g}")
+    if not without:
+        return
+    set_velocity(lmp, configuration, np.zeros(configuration.coordinates))
+    lmp.command("run 0 post no")
+    force = forces_in_order(lmp, configuration.ids)
     for name in without:
         lmp.command(f"unfix {name}")
+    lmp.command("run 0 post no")
+    force -= forces_in_order(lmp, configuration.ids)
+    lmp.command("fix faultgouge_p all property/atom d_fg_x d_fg_y d_fg_z")
+    for k, axis in enumerate("xyz"):
+        owned_array(lmp, f"d_fg_{axis}")[rows_of(lmp, configuration)] = force[:, k]
+        lmp.command(f"variable fg_{axis} atom d_fg_{axis}")
+    lmp.command("fix faultgouge_f all addforce v_fg_x v_fg_y v_fg_z")
