@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from ...analysis import RunFile
-from ...analysis.files.atomic_write import lock_output
+from ...analysis.files.atomic_write import lock_output, replace_whole
 from ...analysis.motion.slips import Slip, find_slips
 from ..equilibria.quasistatic import Equilibrium
 from ..scenes.drive_section import Drive
@@ -147,11 +147,10 @@ class DriveRecord(Record):
         for path, scene in self._others.items():
             with lock_output(path):
                 if not path.exists():
-                    copy = path.with_name(f".{path.name}.copy")
-                    shutil.copyfile(self.path, copy)
-                    with RunFile(copy, "a") as file:
-                        file.put_attribute("scene", json.dumps(scene.resolved()))
-                    copy.replace(path)
+                    with replace_whole(path) as new:
+                        shutil.copyfile(self.path, new)
+                        with RunFile(new, "a") as file:
+                            file.put_attribute("scene", json.dumps(scene.resolved()))
 
     def _put_states(self, states: Sequence[DriveState]) -> None:
         """Write states behind the decided ones; those that are pending in the file already stay."""
