@@ -30,7 +30,6 @@ from faultgouge.analysis.files.formats import (
     write_frames,
     write_packing,
 )
-from faultgouge.analysis.files.formats.configuration_export import export_configuration
 from faultgouge.pywrap import Scene, SceneError
 
 FILMS = pytest.mark.parametrize("suffix", [".xyz", ".gsd"], indirect=True)
@@ -312,7 +311,7 @@ def test_ase_reads_extended_xyz(tmp_path, ramp, configuration):
         packing = run.packing()
         write_frames(tmp_path / "film.xyz", frames_of(run, range(2)))
     write_packing(tmp_path / "one.xyz", packing)
-    export_configuration(tmp_path / "lammps.xyz", configuration)
+    write_packing(tmp_path / "lammps.xyz", configuration)
     one, film, other = (read(tmp_path / f"{name}.xyz", ":") for name in ("one", "film", "lammps"))
     assert [len(one), len(film), len(other)] == [1, 2, 1]
     for atoms in (one[0], film[1]):
@@ -328,10 +327,10 @@ def test_ase_reads_extended_xyz(tmp_path, ramp, configuration):
 LATER = "format 2 of faultgouge's files, and this version knows 1: a later version wrote it, so update faultgouge"
 
 
-@pytest.mark.parametrize("module", ["xyz", "lammps_data", "gsd_file", "checksummed_file", "configuration_file"])
+@pytest.mark.parametrize("module", ["xyz", "lammps_data", "libraries", "checksummed_file", "configuration_file"])
 def test_a_file_of_a_later_format_is_refused(tmp_path, sheared, configuration, monkeypatch, module):
     """And one without a number, of an older version, is read."""
-    suffix = {"xyz": "xyz", "lammps_data": "data", "gsd_file": "gsd"}.get(module, "h5")
+    suffix = {"xyz": "xyz", "lammps_data": "data", "libraries": "gsd"}.get(module, "h5")
     path = tmp_path / f"a.{suffix}"
     place = "faultgouge.analysis.files." + (f"formats.{module}" if suffix != "h5" else "checksummed_file")
 

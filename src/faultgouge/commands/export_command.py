@@ -43,7 +43,7 @@ def export(
         "packing.vtp"
     ),
 ) -> None:
-    """Write a stored packing for ParaView (.vtp), OVITO (.xyz), LAMMPS (.data) or HOOMD (.gsd).
+    """Write a stored packing for ParaView (.vtp), OVITO and ASE (.xyz), LAMMPS (.data) or HOOMD (.gsd).
 
     The file contains disks with radii, net forces and mobilised friction; contacts
     with forces and slips (in .vtp as lines); modes as vectors (not in .data).
@@ -52,9 +52,7 @@ def export(
     displacements; a .pvd for ParaView comes with a folder of .vtp.
     """
     from faultgouge.analysis import Configuration
-    from faultgouge.analysis.files.formats import ModeVectors
-    from faultgouge.analysis.files.formats.configuration_export import check_configuration_writer, export_configuration
-    from faultgouge.analysis.files.formats.registry import check_writer, write_packing
+    from faultgouge.analysis.files.formats import ModeVectors, check_writer, write_packing
 
     lock_output(context, output, file)
     if frames is not None:
@@ -63,28 +61,21 @@ def export(
         _export_frames(file, frames, output)
         return
     packing = stored_packing(file, frame)
-    if isinstance(packing, Configuration):
-        check_configuration_writer(output)
-    else:
-        check_writer(output, mode is not None)
+    check_writer(output, mode is not None)
     if not is_root():
         return
     modes = [] if mode is None else modes_of(packing, mode)[0]
     vectors = [ModeVectors(f"mode_{each.number}", each.eigenvalue, each.displacement) for each in modes]
-    if isinstance(packing, Configuration):
-        words = export_configuration(output, packing, vectors)
-    else:
-        words = f"F_x = {packing.fx:g}: {write_packing(output, packing, vectors)}"
-    print_line(f"{words}; written to {output}")
+    load = "" if isinstance(packing, Configuration) else f"F_x = {packing.fx:g}: "
+    print_line(f"{load}{write_packing(output, packing, vectors)}; written to {output}")
 
 
 def _export_frames(file: Path, says: str, output: Path) -> None:
     """The frames of a ramp or of an undamped run."""
     from faultgouge.analysis import PackingFileError, RunFile
-    from faultgouge.analysis.files.formats.frames import choose_frames, frames_of
-    from faultgouge.analysis.files.formats.registry import check_frames_writer, write_frames
+    from faultgouge.analysis.files.formats import check_writer, choose_frames, frames_of, write_frames
 
-    check_frames_writer(output)
+    check_writer(output, frames=True)
     if file.suffix == ".disks":
         raise PackingFileError(f"{file} is one packing: leave --frames out, or give a run.h5.")
     if not is_root():
