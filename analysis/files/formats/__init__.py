@@ -108,7 +108,8 @@ told by the first line, whatever the name is; MercuryDPM's files have the suffix
 READERS = {suffix: each for each in FORMATS for suffix in each.suffixes}
 WRITERS = {".vtp": ("vtp", "write_vtp"), ".xyz": ("xyz", "write_xyz"), ".gsd": ("libraries", "write_gsd")}
 FILMS = {name: WRITERS[name] for name in (".xyz", ".gsd")} | {".pvd": ("vtp", "write_pvd")}
-"""Module and function by suffix: of one packing, with modes; of several frames. LAMMPS data has no room for modes."""
+"""Module and function by suffix: of one packing, with modes; of several frames."""
+WITHOUT_MODES = {".data": "LAMMPS data", ".csv": "a table of contacts"}
 
 
 def list_formats() -> str:
@@ -213,10 +214,12 @@ def check_writer(path: Path, modes: bool = False, frames: bool = False) -> None:
         return
     if path.suffix == ".pvd":
         raise BadInputError(f"-o {path}: a .pvd is a list of frames; add --frames all, or export a .vtp.")
-    if path.suffix not in (*WRITERS, ".data"):
-        raise BadInputError(f"-o {path}: exports are {', '.join(WRITERS)}, .data; give it one of these suffixes.")
-    if modes and path.suffix == ".data":
-        raise BadInputError(f"-o {path}: LAMMPS data has no room for modes; leave --mode out, or export .vtp or .xyz.")
+    if path.suffix not in (*WRITERS, *WITHOUT_MODES):
+        names = ", ".join([*WRITERS, *WITHOUT_MODES])
+        raise BadInputError(f"-o {path}: exports are {names}; give it one of these suffixes.")
+    if modes and path.suffix in WITHOUT_MODES:
+        what = WITHOUT_MODES[path.suffix]
+        raise BadInputError(f"-o {path}: {what} has no room for modes; leave --mode out, or export .vtp or .xyz.")
 
 
 def write_packing(path: Path, packing: Packing | Configuration, modes: Sequence[ModeVectors] = ()) -> str:
@@ -247,6 +250,8 @@ def write_packing(path: Path, packing: Packing | Configuration, modes: Sequence[
     alone = isinstance(packing, Packing)
     if path.suffix == ".data":
         return str(_function("lammps_data", "write_data" if alone else "write_spheres")(path, packing))
+    if path.suffix == ".csv":
+        return str(_function("tables", "write_contacts")(path, packing))
     if isinstance(packing, Packing):
         exported = exported_packing(Frame(packing), modes)
     else:

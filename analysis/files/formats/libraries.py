@@ -104,6 +104,8 @@ def _frame(hoomd: Any, e: Exported) -> Any:
         box[0, 0] = box[0, 0] if e.periodic[0] else 2 * (np.abs(e.position[:, 0]).max() + radius.max())
     elif e.origin is not None:
         middle = e.origin + 0.5 * box.sum(axis=0)
+    flats = np.flatnonzero(np.diag(box) == 0)
+    box[flats, flats] = np.ptp(e.position, axis=0)[flats] + 2 * radius.max()
     shares = (e.position - middle) @ np.linalg.inv(box)
     place = e.position - middle - (np.floor(shares + 0.5) * e.periodic) @ box
     lengths = np.diag(box)

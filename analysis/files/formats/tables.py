@@ -31,7 +31,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats
+from ...configuration import Configuration
 from ...errors import PackingFileError
+from ...packing.packing import Packing
+from ..atomic_write import write_text
 from ..plain_file import open_text
 from .disks import NAMES, Disks, Slips, of_columns
 from .lammps_dump import CONTACT, dump_frames
@@ -287,6 +290,17 @@ def read_slips(path: Path, length: str = "") -> Slips:
         missing = next(key for key in ("first", "second", "slip") if found[key] is None)
         raise PackingFileError(f"{path} has no column {names[missing][0]} (its columns: {', '.join(columns)}).")
     return Slips(first.astype(np.int64), second.astype(np.int64), slip, found["low"])
+
+
+def write_contacts(path: Path, packing: Packing | Configuration) -> str:
+    """Write a row for each contact, with all digits, and return the contents in words."""
+    columns = packing.configuration.contact_columns()
+    known_by = ",".join(columns)
+    if isinstance(packing, Packing):
+        columns |= {"slip": packing.contacts.slip}
+    rows = zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True)
+    write_text(path, "\n".join([",".join(columns), *map(",".join, rows)]) + "\n", known_by)
+    return "forces, overlaps and mobilised friction; `faultgouge import --contacts` takes the slips"
 
 
 def read_json(path: Path) -> Disks:

@@ -39,14 +39,15 @@ def export(
             help="Frames of the undamped run if the file has its trajectory, else of the ramp; .xyz, .gsd or .pvd.",
         ),
     ] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="The file: .vtp, .pvd, .xyz, .data or .gsd.")] = Path(
+    output: Annotated[Path, typer.Option("-o", "--output", help="A .vtp, .pvd, .xyz, .data, .gsd or .csv.")] = Path(
         "packing.vtp"
     ),
 ) -> None:
     """Write a stored packing for ParaView (.vtp), OVITO and ASE (.xyz), LAMMPS (.data) or HOOMD (.gsd).
 
     The file contains disks with radii, net forces and mobilised friction; contacts
-    with forces and slips (in .vtp as lines); modes as vectors (not in .data).
+    with forces and slips (in .vtp as lines); modes as vectors (not in .data). A .csv
+    has a row for each contact.
     `faultgouge import` reads .xyz, .data and .gsd back unchanged, to the bit. A .gsd
     needs pip install 'faultgouge[export]'. With --frames the file is a film of
     displacements; a .pvd for ParaView comes with a folder of .vtp.
