@@ -20,7 +20,7 @@ snapshots in a file must have the same disks; otherwise a snapshot must be chose
 import zlib
 from collections import deque
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from os import PathLike
 from pathlib import Path
@@ -28,17 +28,15 @@ from typing import TextIO
 
 import numpy as np
 
-from ...arrays import Floats, Indices
+from ...arrays import Floats
 from ...errors import PackingFileError
 from ...packing.compensated import exact_sum
-from ...packing.contacts import FLOOR, Contacts
 from ...packing.geometry import nearest_image
 from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
 from ..plain_file import open_text, read_plain_text
 from ..runfile import law_of_parameters
-from .disks import Disks, of_columns
-from .exported import contact_rows, scalars, slips_of
+from .disks import Disks, Slips, of_columns, packing_of
 
 DISK = {
     "id": ("id",),
@@ -125,35 +123,19 @@ def read_dump(
         If a file is missing or broken, a column is missing, the snapshots do not match, or no law is given.
     """
     disks = Path(disks)
-    contacts = disks.with_suffix(".contacts") if contacts is None else Path(contacts)
-    shown = _snapshot(disks, frame)
     given = _sidecar(disks.with_suffix(".params"))
     law = law or _law(given, disks)
-    absent = () if law.frictional else ("angle", "floor_slip", "slip")
-    disk = _columns(disks, shown, DISK, absent)
-    disk = {name: column[np.argsort(disk["id"])] for name, column in disk.items()}
-    pair = _columns(contacts, _snapshot_of_step(contacts, shown.step), CONTACT, absent)
-    position, low = _places(disk)
-    box_length = float(shown.bounds[0, 1] - shown.bounds[0, 0]) if shown.boundary[0].startswith("p") else None
-    i, j = (_numbers(disk["id"], pair[partner], disks, contacts) for partner in ("first", "second"))
-    try:
-        return Packing(
-            position=position,
-            radius=disk["radius"],
-            angle=disk["angle"],
-            mass=disk["mass"],
-            inertia_factor=given.get("inertia_factor", 1.0) if inertia_factor is None else inertia_factor,
-            box_length=box_length,
-            top=disk["type"] == TOP_TYPE,
-            contacts=_find_contacts(position, i, j, disk, pair, box_length),
-            law=law,
-            fx=given.get("fx", 0.0) if fx is None else fx,
-            fy=given.get("fy", 0.0) if fy is None else fy,
-            position_low=low,
-            drag_time=given.get("tau"),
-        )
-    except ValueError as error:
-        raise PackingFileError(f"{disks} and {contacts} describe no possible packing: {error}") from error
+    found = _deck_disks(disks, contacts, frame, law.frictional, given)
+    assert found.top is not None
+    values = {"fx": fx, "fy": fy, "inertia_factor": inertia_factor}
+    known = {key: given[key] if value is None else value for key, value in values.items() if key in given or value}
+    return packing_of(found, law, found.top, drag_time=given.get("tau"), **known)
+
+
+def read_deck_dump(path: Path, frame: int | None = None) -> Disks:
+    """Read a dump of write.in, with its .contacts and .params."""
+    given = _sidecar(path.with_suffix(".params"))
+    return _deck_disks(path, None, -1 if frame is None else frame, _law(given, path).frictional, given)
 
 
 def _law(given: Mapping[str, float], disks: Path) -> MindlinLaw:
@@ -165,43 +147,39 @@ def _law(given: Mapping[str, float], disks: Path) -> MindlinLaw:
         raise PackingFileError(f"The law of {disks} is not given: {sidecar} does not name {error}.") from None
 
 
-def _places(disk: Mapping[str, Floats]) -> tuple[Floats, Floats | None]:
-    """Centres, and their low parts if the dump has them."""
-    position = np.column_stack([disk["x"], disk["y"]])
-    if "x_low" not in disk:
-        return position, None
-    return exact_sum(position, np.column_stack([disk["x_low"], disk["y_low"]]))
-
-
-def _numbers(ids: Floats, partners: Floats, disks: Path, contacts: Path) -> Indices:
-    """Numbers of the disks with these IDs."""
-    where = np.searchsorted(ids, partners)
-    if np.any(ids[np.minimum(where, len(ids) - 1)] != partners):
-        raise PackingFileError(f"{contacts} has a contact of a disk that {disks} does not have.")
-    return where
-
-
-def _find_contacts(
-    position: Floats,
-    i: Indices,
-    j: Indices,
-    disk: Mapping[str, Floats],
-    pair: Mapping[str, Floats],
-    box_length: float | None,
-) -> Contacts:
-    """The contacts among the listed neighbours, and those with the floor."""
-    radius = disk["radius"]
-    touch = np.hypot(*nearest_image(position[i] - position[j], box_length).T) < radius[i] + radius[j]
-    floor = np.flatnonzero(radius - position[:, 1] > 0)
-    slip_low = None
-    if "slip_low" in pair and "floor_slip_low" in disk:
-        slip_low = np.concatenate([pair["slip_low"][touch], disk["floor_slip_low"][floor]])
-    return Contacts(
-        np.concatenate([i[touch], floor]),
-        np.concatenate([j[touch], np.full(len(floor), FLOOR)]),
-        np.concatenate([pair["slip"][touch], disk["floor_slip"][floor]]),
-        slip_low,
+def _deck_disks(
+    path: Path, contacts: str | PathLike[str] | None, frame: int, frictional: bool, given: Mapping[str, float]
+) -> Disks:
+    """The disks of a dump of the decks, with the slips of all contacts."""
+    beside = path.with_suffix(".contacts") if contacts is None else Path(contacts)
+    shown = _snapshot(path, frame)
+    absent = () if frictional else ("angle", "floor_slip", "slip")
+    disk = _columns(path, shown, DISK, absent)
+    disk = {name: column[np.argsort(disk["id"])] for name, column in disk.items()}
+    pair = _columns(beside, _snapshot_of_step(beside, shown.step), CONTACT, absent)
+    if "x_low" in disk:
+        place, low = exact_sum(*(np.column_stack([disk[f"{axis}{part}"] for axis in "xy"]) for part in ("", "_low")))
+        disk |= dict(zip(("x", "y", "x_low", "y_low"), (*place.T, *low.T), strict=True))
+    periodic = shown.boundary[0].startswith("p")
+    found = of_columns(
+        str(path),
+        disk | {"top": disk["type"] == TOP_TYPE},
+        box_length=float(np.ptp(shown.bounds[0, :2])) if periodic else None,
+        given=given,
     )
+    i, j = (np.minimum(np.searchsorted(found.id, pair[each]), len(found) - 1) for each in ("first", "second"))
+    if np.any(found.id[i] != pair["first"]) or np.any(found.id[j] != pair["second"]):
+        raise PackingFileError(f"{beside} has a contact of a disk that {path} does not have.")
+    apart = nearest_image(found.position[i] - found.position[j], found.box_length)
+    touch = np.hypot(*apart.T) < found.radius[i] + found.radius[j]
+    floor = found.radius > found.position[:, 1]
+    first, second = np.append(found.id[i[touch]], found.id[floor]), np.append(found.id[j[touch]], 0 * found.id[floor])
+    slip, low_slip = (
+        np.append(pair[of_pair][touch], disk[of_floor][floor]) if of_pair in pair and of_floor in disk else None
+        for of_pair, of_floor in (("slip", "floor_slip"), ("slip_low", "floor_slip_low"))
+    )
+    assert slip is not None
+    return replace(found, slips=Slips(first, second, slip, low_slip, complete=True))
 
 
 def dump_frames(path: str | PathLike[str]) -> Iterator[DumpFrame]:
@@ -292,25 +270,6 @@ def _sidecar(path: Path) -> dict[str, float]:
         }
     except ValueError as error:
         raise PackingFileError(f"{path} must have one key and one number a line.") from error
-
-
-def read_deck_dump(path: Path, frame: int | None = None) -> Disks:
-    """Read a dump of write.in, with its .contacts and .params."""
-    packing = read_dump(path, frame=-1 if frame is None else frame)
-    return Disks(
-        str(path),
-        packing.position,
-        packing.radius,
-        np.arange(1, len(packing) + 1),
-        packing.mass,
-        packing.angle,
-        1 + packing.top.astype(np.int64),
-        packing.top,
-        packing.position_low,
-        packing.box_length,
-        slips_of(contact_rows(packing), packing.compensated),
-        scalars(packing),
-    )
 
 
 def read_custom_dump(path: Path, frame: int | None = None) -> Disks:
