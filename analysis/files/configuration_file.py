@@ -21,10 +21,9 @@ from ..configuration import Configuration
 from ..contacts import PER_CONTACT, LinearisedContacts
 from ..errors import PackingFileError
 from .atomic_write import SEAL, check_checksum
-from .checksummed_file import new_file, open_checksummed, write
+from .checksummed_file import check_places, new_file, open_checksummed, write
 from .plain_file import open_plain
-from .runfile_header import CHECKSUM, CREATOR, program_version
-from .runfile_validation import check_places
+from .runfile import CHECKSUM, CREATOR, program_version
 
 if TYPE_CHECKING:
     import h5py

@@ -71,7 +71,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON."
 
 def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
     """The part of a scene file that a command reads; a task that would never end is refused."""
-    from faultgouge.analysis.files.formats.registry import READERS
+    from faultgouge.analysis.files.formats import READERS
     from faultgouge.pywrap.scenes.impossible import refuse_endless
     from faultgouge.pywrap.scenes.scene import Scene
 
