@@ -156,7 +156,12 @@ def _remarks(
 ) -> tuple[str, ...]:
     """Sentences on what moves, which a packing at rest leaves out; velocities have the shape (N, 3)."""
     held = held_remarks(configuration, velocity, rotation, float(lmp.extract_global("dt")))
-    return (*held, *motion_remarks(configuration, velocity), *drag_remarks(fixes))
+    adapts = (
+        f"fix {name} (adapt) may change sizes or laws as LAMMPS runs on: this is said of those that hold now"
+        for name, style in fixes.items()
+        if style.startswith("adapt")
+    )
+    return (*held, *motion_remarks(configuration, velocity), *adapts, *drag_remarks(fixes))
 
 
 def _proved(lmp: Any, configuration: Configuration, commands: Commands, fixes: dict[str, str]) -> Configuration:

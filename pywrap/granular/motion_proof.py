@@ -11,8 +11,10 @@ small, the motions with both signs of the velocities are compared: half of their
 in the amplitude. With contacts at the bound the motions of both signs are not opposite. Then each is compared by
 itself, after the motion from rest has been subtracted.
 
-**K by differences of forces** has no contacts at the bound. If the model acts one step late, the difference is smaller
-in shorter steps, which are taken if the first steps do not agree. If forces are one-sided, K is the mean of both sides,
+**Shorter steps** are taken if the first steps do not agree: where a model acts one step late (mdr), or takes the slip
+by other velocities (synchronized_verlet), the difference falls as the step.
+
+**K by differences of forces** has no contacts at the bound. If forces are one-sided, K is the mean of both sides,
 and no linear motion is LAMMPS's: the difference is told, and the packing is not refused.
 
 **Forces by position.** A force that depends on the position and belongs to no contact may be weak beside the contacts,
@@ -62,8 +64,8 @@ STEPS_OF_PROOF = 5
 """Steps of LAMMPS and of the linearised packing."""
 
 SHORTER_STEPS = 10
-"""By how much steps are shorter where a model may act one step late, as the volume of particles does in mdr: then the
-difference falls as the step, and that of a K which is not LAMMPS's does not."""
+"""By how much steps are shorter: a difference by the way in which a model takes its steps falls, and that of a K which
+is not LAMMPS's does not."""
 
 STEP_PHASE = 1.5
 """Time step times a bound of the fastest rate, which is some three times this rate: five steps are half an oscillation
@@ -132,7 +134,7 @@ def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extr
         )
     if len(configuration.one_sided_particles):
         return difference  # no linear motion is LAMMPS's, and no verdict is given
-    if difference > LARGEST_DIFFERENCE and configuration.operators == "differences":
+    if difference > LARGEST_DIFFERENCE:
         shorter = _Comparison(lmp, configuration, extrapolates, SHORTER_STEPS)
         difference = min(difference, shorter.least_difference()[0])
     if difference <= SMALL_DIFFERENCE:

@@ -252,6 +252,17 @@ def test_a_lid_of_two_masses(cell, lid):
     assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
 
 
+def test_a_lid_out_of_balance_is_named(cell):
+    from faultgouge.pywrap import NotTakenError, from_lammps
+
+    lmp = cell(f"{CONFINED}\nfix body lid rigid single torque 1 off off off")
+    command(lmp, "fix more lid addforce 0 0 -1.0")
+    with pytest.raises(
+        NotTakenError, match="the residual of the lid of 9 particles that move as one, with particle 28"
+    ):
+        from_lammps(lmp)
+
+
 def test_a_spring_in_aveforce_is_refused(cell):
     """The fix is taken away where forces are differences, and the spring would be missing in K."""
     from faultgouge.pywrap import NotTakenError, from_lammps
