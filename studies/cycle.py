@@ -33,7 +33,7 @@ from scipy.linalg import eigvals, lu_factor, lu_solve
 from ..analysis import Configuration, Packing, RunFile
 from ..analysis.arrays import Complexes, Floats, derive_frozen
 from ..analysis.counted import counted
-from ..analysis.files.atomic_write import make_folder, write_json
+from ..analysis.files.atomic_write import FORMAT_KEY, check_format, check_own, make_folder, write_json
 from ..analysis.files.plain_file import read_plain, read_plain_text
 from ..analysis.has_configuration import HasConfiguration
 from ..analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, unit_rounding, zero_uncertainties
@@ -298,12 +298,14 @@ def cycle(path: Path, output: Path, say: Say = print, progress: Progress = lambd
             )
         if settings.spring == "rigid":
             raise SceneError(f"{path} is of a rigid drive, whose layer has no spring and no slips: draw with a spring")
-        make_folder(output)
+        make_folder(output, "cycle.json")
+        check_own(output / "cycle.csv", ",".join(CYCLE_COLUMNS))
         digest, known = hashlib.sha256(read_plain(path)).hexdigest(), output / "cycle.json"
         try:
             stored = json.loads(read_plain_text(known))
+            check_format(stored.get(FORMAT_KEY), known)
             states = list(stored["states"]) if stored["sha256"] == digest else []
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
             states = []
         spring, slips, times = float(settings.spring), slips_in(file), file.observable("time")
         series, displacement = file.series(SERIES), file.observable("displacement")

@@ -94,6 +94,9 @@ LABELS = {
     "critical_restitution": "critical restitution",
 }
 
+COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q")
+"""Of modes.csv."""
+
 PANELS = 4
 """Loads whose frequencies are drawn side by side."""
 
@@ -402,8 +405,7 @@ def _gather(sweep: Sweep, rows: Sequence[Row], output: Path, say: Say) -> list[s
         {"values": row["values"], "says": row["says"]} | {key: row["result"].get(key) for key in keys} for row in rows
     ]
     write_json(output / "modes.json", {"asked": sweep.as_dict(), "rows": lines, "packings": packings})
-    columns = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q")
-    write_csv(output / "modes.csv", columns, lines)
+    write_csv(output / "modes.csv", COLUMNS, lines)
     _draw(good, lines, output, say)
     return _in_words(lines, packings, output)
 
@@ -459,6 +461,7 @@ def _in_words(lines: Sequence[Row], packings: Sequence[Row], output: Path) -> li
     needs=("ramp",),
     section=ModesSection,
     gather=_gather,
+    writes={"modes.json": "", "modes.csv": ",".join(COLUMNS)},
     of_run=cycle,
     example="faultgouge modes modes.toml -o modes",
 )

@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -20,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.arrays import Floats
-from ..analysis.files.atomic_write import write_text
+from ..analysis.files.atomic_write import FORMAT, FORMAT_KEY, check_format, check_own, replace_whole, write_text
 from ..analysis.files.plain_file import read_plain
 from ..pywrap import Scene, SceneError
 
@@ -44,10 +45,12 @@ def read_keyed_rows(path: Path, key: str, what: str) -> list[dict[str, Any]]:
         try:
             rows.append(json.loads(line))
             rows[-1][key]
+            number_of_format = rows[-1].pop(FORMAT_KEY, None)
         except (ValueError, KeyError, TypeError, RecursionError):
             raise SceneError(
                 f"{path}: line {number} is no result of {what}: take it out, or give another folder"
             ) from None
+        check_format(number_of_format, f"{path}, line {number},")
     return rows
 
 
@@ -70,6 +73,8 @@ def append_row(path: Path, row: Mapping[str, Any]) -> None:
                 file.seek(0)
                 file.truncate(file.read().rfind(b"\n") + 1)
         file.write(json.dumps(row).encode() + b"\n")
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def keep_rows(path: Path, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
@@ -87,14 +92,15 @@ class Rows:
 
     def __init__(self, path: Path, scene: Scene, beside: str) -> None:
         self.path = path
-        resolved = {name: keys for name, keys in scene.resolved().items() if name != beside}
+        whole = {name: keys for name, keys in scene.resolved().items() if name != beside}
+        resolved = whole | scene.digests()  # a name alone does not say which packing it is
         self._scene = hashlib.sha256(json.dumps(resolved, sort_keys=True).encode()).hexdigest()[:12]
         self.rows = [row for row in read_keyed_rows(path, "scene", "a study") if row["scene"] == self._scene]
 
     def append(self, **row: Any) -> dict[str, Any]:
         """Write a line; it is in the file when this returns."""
         row = {"scene": self._scene, "version": version("faultgouge")} | row
-        append_row(self.path, row)
+        append_row(self.path, {FORMAT_KEY: FORMAT, **row})
         self.rows.append(row)
         return row
 
@@ -114,26 +120,37 @@ def flat(result: Mapping[str, Any], above: str = "") -> dict[str, Any]:
     return row
 
 
+def check_table(names: list[str], folder: Path) -> None:
+    """Refuse a results.csv and a results.parquet of others, before work begins."""
+    check_own(folder / "results.csv", ",".join(names) + ",")
+    check_own(folder / "results.parquet")
+
+
 def write_tables(rows: list[Row], names: list[str], folder: Path) -> None:
     """Write rows in the order of the table, with the swept keys by name: results.csv, results.parquet if it can be."""
     found = dict.fromkeys([*names, *(name for row in rows for name in flat(row["result"]))])
     columns = [*(name for name in found if name != "says"), "says"]
     table = [row["values"] | flat(row["result"]) | {"says": row["says"]} for row in rows]
-    write_csv(folder / "results.csv", columns, table)
+    write_csv(folder / "results.csv", columns, table, len(names))
     if find_spec("pandas") and find_spec("pyarrow"):
         import pandas as pd
 
         frame = pd.DataFrame([{column: _plain(row.get(column)) for column in columns} for row in table])
-        frame.to_parquet(folder / "results.parquet")
+        frame.attrs[FORMAT_KEY] = FORMAT
+        with replace_whole(folder / "results.parquet") as new:
+            frame.to_parquet(new)
 
 
-def write_csv(path: Path, columns: Sequence[str], table: Iterable[Row]) -> None:
-    """Write some columns of rows; the file is replaced as a whole."""
+def write_csv(path: Path, columns: Sequence[str], table: Iterable[Row], known_by: int | None = None) -> None:
+    """Write some columns of rows; the file is replaced as a whole, if its first columns are the same, `known_by` many.
+
+    All columns by default.
+    """
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows([_cell(row.get(column)) for column in columns] for row in table)
-    write_text(path, text.getvalue())
+    write_text(path, text.getvalue(), head=",".join(columns[:known_by]))
 
 
 def _cell(value: Any) -> Any:

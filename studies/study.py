@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mpi4py import MPI
@@ -81,7 +82,6 @@ class SceneStudy:
     row: TaskRow | None
     counts: str
     kept: str
-    gather: Gather | None = None
 
     def __call__(
         self, scene: Scene, output: Path, say: Say = print, progress: Progress = lambda results, _: results
@@ -110,7 +110,7 @@ class SceneStudy:
             if MPI.COMM_WORLD.rank != 0:
                 return {}
             map_rows: MapRows = map if pool is None else partial(pool.map, unordered=True)
-            make_folder(output)
+            make_folder(output, f"{self.name}.json", f"{self.name}.md")
             rows = Rows(output / f"{self.name}.jsonl", scene, self.beside)
             found = self.compute(scene, Work(rows, map_rows, say, progress))
         real = real_units(scene)
@@ -133,6 +133,7 @@ class SweepTask:
     needs: tuple[str, ...]
     section: type[Section] | None
     gather: Gather | None
+    writes: Mapping[str, str]
     of_run: Callable[[Path, Path, Say, Progress], Sequence[str]] | None
 
     def __call__(self, scene: Scene, start: Start) -> Row:
@@ -194,6 +195,7 @@ def task(
     needs: Iterable[str] = (),
     section: type[Section] | None = None,
     gather: Gather | None = None,
+    writes: Mapping[str, str] = MappingProxyType({}),
     of_run: Callable[[Path, Path, Say, Progress], Sequence[str]] | None = None,
     example: str | None = None,
 ) -> Callable[[TaskRow], SweepTask]:
@@ -205,6 +207,9 @@ def task(
         As of `study`.
     gather : callable, optional
         What is made of all rows.
+    writes : mapping
+        The files that `gather` writes besides pictures, and the heads of those that are tables: files of others of
+        these names are refused before work begins.
     of_run : callable, optional
         What the command does with a stored run, FILE.h5, in place of a scene.
     example : str, optional
@@ -214,6 +219,6 @@ def task(
     def register(row: TaskRow) -> SweepTask:
         name = row.__name__
         own = () if section is None else (name,)
-        return SweepTask(name, row, (*reads, *own), tuple(needs), section, gather, of_run)
+        return SweepTask(name, row, (*reads, *own), tuple(needs), section, gather, writes, of_run)
 
     return register

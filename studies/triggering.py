@@ -627,7 +627,7 @@ def _gather(sweep: Sweep, rows: Sequence[Row], output: Path, say: Say) -> list[s
     return in_words(numbers)
 
 
-@task(reads=UNDAMPED_SECTIONS, needs=("ramp",), gather=_gather)
+@task(reads=UNDAMPED_SECTIONS, needs=("ramp",), gather=_gather, writes={"summary.json": ""})
 def triggering(scene: Scene, start: Start) -> Row:
     """Onsets for several friction coefficients, and the runs between them. An error is the row's "says", beside the
     results of the stages before.

@@ -21,10 +21,9 @@ from ..configuration import Configuration
 from ..contacts import PER_CONTACT, LinearisedContacts
 from ..errors import PackingFileError
 from .atomic_write import SEAL, check_checksum
-from .checksummed_file import new_file, open_checksummed, write
+from .checksummed_file import check_places, new_file, open_checksummed, write
 from .plain_file import open_plain
-from .runfile_header import CHECKSUM, CREATOR, program_version
-from .runfile_validation import check_places
+from .runfile import CHECKSUM, CREATOR, program_version
 
 if TYPE_CHECKING:
     import h5py
@@ -115,6 +114,9 @@ def read_configuration(path: Path) -> Configuration:
     with open_checksummed(path) as file:
         try:
             check_places(file)
+        except PackingFileError as error:
+            raise PackingFileError(f"{path} is refused: {str(error).rstrip('.')}.") from error
+        try:
             group, given = file["snapshot"], file["snapshot/contacts"]
             contacts = LinearisedContacts(
                 **{name: given[name][()] for name in PER_CONTACT if name in given or name not in LATER_KEYS}

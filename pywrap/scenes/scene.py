@@ -35,7 +35,16 @@ from .scene_keys import SceneKeys
 from .sections import Inertia
 from .study_sections import errors_in, require_sections, study_model, study_models
 from .units import real_units
-from .validation import KEYS_TO_ADD, SceneError, Section, read_toml, refusal_sentence, sentence
+from .validation import (
+    KEYS_TO_ADD,
+    SceneError,
+    Section,
+    digest_of,
+    files_named,
+    read_toml,
+    refusal_sentence,
+    sentence,
+)
 
 
 class Scene(SceneKeys):
@@ -172,6 +181,21 @@ class Scene(SceneKeys):
             first = min(errors_in(error), key=lambda each: each["type"] != "extra_forbidden")
             studies = study_models() if first["type"] == "extra_forbidden" else {}
             raise SceneError(f"{name}: {sentence(first, SECTIONS | studies)}.") from None
+
+    @property
+    def files(self) -> dict[str, tuple[Path, ...]]:
+        """The files that the scene names, by section.key; of a dump also those beside it."""
+        sections = ((name, getattr(self, name)) for name in type(self).model_fields)
+        return {
+            f"{name}.{key}": paths
+            for name, section in sections
+            if isinstance(section, Section)
+            for key, paths in files_named(section).items()
+        }
+
+    def digests(self) -> dict[str, str]:
+        """SHA-256 of the contents of these files, by section.key."""
+        return {key: digest_of(paths) for key, paths in self.files.items()}
 
     def resolved(self) -> dict[str, Any]:
         """Every key with its value, defaults included, as plain numbers, strings, lists and dicts.

@@ -7,8 +7,8 @@ import pytest
 
 from faultgouge.analysis import BadInputError, MindlinLaw, PackingFileError
 from faultgouge.analysis.files.formats import packing_of, read_disks, upper_layer
-from faultgouge.analysis.files.formats.csv_json import read_slips
-from faultgouge.analysis.files.formats.upper_layer import layer_remark
+from faultgouge.analysis.files.formats.disks import layer_remark
+from faultgouge.analysis.files.formats.tables import read_slips
 
 LAW = MindlinLaw(2e5, 5e4, 0.5)
 

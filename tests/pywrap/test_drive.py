@@ -245,7 +245,7 @@ def test_what_cannot_be_driven_is_refused_before_it_begins(settled, change, says
     """Scenes that make no sense, and drives that are not slow, or that time steps do not follow."""
     sections = {**BASE, "drive": DRAWN, **change}
 
-    def check():
+    def check() -> None:
         wanted = Scene.from_mapping({key: each for key, each in sections.items() if each}, command="drive")
         check_drive(wanted, settle_for_drive(wanted) if "damping" in change else settled)
 

@@ -10,7 +10,7 @@ import pytest
 from reference_layer import LAYER, toml
 
 from faultgouge.analysis import MindlinLaw, PackingFileError, RunFile, read_dump
-from faultgouge.analysis.files.dumps import dump_frames
+from faultgouge.analysis.files.formats.lammps_dump import dump_frames
 from faultgouge.assessment.explain import InstanceContents
 from faultgouge.pywrap import Engine
 from faultgouge.pywrap.lammps.decks import DECKS

@@ -165,7 +165,9 @@ def stability(
         return _try_cases(output, quick)
     finally:
         if is_root() and (output / "extremes.json").exists():
-            (output / "stability.json").write_bytes((output / "extremes.json").read_bytes())
+            from faultgouge.analysis.files.atomic_write import write_whole
+
+            write_whole(output / "stability.json", (output / "extremes.json").read_bytes())
 
 
 def _try_cases(output: Path, quick: bool) -> Answer:

@@ -51,6 +51,7 @@ def sweep(
 
 def run_task(task: str | None, file: Path, output: Path, shard: str, workers: int | None, dry_run: bool) -> None:
     """Run a sweep, or a scene or a sweep by the command of one task, and print what there is to say of all rows."""
+    from faultgouge.analysis.files.atomic_write import check_own
     from faultgouge.studies.sweep.run_sweep import missing_points, read_results, remaining_work, run_sweep
     from faultgouge.studies.sweep.sweep_plan import Sweep, other_packings, points_of
 
@@ -65,6 +66,8 @@ def run_task(task: str | None, file: Path, output: Path, shard: str, workers: in
         for line in remaining_work(missing_points(points_of(wanted.points, (part, of)), known), known.values()):
             print_line(line)
         return
+    for name, head in getattr(registered.study_of(wanted.task), "writes", {}).items():
+        check_own(output / name, head)
     keeps(f"{output}/results.jsonl has the scenes that have ended; the same command continues from there", output)
     rows = run_sweep(wanted, output, (part, of), say, lambda rows, count: progress(rows, "scenes", count), workers)
     if is_root():

@@ -8,7 +8,7 @@ import pytest
 
 from faultgouge import load
 from faultgouge.analysis import PackingFileError, read_dump
-from faultgouge.analysis.files.dumps import dump_frames
+from faultgouge.analysis.files.formats.lammps_dump import dump_frames
 
 DISK_COLUMNS = "id type x y radius mass d_theta fx fy tqz floor_slip floor_overlap"
 CONTACT_COLUMNS = "id1 id2 f_n f_t slip"
