@@ -39,9 +39,9 @@ from ..factors.sparse_lu import general_lu
 from ..fields_by_name import FieldsByName
 from ..progress import report_progress
 from .eigenvalues import operator_rounding, zero_uncertainty
+from .linear import linear_verdict
 from .motion import Motion
 from .one_sided import WORK_OF_MOTION, OneSidedSystem
-from .rates import rates_of
 
 LOAD_STEP = 0.1
 """Time step of motion under a load, as a share of the largest stable one."""
@@ -287,10 +287,8 @@ def _steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Fl
             break
     else:
         return None
-    if len(way):
-        found = rates_of(replace(motion, stiffness=a))
-        if found.searched or found.grows.any():
-            return None
+    if len(way) and linear_verdict(replace(motion, stiffness=a)).stable is not True:
+        return None
     return velocity
 
 

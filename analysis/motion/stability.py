@@ -27,7 +27,8 @@ from ..counted import counted
 from ..has_configuration import HasConfiguration
 from ..operators.asymmetry import asymmetry
 from ..operators.sliders import with_sticking_contacts
-from .linear import Linear, linear_verdict
+from .eigenvalues import Linear
+from .linear import linear_verdict
 from .motion import Motion
 from .no_verdict import no_verdict
 from .one_sided import VERDICT_STEP, OneSidedSystem, forces_on_coordinates
