@@ -41,7 +41,7 @@ def neighbouring_pairs(lmp: Any, c: Configuration) -> Pairs:
     gap = np.linalg.norm(x[i] - x[j], axis=1) - radius[i] - radius[j]
     others = _acting(lmp)
     if lmp.extract_setting("molecule_flag"):
-        for each in (lmp.numpy.gather_bonds(), lmp.numpy.gather_angles()):
+        for each in filter(len, (lmp.numpy.gather_bonds(), lmp.numpy.gather_angles())):
             members = np.asarray(each).reshape(len(each), -1)[:, 1:]
             others += [members[:, pair] for pair in combinations(range(members.shape[1]), 2)]
     bonded = np.concatenate(others)
