@@ -16,7 +16,7 @@ from faultgouge.analysis.files.atomic_write import lock_output, write_json, writ
 from faultgouge.analysis.files.formats import write_packing
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.lammps.plain_file_names import plain_name, temporary_folder
-from faultgouge.studies.sweep.table import write_csv
+from faultgouge.studies.result_rows import write_csv
 
 SCENE = LAYER + toml({"ramp": {"step": 1e-3, "until": 2e-3}, "output": {"dumps": True}})
 STRANGE = """a 'b' "c" & <d> $x ${y} #"""
