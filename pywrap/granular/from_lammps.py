@@ -28,7 +28,7 @@ from .motion_proof import prove as prove_motion
 
 def from_lammps(
     lmp: Any,
-    commands: Iterable[str] | None = None,
+    commands: Iterable[str] | Commands | None = None,
     *,
     slides: bool = False,
     balance: float = BALANCE,
@@ -77,7 +77,7 @@ def from_lammps(
 
 def take_configuration(
     lmp: Any,
-    commands: Iterable[str] | None,
+    commands: Iterable[str] | Commands | None,
     laws: KnownLaws,
     *,
     slides: bool,
