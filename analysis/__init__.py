@@ -24,7 +24,7 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .configuration import Configuration, Snapshot
     from .contacts import LinearisedContacts
     from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
-    from .files.dumps import read_dump
+    from .files.formats.lammps_dump import read_dump
     from .files.runfile import RunFile
     from .motion.buckling import negative_eigenvalues
     from .motion.eigenvalues import mass_weighted

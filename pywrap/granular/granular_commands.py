@@ -135,6 +135,9 @@ def commands_of(carried_out: Iterable[Sequence[str]], source: str) -> Commands:
                 coefficients = []
             style = line
         elif name == "pair_coeff":
+            # the last line of two types holds; in hybrid styles, of one style
+            mine = list(words[1 : 4 if style.split()[1:2] and style.split()[1].startswith("hybrid") else 3])
+            coefficients = [each for each in coefficients if each.split()[1 : 1 + len(mine)] != mine]
             coefficients.append(line)
         elif name == "fix" and len(words) > 3:
             fixes[words[1]] = line
@@ -243,8 +246,6 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
             raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINE}.")
         if plain == "wall/gran":
             _check_wall(name, line)
-        if plain in BODIES:
-            raise NotLinearisedError(f"fix {name} {style} has particles move as one.")
 
 
 PLANES = ("xplane", "yplane", "zplane")

@@ -12,13 +12,14 @@ this program, so that results of another packing or version are never used.
 import errno
 import fcntl
 import hashlib
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from uuid import uuid4
 from zipfile import BadZipFile
 
@@ -27,6 +28,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Floats
 from ...errors import BadInputError
+from ...factors.lanczos import Border
 from ...files.atomic_write import make_folder, write_whole
 from ..limits import Limits
 from ..system import System
@@ -40,72 +42,15 @@ Take = Callable[[tuple[int, int]], bool]
 SHIFTS_FILE = "shifts.npz"
 """The file of all shifts: to find these, eigenvalues are counted, which takes minutes for 100,000 disks."""
 
+NAMES_OF_SLICES = 16
+"""Hexadecimal digits of the name of a pass's folder."""
+
 LOCK_FILE = "taken"
 """The file whose bytes are locked, each by the search that has taken the slice which begins at so many modes."""
 
 
 class DamagedSliceError(BadInputError):
     """The file of a slice cannot be read: one sentence."""
-
-
-class Border(NamedTuple):
-    """The eigenvalues at the border of a slice, on which neighbouring slices must agree.
-
-    Attributes
-    ----------
-    modes : tuple of (int, int)
-        Numbers in the whole spectrum of the slice's first eigenvalue and of the first one beyond.
-    first, beyond : float
-        These eigenvalues, 1 / time^2; nan beyond the end of the spectrum.
-    spacing : float
-        Mean distance of the slice's eigenvalues and of the next ones on either side, 1 / time^2.
-    """
-
-    modes: tuple[int, int]
-    first: float
-    beyond: float
-    spacing: float
-
-    @property
-    def size(self) -> int:
-        """Number of modes in the slice."""
-        return self.modes[1] - self.modes[0]
-
-    @classmethod
-    def of(cls, number: int, values: Floats, own: slice) -> "Border":
-        """The border of a slice, from increasing eigenvalues, the number of the first, and which are its own."""
-        near = values[max(0, own.start - 1) : own.stop + 1]
-        beyond = float(values[own.stop]) if own.stop < len(values) else float("nan")
-        modes = number + own.start, number + own.stop
-        return cls(modes, float(values[own.start]), beyond, float(np.ptp(near)) / len(near))
-
-
-@dataclass(frozen=True, eq=False)
-class Slice:
-    """A run of neighbouring eigenvalues.
-
-    Attributes
-    ----------
-    first : int
-        Number in the whole spectrum of the first of `values`.
-    values : ndarray, shape (M,)
-        Eigenvalues, increasing: first those of a margin, then the slice's own ones, then another margin. Those farther
-        out in the margins are not converged.
-    vectors : ndarray, shape (E, M)
-        Orthonormal eigenvectors in columns.
-    own : slice
-        Which of the M belong to this slice and to no other.
-    """
-
-    first: int
-    values: Floats = field(repr=False)
-    vectors: Floats = field(repr=False)
-    own: slice
-
-    @property
-    def border(self) -> Border:
-        """The border, on which its neighbours must agree."""
-        return Border.of(self.first, self.values, self.own)
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,7 +188,20 @@ def pass_folder(parent: Path, places: Sequence[System], modes: tuple[int, int], 
         for matrix in place.matrices:
             for array in (matrix.data, matrix.indices, matrix.indptr):
                 digest.update(np.ascontiguousarray(array).data)
-    return parent / digest.hexdigest()[:16]
+    return parent / digest.hexdigest()[:NAMES_OF_SLICES]
+
+
+def remove_passes(parent: Path) -> None:
+    """Remove the folders of passes, which have nothing else in them, and the folder that they are in if it is empty."""
+    for folder in parent.glob("[0-9a-f]" * NAMES_OF_SLICES):
+        if (folder / LOCK_FILE).is_file():
+            for path in folder.iterdir():
+                if path.name in (LOCK_FILE, SHIFTS_FILE) or re.fullmatch(r"\d+-\d+\.npz|[0-9a-f]{32}\.new", path.name):
+                    path.unlink(missing_ok=True)
+            with suppress(OSError):  # it holds what others have put there
+                folder.rmdir()
+    with suppress(OSError):
+        parent.rmdir()
 
 
 def _name(modes: tuple[int, int]) -> str:

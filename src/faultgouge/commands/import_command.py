@@ -138,7 +138,7 @@ def import_(
 
 def _import_disks(file: Path, output: Path, disks: Disks, top: str | None, packing: Packing, relax: bool) -> None:
     """Store a packing in balance, and say what it is."""
-    from faultgouge.analysis.files.formats.upper_layer import layer_remark
+    from faultgouge.analysis.files.formats.disks import layer_remark
 
     for remark in (disks.remark, layer_remark(disks, top, packing.top)):
         if remark:
@@ -169,9 +169,9 @@ def _import_deck(file: Path, output: Path, slides: bool, balance: float | None, 
         configuration = run_deck(
             file, slides=slides, balance=allowed, relaxes=relaxes, keep=output, notice=say, show=show
         )
+    keeps(f"{output} has been written; whether the packing is stable says `faultgouge spectrum {output}`", output)
     if is_root():
         write_configuration(output, configuration, {"deck": text})
-    keeps(f"{output} has been written; whether the packing is stable says `faultgouge spectrum {output}`", output)
     print_line(f"{repr(configuration).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
     print_line(_time_steps(configuration))
     print_line(_verdict(configuration, output))
@@ -237,7 +237,7 @@ def _place_disks(file: Path, frame: int | None, floor: float, width: str | None,
     """The disks of the file; options replace numbers of the file."""
     from dataclasses import replace
 
-    from faultgouge.analysis.files.formats.csv_json import read_slips
+    from faultgouge.analysis.files.formats.tables import read_slips
     from faultgouge.pywrap.lammps.restart_file import read_disks
 
     disks = read_disks(file, frame).above(floor)
@@ -285,7 +285,7 @@ def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[st
 def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict[str, Any]) -> None:
     """Say in one sentence all that neither file nor options say, with the command that would do."""
     from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.files.formats.upper_layer import LAYER_WAYS
+    from faultgouge.analysis.files.formats.disks import LAYER_WAYS
 
     gaps = {"--top 10": "which disks are the upper layer"} if top is None and disks.top is None else {}
     if scene is None and "kn" not in values:
