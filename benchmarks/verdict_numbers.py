@@ -6,7 +6,7 @@ dashpots, with lids that move as one, and of up to 200 particles. LAMMPS is foll
 for 60 units of time or more. The table `tables/verdict_numbers.csv` has a row a packing. `time` is how long one-sided
 motion was followed, 0 where linear motion decides, and D is over the square of the push. `lammps` is the largest D in
 the last fifth of LAMMPS's motion over that in its first half. The last column says which verdicts of the first packings
-are others with one of the numbers halved or doubled: "STILL x 2: unknown" for instance.
+are others with one of the numbers halved or doubled: "STILL_SHARE x 2: unknown" for instance.
 
     nice python benchmarks/verdict_numbers.py [--packings 100:180 200:300] [--keep FOLDER]
 """
@@ -39,7 +39,7 @@ LAWS = (
     "granular hertz, mindlin/force", "gran/hertz/history", "granular hertz, mindlin_rescale/force",
     "granular hooke, linear_history", "granular hertz, mindlin",
 )  # fmt: skip
-NUMBERS = "STILL", "GROWN_ENERGY", "CHUNK"
+NUMBERS = "STILL_SHARE", "GROWN_ENERGY", "CHUNK"
 NAMES = {False: "grows", True: "rests", None: "unknown"}
 COLUMNS = (
     "packing", "law", "dimension", "particles", "at_bound", "verdict", "time", "amplification", "amplification_lammps",

@@ -149,7 +149,7 @@ def stability(
     """
     if follow is None or follow is False:
         return stability_of_packing(packing, rise, time, **known)
-    from .pywrap.growth_followed import follow_by
+    from .pywrap.granular.growth_followed import follow_by
 
     followed = follow_by(packing, None if follow is True else follow)
     return stability_of_packing(packing, rise, time, follow=followed, **known)

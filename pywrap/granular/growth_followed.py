@@ -15,17 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis import Configuration, Packing, Stability, stable_timestep
-from ..analysis.arrays import Floats
-from ..analysis.motion.pushes import random_pushes
-from ..analysis.progress import report_progress
-from .granular.lammps_arrays import owned_array, rows_of, set_velocity
-from .granular.look_in_a_copy import can_copy, in_a_copy, quieten
+from ...analysis import Configuration, Packing, Stability, stable_timestep
+from ...analysis.arrays import Floats
+from ...analysis.motion.pushes import random_pushes
+from ...analysis.progress import report_progress
+from .lammps_arrays import owned_array, rows_of, set_velocity
+from .look_in_a_copy import can_copy, in_a_copy, quieten
 
 STEP_SHARE = 0.1
 """Time step, as a share of the largest stable one."""
 
-PUSH_SHARE = 0.1
+PUSH_OVER_CHANGE = 0.1
 """Displacement by the push, as a share of that at which the first contact changes."""
 
 FOLDS_OF_WINDOW = 6.0
@@ -37,7 +37,7 @@ LOOKS_OF_WINDOW = 60
 LEAST_WINDOW = 300.0
 """Length of a window in stable time steps, at the least: ten periods of a slow mode."""
 
-MOST_STEPS = 4_000_000
+MOST_STEPS_OF_END = 4_000_000
 """Time steps that are followed: some minutes for fifty particles."""
 
 SAME_WINDOWS, SAME_SHARE = 4, 0.15
@@ -112,8 +112,8 @@ def _plugin(packing: Packing) -> Iterator[tuple[Any, Advance, float]]:
     """The same of a packing that the plugin moves."""
     from mpi4py import MPI
 
-    from ..analysis import nearest_image
-    from .lammps.engine import Engine
+    from ...analysis import nearest_image
+    from ..lammps.engine import Engine
 
     step, last = STEP_SHARE * float(stable_timestep(packing)), packing.position
     moved = np.zeros_like(last)
@@ -136,14 +136,14 @@ def _ends(told: Stability, c: Configuration, lmp: Any, advance: Advance, step: f
     push = random_pushes(c, 1)[:, 0].reshape(c.axes, len(c))
     push[:, c.rattlers] = 0.0
     # a push v displaces by v over a frequency, a tenth of the largest
-    set_velocity(lmp, c, (PUSH_SHARE * np.sqrt(changes) * 0.1 * 2 * STEP_SHARE / step * push).ravel())
+    set_velocity(lmp, c, (PUSH_OVER_CHANGE * np.sqrt(changes) * 0.1 * 2 * STEP_SHARE / step * push).ravel())
     window = max(FOLDS_OF_WINDOW / rate, LEAST_WINDOW * step / STEP_SHARE)
     count, largest, moves = (
         max(round(window / step / LOOKS_OF_WINDOW), 1),
         list[float](),
         ~np.isin(np.arange(len(c)), c.rattlers),
     )
-    for _ in range(max(MOST_STEPS // (count * LOOKS_OF_WINDOW), 3 * SAME_WINDOWS)):
+    for _ in range(max(MOST_STEPS_OF_END // (count * LOOKS_OF_WINDOW), 3 * SAME_WINDOWS)):
         seen = []
         for _ in range(LOOKS_OF_WINDOW):
             moved = advance(count)
@@ -154,7 +154,7 @@ def _ends(told: Stability, c: Configuration, lmp: Any, advance: Advance, step: f
         report_progress(f"LAMMPS goes on: displacement {np.sqrt(largest[-1]):.3g}")
         late = largest[-SAME_WINDOWS:]
         same = len(largest) > SAME_WINDOWS and max(late) - min(late) < SAME_SHARE * max(late)
-        if same and late[-1] > PUSH_SHARE * changes:
+        if same and late[-1] > PUSH_OVER_CHANGE * changes:
             return {"displacement": float(np.sqrt(max(late))), "ends": "vibrates"}
     rises = largest[-1] > (1 + SAME_SHARE) * largest[-SAME_WINDOWS]
     return {"displacement": float(np.sqrt(largest[-1])), "ends": "creeps" if rises else "vibrates"}
