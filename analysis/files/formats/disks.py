@@ -472,7 +472,10 @@ def _highest(disks: Disks, count: int) -> NDArray[np.bool_]:
 
 def touching_nothing(disks: Disks) -> NDArray[np.bool_]:
     """Disks that touch neither another disk nor the floor, shape (N,)."""
-    contacts = touching(disks.position, disks.radius, disks.box_length)
+    try:
+        contacts = touching(disks.position, disks.radius, disks.box_length)
+    except ValueError as error:
+        raise PackingFileError(f"{disks.source} describes no possible packing: {error}") from error
     alone = np.ones(len(disks), dtype=np.bool_)
     alone[contacts.i] = alone[contacts.j[~contacts.floor]] = False
     return alone

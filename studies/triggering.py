@@ -18,32 +18,56 @@ noise.
 
 Towards the onset, the response of the pair that is about to coalesce grows as :math:`\epsilon^{-1/2}`, and damping
 limits the response if its time tau is below :math:`\tau_d`.
+
+**The forecast.** If friction falls from mu to a smaller value, the disks do not move at once, but the tangential forces
+change: the packing is out of balance by f, and moves as :math:`M \ddot q + K q = f` from rest, with f and K those of
+the smaller mu. This motion contains both the jump and, if K has complex eigenvalues, the growth after the jump. It
+holds while displacements are small against overlaps (:func:`forecast`).
+
+**The task of a sweep.** The packing is ramped for every friction coefficient of the scene, and for the weakened
+friction :math:`\mu \mu_{ss}` (without [friction] in the scene, for the last coefficient), each as in
+:mod:`~faultgouge.studies.onset`. Weakening lowers the onset if :math:`F_x^c(\mu \mu_{ss}) < F_x^c(\mu)`, which may be
+known even if one of the two is censored. If both are known and there is a window between them, undamped runs from its
+middle show whether the packing erupts, beside the control. The *rise* is the distance in decades between the largest D
+of the perturbed run and of the one with mu(v). The pair may also be real again at the middle of the window, or grow too
+slowly for the length of the run; the rate is therefore stored as well.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from mpi4py import MPI
 
-from ...analysis import Growth, Onset, Packing, RunFile, fit_growth, spectrum
-from ...analysis.arrays import Floats
-from ...analysis.motion.normal_form import LEAST_CROSSOVER, NormalForm
-from ...analysis.motion.power_law import PowerLaw, fit_power_law
-from ...analysis.motion.response import Response, layer_force, linear_response
-from ...analysis.windows.pair_over_load import normal_forms
-from ...pywrap import Engine, Equilibrium, Sample, Scene
-from ...pywrap.lammps.dynamics import Weakening
-from ...pywrap.runs.scene_path import next_equilibrium
-from ...pywrap.runs.undamped import perturb, time_step, weakening_of
-from ...pywrap.scenes.sections import Friction
-from ...pywrap.scenes.validation import require_section
-from ..packing_tools import unit_of_time
-from .forecast import JUMP_SHARE, Forecast, forecast
+from ..analysis import FaultgougeError, Growth, Onset, Packing, RunFile, fit_growth, spectrum
+from ..analysis.arrays import Floats
+from ..analysis.files.atomic_write import write_json
+from ..analysis.motion.growth_of_run import JUMP_SHARE, LINEAR_RANGE
+from ..analysis.motion.normal_form import LEAST_CROSSOVER, NormalForm
+from ..analysis.motion.power_law import PowerLaw, fit_power_law
+from ..analysis.motion.response import LinearMotion, Response, layer_force, linear_response
+from ..analysis.windows.pair_over_load import normal_forms
+from ..pywrap import Engine, Equilibrium, Sample, Scene
+from ..pywrap.lammps.dynamics import Weakening
+from ..pywrap.runs.path_error import with_path_error
+from ..pywrap.runs.scene_path import next_equilibrium, scene_path
+from ..pywrap.runs.undamped import perturb, time_step, weakening_of
+from ..pywrap.scenes.command_sections import UNDAMPED_SECTIONS
+from ..pywrap.scenes.sections import Friction, Perturb
+from ..pywrap.scenes.validation import require_section
+from .executors import Say
+from .onset import first_window
+from .packing_tools import Start, unit_of_time
+from .result_rows import Row
+from .statistics import quartiles, share, sign_test
+from .study import task
+
+if TYPE_CHECKING:
+    from .sweep.sweep_plan import Sweep
 
 EARLY_SAMPLES = 2000
 """Samples of each run at times that grow geometrically: the layer passes the velocities over which the friction falls
@@ -369,3 +393,257 @@ def summary(triggering: Triggering) -> dict[str, Any]:
         "half_gain_time_over_tau_d": [pair.half_gain_time() / pair.tau_d for pair in sensitive.near],
         "plateaus": sensitive.plateaus,
     }
+
+
+FORECAST_TIMES = 2000
+"""Times at which the linear motion is looked at."""
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """The linear motion after friction has weakened.
+
+    Attributes
+    ----------
+    jump : float
+        Largest D within the window of the jump, length^2.
+    growth : float
+        Decades from the jump to the largest D of the whole run; without bound, where a pair grows.
+    room : float
+        Decades from the jump to the D at which the motion ceases to be linear.
+    rate : float
+        Growth rate of D of the fastest motion, 1 / time; 0 if none grows.
+    """
+
+    jump: float
+    growth: float
+    room: float
+    rate: float
+
+
+def forecast(start: Equilibrium, mu: float, time: float, window: float | None = None) -> Forecast:
+    """Jump and growth of an equilibrium whose friction coefficient becomes `mu`, in the `time` that follows.
+
+    The jump is what happens within `window`, by default `JUMP_SHARE` of the time.
+    """
+    packing = start.packing
+    weak = replace(packing, law=replace(packing.law, mu=mu))
+    times = time * np.arange(1, FORECAST_TIMES + 1) / FORECAST_TIMES
+    with np.errstate(over="ignore"):
+        msd = LinearMotion.of(weak).response(times, force=weak.net_force - packing.net_force).msd
+    msd = np.fmin(msd, np.finfo(float).max)
+    first = float(msd[times <= (JUMP_SHARE * time if window is None else window)].max(initial=msd[0]))
+    return Forecast(
+        jump=first,
+        growth=float(np.log10(msd.max() / first)),
+        room=float(np.log10((LINEAR_RANGE * packing.smallest_overlap) ** 2 / first)),
+        rate=spectrum(weak).growth_rate(),
+    )
+
+
+def rise_in_decades(eruption: Row, of: str = "weakening") -> float:
+    """Decades between the largest D of the perturbed run and of the run with mu(v), or of the "control"."""
+    return float(np.log10(eruption[of] / eruption["perturbed"]))
+
+
+def grows(eruption: Row) -> bool:
+    """Whether D goes on to grow after the jump, at the rate of the spectrum with the weakened friction."""
+    return bool(eruption["verdict"] == "grows")
+
+
+def _examination(scene: Scene, start: Start) -> Iterator[Row]:
+    """The results of each stage, so that a stage that fails loses none of the earlier ones."""
+    ramps: list[Row] = []
+    paths: list[tuple[Equilibrium, ...]] = []
+    for mu in frictions(scene):
+        end, path = first_onset(scene, mu, start)
+        paths.append(path)
+        ramps.append(end)
+        yield {"ramps": [*ramps]}
+    if len(ramps) < 2:
+        return
+    strong, weak = ramps[0], ramps[-1]
+    lowered = sign_test(strong, weak)
+    yield {"lowered": lowered}
+    if lowered and strong["ends"] == "onset" and scene.perturb is not None and scene.friction is not None:
+        window = weak["reach"], strong["reach"]
+        yield {"eruption": eruption(scene, paths[0], window, scene.perturb, scene.friction)}
+
+
+def frictions(scene: Scene) -> tuple[float, ...]:
+    """The scene's friction coefficients: the first one weakens, and the last one is its weakened value."""
+    if scene.friction is None:
+        return scene.law.mus
+    weak = scene.friction.mu_ss * scene.law.mus[0]
+    # 0.8 * 0.7 is not 0.56 to the last bit
+    return (*(mu for mu in scene.law.mus if not np.isclose(mu, weak, rtol=1e-12, atol=0.0)), weak)
+
+
+def first_onset(scene: Scene, mu: float, start: Start) -> tuple[Row, tuple[Equilibrium, ...]]:
+    """How the ramp of a scene ends for one friction coefficient, with its equilibria up to there.
+
+    Returns
+    -------
+    row : dict
+        mu; ends : "onset", a window of complex eigenvalues, "until", the last F_x of the scene, or "flows", no
+        equilibrium beyond `reach`; reach : the largest F_x up to which there is no window, force per disk of the upper
+        layer: the onset, if there is one; error : uncertainty of the onset, or None.
+    path : tuple of Equilibrium
+    """
+    rest = start(mu)
+    with Engine(rest.packing, MPI.COMM_SELF) as engine:
+        path = scene_path(engine, rest, scene)
+        ends, reach, found = first_window(path, scene)
+        error = None
+        if found is not None:
+            whole = with_path_error(found, path)
+            reach, error = whole.fx_c, whole.error
+        return {"mu": mu, "ends": ends, "reach": reach, "error": error}, tuple(path.equilibria)
+
+
+def eruption(
+    scene: Scene,
+    path: tuple[Equilibrium, ...],
+    window: tuple[float, float],
+    settings: Perturb,
+    friction: Friction,
+) -> Row:
+    """The runs in a window between two onsets, and the control; path leads up to the upper one.
+
+    Returns
+    -------
+    dict
+        fx, fx_control : the middle of the window, and the control below it, force per disk of the upper layer; rate :
+        growth rate of D with the weakened friction at fx, from the spectrum, 1 / time, 0 if it is stable; unperturbed,
+        perturbed, weakening, control : largest D, length^2, of the three runs at fx, and with mu(v) at fx_control;
+        verdict, weakens_at, jump : whether D grows after its jump, when friction weakens, and the largest D shortly
+        after that (`TriggeringOutcome` of :mod:`~faultgouge.studies.triggering.compute`); fitted_rate : of D after the
+        jump, or None; foreseen_jump : by linear theory, length^2; perturbation_shows : whether the perturbed run
+        differs from the unperturbed one.
+    """
+    middle = 0.5 * (window[0] + window[1])
+    loads = middle, max(0.0, 2 * window[0] - middle)
+    start, below = (equilibrium_at(scene, path, fx, MPI.COMM_SELF) for fx in loads)
+
+    def run(start: Equilibrium, amplitude: float, weakening: Weakening | None = None) -> Series:
+        changes = {"fx": start.fx, "amplitude": amplitude}
+        one = scene.model_copy(update={"perturb": settings.model_copy(update=changes)})
+        return series_of(perturb(one, start, communicator=MPI.COMM_SELF, weakening=weakening))
+
+    quiet = run(start, 0.0)
+    weakening = calibrate_weakening(friction, quiet)
+    perturbed, weakened = run(start, settings.amplitude), run(start, settings.amplitude, weakening)
+    foreseen = foresee(start, friction.mu_ss * start.packing.law.mu, weakened, weakening.v0)
+    outcome = judge(weakened, weakening.v0, foreseen)
+    return {
+        "fx": start.fx,
+        "fx_control": below.fx,
+        "rate": weakened_rate(start.packing, friction.mu_ss),
+        "unperturbed": largest(quiet),
+        "perturbed": largest(perturbed),
+        "weakening": largest(weakened),
+        "control": largest(run(below, settings.amplitude, weakening)),
+        "verdict": outcome.verdict,
+        "weakens_at": outcome.crossing,
+        "jump": outcome.jump,
+        "fitted_rate": None if outcome.fitted is None else outcome.fitted.rate,
+        "foreseen_jump": foreseen.jump,
+        "perturbation_shows": differs(perturbed, quiet),
+    }
+
+
+RISES_IN_DECADES = (5, 10)
+"""Rises in decades whose shares are given; the paper's figure 5 has 12."""
+
+QUARTILES = (0.25, 0.5, 0.75)
+
+
+def summary_of_rows(rows: Sequence[Row]) -> dict[str, Any]:
+    """Summarise the rows of a sweep of the task "triggering" in numbers.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        As `run_sweep` returns them.
+
+    Returns
+    -------
+    dict
+        onsets : for each friction coefficient how the ramps end, with quartiles of F_x^c; lowered : share in which
+        weakening friction lowers the onset; lowered_unknown : how many others do not tell; rises, control_rises : by
+        decades, the share of the runs with mu(v) whose D rises by so much, and of the controls; rise_quartiles,
+        control_rise_quartiles : decades, or None; unstable_when_weakened, grows, perturbation_shows : shares of the
+        scenes with runs. A share is what `share` returns.
+    """
+    ramps = [end for row in rows for end in row["result"].get("ramps", ())]
+    eruptions = [found for row in rows if (found := row["result"].get("eruption"))]
+    several = [row for row in rows if len(row["result"].get("ramps", ())) > 1]
+    decided = [row["result"]["lowered"] for row in several if row["result"]["lowered"] is not None]
+    undecided = [row for row in several if row["result"]["lowered"] is None and row["says"] is None]
+    rises, controls = ([rise_in_decades(each, of) for each in eruptions] for of in ("weakening", "control"))
+
+    def at_least(values: list[float]) -> dict[str, Any]:
+        return {
+            str(decades): share(sum(each >= decades for each in values), len(values)) for decades in RISES_IN_DECADES
+        }
+
+    return {
+        "onsets": [_ends_of(mu, ramps) for mu in dict.fromkeys(end["mu"] for end in ramps)],
+        "lowered": share(sum(decided), len(decided)),
+        "lowered_unknown": len(undecided),
+        "rises": at_least(rises),
+        "control_rises": at_least(controls),
+        "rise_quartiles": np.quantile(rises, QUARTILES).tolist() if rises else None,
+        "control_rise_quartiles": np.quantile(controls, QUARTILES).tolist() if controls else None,
+        "unstable_when_weakened": share(sum(each["rate"] > 0 for each in eruptions), len(eruptions)),
+        "grows": share(sum(map(grows, eruptions)), len(eruptions)),
+        "perturbation_shows": share(sum(each["perturbation_shows"] for each in eruptions), len(eruptions)),
+    }
+
+
+def in_words(numbers: dict[str, Any]) -> list[str]:
+    """The summary as lines for a terminal."""
+    from ..figures.pages import lines
+
+    return lines(__package__ or "", "triggering.j2", result=numbers)
+
+
+def _ends_of(mu: float, ramps: Sequence[Row]) -> dict[str, Any]:
+    ends = [each["ends"] for each in ramps if each["mu"] == mu]
+    found = [each == "onset" for each in ends]
+    return {
+        "mu": mu,
+        "found": share(sum(found), len(found)),
+        "none_until": ends.count("until"),
+        "flows": ends.count("flows"),
+        "quartiles": quartiles([each["reach"] for each in ramps if each["mu"] == mu], found),
+    }
+
+
+def _gather(sweep: Sweep, rows: Sequence[Row], output: Path, say: Say) -> list[str]:
+    """Shares over all scenes: summary.json, and lines for a terminal."""
+    numbers = summary_of_rows(rows)
+    write_json(output / "summary.json", numbers)
+    return in_words(numbers)
+
+
+@task(reads=UNDAMPED_SECTIONS, needs=("ramp",), gather=_gather, writes={"summary.json": ""})
+def triggering(scene: Scene, start: Start) -> Row:
+    """Onsets for several friction coefficients, and the runs between them. An error is the row's "says", beside the
+    results of the stages before.
+
+    Returns
+    -------
+    dict
+        ramps : what `first_onset` finds for each friction coefficient, the scene's first one first and what it weakens
+        to last; lowered : whether weakening friction lowers the onset, None if that cannot be known; eruption : what
+        `eruption` finds, None without a window between the two onsets, or without [perturb] in the scene.
+    """
+    row: Row = {"ramps": [], "lowered": None, "eruption": None}
+    require_section(scene.ramp, "ramp")
+    try:
+        for found in _examination(scene, start):
+            row |= found
+    except (FaultgougeError, ValueError) as error:  # ValueError: of LAPACK
+        row["says"] = str(error)
+    return row

@@ -24,17 +24,20 @@ from typing import Any, Literal
 import numpy as np
 from scipy.linalg import eigh, eigvals
 
-from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, dynamical_matrix, find_onset
-from ...analysis.arrays import Floats, Indices
-from ...analysis.motion.nearest_modes import nearest_modes
-from ...analysis.windows import force_bearing, takes_all_modes
-from ...pywrap import Scene, SceneError
-from ...pywrap.equilibria.quasistatic import Equilibrium
-from ...pywrap.load_path import LoadPath
-from ...pywrap.runs.path_error import with_path_error
-from ...pywrap.runs.ramp_loads import ramp_loads
-from ...pywrap.scenes.validation import require_section
-from ..packing_tools import Start, contact_pairs, path_from
+from ..analysis import NoEquilibriumError, Onset, OnsetError, Packing, dynamical_matrix, find_onset
+from ..analysis.arrays import Floats, Indices
+from ..analysis.motion.nearest_modes import nearest_modes
+from ..analysis.windows import force_bearing, takes_all_modes
+from ..pywrap import Scene, SceneError
+from ..pywrap.equilibria.quasistatic import Equilibrium
+from ..pywrap.load_path import LoadPath
+from ..pywrap.runs.path_error import with_path_error
+from ..pywrap.runs.ramp_loads import ramp_loads
+from ..pywrap.scenes.command_sections import PATH
+from ..pywrap.scenes.validation import require_section
+from .packing_tools import Start, contact_pairs, path_from
+from .result_rows import Row
+from .study import task
 
 EndOfRamp = Literal["onset", "until", "flows"]
 
@@ -43,7 +46,8 @@ DISTANCE_BELOW = 1e-7
 about the root of this distance, so that both are accurate."""
 
 
-def onset(scene: Scene, start: Start) -> dict[str, Any]:
+@task(reads=PATH, needs=("ramp",))
+def onset(scene: Scene, start: Start) -> Row:
     """The first onset of a scene with one friction coefficient, as a row of a table.
 
     Raises

@@ -1,4 +1,4 @@
-r"""The figures of remote triggering, from the results of `compute`.
+r"""The figures of remote triggering, from the results of `studies.triggering`.
 
 Friction weakens with the velocity v of the upper layer as
 
@@ -28,7 +28,7 @@ from ...figures.series import draw_series, few_decades, positive, scientific
 from ...figures.style import INK, styled
 from ...pywrap.lammps.dynamics import Weakening
 from ..study import Figures
-from .compute import Sensitivity, Triggering
+from ..triggering import Sensitivity, Triggering
 
 GrowthCurve = tuple[Floats, Floats]
 """Times, and D at these, length^2."""
