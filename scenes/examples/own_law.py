@@ -1,4 +1,6 @@
-"""A contact law of one's own: the analysis needs the forces of each contact and their derivatives, and no law.
+# A column of two disks with a contact law of one's own: the analysis needs forces and derivatives, and no law.
+# python own_law.py
+"""A column of two disks with a law that no program has.
 
 Two disks stand one above the other on a plane, under a weight. The law is f_n = k a (exp(overlap / a) - 1), with a
 tangential spring k_t. The two vertical modes are known: their eigenvalues are (3 -+ sqrt 5)/2 times k_n / m. One
