@@ -59,16 +59,8 @@ class SealedFile:
     def __init__(self, path: str | PathLike[str], mode: Literal["r", "a"] = "r") -> None:
         self.path = Path(path)
         self._unsaved, self._sound, self._next_save = False, True, 0.0
-        if not self.path.is_file():
-            raise PackingFileError(f"{self.path} {'is no file' if self.path.exists() else 'does not exist'}.")
-        check_checksum(self.path)
         self._writable = mode == "a"
-        self._file = _image(self.path) if self._writable else open_checksummed(self.path)
-        try:
-            check_places(self._file)
-        except PackingFileError as error:
-            self._file.close()
-            raise PackingFileError(f"{self.path} is refused: {str(error).rstrip('.')}.") from error
+        self._file = open_sealed(self.path, self._writable)
         if "snapshot" in self._file:
             self._file.close()
             raise PackingFileError(
@@ -166,37 +158,36 @@ def write(path: Path, file: h5py.File) -> None:
     write_whole(path, add_checksum(image), image)
 
 
-def open_checksummed(path: Path) -> h5py.File:
-    """Open a file for reading."""
+def open_sealed(path: Path, writable: bool = False) -> h5py.File:
+    """Open a file that has been checked whole; its content in memory, if it is to be changed.
+
+    Raises PackingFileError if the file is missing, damaged, of a later format, or unpacks to what is not in it.
+    """
     import h5py
 
+    if not path.is_file():
+        raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
+    check_checksum(path)
     try:
-        return h5py.File(path, "r", locking=False)
-    except OSError:
-        pass  # another reader in this process, such as MDAnalysis, has it open with locks
-    try:
-        return h5py.File(path, "r")
+        if writable:
+            image = read_plain(path)[HEADER_SIZE:]
+            file = h5py.File(h5py.h5f.open_file_image(image, flags=h5py.h5f.FILE_IMAGE_OPEN_RW))
+        else:
+            try:
+                file = h5py.File(path, "r", locking=False)
+            except OSError:  # another reader in this process, such as MDAnalysis, has it open with locks
+                file = h5py.File(path, "r")
     except OSError as error:
         raise PackingFileError(f"{path} is not a readable HDF5 file: {error}.") from error
-
-
-def _image(path: Path) -> h5py.File:
-    """The content of a sealed file in memory, for changes."""
-    import h5py
-
-    image = read_plain(path)[HEADER_SIZE:]
-    return h5py.File(h5py.h5f.open_file_image(image, flags=h5py.h5f.FILE_IMAGE_OPEN_RW))
-
-
-def check_places(file: h5py.File) -> None:
-    """Refuse a later format, links to other files, and what unpacks to more than the memory of this machine."""
     try:
         check_format(file.attrs.get(FORMAT_KEY), "it")
         _check_places(file)
-    except PackingFileError:
-        raise
     except Exception as error:  # h5py raises nearly every exception there is
-        raise PackingFileError(f"it cannot be read: {str(error).strip() or type(error).__name__}") from error
+        file.close()
+        said = str(error).strip().rstrip(".") or type(error).__name__
+        cannot = "" if isinstance(error, PackingFileError) else "it cannot be read: "
+        raise PackingFileError(f"{path} is refused: {cannot}{said}.") from error
+    return file
 
 
 def _check_places(file: h5py.File) -> None:

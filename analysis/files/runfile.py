@@ -437,13 +437,17 @@ def program_version() -> str:
         return ""
 
 
-def write_header(file: h5py.File, packing: Packing) -> None:
-    """The groups and parameters of a file without frames, for the disks of a packing."""
+def write_h5md(file: h5py.File) -> None:
+    """The version of H5MD, and what has written the file."""
     h5md = file.create_group("h5md")
     h5md.attrs["version"] = np.array([1, 1])
     h5md.create_group("author").attrs["name"] = CREATOR
-    creator = h5md.create_group("creator")
-    creator.attrs["name"], creator.attrs["version"] = CREATOR, program_version()
+    h5md.create_group("creator").attrs.update({"name": CREATOR, "version": program_version()})
+
+
+def write_header(file: h5py.File, packing: Packing) -> None:
+    """The groups and parameters of a file without frames, for the disks of a packing."""
+    write_h5md(file)
     disks = file.create_group("particles/disks")
     box = disks.create_group("box")
     box.attrs["dimension"] = 3

@@ -21,13 +21,13 @@ from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError,
 from .instance_queries import open_files, require_instance
 from .look_in_a_copy import can_copy, in_a_copy
 from .looks import look_at_contacts
-from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError, OtherStiffnessError
+from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError, OtherStiffnessError, push_remark
 from .motion_proof import prove as prove_motion
 
 
 def from_lammps(
     lmp: Any,
-    commands: Iterable[str] | None = None,
+    commands: Iterable[str] | Commands | None = None,
     *,
     slides: bool = False,
     balance: float = BALANCE,
@@ -76,7 +76,7 @@ def from_lammps(
 
 def take_configuration(
     lmp: Any,
-    commands: Iterable[str] | None,
+    commands: Iterable[str] | Commands | None,
     laws: KnownLaws,
     *,
     slides: bool,
@@ -178,4 +178,9 @@ def _by_differences(lmp: Any, given: Commands | None, *, balance: float, prove: 
     made = derive_frozen(made, remarks=_remarks(lmp, made, still.fixes, still.velocity, still.rotation))
     refuse_motion(made, balance, still.commands)
     proves = prove and made.residual <= BALANCE * force_scale(made)
-    return _proved(lmp, made, still.commands, still.fixes) if proves else made
+    if not proves:
+        return made
+    made = _proved(lmp, made, still.commands, still.fixes)
+    if not len(made.one_sided_particles):
+        return made
+    return derive_frozen(made, remarks=(*made.remarks, push_remark(lmp, made)))

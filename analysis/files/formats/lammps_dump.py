@@ -34,6 +34,7 @@ from ...packing.compensated import exact_sum
 from ...packing.geometry import nearest_image
 from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
+from ..atomic_write import FORMAT_KEY, check_format
 from ..plain_file import open_text, read_plain_text
 from ..runfile import law_of_parameters
 from .disks import Disks, Slips, of_columns, packing_of
@@ -123,10 +124,9 @@ def read_dump(
         If a file is missing or broken, a column is missing, the snapshots do not match, or no law is given.
     """
     disks = Path(disks)
-    given = _sidecar(disks.with_suffix(".params"))
-    law = law or _law(given, disks)
-    found = _deck_disks(disks, contacts, frame, law.frictional, given)
+    found, law = _deck_disks(disks, contacts, frame, law)
     assert found.top is not None
+    given = found.given
     values = {"fx": fx, "fy": fy, "inertia_factor": inertia_factor}
     known = {key: given[key] if value is None else value for key, value in values.items() if key in given or value}
     return packing_of(found, law, found.top, drag_time=given.get("tau"), **known)
@@ -134,8 +134,7 @@ def read_dump(
 
 def read_deck_dump(path: Path, frame: int | None = None) -> Disks:
     """Read a dump of write.in, with its .contacts and .params."""
-    given = _sidecar(path.with_suffix(".params"))
-    return _deck_disks(path, None, -1 if frame is None else frame, _law(given, path).frictional, given)
+    return _deck_disks(path, None, -1 if frame is None else frame, None)[0]
 
 
 def _law(given: Mapping[str, float], disks: Path) -> MindlinLaw:
@@ -148,12 +147,14 @@ def _law(given: Mapping[str, float], disks: Path) -> MindlinLaw:
 
 
 def _deck_disks(
-    path: Path, contacts: str | PathLike[str] | None, frame: int, frictional: bool, given: Mapping[str, float]
-) -> Disks:
-    """The disks of a dump of the decks, with the slips of all contacts."""
+    path: Path, contacts: str | PathLike[str] | None, frame: int, law: MindlinLaw | None
+) -> tuple[Disks, MindlinLaw]:
+    """The disks of a dump of the decks, with the slips of all contacts, and the law; that of the file by default."""
     beside = path.with_suffix(".contacts") if contacts is None else Path(contacts)
     shown = _snapshot(path, frame)
-    absent = () if frictional else ("angle", "floor_slip", "slip")
+    given = _sidecar(path.with_suffix(".params"))
+    law = law or _law(given, path)
+    absent = () if law.frictional else ("angle", "floor_slip", "slip")
     disk = _columns(path, shown, DISK, absent)
     disk = {name: column[np.argsort(disk["id"])] for name, column in disk.items()}
     pair = _columns(beside, _snapshot_of_step(beside, shown.step), CONTACT, absent)
@@ -179,7 +180,7 @@ def _deck_disks(
         for of_pair, of_floor in (("slip", "floor_slip"), ("slip_low", "floor_slip_low"))
     )
     assert slip is not None
-    return replace(found, slips=Slips(first, second, slip, low_slip, complete=True))
+    return replace(found, slips=Slips(first, second, slip, low_slip, complete=True)), law
 
 
 def dump_frames(path: str | PathLike[str]) -> Iterator[DumpFrame]:
@@ -264,12 +265,13 @@ def _sidecar(path: Path) -> dict[str, float]:
     if not path.is_file():
         return {}
     try:
-        return {
-            key: float(value)
-            for key, value in (line.split() for line in read_plain_text(path).splitlines() if line.strip())
-        }
+        lines = (line.split() for line in read_plain_text(path).splitlines() if line.strip())
+        found = {key: float(value) for key, value in lines}
     except ValueError as error:
         raise PackingFileError(f"{path} must have one key and one number a line.") from error
+    number = found.pop(FORMAT_KEY, None)
+    check_format(None if number is None else f"{number:g}", path)
+    return found
 
 
 def read_custom_dump(path: Path, frame: int | None = None) -> Disks:
