@@ -12,7 +12,7 @@
 - `motion_proof`: a few of LAMMPS's own steps (`lammps_steps`) beside those of the Configuration (`linear_steps`);
   `acting_fixes`: what explains a difference
 - `from_lammps`: the choice among all of these; `compare_motion`: a longer motion beside LAMMPS's
-- `relax`: an instance brought to rest; `lammps_path`: its loading path; `run_deck`: the deck of a user, carried out by LAMMPS;
+- `relax`: an instance brought to rest; `lammps_path`: its loading path; `run_deck`: the deck of a user, run by LAMMPS;
   `kept_state`: the last state of a deck that cannot be taken
 
 May import: `lammps`, `load_path`.

@@ -190,13 +190,14 @@ run 100000   # until it rests; 0 for a restart at rest"""
 
 def _deck_around(file: Path) -> str:
     """Lines of a deck for a restart or data file of LAMMPS, to be filled in; empty for other files."""
-    from faultgouge.analysis.files.formats import registry
+    from faultgouge.analysis.files.formats import RESTART_BEGINNING
 
     if not file.is_file():
         return ""
     with file.open("rb") as stream:
-        head = stream.readline(500).decode(errors="replace")
-    if registry.is_restart(file):
+        first = stream.readline(500)
+    head = first.decode(errors="replace")
+    if first.startswith(RESTART_BEGINNING):
         reads = f"comm_modify vel yes\nread_restart {file.name}"
     elif head.startswith("LAMMPS data file"):
         units = (re.findall(r"units = (\w+)", head) or ["lj"])[0]
