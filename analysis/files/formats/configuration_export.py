@@ -4,7 +4,7 @@ The motion of a mode, growth left out, is a film of frames: an .xyz of many fram
 .vtp is laid out as that of a Packing (:mod:`.vtp`): N centres, then two ends for each contact.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -25,8 +25,14 @@ def check_configuration_writer(path: Path) -> None:
         raise BadInputError(f"-o {path}: a configuration goes into .vtp, .xyz; give it one of these suffixes.")
 
 
-def export_configuration(path: Path, configuration: Configuration, modes: Sequence[ModeVectors] = ()) -> str:
-    """Write a configuration as .vtp or .xyz, and return the contents in words.
+def export_configuration(
+    path: Path,
+    configuration: Configuration,
+    modes: Sequence[ModeVectors] = (),
+    values: Mapping[str, Floats] | None = None,
+) -> str:
+    """Write a configuration as .vtp or .xyz, and return the contents in words; `values` are further numbers of the
+    particles, shape (N,) each.
 
     Raises
     ------
@@ -37,9 +43,9 @@ def export_configuration(path: Path, configuration: Configuration, modes: Sequen
     """
     check_configuration_writer(path)
     if path.suffix == ".vtp":
-        write_xml(path, _poly_data(configuration, _in_space(configuration), modes))
+        write_xml(path, _poly_data(configuration, _in_space(configuration), modes, values))
     else:
-        _write_xyz(path, configuration, [(_in_space(configuration), modes)])
+        _write_xyz(path, configuration, [(_in_space(configuration), modes)], values)
     what = {"particle": len(configuration), "contact": len(configuration.contacts), "mode": len(modes)}
     return ", ".join(counted(number, noun) for noun, number in what.items())
 
@@ -103,7 +109,12 @@ def _of_particles(configuration: Configuration, modes: Sequence[ModeVectors]) ->
     return values
 
 
-def _poly_data(configuration: Configuration, position: Floats, modes: Sequence[ModeVectors]) -> ElementTree.Element:
+def _poly_data(
+    configuration: Configuration,
+    position: Floats,
+    modes: Sequence[ModeVectors],
+    values: Mapping[str, Floats] | None = None,
+) -> ElementTree.Element:
     """Particles where they have been moved to, with the contacts that they have at rest."""
     c = configuration.contacts
     first, rest = position[c.i], _in_space(configuration)
@@ -122,18 +133,23 @@ def _poly_data(configuration: Configuration, position: Floats, modes: Sequence[M
     moved = np.where(c.wall[:, None], 0.0, position[np.maximum(c.j, 0)] - rest[np.maximum(c.j, 0)])
     second = rest[c.i] - configuration.branch + moved
     ends = np.stack([first, second], axis=1).reshape(-1, 3)
-    return write_poly_data(position, ends, numbers, _of_particles(configuration, modes), on_contacts)
+    return write_poly_data(
+        position, ends, numbers, _of_particles(configuration, modes) | dict(values or {}), on_contacts
+    )
 
 
 def _write_xyz(
-    path: Path, configuration: Configuration, frames: Sequence[tuple[Floats, Sequence[ModeVectors]]]
+    path: Path,
+    configuration: Configuration,
+    frames: Sequence[tuple[Floats, Sequence[ModeVectors]]],
+    values: Mapping[str, Floats] | None = None,
 ) -> None:
     """Frames, each of positions and modes."""
     lattice, origin = (" ".join(map(repr, each.ravel().tolist())) for each in (configuration.box, configuration.origin))
     sides = " ".join("T" if each else "F" for each in configuration.periodic)
     with replace_whole(path) as new, new.open("w") as stream:
         for position, modes in frames:
-            columns = {"pos": position} | _of_particles(configuration, modes)
+            columns = {"pos": position} | _of_particles(configuration, modes) | dict(values or {})
             columns = {("forces" if name == "net_force" else name): value for name, value in columns.items()}
             sizes = [f"{name}:R:{1 if value.ndim == 1 else value.shape[1]}" for name, value in columns.items()]
             rows = np.column_stack([value if value.ndim == 2 else value[:, None] for value in columns.values()])

@@ -15,7 +15,18 @@ import typer
 
 from .on_demand import CommandGroup, CommandsByName
 
-FAMILIES = ("runs", "drive", "spectrum", "onset", "pictures", "import_command", "export_command", "studies", "sweeps")
+FAMILIES = (
+    "runs",
+    "drive",
+    "spectrum",
+    "onset",
+    "pictures",
+    "vibrations",
+    "import_command",
+    "export_command",
+    "studies",
+    "sweeps",
+)
 """Modules with commands."""
 
 
