@@ -22,7 +22,7 @@ from scipy.sparse import csc_array, eye_array
 
 from ..arrays import Complexes, Floats
 from ..errors import FaultgougeError
-from ..factors.sparse_lu import Factors, accurate_lu
+from ..factors.sparse_lu import Factors, general_lu
 from .modes import Modes
 
 ROOM = 1.06
@@ -224,7 +224,7 @@ class ShiftedDisc:
         SpectrumError
             If the largest space does not hold them.
         """
-        factors = accurate_lu(csc_array(matrix - shift * eye_array(matrix.shape[0])))
+        factors = general_lu(csc_array(matrix - shift * eye_array(matrix.shape[0])), ordered=True)
         start = np.random.default_rng(seed)
         krylov = Krylov(factors.solve, start.standard_normal((block, matrix.shape[0])), reach.most)
         while True:

@@ -140,7 +140,7 @@ def packing_in(run: RunFile, frame: int = -1) -> Packing:
     packing = run.packing(frame)
     if run.attributes.get("task") != "drive":
         return packing
-    from .pywrap.runs.drive_recorder import drive_of
+    from .pywrap.runs.drive import drive_of
 
     settings = drive_of(run)
     return packing if settings is None or settings.spring == "rigid" else replace(packing, spring=settings.spring)

@@ -13,7 +13,7 @@ from ...analysis.files.atomic_write import make_folder, write_json
 from ...analysis.files.plain_file import read_plain, read_plain_text
 from ...figures.style import report_failure, save
 from ...pywrap import SceneError
-from ...pywrap.runs.drive_recorder import SERIES, drive_of, slips_in
+from ...pywrap.runs.drive import SERIES, drive_of, slips_in
 from ..executors import Progress, Say
 from ..sweep.table import write_csv
 from .compute import cycle_state

@@ -126,11 +126,11 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
     ("changes", "says"),
     [
         # law and damping
-        ({"law.exponent": 2.0}, "law.exponent = 2 is refused: give 1.5 (Hertz) or 1 (harmonic disks)"),
+        ({"law.exponent": 1.25}, "law.exponent = 1.25 is refused: give 1.5 or 1"),
         ({"law.history": "whole"}, "law.history = 'whole' is refused"),
         (
             {"law.history": "rescaled", "law.exponent": 1},
-            'law.history = "rescaled" needs law.exponent = 1.5: harmonic disks have one stiffness',
+            'law.history = "rescaled" needs a law.exponent of 1.4 or more',
         ),
         ({"damping.tau": 0.0}, "damping.tau = 0.0 is refused: give a number above 0"),
         ({"damping": {}}, "damping has nothing in it: give cn, ct or tau, or leave the section out"),

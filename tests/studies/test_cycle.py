@@ -11,8 +11,7 @@ from faultgouge.analysis import FLOOR, Contacts, MindlinLaw, Packing, RunFile, s
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 from faultgouge.analysis.motion.motion import Motion
 from faultgouge.pywrap import Equilibrium, Scene, SceneError
-from faultgouge.pywrap.runs.drive_recorder import SERIES, DriveRecord
-from faultgouge.pywrap.runs.drive_setup import settle_for_drive
+from faultgouge.pywrap.runs.drive import SERIES, DriveRecord, settle_for_drive
 from faultgouge.studies.cycle.compute import cycle_state, null_vector, with_spring
 from faultgouge.studies.cycle.study import CYCLE_COLUMNS, cycle
 

@@ -17,10 +17,11 @@ from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array
 
 from ...arrays import Floats, Indices
+from ...factors.lanczos import Slice
 from ...motion.eigenvalues import active_coordinates
 from ..limits import LIMITS, Limits
 from .ranks import Ranks
-from .store import NEW_PASS, Slice, SlicePass
+from .store import NEW_PASS, SlicePass
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +226,7 @@ class Bases:
             if self.ranks.rank == 0 and not stored.found:
                 yield replace(Basis.of(matrix, limits), own=slice(*self.range(matrix)))
             return
-        from .lanczos import slices  # with libraries that nothing else needs
+        from .slices import slices  # with libraries that nothing else needs
 
         inner = matrix[active][:, active]
         symmetric, margin = csc_array(0.5 * (inner + inner.T)), limits.margin + limits.modes_beyond

@@ -28,6 +28,7 @@ from scipy.sparse.linalg import ArpackError
 
 from ...arrays import Floats
 from ...errors import FaultgougeError, NoEquilibriumError
+from ...factors.lanczos import Border
 from ...motion.eigenvalues import active_coordinates
 from ...progress import report_progress
 from ..edges import DoubtError, Increments, LostPairError, Window, follow_to, track
@@ -40,7 +41,7 @@ from ..system_modes import SystemModes
 from .axis import growing_modes
 from .clusters import SliceSearch
 from .eigenbasis import Basis, Levels
-from .store import Border, Candidate, SliceResult
+from .store import Candidate, SliceResult
 
 
 class SlicedGrowth(SliceSearch):

@@ -83,8 +83,7 @@ def _run(
     The files of other scenes, which differ in the signal, begin where the signal does.
     """
     from faultgouge.pywrap import Equilibrium
-    from faultgouge.pywrap.runs.drive_recorder import DriveRecord
-    from faultgouge.pywrap.runs.drive_setup import check_drive, settle_for_drive
+    from faultgouge.pywrap.runs.drive import DriveRecord, check_drive, settle_for_drive
 
     with DriveRecord(output, scene, saved=keeps) as record:
         if record.last is None:
@@ -111,7 +110,7 @@ def _others(output: Path, scene: Scene) -> dict[str, tuple[Path, Scene]]:
     assert settings is not None
     if settings.signal is None:
         return {}
-    from faultgouge.pywrap.runs.drive_recorder import NOISES
+    from faultgouge.pywrap.runs.drive import NOISES
 
     noises = {f"noise{number}": settings.with_noise(number) for number in range(1, NOISES + 1)}
     changed = {"without": settings.without_signal()} | noises
@@ -124,7 +123,7 @@ def _others(output: Path, scene: Scene) -> dict[str, tuple[Path, Scene]]:
 def _advances(output: Path, others: dict[str, Path]) -> dict[str, Any]:
     """How much earlier the next slip is, with the signal and with noise; nothing without a signal."""
     from faultgouge.analysis import RunFile
-    from faultgouge.pywrap.runs.drive_recorder import SERIES, advance_error, clock_advance
+    from faultgouge.pywrap.runs.drive import SERIES, advance_error, clock_advance
 
     if not others:
         return {}
@@ -158,8 +157,7 @@ def _result(path: Path, scene: Scene) -> dict[str, Any]:
 
     from faultgouge.analysis import RunFile
     from faultgouge.analysis.motion.slips import friction_of
-    from faultgouge.pywrap.runs.drive import strays
-    from faultgouge.pywrap.runs.drive_recorder import SERIES, all_slips_in
+    from faultgouge.pywrap.runs.drive import SERIES, all_slips_in, strays
 
     with RunFile(path) as file:
         (slips, under_way), series, times = all_slips_in(file), file.series(SERIES), file.observable("time")

@@ -128,7 +128,7 @@ def stored_series(file: Path) -> dict[str, Any] | None:
 def stored_drive(file: Path) -> tuple[dict[str, Any], list[Slip]] | None:
     """The series of a drive.h5 and its slips; None of another file."""
     from faultgouge.analysis import RunFile
-    from faultgouge.pywrap.runs.drive_recorder import SERIES, drive_of, slips_in
+    from faultgouge.pywrap.runs.drive import SERIES, drive_of, slips_in
 
     if file.suffix == ".disks":
         return None
@@ -143,7 +143,7 @@ def frame_at(file: Path, frame: int, time: float | None) -> int:
     if time is None:
         return frame
     from faultgouge.analysis import BadInputError, RunFile
-    from faultgouge.pywrap.runs.drive_recorder import drive_of
+    from faultgouge.pywrap.runs.drive import drive_of
 
     if not isfinite(time):
         raise BadInputError(f"--time {time:g} is no time: give a number")
