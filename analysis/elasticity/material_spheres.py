@@ -164,8 +164,10 @@ def spheres_of_material(
     box = np.asarray(box, float)
     i, j, branch = touching_spheres(place, radius, box, periodic) if contacts is None else contacts
     distance = np.linalg.norm(branch, axis=1)
-    normal = branch / distance[:, None]
-    wall = j < 0
+    if not distance.all():
+        k = int(np.argmin(distance))
+        raise BadInputError(f"Spheres {i[k] + 1} and {j[k] + 1}, counted from 1, are in one place: separate them.")
+    normal, wall = branch / distance[:, None], j < 0
     other = np.where(wall, np.inf, radius[j])
     overlap = np.maximum(np.where(wall, radius[i], radius[i] + radius[j]) - distance, 0.0)
     reduced, heavy = 1 / (1 / radius[i] + 1 / other), np.where(wall, mass[i], mass[i] * mass[j] / (mass[i] + mass[j]))

@@ -359,10 +359,10 @@ class QuietResponse:
         self.matrix = matrix
         self.factors = general_lu(csc_array(matrix + diags_array(np.full(len(mass), self.held))))
 
-    def solve(self, force: Complexes) -> Complexes:
+    def solve(self, force: Complexes, refinements: int = REFINEMENTS) -> Complexes:
         """q of (K + i omega C - omega^2 M) q = F, shape (coordinates, n)."""
         moved = self.factors.solve(force)
-        for _ in range(REFINEMENTS):
+        for _ in range(refinements):
             moved += self.factors.solve(np.asarray(force - self.matrix @ moved))
         return np.asarray(moved)
 

@@ -233,7 +233,7 @@ def softness(packing: HasConfiguration) -> tuple[Floats, Floats]:
         drives = force.copy()
         if floats:  # the box as a whole has nothing to hold it: forces are those without their mean
             drives[: d * n] = _without_mean(drives, d, n)
-        moved = response.solve(drives)[: d * n]
+        moved = response.solve(drives, 1)[: d * n]
         values = force[: d * n] * (_without_mean(moved, d, n) if floats else moved)
         found += [values.sum(axis=1), (values**2).sum(axis=1)]
         report_progress(f"softness, {done + 1} of {len(batches)}")

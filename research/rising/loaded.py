@@ -92,7 +92,13 @@ def loaded(seed: int, history: str, rate: float) -> dict[str, Any]:
 
 
 def _six_digits(value: Any) -> Any:
-    return [_six_digits(each) for each in value] if isinstance(value, list) else value if isinstance(value, int) else float(f"{value:.4g}")
+    return (
+        [_six_digits(each) for each in value]
+        if isinstance(value, list)
+        else value
+        if isinstance(value, int)
+        else float(f"{value:.4g}")
+    )
 
 
 def _pairs(packing: Packing) -> set[tuple[int, int]]:

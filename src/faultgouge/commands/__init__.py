@@ -16,17 +16,9 @@ import typer
 from .on_demand import CommandGroup, CommandsByName
 
 FAMILIES = (
-    "runs",
-    "drive",
-    "spectrum",
-    "onset",
-    "pictures",
-    "vibrations",
-    "import_command",
-    "export_command",
-    "studies",
+    "runs", "drive", "spectrum", "onset", "pictures", "vibrations", "import_command", "export_command", "studies",
     "sweeps",
-)
+)  # fmt: skip
 """Modules with commands."""
 
 
