@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.arrays import Floats
+from ..analysis.files.atomic_write import FORMAT, FORMAT_KEY, check_format
 from ..analysis.files.plain_file import read_plain
 from ..pywrap import Scene, SceneError
 
@@ -33,10 +35,12 @@ def read_keyed_rows(path: Path, key: str, what: str) -> list[dict[str, Any]]:
         try:
             rows.append(json.loads(line))
             rows[-1][key]
+            number_of_format = rows[-1].pop(FORMAT_KEY, None)
         except (ValueError, KeyError, TypeError, RecursionError):
             raise SceneError(
                 f"{path}: line {number} is no result of {what}: take it out, or give another folder"
             ) from None
+        check_format(number_of_format, f"{path}, line {number},")
     return rows
 
 
@@ -59,6 +63,8 @@ def append_row(path: Path, row: Mapping[str, Any]) -> None:
                 file.seek(0)
                 file.truncate(file.read().rfind(b"\n") + 1)
         file.write(json.dumps(row).encode() + b"\n")
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def keep_rows(path: Path, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
@@ -76,14 +82,15 @@ class Rows:
 
     def __init__(self, path: Path, scene: Scene, beside: str) -> None:
         self.path = path
-        resolved = {name: keys for name, keys in scene.resolved().items() if name != beside}
+        whole = {name: keys for name, keys in scene.resolved().items() if name != beside}
+        resolved = whole | scene.digests()  # a name alone does not say which packing it is
         self._scene = hashlib.sha256(json.dumps(resolved, sort_keys=True).encode()).hexdigest()[:12]
         self.rows = [row for row in read_keyed_rows(path, "scene", "a study") if row["scene"] == self._scene]
 
     def append(self, **row: Any) -> dict[str, Any]:
         """Write a line; it is in the file when this returns."""
         row = {"scene": self._scene, "version": version("faultgouge")} | row
-        append_row(self.path, row)
+        append_row(self.path, {FORMAT_KEY: FORMAT, **row})
         self.rows.append(row)
         return row
 

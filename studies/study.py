@@ -98,7 +98,7 @@ class SceneStudy:
             if MPI.COMM_WORLD.rank != 0:
                 return {}
             map_rows: MapRows = map if pool is None else partial(pool.map, unordered=True)
-            make_folder(output)
+            make_folder(output, f"{self.name}.json", f"{self.name}.md")
             rows = Rows(output / f"{self.name}.jsonl", scene, self.beside)
             found = self.compute(scene, Work(rows, map_rows, say, progress))
         real = real_units(scene)

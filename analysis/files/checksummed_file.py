@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from numpy.typing import NDArray
 
 from ..errors import PackingFileError
-from .atomic_write import HEADER_SIZE, add_checksum, check_checksum, write_whole
+from .atomic_write import FORMAT, FORMAT_KEY, HEADER_SIZE, add_checksum, check_checksum, write_whole
 from .plain_file import read_plain
 from .runfile_validation import check_places
 
@@ -57,7 +57,7 @@ class SealedFile:
             check_places(self._file)
         except PackingFileError as error:
             self._file.close()
-            raise PackingFileError(f"{self.path} is refused: {error}.") from error
+            raise PackingFileError(f"{self.path} is refused: {str(error).rstrip('.')}.") from error
         if "snapshot" in self._file:
             self._file.close()
             raise PackingFileError(
@@ -148,7 +148,8 @@ def new_file() -> h5py.File:
 
 
 def write(path: Path, file: h5py.File) -> None:
-    """Write a file that is kept in memory, with its checksum."""
+    """Write a file that is kept in memory, with its checksum and the number of its format."""
+    file.attrs[FORMAT_KEY] = FORMAT
     file.flush()
     image = file.id.get_file_image()
     write_whole(path, add_checksum(image), image)

@@ -115,6 +115,9 @@ def read_configuration(path: Path) -> Configuration:
     with open_checksummed(path) as file:
         try:
             check_places(file)
+        except PackingFileError as error:
+            raise PackingFileError(f"{path} is refused: {str(error).rstrip('.')}.") from error
+        try:
             group, given = file["snapshot"], file["snapshot/contacts"]
             contacts = LinearisedContacts(
                 **{name: given[name][()] for name in PER_CONTACT if name in given or name not in LATER_KEYS}

@@ -141,7 +141,7 @@ class RunFile(SealedFile):
         return self._file["observables"][name]["value"][: len(self)]
 
     def append(self, packing: Packing, **scalars: float) -> None:
-        """Add a frame and make sure that it is on the storage device.
+        """Add a frame; it is stored with the next saving, which takes at most `SHARE_OF_SAVING` of the time.
 
         Parameters
         ----------

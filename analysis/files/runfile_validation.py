@@ -11,6 +11,7 @@ import os
 from typing import TYPE_CHECKING
 
 from ..errors import PackingFileError
+from .atomic_write import FORMAT_KEY, check_format
 
 if TYPE_CHECKING:
     import h5py
@@ -23,8 +24,9 @@ LARGEST_SHAPE = 1 << 45
 
 
 def check_places(file: h5py.File) -> None:
-    """Refuse links to other files, and what unpacks to more than the memory of this machine."""
+    """Refuse a later format, links to other files, and what unpacks to more than the memory of this machine."""
     try:
+        check_format(file.attrs.get(FORMAT_KEY), "it")
         _check_places(file)
     except PackingFileError:
         raise

@@ -21,7 +21,7 @@ import numpy as np
 from threadpoolctl import threadpool_info
 
 from ...analysis import FaultgougeError
-from ...analysis.files.atomic_write import make_folder, write_text
+from ...analysis.files.atomic_write import make_folder, write_json, write_text
 from ...figures.pages import render
 from ...figures.style import report_failure, save
 from ...pywrap import Scene, ramp
@@ -81,7 +81,7 @@ def report(
     ReportError
         After all studies, if one has failed.
     """
-    make_folder(output)
+    make_folder(output, "report.json", "report.md")
     scene = Scene.from_toml(SCENE)
     equilibria = tuple(ramp(scene))
     done: list[Study] = []
@@ -146,7 +146,7 @@ def _write_report(output: Path, quick: bool, done: list[Study], failed: dict[str
         "studies": [asdict(study) for study in done],
         "failed": [{"name": name, "says": says} for name, says in failed.items()],
     }
-    write_text(output / "report.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
+    write_json(output / "report.json", result, allow_nan=False)
     page = render(__package__ or "", "report.md.j2", where=where, quick=quick, done=done, failed=failed, stem=stem)
     write_text(output / "report.md", page)
     return result

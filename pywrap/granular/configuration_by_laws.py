@@ -29,7 +29,6 @@ is for :mod:`~faultgouge.analysis.motion.one_sided`.
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...analysis import Configuration, LinearisedContacts, MindlinLaw
 from ...analysis.arrays import Floats, derive_frozen
@@ -67,12 +66,13 @@ def configuration_by_laws(lmp: Any, commands: Commands, found: Arrays, laws: Kno
     if not len(found["id"]):
         raise NotTakenError("This LAMMPS has no particles.")
     lines = {name: line for name, line in commands.fixes.items() if f"group {name}" in found}
-    members = {name: found[f"group {name}"] for name in lines}
+    members = {name.removeprefix("group "): each for name, each in found.items() if name.startswith("group ")}
     moved = mobility(lines, members, found["rmass"], lmp.extract_setting("dimension"))
     free, frozen = moved.free, np.zeros(len(found["id"]), bool)
     for name, line in lines.items():
         frozen |= members[name] & (without_suffix(line.split()[3]) == "freeze")
-    contacts, remarks = _linearised_contacts(lmp, commands, found, frozen, laws, box_of(lmp)[0])
+    felt = np.where(frozen, np.inf, moved.felt_mass)
+    contacts, remarks = _linearised_contacts(lmp, commands, found, felt, laws, box_of(lmp)[0])
     made = Configuration(
         **particles_of(lmp, found, free, moved.factor), contacts=contacts, constraint=moved.needed, remarks=remarks
     )
@@ -115,9 +115,10 @@ def _check_torques(others: Floats, commands: Commands, contacts: LinearisedConta
 
 
 def _linearised_contacts(
-    lmp: Any, commands: Commands, found: Arrays, frozen: NDArray[np.bool_], laws: KnownLaws, box: Floats
+    lmp: Any, commands: Commands, found: Arrays, mass: Floats, laws: KnownLaws, box: Floats
 ) -> tuple[LinearisedContacts, tuple[str, ...]]:
-    """Contacts between particles, then those with each wall; and remarks on their laws."""
+    """Contacts between particles, then those with each wall; and remarks on their laws. `mass` is what dashpots feel,
+    infinite where frozen."""
     pairs, walls = (
         contacts_of_pairs(found, box),
         [name.removeprefix("wall ") for name in found if name.startswith("wall ")],
@@ -142,7 +143,7 @@ def _linearised_contacts(
             if key not in laws:
                 laws[key] = measure_law(lmp, commands, name, state, group.who)
             remarks.append(remark_on(laws[key], commands, name, state))
-            parts.append(_linearise_measured(laws[key], group, found, frozen))
+            parts.append(_linearise_measured(laws[key], group, found, mass))
     values = {name: [getattr(each, name) for each in parts] for name in PER_CONTACT}
     if not parts:
         values = {
@@ -175,20 +176,17 @@ def _linearise_smooth(law: MindlinLaw, contacts: OneLaw) -> LinearisedContacts:
     return made
 
 
-def _linearise_measured(
-    law: MeasuredLaw, contacts: OneLaw, found: Arrays, frozen: NDArray[np.bool_]
-) -> LinearisedContacts:
-    """Contacts of a law that has been measured."""
+def _linearise_measured(law: MeasuredLaw, contacts: OneLaw, found: Arrays, mass: Floats) -> LinearisedContacts:
+    """Contacts of a law that has been measured; `mass` as above."""
     i, j, overlap, arms = (contacts.geometry[name] for name in ("i", "j", "overlap", "slip_arm"))
     normal_force, tangential_force = contacts.forces[:, 0], contacts.forces[:, 1:]
-    wall, radius, mass = j == WALL, found["radius"], found["rmass"]
+    wall, radius = j == WALL, found["radius"]
     stiffness = (1 + law.stiffness.overlap) * normal_force / overlap
     reduced_radius = np.where(wall, radius[i], radius[i] * radius[j] / (radius[i] + radius[j]))
     # frozen particles weigh infinitely much in LAMMPS's dashpots, but not at walls; two frozen ones matter to nobody
-    inverse = np.where(frozen, 0.0, 1 / mass)
-    inverse_mass = inverse[i] + inverse[j]
-    reduced_mass = np.divide(1.0, inverse_mass, out=np.zeros(len(i)), where=inverse_mass > 0)
-    reduced_mass = np.where(wall, mass[i], reduced_mass)
+    inverse = 1 / mass[i] + 1 / mass[j]
+    reduced_mass = np.divide(1.0, inverse, out=np.zeros(len(i)), where=inverse > 0)
+    reduced_mass = np.where(wall, np.where(np.isinf(mass), found["rmass"], mass)[i], reduced_mass)
     _agree(law.stiffness.at(reduced_radius, overlap) * overlap, stiffness, contacts)
     per_overlap = tangential_force / overlap[:, None]
     return LinearisedContacts(

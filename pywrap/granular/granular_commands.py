@@ -252,8 +252,6 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
             raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINE}.")
         if plain == "wall/gran":
             _check_wall(name, line)
-        if plain in BODIES:
-            raise NotLinearisedError(f"fix {name} {style} has particles move as one.")
 
 
 PLANES = ("xplane", "yplane", "zplane")

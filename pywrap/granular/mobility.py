@@ -36,9 +36,13 @@ def refuse_two_integrators(lines: dict[str, str], members: dict[str, NDArray[np.
     NotTakenError
         With both fixes.
     """
-    moving = [name for name, line in lines.items() if without_suffix(line.split()[3]) in INTEGRATES]
-    for one, other in combinations(moving, 2):
-        both = int(np.count_nonzero(members[one] & members[other]))
+    moves = {
+        name: _members_of_bodies(name, members) if without_suffix(line.split()[3]) in BODIES else members[name]
+        for name, line in lines.items()
+        if without_suffix(line.split()[3]) in INTEGRATES
+    }
+    for one, other in combinations(moves, 2):
+        both = int(np.count_nonzero(moves[one] & moves[other]))
         if both:
             raise NotTakenError(
                 f"fix {one} and fix {other} both move {counted(both, 'particle')}, which LAMMPS then moves twice in "
@@ -46,11 +50,17 @@ def refuse_two_integrators(lines: dict[str, str], members: dict[str, NDArray[np.
             )
 
 
+def _members_of_bodies(name: str, members: dict[str, NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    """Who is in a body of a fix rigid, which moves no other particle of its own group."""
+    return np.any([each for key, each in members.items() if key.startswith(f"{name} ")], axis=0)
+
+
 class Mobility(NamedTuple):
-    """P of q = P Q, square, and I/(m R^2) of each particle."""
+    """P of q = P Q, square; I/(m R^2) of each particle; and the mass that dashpots feel, of a body all of its own."""
 
     constraint: csr_array
     factor: Floats
+    felt_mass: Floats
 
     @property
     def free(self) -> NDArray[np.bool_]:
@@ -100,13 +110,15 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
         If a fix moves or holds particles otherwise.
     """
     refuse_two_integrators(lines, members)
-    found = _Coordinates(mass)
+    found, felt = _Coordinates(mass), np.array(mass)
     # forces are set after all integrators are known, whatever the order of the deck
     for name in sorted(lines, key=lambda each: without_suffix(lines[each].split()[3]) in ("setforce", "aveforce")):
         words = lines[name].split()
         if without_suffix(words[3]) in BODIES:
             for body in translating_bodies(lines[name], dimension):
-                _move_body(found, body.axes, members[f"{name} {body.group}"])
+                inside = members[f"{name} {body.group}"]
+                felt[inside] = mass[inside].sum()
+                _move_body(found, body.axes, inside)
         else:
             _apply(found, name, without_suffix(words[3]), words[4:], members[name])
     for name, line in lines.items():
@@ -122,7 +134,7 @@ def mobility(lines: dict[str, str], members: dict[str, NDArray[np.bool_]], mass:
     column = (found.leader[axes] + len(mass) * np.arange(len(axes))[:, None]).ravel()
     size = len(axes) * len(mass)
     constraint = csr_array((found.weight[axes].ravel()[row], (row, column[row])), shape=(size, size))
-    return Mobility(constraint, found.factor)
+    return Mobility(constraint, found.factor, felt)
 
 
 def _apply(found: _Coordinates, name: str, style: str, words: list[str], members: NDArray[np.bool_]) -> None:

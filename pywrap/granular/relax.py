@@ -23,8 +23,7 @@ from .configuration_by_differences import still_particles
 from .from_lammps import take_configuration
 from .granular_commands import NotTakenError, read_commands
 from .instance_queries import explain_error, require_instance
-from .lammps_arrays import owned_array, rows_of, set_velocity
-from .lammps_steps import set_up_run
+from .lammps_arrays import owned_array, rows_of, set_up_run, set_velocity
 from .look_in_a_copy import can_copy
 
 REST_SHARE = 1e-8

@@ -47,7 +47,7 @@ from ...analysis import (
     stable_timestep,
 )
 from ...analysis.factors.sparse_lu import general_lu
-from ...analysis.files.atomic_write import lock_output
+from ...analysis.files.atomic_write import lock_output, replace_whole
 from ...analysis.motion.slips import Slip, SlipDetector, find_slips
 from ...analysis.progress import Watch
 from ..equilibria.quasistatic import Equilibrium
@@ -562,11 +562,10 @@ class DriveRecord(Record):
         for path, scene in self._others.items():
             with lock_output(path):
                 if not path.exists():
-                    copy = path.with_name(f".{path.name}.copy")
-                    shutil.copyfile(self.path, copy)
-                    with RunFile(copy, "a") as other:
-                        other.put_attribute("scene", json.dumps(scene.resolved()))
-                    copy.replace(path)
+                    with replace_whole(path) as new:
+                        shutil.copyfile(self.path, new)
+                        with RunFile(new, "a") as other:
+                            other.put_attribute("scene", json.dumps(scene.resolved()))
 
 
 def drive_of(file: RunFile) -> Drive | None:

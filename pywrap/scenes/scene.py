@@ -36,7 +36,16 @@ from .quantities import as_numbers
 from .scene_keys import SceneKeys
 from .sections import Inertia
 from .units import real_units
-from .validation import SceneError, Section, read_toml, refusal_sentence, require_section, sentence
+from .validation import (
+    SceneError,
+    Section,
+    digest_of,
+    files_named,
+    read_toml,
+    refusal_sentence,
+    require_section,
+    sentence,
+)
 
 
 class Scene(SceneKeys):
@@ -173,6 +182,21 @@ class Scene(SceneKeys):
             # A misspelled name makes the right one missing, too: the misspelling is the cause.
             errors = sorted(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
             raise SceneError(f"{name}: {sentence(errors[0], SECTIONS)}.") from None
+
+    @property
+    def files(self) -> dict[str, tuple[Path, ...]]:
+        """The files that the scene names, by section.key; of a dump also those beside it."""
+        sections = ((name, getattr(self, name)) for name in type(self).model_fields)
+        return {
+            f"{name}.{key}": paths
+            for name, section in sections
+            if isinstance(section, Section)
+            for key, paths in files_named(section).items()
+        }
+
+    def digests(self) -> dict[str, str]:
+        """SHA-256 of the contents of these files, by section.key."""
+        return {key: digest_of(paths) for key, paths in self.files.items()}
 
     def resolved(self) -> dict[str, Any]:
         """Every key with its value, defaults included, as plain numbers, strings, lists and dicts.

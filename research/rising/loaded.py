@@ -11,7 +11,7 @@ rate first; none left out.
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -22,10 +22,13 @@ from mpi4py import MPI
 from faultgouge.analysis import Packing, Signal, stable_timestep
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.studies.result_rows import append_row
+from faultgouge.studies.statistics import share
 from research.laws.both_laws import as_slider
 from research.modes.sets import sets
 from research.rising.compute import COMPARED, HISTORIES, with_restitution
 from research.tables import known_rows
+
+Row = dict[str, Any]
 
 LOADED_RATES = (1e-3, 3e-4, 1e-4)
 """Rates of the force on each disk of the upper layer, force / time."""
@@ -39,11 +42,27 @@ STEP_SHARE, STEPS_BETWEEN = 0.2, 20
 START = 20.0
 """Time in which the rate grows from nothing, as half of a cosine: a load that began at once would ring for hundreds."""
 
-VIBRATIONS = (0.01, 0.05)
-"""Vibration over drift of a window from which on it vibrates; the shares of both are kept."""
+VIBRATES = 0.05
+"""Vibration over drift of a window from which on it vibrates: what is left of the start is 0.03 at the most."""
+
+VIBRATIONS = (0.01, VIBRATES)
+"""The ratios whose shares of windows a row has."""
+
+SLIP = 6
+"""In a slip a layer moves in one part of the way so many times as far as in the median: without one 3.4 times at the
+most, at the start; with one from 11 times on."""
+
+MOSTLY, LAST_PARTS = 0.5, 3
+"""Share of the windows of the last part from which a layer vibrates at the end; parts of which drift and vibration at
+the end are means."""
 
 
-def loaded(seed: int, history: str, rate: float) -> dict[str, Any]:
+def starts_of(rising: Row) -> list[Row]:
+    """Drift and vibration from each start that was followed."""
+    return [rising, *([rising["other_start"]] if rising.get("other_start") else [])]
+
+
+def loaded(seed: int, history: str, rate: float) -> Row:
     """The row of one layer under a load that rises from nothing: lists over the parts of the way."""
     begin = time.process_time()
     load, restitution = COMPARED
@@ -59,7 +78,7 @@ def loaded(seed: int, history: str, rate: float) -> dict[str, Any]:
     t = np.linspace(0.0, START, 401)
     rises = rate * (t / 2 - START / (2 * np.pi) * np.sin(np.pi * t / START))
     signal = Signal(np.append(t, START + 2 * last / rate), np.append(rises, rises[-1] + 2 * last))
-    row: dict[str, Any] = {"seed": seed, "law": history, "rate": rate, "restitution": restitution, "time_step": step}
+    row: Row = {"seed": seed, "law": history, "rate": rate, "restitution": restitution, "time_step": step}
     parts = []
     with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(step, signal=signal):
         lmp = engine.lammps
@@ -131,6 +150,59 @@ def compute_loaded(table: Path, seeds: int, watch: Any = print) -> None:
             watch(f"{history} at {rate:g}, seed {seed}: {row['cpu_seconds']} s", flush=True)
 
 
-def rows_loaded(table: Path) -> Iterator[dict[str, Any]]:
-    """The rows of a table in the order of rates, laws and seeds."""
-    yield from sorted(known_rows(table), key=lambda row: (-row["rate"], row["law"], row["seed"]))
+def summaries(rows: Sequence[Row], path: Sequence[Row]) -> list[Row]:
+    """Of each law and rate: slips, the share of the way with vibration, and drift and vibration at its end.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        Those of `loaded`.
+    path : sequence of dict
+        What is told of the equilibria of the same seeds at the end of the way (tables/layers.jsonl).
+    """
+    told = {row["seed"]: starts_of(row["rising"]) for row in path if row.get("rising")}
+    found = []
+    for law, rate in product(HISTORIES, LOADED_RATES):
+        own = [row for row in rows if (row["law"], row["rate"]) == (law, rate)]
+        stay = [row for row in own if not slips(row)]
+        ends = [(row["seed"], *(_at_the_end(row[name]) for name in ("drift", "vibration"))) for row in stay]
+        beside = [
+            {name: value / told[seed][0][name] for name, value in (("drift", drift), ("vibration", vibration))}
+            for seed, drift, vibration in ends
+            if seed in told and law == "coulomb"
+        ]
+        found.append(
+            {
+                "law": law,
+                "rate": rate,
+                "layers": len(own),
+                "slip": share(len(own) - len(stay), len(own)),
+                "on_the_way": share(sum(max(_vibrates(row)) > 0 for row in own), len(own)),
+                "part": _spread([float(np.mean(_vibrates(row))) for row in own]),
+                "at_the_end": share(sum(_vibrates(row)[-1] >= MOSTLY for row in own), len(own)),
+                "drift": _spread([drift for _, drift, _ in ends]),
+                "vibration": _spread([vibration for _, _, vibration in ends]),
+                "over_told": {name: _spread([each[name] for each in beside]) for name in ("drift", "vibration")},
+            }
+        )
+    return found
+
+
+def slips(row: Row) -> int:
+    """In how many parts of the way a layer moves as in a slip."""
+    increments = np.abs(np.diff([0.0, *row["moved"]]))
+    return int(np.sum(increments > SLIP * np.median(increments)))
+
+
+def _vibrates(row: Row) -> list[float]:
+    """Share of the windows of each part of the way that vibrate."""
+    return [shares[VIBRATIONS.index(VIBRATES)] for shares in row["vibrates"]]
+
+
+def _at_the_end(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values[-LAST_PARTS:]))))
+
+
+def _spread(values: Sequence[float]) -> list[float] | None:
+    """Median, least and largest."""
+    return [float(np.median(values)), min(values), max(values)] if values else None

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...analysis import RunFile
-from ...analysis.files.atomic_write import make_folder, write_json
+from ...analysis.files.atomic_write import FORMAT_KEY, check_format, check_own, make_folder, write_json
 from ...analysis.files.plain_file import read_plain, read_plain_text
 from ...figures.style import report_failure, save
 from ...pywrap import SceneError
@@ -68,7 +68,8 @@ def cycle(path: Path, output: Path, say: Say = print, progress: Progress = lambd
         assert settings is not None
         if settings.spring == "rigid":
             raise SceneError(f"{path} is of a rigid drive, whose layer has no spring and no slips: draw with a spring")
-        make_folder(output)
+        make_folder(output, "cycle.json")
+        check_own(output / "cycle.csv", ",".join(CYCLE_COLUMNS))
         spring, slips, times = float(settings.spring), slips_in(file), file.observable("time")
         series, displacement = file.series(SERIES), file.observable("displacement")
         states = _known(output / "cycle.json", digest)
@@ -90,6 +91,7 @@ def _known(path: Path, digest: str) -> list[dict[str, Any]]:
     """States that a cycle.json has of the same file; none of another one."""
     try:
         stored = json.loads(read_plain_text(path))
+        check_format(stored.get(FORMAT_KEY), path)
         return list(stored["states"]) if stored["sha256"] == digest else []
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ...analysis.files.atomic_write import write_json
+from ...analysis.files.atomic_write import check_own, write_json
 from ...figures.style import report_failure, save
 from ...figures.writers import write_film
 from ...pywrap import Scene, SceneError
@@ -78,6 +78,8 @@ def modes(
     dict
         What modes.json holds; empty on ranks other than 0.
     """
+    check_own(output / "modes.json")
+    check_own(output / "modes.csv", ",".join(MODES_COLUMNS))
     rows = run_sweep(sweep, output, part, say, progress, workers)
     if not rows:
         return {}

@@ -42,7 +42,7 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     dict
         The contents of summary.json.
     """
-    make_folder(output)
+    make_folder(output, "summary.json", "report.md")
     runs = _ramps(scene, output / "run.h5", say)
     say("undamped run above the onset")
     growth = growth_run(scene, runs[0], output / "run.h5")

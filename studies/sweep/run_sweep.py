@@ -25,13 +25,13 @@ from typing import Any
 from mpi4py import MPI
 
 from ...analysis import FaultgougeError
-from ...analysis.files.atomic_write import lock_output, make_folder, write_json
+from ...analysis.files.atomic_write import FORMAT, FORMAT_KEY, check_format, lock_output, make_folder, write_json
 from ...analysis.files.plain_file import read_plain_text
 from ...pywrap import SceneError
 from .. import result_rows
 from ..executors import Progress, Say, open_executor
 from .sweep_plan import Sweep, SweepPoint, shard
-from .table import Row, write_tables
+from .table import Row, check_table, write_tables
 from .tasks import TASKS
 from .workers import compute_points
 
@@ -121,7 +121,8 @@ def run_sweep(
     with open_executor(workers, executor) as pool:
         if MPI.COMM_WORLD.rank != 0:
             return []
-        make_folder(output)
+        make_folder(output, REQUEST_FILE)
+        check_table(sweep.names, output)
         with lock_output(output):
             known = read_results(output / RESULTS_FILE)
             missing = missing_points(points, known)
@@ -131,7 +132,9 @@ def run_sweep(
             if others := known.keys() - {point.key for point in sweep.points}:
                 say(f"{len(others)} rows there are of other scenes, code or versions, and are not in the table")
             with closing(compute_points(pool, sweep.located_task, missing)) as ended:
-                for row in progress(result_rows.keep_rows(output / RESULTS_FILE, ended), len(missing)):
+                rows = result_rows.keep_rows(output / RESULTS_FILE, ({FORMAT_KEY: FORMAT, **row} for row in ended))
+                for row in progress(rows, len(missing)):
+                    del row[FORMAT_KEY]
                     known[row["key"]] = row
             table = [known[point.key] for point in points]
             write_tables(table, sweep.names, output)
@@ -227,7 +230,7 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
         If the parts, and what the folder has, do not belong together, or are not parts of a sweep.
     """
     request = _common_request(parts)
-    make_folder(output)
+    make_folder(output, REQUEST_FILE)
     with lock_output(output):
         if (output / REQUEST_FILE).exists() or (output / RESULTS_FILE).exists():
             _common_request([*parts, output])
@@ -237,7 +240,7 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
         write_json(output / REQUEST_FILE, request | {"shard": [1, 1]})
         for row in table:
             if _as_text(kept.get(row["key"])) != _as_text(row):
-                result_rows.append_row(output / RESULTS_FILE, row)
+                result_rows.append_row(output / RESULTS_FILE, {FORMAT_KEY: FORMAT, **row})
         sweep = Sweep(request["task"], request["sweep"], request["scene"])
         write_tables(table, sweep.names, output)
     count = len(request["keys"])
@@ -288,4 +291,5 @@ def _read(path: Path) -> dict[str, Any]:
         raise SceneError(f"{path} is not valid JSON ({error}): give a file that faultgouge has written") from None
     if not isinstance(value, dict):
         raise SceneError(f"{path} is no result of faultgouge: give a file that it has written")
+    check_format(value.pop(FORMAT_KEY, None), path)
     return value

@@ -18,11 +18,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from importlib.metadata import version
 from itertools import product
 from math import prod
@@ -32,9 +31,6 @@ from typing import Any
 from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.validation import read_toml
 from .user_function import is_user_function, locate, user_function
-
-FILES = (("packing", "file"), ("perturb", "signal"))
-"""Keys of a scene that name a file, of which a resolved scene has the path from the root."""
 
 MOST_POINTS = 1_000_000
 """Points of a sweep at the most: more is a slip of the pen."""
@@ -202,18 +198,10 @@ def shard(points: tuple[SweepPoint, ...], part: tuple[int, int]) -> tuple[SweepP
 def with_contents(scene: Scene) -> dict[str, Any]:
     """A resolved scene with the digests of its files in place of their names, which any other file could have."""
     resolved = scene.resolved()
-    for section, key in FILES:
-        name = resolved.get(section, {}).get(key)
-        if isinstance(name, str) and os.path.isabs(name):
-            about = os.stat(name)
-            resolved[section][key] = _file_digest(name, about.st_ino, about.st_size, about.st_mtime_ns)
+    for name, content in scene.digests().items():
+        section, key = name.split(".")
+        resolved[section][key] = content[:16]
     return resolved
-
-
-@cache
-def _file_digest(name: str, *_about: int) -> str:
-    """The digest of a file, read once until something about the file changes."""
-    return hashlib.sha256(Path(name).read_bytes()).hexdigest()[:16]
 
 
 def digest(value: Any) -> str:

@@ -138,7 +138,11 @@ def test_a_signal_is_found_beside_the_sweep_and_counts_by_its_content(tmp_path):
             "friction": {"v0": 1e-6, "v_ss": "10 v0"},
         }
         found += keys(Sweep.from_mapping({"task": "triggering", "scene": scene}, TASKS, tmp_path))
-    assert found[0] != found[1]
+        drive = {"spring": 3.0, "velocity": 1e-3, "until": 5.0, "signal": "signal.txt", "at": 1.0}
+        asked = {"task": "ask.py:ask", "scene": SMALL | {"drive": drive}}
+        (tmp_path / "ask.py").write_text("def ask(scene):\n    return {}\n")
+        found += keys(Sweep.from_mapping(asked, TASKS, tmp_path))
+    assert len(set(found)) == 4
 
 
 def test_failures_are_tried_again_but_for_scenes_without_equilibrium(folder):

@@ -14,9 +14,10 @@ from ...arrays import Floats
 from ...configuration import Configuration
 from ...counted import counted
 from ...errors import BadInputError
-from ..atomic_write import replace_whole
+from ..atomic_write import FORMAT, FORMAT_KEY, replace_whole
 from .export_quantities import ModeVectors, sum_at_particles
 from .vtp import write_frame_list, write_poly_data, write_xml
+from .xyz import species_of
 
 
 def check_configuration_writer(path: Path) -> None:
@@ -154,5 +155,7 @@ def _write_xyz(
             sizes = [f"{name}:R:{1 if value.ndim == 1 else value.shape[1]}" for name, value in columns.items()]
             rows = np.column_stack([value if value.ndim == 2 else value[:, None] for value in columns.values()])
             box = f'Lattice="{lattice}" Origin="{origin}" pbc="{sides}"'
-            stream.write(f"{len(configuration)}\n{box} Properties={':'.join(sizes)}\n")
-            stream.writelines(" ".join(map(repr, row)) + "\n" for row in rows.tolist())
+            head = f"{box} Properties=species:S:1:{':'.join(sizes)} {FORMAT_KEY}={FORMAT}"
+            stream.write(f"{len(configuration)}\n{head}\n")
+            lines = zip(species_of(configuration.top), rows.tolist(), strict=True)
+            stream.writelines(f"{name} {' '.join(map(repr, row))}\n" for name, row in lines)

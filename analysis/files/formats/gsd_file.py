@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import PackingFileError
 from ...packing.packing import Packing
-from ..atomic_write import replace_whole
+from ..atomic_write import FORMAT, FORMAT_KEY, check_format, replace_whole
 from ..plain_file import check_plain
 from . import export_quantities
 from .disks import Disks, of_columns
@@ -50,7 +50,8 @@ def _disks(path: Path, frame: Any) -> Disks:
     if "x" in own:
         columns = {name: array.astype(np.float64) for name, array in own.items()}
         values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
-        period = values.get("box_length")
+        period, number = values.get("box_length"), values.get(FORMAT_KEY)
+        check_format(None if number is None else int(number), path)
         rows = log.get(CONTACTS)
         return of_columns(
             str(path),
@@ -139,6 +140,6 @@ def _frame(hoomd: Any, packing: Packing) -> Any:
     frame.log = {
         OWN_QUANTITIES + name: np.ascontiguousarray(column, dtype=np.float64) for name, column in columns.items()
     }
-    numbers = export_quantities.scalars(packing) | ({} if box is None else {"box_length": box})
+    numbers = export_quantities.scalars(packing) | ({} if box is None else {"box_length": box}) | {FORMAT_KEY: FORMAT}
     frame.log |= {f"faultgouge/{key}": np.array([value], dtype=np.float64) for key, value in numbers.items()}
     return frame

@@ -19,7 +19,7 @@ import numpy as np
 
 from ...errors import PackingFileError
 from ...packing.packing import Packing
-from ..atomic_write import write_text
+from ..atomic_write import FORMAT, FORMAT_KEY, check_format, write_text
 from . import export_quantities
 from .disks import Disks, of_columns, sphere_volume
 from .export_quantities import Frame, ModeVectors
@@ -57,6 +57,7 @@ def read_data(path: Path) -> Disks:
     columns |= columns_of(path, comments, names, f"{len(names)} behind the #")
     columns["top"] = columns["type"] - 1
     values = dict(part.split("=") for part in marked.partition(HEADER_COMMENT)[2].split() if "=" in part)
+    check_format(values.get(FORMAT_KEY), path)
     contacts = " ".join(
         line.removeprefix(CONTACT_COMMENT) for line in lines[:start] if line.startswith(CONTACT_COMMENT)
     )
@@ -89,7 +90,7 @@ def write_data(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) ->
     density = packing.mass / volume  # no other double gives LAMMPS the mass to the bit where this one does not
     sides = "f" if packing.box_length is None else "p"
     lines = [
-        f"{HEADER_COMMENT} sides={sides} "
+        f"{HEADER_COMMENT} {FORMAT_KEY}={FORMAT} sides={sides} "
         + " ".join(f"{key}={value!r}" for key, value in export_quantities.scalars(packing).items())
     ]
     lines += ["", f"{len(packing)} atoms", "2 atom types", *box_lines(packing), ""]

@@ -11,9 +11,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import PackingFileError
-from ..atomic_write import replace_whole
+from ..atomic_write import FORMAT, FORMAT_KEY, check_format, replace_whole
 from . import export_quantities
 from .disks import Disks, of_columns
 from .export_quantities import Frame, ModeVectors
@@ -34,6 +35,7 @@ def read_xyz(path: Path, frame: int | None = None) -> Disks:
 
     begin, count = block_of_frame(path, lines, 2, count_at, frame, "XYZ")
     values = {key: quoted or plain for key, quoted, plain in PAIR.findall(lines[begin + 1])}
+    check_format(values.get(FORMAT_KEY), path)
     if "Properties" not in values:
         raise PackingFileError(
             f"{path}, line {begin + 2}: it has no Properties=..., so that this is no extended XYZ file."
@@ -113,12 +115,17 @@ def _text(frame: Frame, modes: list[ModeVectors]) -> str:
     packing, columns = frame.packing, _write_columns(frame, modes)
     rows = np.column_stack([array if array.ndim == 2 else array[:, None] for *_, array in columns])
     whole = np.concatenate([[kind == "I"] * (1 if a.ndim == 1 else a.shape[1]) for _, kind, a in columns])
-    species = np.where(packing.top, "T", "B").tolist()
+    species = species_of(packing.top)
     lines = [str(len(packing)), _head(frame, columns)]
     for name, row in zip(species, rows.tolist(), strict=True):
         words = (str(int(value)) if is_whole else repr(value) for value, is_whole in zip(row, whole, strict=True))
         lines.append(f"{name} " + " ".join(words))
     return "\n".join(lines) + "\n"
+
+
+def species_of(top: NDArray[np.bool_]) -> list[str]:
+    """U for the upper layer and B for the bed: ASE takes symbols of elements alone, and these are two."""
+    return np.where(top, "U", "B").tolist()
 
 
 def _head(frame: Frame, columns: list[tuple[str, str, np.ndarray]]) -> str:
@@ -132,6 +139,7 @@ def _head(frame: Frame, columns: list[tuple[str, str, np.ndarray]]) -> str:
         f'Lattice="{float(width)!r} 0.0 0.0 0.0 {float(height)!r} 0.0 0.0 0.0 {2 * float(packing.radius.max())!r}"',
         f'pbc="{"F" if box is None else "T"} F F"',
         f"Properties=species:S:1:{properties}",
+        f"{FORMAT_KEY}={FORMAT}",
         *(f"{key}={float(value)!r}" for key, value in (export_quantities.scalars(packing) | frame.number).items()),
     ]
     if frame.whole:

@@ -15,10 +15,12 @@ from .terminal import (
     Out,
     ScenePath,
     check_output,
+    hold_lock,
     print_json,
     print_line,
     read_scene,
     say,
+    say_remark,
     status,
     stored_files,
     table_of,
@@ -29,6 +31,11 @@ if TYPE_CHECKING:
     from faultgouge.pywrap import Scene
 
 app = typer.Typer()
+
+SLIP_COLUMNS = (
+    "begins", "ends", "force_before", "force_after", "slip", "kinetic_energy", "frame_before", "frame_after",
+)  # fmt: skip
+"""Columns of the table of slips."""
 
 
 @app.command(epilog="Example: faultgouge drive drive.toml -o drive.h5")
@@ -49,7 +56,8 @@ def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = Fa
     if table == output:
         raise OutputError(f"{output} is the table of the slips: give the run another name, {output.stem}.h5")
     check_output(output, scene, *stored_files(wanted))
-    check_output(table, scene, output)
+    hold_lock(output)
+    check_output(table, scene, output, head=",".join(SLIP_COLUMNS))
     settings = require_section(wanted.drive, "drive")
     others = _others(output, wanted)
     for path, _ in others.values():
@@ -86,6 +94,7 @@ def _run(
     from faultgouge.pywrap.runs.drive import DriveRecord, check_drive, settle_for_drive
 
     with DriveRecord(output, scene, saved=keeps) as record:
+        say_remark(record)
         if record.last is None:
             if start is None:
                 with status("settling") as show:
@@ -184,9 +193,9 @@ def _write_table(path: Path, slips: list[dict[str, Any]]) -> None:
     """The slips as rows of numbers with all digits."""
     from faultgouge.analysis.files.atomic_write import write_text
 
-    columns = ("begins", "ends", "force_before", "force_after", "slip", "kinetic_energy", "frame_before", "frame_after")
-    rows = [",".join(repr(slip[name]) for name in columns) for slip in slips]
-    write_text(path, "\n".join([",".join(columns), *rows]) + "\n")
+    head = ",".join(SLIP_COLUMNS)
+    rows = [",".join(repr(slip[name]) for name in SLIP_COLUMNS) for slip in slips]
+    write_text(path, "\n".join([head, *rows]) + "\n", head)
 
 
 def _in_words(result: dict[str, Any], rigid: bool) -> str:
@@ -196,9 +205,8 @@ def _in_words(result: dict[str, Any], rigid: bool) -> str:
     if not slips:
         why = ", of a rigid drive, which counts no slips" if rigid else under_way or ": no slip"
         return f"t = {result['time']:.4g}{why}; {mean}, at most {friction['largest']:.3g}"
-    columns = ("begins", "ends", "force_before", "force_after", "slip", "kinetic_energy", "frame_before", "frame_after")
     headings = ("begins", "ends", "F before", "F after", "slip", "kinetic energy", "frame before", "frame after")
-    rows = [[f"{slip[name]:.4g}" for name in columns] for slip in slips]
+    rows = [[f"{slip[name]:.4g}" for name in SLIP_COLUMNS] for slip in slips]
     recurrence = ""
     if len(slips) > 1:
         recurrence = f", one in {(slips[-1]['begins'] - slips[0]['begins']) / (len(slips) - 1):.4g} units of time"

@@ -152,9 +152,9 @@ def _import_deck(file: Path, output: Path, slides: bool, balance: float | None, 
     with status(f"{file}: LAMMPS runs"):
         allowed = BALANCE if balance is None else balance
         configuration = run_deck(file, slides=slides, balance=allowed, relaxes=relaxes, keep=output)
+    keeps(f"{output} has been written; whether the packing is stable says `faultgouge spectrum {output}`", output)
     if is_root():
         write_configuration(output, configuration, {"deck": text})
-    keeps(f"{output} has been written; whether the packing is stable says `faultgouge spectrum {output}`", output)
     print_line(f"{repr(configuration).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
     print_line(_time_steps(configuration))
     print_line(_verdict(configuration, output))

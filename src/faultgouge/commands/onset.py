@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
@@ -101,7 +100,9 @@ def onset(
     tell(f'law of friction: {wanted.law.in_words} (history = "{wanted.law.history}")')
     result = _write_result(output, found)
     if is_root() and folder is not None and not slices:
-        shutil.rmtree(folder, ignore_errors=True)  # the result is there: files left over do no harm
+        from faultgouge.analysis.windows.slices.store import remove_passes
+
+        remove_passes(folder)  # the result is there
     if as_json:
         print_json(result)
     if failed is not None:

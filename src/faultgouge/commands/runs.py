@@ -17,6 +17,7 @@ from .terminal import (
     ScenePath,
     check_output,
     growth_in,
+    hold_lock,
     lock_output,
     print_json,
     print_line,
@@ -24,6 +25,7 @@ from .terminal import (
     read_scene,
     report_fallback,
     say,
+    say_remark,
     status,
     stored_files,
 )
@@ -66,7 +68,9 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
 
     wanted = read_scene(scene, "settle", "settle")
     check_output(output, scene, *stored_files(wanted))
+    hold_lock(output)
     with Record(output, wanted, saved=keeps) as record:
+        say_remark(record)
         last = _settle_or_read(wanted, record)
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
             record.finish()
@@ -88,8 +92,10 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
 
     wanted = read_scene(scene, "ramp", "ramp")
     check_output(output, scene, *stored_files(wanted))
+    hold_lock(output)
     settings = require_section(wanted.ramp, "ramp")
     with Record(output, wanted, saved=keeps) as record:
+        say_remark(record)
         start = _settle_or_read(wanted, record)
         loads = all_loads(settings)
         total, done = len(loads), count_behind(settings, record.forces)
@@ -135,11 +141,13 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
 
     wanted = read_scene(scene, "perturb", "perturb")
     check_output(output, scene, *stored_files(wanted))
+    hold_lock(output)
     require_section(wanted.perturb, "perturb")
     mus = wanted.law.mus
     if len(mus) > 1:
         say(f"the run uses mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene")
     with Record(output, wanted, task="perturb", saved=keeps) as record:
+        say_remark(record)
         if record.last is None:
             record.append(_start(wanted))
         assert record.last is not None

@@ -143,7 +143,9 @@ def stability(
         extremes(output, quick, as_json)
     finally:
         if is_root() and (output / "extremes.json").exists():
-            (output / "stability.json").write_bytes((output / "extremes.json").read_bytes())
+            from faultgouge.analysis.files.atomic_write import write_whole
+
+            write_whole(output / "stability.json", (output / "extremes.json").read_bytes())
 
 
 @app.command(epilog="Example: mpiexec -n 3 faultgouge trigger trigger.toml -o trigger")

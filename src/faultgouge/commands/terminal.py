@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
     from faultgouge.analysis.motion.growth_of_run import GrowthOfRun
     from faultgouge.analysis.motion.slips import Slip
-    from faultgouge.pywrap import Equilibrium, Scene
+    from faultgouge.pywrap import Equilibrium, Record, Scene
     from faultgouge.pywrap.scenes.impossible import Task
 
 T = TypeVar("T")
@@ -88,9 +88,8 @@ def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
 
 
 def stored_files(scene: Scene) -> list[Path]:
-    """The files that a scene names: of its packing, and of the signal that forces it."""
-    signals = [section.signal for section in (scene.perturb, scene.drive) if section is not None]
-    return [Path(each) for each in (getattr(scene.packing, "file", None), *signals) if each is not None]
+    """The files that a scene names."""
+    return [path for paths in scene.files.values() for path in paths]
 
 
 def stored_packing(file: Path, frame: int = -1) -> Packing | Configuration:
@@ -166,11 +165,19 @@ def growth_in(file: Path, series: dict[str, Any]) -> GrowthOfRun:
     return growth_of_run(packing, series["time"], series["msd"], series["friction"], dt)
 
 
-def check_output(output: Path, *inputs: Path) -> None:
-    """Refuse a file that cannot be written, or is one of the inputs, before any work."""
+def check_output(output: Path, *inputs: Path, head: str = "") -> None:
+    """Refuse a file that cannot be written, or is one of the inputs, or of others, before any work."""
     from faultgouge.analysis.files.atomic_write import check_output as check
 
-    check(output, *inputs)
+    check(output, *inputs, head=head)
+
+
+def hold_lock(output: Path) -> None:
+    """Have the guard remove the lock of a file that a run writes, if the run cannot do so itself."""
+    from faultgouge.analysis.files.atomic_write import lock_of
+
+    if is_root() and (lock := lock_of(output)):
+        holds(lock)
 
 
 def lock_output(context: typer.Context, output: Path, *inputs: Path) -> None:
@@ -178,8 +185,9 @@ def lock_output(context: typer.Context, output: Path, *inputs: Path) -> None:
     from faultgouge.analysis.files.atomic_write import lock_output as lock
 
     check_output(output, *inputs)
-    if is_root() and (taken := context.with_resource(lock(output))):
-        holds(taken)
+    if is_root():
+        hold_lock(output)
+        context.with_resource(lock(output))
 
 
 @contextmanager
@@ -196,9 +204,11 @@ def lock_folder(folder: Path) -> Iterator[None]:
 
 
 def print_json(value: dict[str, Any]) -> None:
-    """The result on standard output."""
+    """The result on standard output, the same as in a file."""
+    from faultgouge.analysis.files.atomic_write import FORMAT, FORMAT_KEY
+
     if is_root():
-        print(json.dumps(value, indent=1))
+        print(json.dumps({FORMAT_KEY: FORMAT, **value}, indent=1))
 
 
 def print_line(result: str) -> None:
@@ -212,6 +222,12 @@ def say(message: str) -> None:
     """A line on standard error."""
     if is_root():
         print(message, file=sys.stderr)
+
+
+def say_remark(record: Record) -> None:
+    """Say what is not known of a file that goes on."""
+    if record.remark:
+        say(record.remark)
 
 
 def report_fallback(equilibrium: Equilibrium) -> None:

@@ -66,13 +66,13 @@ FIXES = {
     "smd cvel 2.0 1e-9 tether 1.5 1.5 NULL 0.0": "fix trap smd pulls at particles",
     "rhok 1 0 0 20.0 0.2": "fix trap rhok acts on particles as contacts do not tell",
     "flow/gauss 1 1 0": "fix trap flow/gauss acts on particles as contacts do not tell",
-    "damping/cundall 0.3 0.3": "fix trap damping/cundall damps as the forces",
+    "addtorque 2.0 0.0 2.0": "fix trap addtorque acts on particles as contacts do not tell",
     "momentum 1000 linear 1 1 0": "fix trap momentum changes velocities",
     "temp/rescale 1000 1e-20 1e-20 0.0 1.0": "fix trap temp/rescale changes velocities",
     "temp/berendsen 1e-20 1e-20 1.0": "fix trap temp/berendsen changes velocities",
 }
 
-OFTEN = ("momentum", "temp")
+OFTEN = ("momentum", "temp", "addtorque")
 """Begins of fixes whose refusal takes less than a second."""
 
 
@@ -150,7 +150,13 @@ def test_fixes_that_act_on_what_moves(bed, fix, says):
 
 @pytest.mark.parametrize(
     "fix",
-    ["addforce 0.01 0 0", "indent 1.0 sphere 0 0 100 1", "setforce NULL NULL NULL", "ave/time 1 1 1 c_thermo_temp"],
+    [
+        "addforce 0.01 0 0",
+        "damping/cundall 0.3 0.3",
+        "indent 1.0 sphere 0 0 100 1",
+        "setforce NULL NULL NULL",
+        "ave/time 1 1 1 c_thermo_temp",
+    ],
 )
 def test_fixes_without_effect_on_small_motion(bed, fix):
     """Whatever their names are, the proof takes them."""
