@@ -24,9 +24,10 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .arrays import Complexes, Floats, Indices
     from .configuration import Configuration, Snapshot
     from .contacts import LinearisedContacts
+    from .elasticity.dissipation import LostEnergy, lost_by_modes, lost_energy
     from .elasticity.material_spheres import Material, spheres_of_material, timestep_rules
     from .elasticity.moduli import ElasticModuli, elastic_moduli, stress
-    from .elasticity.vibrations import Vibrations, Wave, dispersion, softness, vibrations
+    from .elasticity.vibrations import PlaneWave, Vibrations, dispersion, softness, vibrations
     from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
     from .files.dumps import read_dump
     from .files.runfile import RunFile
@@ -68,17 +69,17 @@ if TYPE_CHECKING:  # each is imported when it is used
 
 __all__ = [
     "FLOOR", "BadInputError", "Complexes", "Configuration", "ContactGeometry", "Contacts", "ElasticModuli",
-    "FastestGrowth", "FaultgougeError", "Floats", "Growth", "Indices", "LinearisedContacts", "Material", "MindlinLaw",
-    "Mode", "Modes", "Motion", "NoEquilibriumError", "NoGainError", "OneSidedMotion", "OneSidedOutcome", "Onset",
-    "OnsetError", "OutputError", "Packing", "PackingFileError", "PowerLaw", "RisingMotion", "RunFile", "Signal",
-    "Slip", "Snapshot", "Spectrum", "Stability", "TransientGain", "Vibrations", "Wave", "Window", "closest_to_meeting",
-    "complex_windows", "damping_matrix", "discrete_frequency", "dispersion", "dynamical_matrix", "eigenvalues",
-    "elastic_moduli", "fastest_growing", "find_onset", "fit_growth", "fit_power_law", "growth_of_run", "growth_rate",
-    "largest_damping_rate", "largest_frequency", "layer_force", "linear_response", "mass_weighted",
-    "mean_square_displacement", "nearest_image", "nearest_modes", "negative_eigenvalues", "normal_modes",
-    "one_sided_motion", "pair_eigenvalues", "rayleigh_timestep", "read_dump", "softness", "solid_fraction", "spectrum",
-    "spheres_of_material", "stability", "stable_timestep", "stiffness_matrix", "stress", "timestep_rules", "touching",
-    "transient_gain", "vibrations",
+    "FastestGrowth", "FaultgougeError", "Floats", "Growth", "Indices", "LinearisedContacts", "LostEnergy", "Material",
+    "MindlinLaw", "Mode", "Modes", "Motion", "NoEquilibriumError", "NoGainError", "OneSidedMotion", "OneSidedOutcome",
+    "Onset", "OnsetError", "OutputError", "Packing", "PackingFileError", "PlaneWave", "PowerLaw", "RisingMotion",
+    "RunFile", "Signal", "Slip", "Snapshot", "Spectrum", "Stability", "TransientGain", "Vibrations", "Window",
+    "closest_to_meeting", "complex_windows", "damping_matrix", "discrete_frequency", "dispersion", "dynamical_matrix",
+    "eigenvalues", "elastic_moduli", "fastest_growing", "find_onset", "fit_growth", "fit_power_law", "growth_of_run",
+    "growth_rate", "largest_damping_rate", "largest_frequency", "layer_force", "linear_response", "lost_by_modes",
+    "lost_energy", "mass_weighted", "mean_square_displacement", "nearest_image", "nearest_modes",
+    "negative_eigenvalues", "normal_modes", "one_sided_motion", "pair_eigenvalues", "rayleigh_timestep", "read_dump",
+    "softness", "solid_fraction", "spectrum", "spheres_of_material", "stability", "stable_timestep",
+    "stiffness_matrix", "stress", "timestep_rules", "touching", "transient_gain", "vibrations",
 ]  # fmt: skip
 
 if not TYPE_CHECKING:

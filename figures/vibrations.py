@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from faultgouge.analysis import ElasticModuli, Vibrations, Wave
+from faultgouge.analysis import ElasticModuli, Vibrations, PlaneWave
 
 from .style import EDGE, FLOOR, INK, MOBILIZATION, styled
 
@@ -53,12 +53,12 @@ def draw_vibrations(found: Vibrations) -> Figure:
 
 
 @styled
-def draw_waves(waves: Sequence[Wave], moduli: ElasticModuli | None = None) -> Figure:
+def draw_waves(waves: Sequence[PlaneWave], moduli: ElasticModuli | None = None) -> Figure:
     """Frequency and attenuation of plane waves over their wave number, beside the speeds of the elastic moduli.
 
     Parameters
     ----------
-    waves : sequence of Wave
+    waves : sequence of PlaneWave
         Along one direction.
     moduli : ElasticModuli, optional
         Their lines are those of its isotropic part.

@@ -54,9 +54,9 @@ from ..has_configuration import HasConfiguration
 
 FLOPPY = 1e-10
 """Stiffness, as a share of the largest entry of K, of a spring that holds motions without stiffness: particles that
-touch nothing, spheres that spin. `REFINEMENTS` takes its effect out of all other motions."""
+touch nothing, spheres that spin. `CORRECTIONS` takes its effect out of all other motions."""
 
-REFINEMENTS = 4
+CORRECTIONS = 4
 """Each refinement leaves a share FLOPPY/(FLOPPY + lambda) of a motion of stiffness lambda: one of 1e-8 of the largest
 is right to 1e-10."""
 
@@ -282,8 +282,8 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
     moved = response.solve(loads)
     if (lacks := response.lacks(loads, moved)) > UNSOLVED:
         raise BadInputError(
-            f"A strain drives a motion without stiffness ({lacks:.1g} of the forces stay unbalanced): the packing "
-            "is floppy and has no elastic moduli."
+            f"The packing has no elastic moduli: under a strain {lacks:.1g} of the forces stay unbalanced, as they "
+            "drive a motion without stiffness."
         )
     moved = moved.reshape(size, 3, 3)
     work = affine.copy()
@@ -359,7 +359,7 @@ class QuietResponse:
         self.matrix = matrix
         self.factors = general_lu(csc_array(matrix + diags_array(np.full(len(mass), self.held))))
 
-    def solve(self, force: Complexes, refinements: int = REFINEMENTS) -> Complexes:
+    def solve(self, force: Complexes, refinements: int = CORRECTIONS) -> Complexes:
         """q of (K + i omega C - omega^2 M) q = F, shape (coordinates, n)."""
         moved = self.factors.solve(force)
         for _ in range(refinements):

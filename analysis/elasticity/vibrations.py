@@ -252,7 +252,7 @@ def _without_mean(vectors: Floats, d: int, n: int) -> Floats:
     return np.asarray(parts - parts.mean(axis=1, keepdims=True)).reshape(d * n, -1)
 
 
-class Wave(NamedTuple):
+class PlaneWave(NamedTuple):
     """A plane wave: |q|, 1 / length; 0 longitudinal, 1 or 2 transverse; omega, radian / time; gamma, 1 / time; and the
     root mean square by which the fit misses, of an amplitude of one."""
 
@@ -263,7 +263,7 @@ class Wave(NamedTuple):
     misfit: float
 
 
-def dispersion(packing: HasConfiguration, axis: int = 0, waves: int = 4) -> list[Wave]:
+def dispersion(packing: HasConfiguration, axis: int = 0, waves: int = 4) -> list[PlaneWave]:
     """Frequencies and attenuation of the longest plane waves along an axis of the box.
 
     Parameters
@@ -273,7 +273,7 @@ def dispersion(packing: HasConfiguration, axis: int = 0, waves: int = 4) -> list
     axis : int
         Edge of the box, whose reciprocal vector is the direction.
     waves : int
-        Wave lengths, from that of the box.
+        PlaneWave lengths, from that of the box.
 
     Raises
     ------
@@ -309,7 +309,7 @@ def dispersion(packing: HasConfiguration, axis: int = 0, waves: int = 4) -> list
             omega, gamma, misfit = _fit(time, kept[:, k], float(rough))
             # Verlet's own frequency of a motion is (2/dt) arcsin(omega dt/2)
             true = 2 / limit * np.sin(omega * limit / 2)
-            found.append(Wave(float(np.linalg.norm(number * reciprocal)), k, float(true), gamma, misfit))
+            found.append(PlaneWave(float(np.linalg.norm(number * reciprocal)), k, float(true), gamma, misfit))
         report_progress(f"plane waves, {number} of {waves}")
     return found
 

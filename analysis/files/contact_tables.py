@@ -47,7 +47,7 @@ from ..motion.stability import Stability, stability
 from .dumps import dump_frames
 from .formats.text_columns import lines_of, number_of
 
-SIX_DIGITS = 5e-6
+HALF_A_DIGIT = 5e-6
 """Largest relative error of a number that is rounded to six digits."""
 
 AT_REST = 1e-3
@@ -57,7 +57,7 @@ and a run that nearly rests 1e-4. Measured forces of a laboratory are out of bal
 BETTER_SIGN = 0.1
 """Share of the residual that the other sign must leave to be the right one."""
 
-DRAWS = 4
+ROUNDED_TABLES = 4
 """Draws of numbers within their rounding, beside the table itself, whose verdicts must agree."""
 
 FSTAT = ["time", "id1", "id2", "cx", "cy", "cz", "delta", "deltat", "fn", "ft", "nx", "ny", "nz", "tx", "ty", "tz"]
@@ -253,7 +253,7 @@ def read_contacts(
 
     def packing(normal: Floats, tangential: Floats) -> Configuration:
         size, bound = np.linalg.norm(tangential, axis=1), material.friction * np.maximum(normal, 0.0)
-        scale = np.divide(bound, size, out=np.ones_like(size), where=size > (1 - 3 * SIX_DIGITS) * bound)
+        scale = np.divide(bound, size, out=np.ones_like(size), where=size > (1 - 3 * HALF_A_DIGIT) * bound)
         over = size > (1 + AT_REST) * bound
         if over.any():
             worst = int(np.argmax(size / np.maximum(bound, np.finfo(float).tiny)))
@@ -347,7 +347,7 @@ def _out_of_balance(c: Configuration) -> float:
     return float(np.abs(force[touch]).max(initial=0.0) / (c.normal_force.mean() if len(c.contacts) else 1.0))
 
 
-def verdict_within_digits(found: Configuration, draws: int = DRAWS) -> tuple[Stability, str]:
+def verdict_within_digits(found: Configuration, draws: int = ROUNDED_TABLES) -> tuple[Stability, str]:
     """The verdict of a packing of a table, and what its digits tell of it.
 
     Returns
@@ -361,8 +361,8 @@ def verdict_within_digits(found: Configuration, draws: int = DRAWS) -> tuple[Sta
     rng, seen, rates = np.random.default_rng(0), [verdict.stable], [verdict.growth_rate]
     c = found.contacts
     for _ in range(draws):
-        error = 1 + SIX_DIGITS * rng.uniform(-1, 1, (2, len(c)))
-        turned = c.tangential_force + SIX_DIGITS * c.normal_force[:, None] * rng.uniform(-1, 1, (len(c), 3))
+        error = 1 + HALF_A_DIGIT * rng.uniform(-1, 1, (2, len(c)))
+        turned = c.tangential_force + HALF_A_DIGIT * c.normal_force[:, None] * rng.uniform(-1, 1, (len(c), 3))
         turned -= np.einsum("ca,ca->c", turned, c.normal)[:, None] * c.normal
         if found.dimension == 2:
             turned[:, 2] = 0.0

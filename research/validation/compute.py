@@ -107,11 +107,9 @@ def lattice_dynamics(packing: Configuration, cells: tuple[int, int, int]) -> dic
     bonds = edge / 2 * np.array([b for b in product((-1, 0, 1), repeat=3) if np.abs(b).sum() == 2])
     scale = 1 / np.sqrt(np.repeat([mass[0], mass[-1]], 3))
     told = []
-    # the reciprocal points of the box within one zone of the primitive cell
-    primitive = np.linalg.inv(edge / 2 * np.array([[0, 1, 1], [1, 0, 1], [1, 1, 0]]))
-    points = np.array(list(product(*(range(2 * each) for each in cells)))) / (edge * np.array(cells))
-    inside = {tuple(np.round((point @ np.linalg.inv(primitive.T)) % 1 % (1 - 1e-9), 9)): point for point in points}
-    for point in inside.values():
+    # wave vectors of the box, but for (2, 0, 0), (0, 2, 0) and (1, 1, 1), which are reciprocal vectors of the crystal
+    for number in product(range(2 * cells[0]), range(2 * cells[1]), range(cells[2])):
+        point = np.array(number) / (edge * np.array(cells))
         block = np.zeros((6, 6), complex)
         for bond in bonds:
             n = bond / np.linalg.norm(bond)

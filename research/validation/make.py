@@ -34,7 +34,8 @@ def numbers() -> dict[str, object]:
 def write_page(folder: Path) -> Path:
     """README.md of the stored numbers."""
     page = folder / "README.md"
-    page.write_text(render(HERE / "README.md.j2", json.loads((HERE / "validation.json").read_text())))
+    found = json.loads((HERE / "validation.json").read_text())
+    page.write_text(render("research.validation", "README.md.j2", **found))
     return page
 
 

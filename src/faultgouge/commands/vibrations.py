@@ -11,7 +11,7 @@ from ..mpi_rank import is_root
 from .terminal import AsJson, Frame, NewFolder, lock_folder, print_json, print_line, refuse_scene, say, status
 
 if TYPE_CHECKING:
-    from ..analysis import Configuration, ElasticModuli, Vibrations, Wave
+    from ..analysis import Configuration, ElasticModuli, Vibrations, PlaneWave
     from ..analysis.has_configuration import HasConfiguration
 
 app = typer.Typer()
@@ -99,7 +99,7 @@ def vibrations(
     with lock_folder(output), status(f"{file}: vibrations") as show, show_progress(show):
         found = vibrations_of(packing)
         soft, error = softness(packing)
-        plane: list[Wave] = []
+        plane: list[PlaneWave] = []
         moduli: ElasticModuli | None = None
         for name, compute in {"moduli": elastic_moduli, "waves": dispersion}.items():
             try:
@@ -134,7 +134,7 @@ def _columns(found: Vibrations) -> dict[str, Any]:
 
 
 def _write(
-    folder: Path, configuration: Configuration, found: Vibrations, soft: Any, error: Any, plane: list[Wave],
+    folder: Path, configuration: Configuration, found: Vibrations, soft: Any, error: Any, plane: list[PlaneWave],
     moduli: ElasticModuli | None,
 ) -> None:  # fmt: skip
     import json
@@ -169,7 +169,7 @@ def _write(
         export_configuration(folder / f"softness{suffix}", configuration, values={"softness": soft})
 
 
-def _draw(folder: Path, found: Vibrations, plane: list[Wave], moduli: ElasticModuli | None) -> None:
+def _draw(folder: Path, found: Vibrations, plane: list[PlaneWave], moduli: ElasticModuli | None) -> None:
     from faultgouge.figures import save
     from faultgouge.figures.style import report_failure
     from faultgouge.figures.vibrations import draw_vibrations, draw_waves
