@@ -29,7 +29,7 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .elasticity.moduli import ElasticModuli, elastic_moduli, stress
     from .elasticity.vibrations import PlaneWave, Vibrations, dispersion, softness, vibrations
     from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
-    from .files.dumps import read_dump
+    from .files.formats.lammps_dump import read_dump
     from .files.runfile import RunFile
     from .motion.buckling import negative_eigenvalues
     from .motion.eigenvalues import mass_weighted

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from faultgouge.analysis import ElasticModuli, Vibrations, PlaneWave
+from faultgouge.analysis import ElasticModuli, PlaneWave, Vibrations
 
 from .style import EDGE, FLOOR, INK, MOBILIZATION, styled
 
@@ -74,11 +74,11 @@ def draw_waves(waves: Sequence[PlaneWave], moduli: ElasticModuli | None = None) 
         above.plot(number, [wave.frequency for wave in these], mark, color=colour, markersize=3.5, label=names[kind])
         below.plot(number, [wave.attenuation for wave in these], mark, color=colour, markersize=3.5)
     if moduli is not None:
-        d, lame = moduli.dimension, moduli.bulk - 2 * moduli.shear / moduli.dimension
+        lame = moduli.bulk - 2 * moduli.shear / moduli.dimension
         speeds = np.sqrt(np.array([lame + 2 * moduli.shear, moduli.shear]) / moduli.density)
         for speed, colour, name in zip(speeds, (INK, SHARE_COLOUR), ("P", "S"), strict=True):
             above.plot([0, most], [0, speed * most], color=colour, linewidth=0.7, linestyle="--",
-                       label=f"{name} of the moduli, {d}D")  # fmt: skip
+                       label=f"{name}, elastic moduli")  # fmt: skip
     above.set(ylabel=r"frequency $\omega$", ylim=(0, None))
     above.legend(fontsize=6)
     below.set(xlabel="wave number $q$", ylabel=r"attenuation $\gamma$", xlim=(0, 1.05 * most))

@@ -21,7 +21,7 @@ ROOT = Path(faultgouge.__file__).parent
 
 FLOORS = {
     "faultgouge": (
-        ("lammps_inputs", "parent_death", "plugin", "mpi_rank"),
+        ("lammps_inputs", "parent_death", "plugin", "mpi_rank", "registered"),
         ("analysis",),
         ("figures", "pywrap"),
         ("assessment", "studies"),
@@ -241,7 +241,6 @@ INSIDE = {
     "pywrap.runs.drive": "slips and clock advances from the rows of a drive.h5",
     "pywrap.scenes.drive_section": "the scale of the probe that a page states",
     "pywrap.scenes.validation": "read_toml, as Python 3.10 has no reader; require_section",
-    "studies.modes.draw": "the page goes on with curves of that study",
 }
 """Modules behind the doors that research uses for all that, and what for."""
 

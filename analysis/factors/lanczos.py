@@ -14,10 +14,12 @@ spectrum. Two slices that meet must give the same eigenvalue the same number.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import eigh, qr
 from scipy.sparse import csc_array, csr_array, eye_array
 
@@ -48,11 +50,6 @@ class SliceSizes:
     """Blocks between two looks. A look costs as much as two blocks of 30,000 coordinates, or as twenty of 3,000."""
     last_look: int = 200
     """Blocks at the most."""
-    blocks_together: int = 2
-    """Blocks that are made orthogonal to all before them at a time: three stray too far in most slices."""
-    stray_limit: float = 3e-6
-    """Part of a new vector along the basis, up to which the part is taken away afterwards; some 1e-7 at 29,000
-    coordinates. Its square, 1e-11, then remains in lengths and angles of the basis."""
     vector_residual: float = 1e-2
     """Residual of the eigenvectors of a slice, in mean distances of eigenvalues, as of the inverse. It enters an
     eigenvalue as its square over the distance of modes outside: 4e-6 at the most was measured (29,000 coordinates).
@@ -168,37 +165,56 @@ class SlicedSpectrum:
         self.sizes, self.factorise = sizes, factorise
         self.order: Indices = np.argsort(elimination_places(matrix))
         self.given, self.matrix = csr_array(matrix), csc_array(matrix[self.order][:, self.order])
-        self.spare: list[Floats] = []  # memory for bases: fresh memory takes longer than a pass over it
 
     def below(self, shift: float) -> int:
         """Number of eigenvalues below the shift."""
         return self.factorise(self.matrix, shift)[1]
 
-    def walk(self, first: int, stop: int, shift: float, margin: int) -> Iterator[Slice]:
+    def walk(self, first: int, stop: int, low: float, shift: float, margin: int) -> Iterator[tuple[Slice, Solve]]:
         """Slices from the eigenvalue of number `first` to the one before `stop`, each about a shift next to the last.
 
-        The factors of each slice count what is below its shift, so that no other counts are needed. `shift` is a guess
-        of the first, beyond the eigenvalue of number `first`; `margin` as in `slice_about`.
+        The factors of each slice count what is below its shift, so that no other counts are needed.
+
+        Parameters
+        ----------
+        first, stop : int
+            Numbers of eigenvalues.
+        low, shift : float
+            A place below the first of them, and a guess of the first shift.
+        margin : int
+            As of `slice_about`.
+
+        Yields
+        ------
+        Slice
+        callable
+            Solves (S - shift) x = b with the factors of the slice, in the order of the matrix.
 
         Raises
         ------
         SliceError
             If eigenvalues do not converge, or neighbouring slices disagree.
         """
-        known, before = -float(abs(self.matrix).sum(axis=0).max()), None
+        most, before, high = self.sizes.slice_size, None, np.inf
         while first < stop:
             solve, below = self.factorise(self.matrix, shift)
-            if not 0 < below - first <= self.sizes.slice_size:  # a bisection where the guess is far off
-                step = (shift - known) * min(0.5 * self.sizes.slice_size / max(below - first, 1), 2.0)
-                shift = known + step if before is not None or below > first else 0.5 * (shift + abs(shift)) + 1e-300
+            if below <= first:
+                low, shift = shift, 0.5 * (shift + high) if np.isfinite(high) else shift + 2 * (shift - low)
                 continue
-            own = first, min(stop, 2 * below - first)
-            part = self.slice_about(shift, own, margin, (solve, below))
+            if below - first > most and shift - low > 1e-9 * abs(shift):
+                high, shift = shift, low + (shift - low) * max(0.4 * most / (below - first), 0.1)
+                continue
+            part = self.slice_about(shift, (first, min(stop, 2 * below - first)), margin, (solve, below))
             if before is not None:
                 compare_slices(before, part.border)
-            yield part
-            first, before, known = own[1], part.border, float(part.values[part.own][-1])
-            shift = known + 0.5 * self.sizes.slice_size * max(part.border.spacing, 1e-12 * abs(known))
+            yield part, partial(self._in_order, solve)
+            first, before, low, high = part.border.modes[1], part.border, float(part.values[part.own][-1]), np.inf
+            shift = low + 0.5 * most * max(part.border.spacing, 1e-9 * abs(low))
+
+    def _in_order(self, solve: Solve, right: Floats) -> Floats:
+        found = np.empty_like(right)
+        found[self.order] = solve(right[self.order])
+        return found
 
     def slice_about(
         self, shift: float, own: tuple[int, int], margin: int, factors: Factorization | None = None
@@ -214,11 +230,12 @@ class SlicedSpectrum:
         """
         solve, below = factors or self.factorise(self.matrix, shift)
         size, block = self.matrix.shape[0], self.sizes.block
-        basis = self.spare.pop() if self.spare else np.empty((min(self.sizes.last_look * block, size), size))
-        krylov = BlockLanczos(solve, basis, self.sizes)
-        krylov.extend(self.sizes.first_look)
+        start = np.random.default_rng(0).standard_normal((block, size))
+        krylov = BlockKrylov(solve, start, self.sizes.last_look * block)
+        krylov.extend(self.sizes.first_look * block)
         while True:
-            inverse, vectors, residuals = krylov.ritz()
+            inverse, vectors = eigh(0.5 * (krylov.square + krylov.square.T), check_finite=False)
+            residuals = krylov.residuals(vectors)
             # by increasing eigenvalue: those below the shift have negative inverses
             order = np.concatenate([np.flatnonzero(inverse < 0)[::-1], np.flatnonzero(inverse > 0)[::-1]])
             values = shift + 1 / inverse[order]
@@ -230,13 +247,16 @@ class SlicedSpectrum:
                 spacing = np.ptp(values[inner]) / (ends[1] - ends[0])
                 if np.all(residuals[order[inner]] <= self.sizes.vector_residual * spacing * inverse[order[inner]] ** 2):
                     break
-            krylov.extend(self.sizes.looks)
+            if krylov.full:
+                raise SliceError(
+                    f"a Krylov space of {krylov.used} vectors does not hold the eigenvalues about {shift:.6g}"
+                )
+            krylov.extend(krylov.used + self.sizes.looks * block)
         kept = slice(max(0, own[0] - first - margin), min(len(values), own[1] - first + margin))
         start = own[0] - first - kept.start
         chosen, found = vectors[:, order[kept]], np.empty((size, kept.stop - kept.start))
         for rows in self.sizes.chunks(size):
-            found[self.order[rows]] = basis[: len(inverse), rows].T @ chosen
-        self.spare.append(basis)
+            found[self.order[rows]] = krylov.basis[: len(inverse), rows].T @ chosen
         part = Slice(
             first=first + kept.start,
             values=values[kept],
@@ -264,66 +284,86 @@ class SlicedSpectrum:
             )
 
 
-class BlockLanczos:
-    """An orthonormal basis Q of the block Krylov space of an operator, and the operator in it, H = Q^T A Q.
+DEPENDENT = 1e-10
+"""Length of a new vector, beside the longest of its block, below which its direction is rounding."""
 
-    A new block is made orthogonal to the last blocks at once, and to all others later, together with the next block:
-    the basis is then read from memory half as often. The part of a block along the others by then, the part that has
-    strayed, is known when it is taken away. If a shift is next to an eigenvalue, blocks may stray too far. Such blocks
-    are made anew, and from then on fewer at a time (semiorthogonality: Simon, Linear Algebra Appl. 61, 101 (1984)).
+PASSES, SHORTENED = 3, 0.5
+"""How often a block is made orthogonal to the whole space at the most, and the share of its length that has to be left
+for this to have been the last time: rounding is then twice that of a unit vector at the most (Daniel, Gragg, Kaufman
+and Stewart, Math. Comput. 30, 772 (1976))."""
 
-    The vectors are rows: products of many vectors with a few then take a third of the time.
+
+class BlockKrylov:
+    """An orthonormal basis Q of the block Krylov space of an operator F, and H = Q^T F Q.
+
+    A block is made orthogonal to all before it until that no longer shortens it much: once is not enough. Images by a
+    nearly symmetric operator have most of what they share with the space in the last two blocks, which come first, so
+    that the whole space is gone through once, or little more. The vectors are rows, so that the products of many with a
+    few take half of the time.
+
+    Parameters
+    ----------
+    operator : callable
+        F, of columns.
+    start : ndarray, shape (b, n)
+        The first block.
+    most : int
+        Vectors at the most.
     """
 
-    def __init__(self, operator: Solve, basis: Floats, sizes: SliceSizes) -> None:
-        self.operator, self.basis, self.sizes, block = operator, basis, sizes, sizes.block
-        most, size = basis.shape
-        self.projection = np.zeros((most, most))
-        start = np.random.default_rng(0).standard_normal((block, size))
-        self.basis[:block] = qr(start.T, mode="economic")[0].T
-        self.next = np.zeros((block, block))
-        self.used = self.firm = block  # vectors, and those of them that are orthogonal to all others
-        # blocks that are made orthogonal at a time; 0: each is orthogonal to all before it at once
-        self.together = sizes.blocks_together
+    def __init__(self, operator: Solve, start: Floats, most: int) -> None:
+        self.operator, (self.block, size) = operator, start.shape
+        self.most = min(most, size - size % self.block)
+        self.basis = np.empty((self.most + self.block, size))
+        self.projection = np.zeros((self.most + self.block, self.most))
+        self.basis[: self.block] = qr(start.T, mode="economic")[0].T
+        self.used = 0  # vectors that have an image
 
-    def extend(self, blocks: int) -> None:
-        """So many blocks more, each orthogonal to all before it."""
-        wanted = self.used + blocks * self.sizes.block
-        while self.firm < wanted:
-            self._step()
-            if self.used == wanted or self.used >= self.firm + self.together * self.sizes.block:
-                self._settle()
+    @property
+    def full(self) -> bool:
+        """Whether no block is left."""
+        return self.used + self.block > self.most
 
-    def _step(self) -> None:
-        """One block more, orthogonal to the last ones."""
-        block, used = self.sizes.block, self.used
-        if used + block > len(self.basis):
-            raise SliceError(f"a Krylov space of {used} vectors does not hold the eigenvalues about its shift")
-        last, near = slice(used - block, used), slice(max(0, self.firm - 2 * block) if self.together else 0, used)
-        image = np.ascontiguousarray(self.operator(self.basis[last].T).T)
-        inside = image @ self.basis[near].T
-        image -= inside @ self.basis[near]
-        self.projection[last, near] = inside
-        self.projection[near, last] = inside.T
-        vectors, self.next = qr(image.T, mode="economic", overwrite_a=True)
-        self.basis[used : used + block] = vectors.T
-        self.used += block
+    def extend(self, wanted: int) -> None:
+        """So many vectors at least, or all."""
+        while self.used < max(wanted, 1) and not self.full:
+            last, known = slice(self.used, self.used + self.block), self.used + self.block
+            image = np.ascontiguousarray(self.operator(self.basis[last].T).T)
+            self._leave_space(image, known)
+            vectors, rest = qr(image.T, mode="economic", overwrite_a=True, check_finite=False)
+            if np.abs(np.diag(rest)).min() < DEPENDENT * np.abs(np.diag(rest)).max(initial=1e-300):
+                # a direction that rounding has chosen: any serves that is orthogonal to all before
+                part = vectors.T @ self.basis[:known].T
+                image = vectors.T - part @ self.basis[:known]
+                vectors, turned = qr(image.T, mode="economic", overwrite_a=True, check_finite=False)
+                self.projection[:known, last] += part.T @ rest
+                rest = turned @ rest  # the others have changed their signs
+            self.basis[known : known + self.block] = vectors.T
+            self.projection[known : known + self.block, last] = rest
+            self.used = known
 
-    def _settle(self) -> None:
-        """Make the last blocks orthogonal to the blocks before them, or give the last blocks up."""
-        firm, fresh = self.firm, self.basis[self.firm : self.used]
-        products = fresh @ self.basis[: self.used].T
-        strayed, among = products[:, :firm], products[:, firm:] - np.eye(len(fresh))
-        far, limit = np.linalg.norm(strayed, axis=1).max(), self.sizes.stray_limit
-        if self.together and (far > limit or np.abs(among).max() > limit**2):
-            self.used, self.together = firm, self.together - 1
-        else:
-            fresh -= strayed @ self.basis[:firm]
-            self.firm = self.used
+    def _leave_space(self, image: Floats, known: int) -> None:
+        """Make the images of the last block orthogonal to all vectors so far; H gets what they had of these."""
+        images = slice(self.used, known)
 
-    def ritz(self) -> tuple[Floats, Floats, Floats]:
-        """Eigenvalues and eigenvectors of H, and the residuals of these as vectors of A."""
-        block = self.sizes.block
-        used = self.used - block  # the last block has no image yet
-        values, vectors = eigh(self.projection[:used, :used], check_finite=False)
-        return values, vectors, np.linalg.norm(self.next @ vectors[used - block :], axis=0)
+        def leave(first: int) -> Floats:
+            part = image @ self.basis[first:known].T
+            np.subtract(image, part @ self.basis[first:known], out=image)
+            self.projection[first:known, images] += part.T
+            return np.asarray(np.linalg.norm(image, axis=1))
+
+        length = leave(max(0, known - 2 * self.block))
+        for _ in range(PASSES):
+            before, length = length, leave(0)
+            if np.all(length > SHORTENED * before):
+                return
+
+    @property
+    def square(self) -> Floats:
+        """H, shape (m, m)."""
+        return self.projection[: self.used, : self.used]
+
+    def residuals(self, vectors: NDArray) -> Floats:
+        """Of vectors of H, as of the operator's."""
+        rest = self.projection[self.used : self.used + self.block, self.used - self.block : self.used]
+        return np.asarray(np.linalg.norm(rest @ vectors[self.used - self.block :], axis=0))

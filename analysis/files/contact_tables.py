@@ -44,8 +44,8 @@ from ..counted import counted
 from ..elasticity.material_spheres import Material, spheres_of_material
 from ..errors import BadInputError, PackingFileError
 from ..motion.stability import Stability, stability
-from .dumps import dump_frames
-from .formats.text_columns import lines_of, number_of
+from .formats.lammps_dump import dump_frames
+from .formats.tables import lines_of, number_of
 
 HALF_A_DIGIT = 5e-6
 """Largest relative error of a number that is rounded to six digits."""

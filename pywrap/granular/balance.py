@@ -43,14 +43,18 @@ def refuse_motion(configuration: Configuration, balance: float, commands: Comman
     size = configuration.particle_residual
     worst = int(np.argmax(size))
     place = ", ".join(f"{x:.6g}" for x in configuration.position[worst])
+    who = f"particle {configuration.ids[worst]} at ({place})"
+    if configuration.constraint is not None and worst in configuration.joined:
+        led = np.diff((configuration.constraint != 0).tocsc().indptr).reshape(configuration.axes, -1)[:, worst].max()
+        who = f"the lid of {led} particles that move as one, with {who} among them,"
     others = int(np.sum(size > balance * force)) - 1
     also = f", and {others} more {'are' if others > 1 else 'is'} out of balance" if others else ""
-    advice = known_cause(commands, configuration.contacts) or (
+    advice = known_cause(commands, configuration.contacts, size) or (
         "bring it to rest by faultgouge.relax(lmp), in a command --relax, or a longer run with drag (fix viscous, and "
         "fix viscous/sphere for rotation), or allow more by from_lammps(lmp, balance=...), in a command --balance"
     )
     raise NotTakenError(
-        f"The packing moves: the residual of particle {configuration.ids[worst]} at ({place}) is "
+        f"The packing moves: the residual of {who} is "
         f"{size[worst] / force:.3g} of the mean contact force, and {balance:g} is allowed{also}; {advice}."
     )
 
@@ -159,8 +163,11 @@ def lost_histories(commands: Commands) -> str:
     return ""
 
 
-def known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
-    """Why forces are out of balance though the packing may be at rest; empty if no cause is known."""
+def known_cause(commands: Commands, contacts: LinearisedContacts, residual: Floats | None = None) -> str:
+    """Why forces are out of balance though the packing may be at rest; empty if no cause is known.
+
+    Histories may be lost where friction can bear the residual force on the particle that has most, shape (N,).
+    """
     if says := restless_fix(commands):
         return f"{says}, and run on"
     if says := creeping_law(commands):
@@ -170,5 +177,8 @@ def known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
     if says := lost_histories(commands):
         return says
     has_friction = (contacts.friction > 0) & np.isfinite(contacts.friction)  # infinite where no law is known
+    if residual is not None:
+        at = (contacts.i == np.argmax(residual)) | (contacts.j == np.argmax(residual))
+        has_friction &= bool(contacts.friction[at].sum() >= residual.max())
     lost = np.count_nonzero(has_friction & ~contacts.tangential_force.any(axis=1))
     return f"{lost} of {len(contacts)} contacts {LOST}" if lost else ""

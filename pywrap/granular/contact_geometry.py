@@ -3,6 +3,7 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...analysis.arrays import Floats, Indices
 from ...analysis.contacts import WALL
@@ -21,6 +22,10 @@ class OneLaw(NamedTuple):
     who: str
     geometry: dict[str, Any]
     forces: Floats
+
+    def chosen(self, which: NDArray[np.bool_]) -> "OneLaw":
+        """Some of the contacts."""
+        return OneLaw(self.who, {name: values[which] for name, values in self.geometry.items()}, self.forces[which])
 
 
 def _geometry(
@@ -62,8 +67,7 @@ def by_types(pairs: OneLaw, kind: Indices) -> dict[Any, OneLaw]:
     codes, found = low * count + high, {}
     for code in np.unique(codes).tolist():
         (first, second), which = divmod(code, count), codes == code
-        geometry = {name: values[which] for name, values in pairs.geometry.items()}
-        found[first, second] = OneLaw(f"contacts of types {first} and {second}", geometry, pairs.forces[which])
+        found[first, second] = pairs.chosen(which)._replace(who=f"contacts of types {first} and {second}")
     return found
 
 

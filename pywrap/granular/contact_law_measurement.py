@@ -263,7 +263,7 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
     bench.run(f"timestep {step:.17g}")
     normal_dashpot = _dashpot(bench, "closing", fn, 0.1 * delta / step)
     bench.place_at(wanted)
-    bench.move(slipping=1e12 * delta / step)  # far beyond Coulomb's bound, of soft springs too
+    bench.move(slipping=1e60 * delta / step)  # far beyond Coulomb's bound, of the softest spring, too
     bench.run("run 1 post no")
     mu = bench.force()[1] / fn  # while the contact slides: dashpots bear a part of the force
     if mu == 0:
@@ -325,7 +325,7 @@ def _dashpot(bench: TwoParticleLammps, direction: Literal["closing", "slipping"]
     """Force per velocity of a contact without slip: first at some speed, then where the force is a tenth of scale."""
     component = 0 if direction == "closing" else 1
     bench.rest()
-    rest, found = bench.force()[component], 0.0
+    rest, found, force = bench.force()[component], 0.0, 0.0
     for _ in range(6):  # a speed whose force is lost in rounding, or is cut at the bound, comes nearer
         bench.move(**{direction: speed})
         bench.run("run 0 post no")
@@ -336,4 +336,4 @@ def _dashpot(bench: TwoParticleLammps, direction: Literal["closing", "slipping"]
         speed *= 0.1 * scale / abs(force) if abs(force) > 1e-9 * scale else 1e6
         if abs(force) <= 1e-9 * scale and speed > 1e30:
             break
-    return found if abs(found) * speed > 1e-12 * scale else 0.0
+    return found if abs(force) > 1e-9 * scale else 0.0

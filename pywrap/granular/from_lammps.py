@@ -21,7 +21,7 @@ from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError,
 from .instance_queries import open_files, require_instance
 from .look_in_a_copy import can_copy, in_a_copy
 from .looks import look_at_contacts
-from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError, OtherStiffnessError
+from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError, OtherStiffnessError, push_remark
 from .motion_proof import prove as prove_motion
 
 
@@ -156,7 +156,12 @@ def _remarks(
 ) -> tuple[str, ...]:
     """Sentences on what moves, which a packing at rest leaves out; velocities have the shape (N, 3)."""
     held = held_remarks(configuration, velocity, rotation, float(lmp.extract_global("dt")))
-    return (*held, *motion_remarks(configuration, velocity), *drag_remarks(fixes))
+    adapts = (
+        f"fix {name} (adapt) may change sizes or laws as LAMMPS runs on: this is said of those that hold now"
+        for name, style in fixes.items()
+        if style.startswith("adapt")
+    )
+    return (*held, *motion_remarks(configuration, velocity), *adapts, *drag_remarks(fixes))
 
 
 def _proved(lmp: Any, configuration: Configuration, commands: Commands, fixes: dict[str, str]) -> Configuration:
@@ -173,4 +178,9 @@ def _by_differences(lmp: Any, given: Commands | None, *, balance: float, prove: 
     made = derive_frozen(made, remarks=_remarks(lmp, made, still.fixes, still.velocity, still.rotation))
     refuse_motion(made, balance, still.commands)
     proves = prove and made.residual <= BALANCE * force_scale(made)
-    return _proved(lmp, made, still.commands, still.fixes) if proves else made
+    if not proves:
+        return made
+    made = _proved(lmp, made, still.commands, still.fixes)
+    if not len(made.one_sided_particles):
+        return made
+    return derive_frozen(made, remarks=(*made.remarks, push_remark(lmp, made)))

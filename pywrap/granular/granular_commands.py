@@ -118,6 +118,9 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
                 coefficients = []
             style = " ".join(words)
         elif words[0] == "pair_coeff":
+            # the last line of two types holds; in hybrid styles, of one style
+            mine = words[1 : 4 if style.split()[1:2] and style.split()[1].startswith("hybrid") else 3]
+            coefficients = [each for each in coefficients if each.split()[1 : 1 + len(mine)] != mine]
             coefficients.append(" ".join(words))
         elif words[0] == "fix" and len(words) > 3:
             fixes[words[1]] = " ".join(words)

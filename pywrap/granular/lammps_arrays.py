@@ -53,6 +53,14 @@ def set_velocity(lmp: Any, configuration: Configuration, velocity: Floats) -> No
     owned_array(lmp, "omega")[rows] = rotation / configuration.radius[:, None]
 
 
+def on_coordinates(lmp: Any, c: Configuration, along: str, around: str) -> Floats:
+    """Two arrays of LAMMPS on the coordinates, shape (axes N,): v and R omega, or F and T/R."""
+    rows = rows_of(lmp, c)
+    turns = owned_array(lmp, around)[rows]
+    turns = turns * c.radius[:, None] if around == "omega" else turns / c.radius[:, None]
+    return c.join_vectors(owned_array(lmp, along)[rows], turns)
+
+
 def set_up_run(lmp: Any) -> None:
     """Set up a run, which goes on without a set-up of its own.
 

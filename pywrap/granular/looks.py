@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.arrays import Floats
-from .force_probe import HOLDS, MOVES
+from .force_differences import HOLDS, MOVES
 from .granular_commands import (
     BODIES,
     GIVE_LINE,

@@ -11,8 +11,10 @@ small, the motions with both signs of the velocities are compared: half of their
 in the amplitude. With contacts at the bound the motions of both signs are not opposite. Then each is compared by
 itself, after the motion from rest has been subtracted.
 
-**K by differences of forces** has no contacts at the bound. If the model acts one step late, the difference is smaller
-in shorter steps, which are taken if the first steps do not agree. If forces are one-sided, K is the mean of both sides,
+**Shorter steps** are taken if the first steps do not agree: where a model acts one step late (mdr), or takes the slip
+by other velocities (synchronized_verlet), the difference falls as the step.
+
+**K by differences of forces** has no contacts at the bound. If forces are one-sided, K is the mean of both sides,
 and no linear motion is LAMMPS's: the difference is told, and the packing is not refused.
 
 **Forces by position.** A force that depends on the position and belongs to no contact may be weak beside the contacts,
@@ -39,7 +41,16 @@ from .acting_fixes import acting_fixes
 from .balance import force_scale
 from .granular_commands import GIVE_LINES, NotLinearisedError, NotTakenError
 from .instance_queries import styles_of
-from .lammps_arrays import STILL_STEP, forces_in_order, has_bodies, owned_array, rows_of, set_up_run, set_velocity
+from .lammps_arrays import (
+    STILL_STEP,
+    forces_in_order,
+    has_bodies,
+    on_coordinates,
+    owned_array,
+    rows_of,
+    set_up_run,
+    set_velocity,
+)
 from .look_in_a_copy import in_a_copy, quieten
 
 LARGEST_DIFFERENCE = 1e-3
@@ -62,8 +73,8 @@ STEPS_OF_PROOF = 5
 """Steps of LAMMPS and of the linearised packing."""
 
 SHORTER_STEPS = 10
-"""By how much steps are shorter where a model may act one step late, as the volume of particles does in mdr: then the
-difference falls as the step, and that of a K which is not LAMMPS's does not."""
+"""By how much steps are shorter: a difference by the way in which a model takes its steps falls, and that of a K which
+is not LAMMPS's does not."""
 
 STEP_PHASE = 1.5
 """Time step times a bound of the fastest rate, which is some three times this rate: five steps are half an oscillation
@@ -80,6 +91,9 @@ USUAL_OVERLAP = 1e-4
 
 CAUSE_SHARE = 0.1
 """Share of the difference that is left where constant forces stand in the place of a fix that is its cause."""
+
+PUSH_SHARE, STEPS_AFTER_PUSH = 1e-3, 20_000
+"""A push as a share of velocities that take a contact through its overlap, and the steps for which it is followed."""
 
 COMMON_MULTIPLE = 2**12 * 5**9 * 3**4 * 7 * 11 * 13
 """A time step that is a multiple of the intervals that people write: some fixes act every so many steps alone."""
@@ -132,7 +146,7 @@ def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extr
         )
     if len(configuration.one_sided_particles):
         return difference  # no linear motion is LAMMPS's, and no verdict is given
-    if difference > LARGEST_DIFFERENCE and configuration.operators == "differences":
+    if difference > LARGEST_DIFFERENCE:
         shorter = _Comparison(lmp, configuration, extrapolates, SHORTER_STEPS)
         difference = min(difference, shorter.least_difference()[0])
     if difference <= SMALL_DIFFERENCE:
@@ -141,6 +155,18 @@ def prove(lmp: Any, configuration: Configuration, fixes: dict[str, str], *, extr
     if difference <= LARGEST_DIFFERENCE and not causes:
         return difference
     raise _not_proved(configuration, difference, causes)
+
+
+def push_remark(lmp: Any, configuration: Configuration) -> str:
+    """What LAMMPS's own particles do after a push without drag, for a packing whose forces are one-sided."""
+    c, timestep = configuration, float(lmp.extract_global("dt"))
+    push = PUSH_SHARE * _Comparison(lmp, c, extrapolates=False).start
+    end = steps_in_a_copy(lmp, c, push, timestep, STEPS_AFTER_PUSH)
+    left = float(np.sum(c.coordinate_mass * end**2) / np.sum(c.coordinate_mass * push**2))
+    return (
+        f"LAMMPS itself, pushed by {np.abs(push).max():.2g} (length / time) at most, without drag, has {left:.2g} of "
+        f"the kinetic energy of the push after t = {STEPS_AFTER_PUSH * timestep:.4g} ({STEPS_AFTER_PUSH} steps)"
+    )
 
 
 def _causes(others: dict[str, str], serves: Callable[[tuple[str, ...]], bool]) -> list[str]:
@@ -361,7 +387,7 @@ def steps_in_a_copy(
         lmp.command(f"timestep {timestep:.17g}")
         set_up_run(lmp)
         lmp.command(f"run {steps} pre no post no")
-        return _on_coordinates(lmp, configuration, "v", "omega")
+        return on_coordinates(lmp, configuration, "v", "omega")
 
     return in_a_copy(take)
 
@@ -372,12 +398,12 @@ def _constant_in_time(lmp: Any, configuration: Configuration) -> bool:
     set_velocity(lmp, configuration, np.zeros(configuration.coordinates))
     try:
         lmp.command("run 0 post no")
-        before = _on_coordinates(lmp, configuration, "f", "torque")
+        before = on_coordinates(lmp, configuration, "f", "torque")
         lmp.command(f"reset_timestep {COMMON_MULTIPLE}")
         lmp.command("run 0 post no")
     except Exception:  # a fix or a load that takes no other step
         return False
-    change = np.abs(_on_coordinates(lmp, configuration, "f", "torque") - before)
+    change = np.abs(on_coordinates(lmp, configuration, "f", "torque") - before)
     return bool(change.max() <= 1e-9 * force_scale(configuration))
 
 
@@ -388,22 +414,14 @@ def _change_by_displacement(lmp: Any, configuration: Configuration, way: Floats,
     set_velocity(lmp, configuration, np.zeros(configuration.coordinates))
     lmp.command(f"timestep {STILL_STEP * lmp.extract_global('dt'):.17g}")
     lmp.command("run 0 post no")
-    before, changes = _on_coordinates(lmp, configuration, "f", "torque"), []
+    before, changes = on_coordinates(lmp, configuration, "f", "torque"), []
     # within one run: a spring of fix smd begins where a run begins; but a fix rigid has its bodies follow where it does
     step = "run 1 post no" if has_bodies(lmp) else "run 1 pre no post no"
     for each in (way, -2 * way):
         owned_array(lmp, "x")[:] += each
         lmp.command(step)
-        changes.append(np.abs(_on_coordinates(lmp, configuration, "f", "torque") - before))
+        changes.append(np.abs(on_coordinates(lmp, configuration, "f", "torque") - before))
     return np.minimum(*changes)
-
-
-def _on_coordinates(lmp: Any, c: Configuration, along: str, around: str) -> Floats:
-    """Two arrays of LAMMPS on the coordinates, shape (axes N,): v and R omega, or F and T/R."""
-    rows = rows_of(lmp, c)
-    turns = owned_array(lmp, around)[rows]
-    turns = turns * c.radius[:, None] if around == "omega" else turns / c.radius[:, None]
-    return c.join_vectors(owned_array(lmp, along)[rows], turns)
 
 
 def _leave_out(lmp: Any, configuration: Configuration, without: tuple[str, ...]) -> None:

@@ -46,7 +46,6 @@ KEYS_TO_ADD = {
     "damping": "cn, ct or tau",
     "drive": "spring, velocity and until",
     "friction": "v0, the velocity at which friction weakens",
-    "eruptions": "load, a list of F_x",
 }
 """Keys that a section must have."""
 

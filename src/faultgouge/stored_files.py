@@ -18,7 +18,7 @@ from .analysis import stress as stress_of_packing
 from .analysis import vibrations as vibrations_of_packing
 from .analysis.files.configuration_file import holds_configuration, read_configuration
 from .analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
-from .analysis.files.runfile_header import law_of_parameters
+from .analysis.files.runfile import law_of_parameters
 from .analysis.has_configuration import HasConfiguration
 
 

@@ -25,7 +25,7 @@ from ...pywrap.onset import ONSET_DISTANCES, onset_run
 from ...pywrap.runs.undamped import perturb, time_step
 from ...pywrap.scenes.sections import Perturb
 from ...pywrap.scenes.validation import require_section
-from ..triggering.compute import Triggering, equilibrium_at, series_of, trigger
+from ..triggering import Triggering, equilibrium_at, series_of, trigger
 
 EFOLDS = 48.0
 """Length of the undamped run in units of 1/rate: D grows by up to 20 decades in it."""

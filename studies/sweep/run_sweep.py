@@ -20,6 +20,7 @@ from concurrent.futures import Executor
 from contextlib import closing
 from importlib.metadata import version
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from mpi4py import MPI
@@ -30,9 +31,8 @@ from ...analysis.files.plain_file import read_plain_text
 from ...pywrap import SceneError
 from .. import result_rows
 from ..executors import Progress, Say, open_executor
-from .sweep_plan import Sweep, SweepPoint, shard
-from .table import Row, check_table, write_tables
-from .tasks import TASKS
+from ..result_rows import Row, check_table, write_tables
+from .sweep_plan import Sweep, SweepPoint, points_of
 from .workers import compute_points
 
 RESULTS_FILE, REQUEST_FILE = "results.jsonl", "sweep.json"
@@ -71,7 +71,7 @@ def sweep(
         raise SceneError(
             f"sweep takes the path of a SWEEP.toml, or a mapping of its contents, and no {type(request).__name__}."
         )
-    wanted = Sweep.from_mapping(request, TASKS) if isinstance(request, Mapping) else Sweep.from_toml(request, TASKS)
+    wanted = Sweep.from_mapping(request) if isinstance(request, Mapping) else Sweep.from_toml(request)
     return run_sweep(wanted, Path(output), workers=workers, executor=executor, say=say)
 
 
@@ -117,7 +117,7 @@ def run_sweep(
     WorkerError
         If workers are killed repeatedly.
     """
-    points = shard(sweep.points, part)
+    points = points_of(sweep.points, part)
     with open_executor(workers, executor) as pool:
         if MPI.COMM_WORLD.rank != 0:
             return []
@@ -156,6 +156,28 @@ def missing_points(points: Iterable[SweepPoint], known: dict[str, Row]) -> list[
         return row is not None and (row["says"] is None or row["final"])
 
     return [point for point in points if not is_known(point)]
+
+
+def remaining_work(points: Sequence[SweepPoint], known: Iterable[Row] = ()) -> list[str]:
+    """Lines about the points that are not known yet: how many, and how long they take if the known rows are typical."""
+    scenes = [point.scene for point in points if point.scene is not None]
+    settlings = {point.settling_key for point in points if point.scene is not None}
+    seconds = [row["cpu_seconds"] for row in known if row["says"] is None]
+    time = "how long a scene takes is not known before the first of them: begin, and ask again"
+    if seconds:
+        one = median(seconds)
+        time = (
+            f"about {_span(one * len(scenes))} of one core, if a scene takes {_span(one)} as in the {len(seconds)} "
+            "rows that are there"
+        )
+    refused = [f"{len(points) - len(scenes)} points make no scene, and will say why"] * (len(scenes) < len(points))
+    return [f"{len(scenes)} scenes to compute, {len(settlings)} packings to settle", *refused, time]
+
+
+def _span(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
 
 
 def require_result(rows: Sequence[Row]) -> None:

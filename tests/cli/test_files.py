@@ -1,7 +1,6 @@
 """Files as users have them: pipes, names with blanks and quotes, links, files that others write, and read-only ones."""
 
 import errno
-import json
 import os
 import signal
 import subprocess
@@ -317,22 +316,6 @@ def test_no_link_is_followed_and_the_mode_is_kept(tmp_path):
     assert (tmp_path / "l.json").read_text() == "new"
     assert (tmp_path / "l.json").stat().st_mode & 0o777 == 0o640
     assert {path.name for path in tmp_path.iterdir()} == {"victim", "l.json.part", "l.json"}
-
-
-@pytest.mark.parametrize(
-    ("disk", "says"),
-    [
-        ({"radius": 1e-300}, "The radius of disk 0 is 1e-300: give one between 1e-100 and 1e+100"),
-        ({"x": 1.55, "y": 0.49}, "are 0 apart"),
-    ],
-)
-def test_a_packing_that_is_none(refusal, tmp_path, disk, says):
-    disks = {"x": [0.5, 1.55], "y": [0.49, 0.49], "radius": [0.5, 0.5], "top": [0, 1], "box_length": 4.0}
-    for key, value in disk.items():
-        disks[key][0] = value
-    (tmp_path / "packing.json").write_text(json.dumps(disks))
-    (tmp_path / "scene.toml").write_text(SCENE.replace(str(REFERENCE), "packing.json"))
-    assert says in refusal("onset", "scene.toml")
 
 
 @pytest.mark.slow

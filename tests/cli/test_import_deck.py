@@ -6,9 +6,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from pile_decks import DECK, FLAT, ROUND
 
 from faultgouge.analysis.files.configuration_file import read_configuration
+from faultgouge.pywrap.lammps.instance import lammps_instance
 
 
 @pytest.mark.parametrize("shape", [FLAT, ROUND], ids=["disks", "spheres"])
@@ -35,9 +37,15 @@ def test_deck(faultgouge_here, tmp_path, shape):
     names = {each.get("Name"): each.get("NumberOfComponents") for each in piece.find("PointData")}
     assert names["mode_1"] == names["mode_1_rotation"] == names["net_force"] == "3"
     faultgouge_here("export", "pile.h5", "-o", "pile.xyz")
-    rows = np.loadtxt((tmp_path / "pile.xyz").read_text().splitlines()[2:])
+    rows = np.loadtxt((tmp_path / "pile.xyz").read_text().splitlines()[2:], usecols=range(1, 4))
     assert np.array_equal(rows[:, : configuration.dimension], configuration.position)
-    assert "goes into .vtp, .xyz" in faultgouge_here("export", "pile.h5", "-o", "pile.data", code=2).stderr
+    faultgouge_here("export", "pile.h5", "-o", "pile.data")
+    lammps = lammps_instance(MPI.COMM_SELF, None)
+    lammps.commands_list(["atom_style sphere", f"read_data {tmp_path}/pile.data"])
+    order, place, mass = (np.array(lammps.numpy.extract_atom(name)[:3]) for name in ("id", "x", "rmass"))
+    lammps.close()
+    assert np.array_equal(place[np.argsort(order), : configuration.dimension], configuration.position)
+    np.testing.assert_allclose(mass.ravel()[np.argsort(order)], configuration.mass, rtol=1e-15)
     assert "nothing moves in it" in faultgouge_here("movie", "pile.h5", code=None).stderr
     assert "3 contacts (3 with walls)" in faultgouge_here("draw", "pile.h5", "-o", "pile.png").stdout
     faultgouge_here("view", "pile.h5", "-o", "page.html")
@@ -57,10 +65,12 @@ def _check_film_of_spheres(faultgouge_here, tmp_path, configuration):
     """Each frame has the spheres where the mode moves them, about where they rest, half a radius away at most."""
     faultgouge_here("movie", "pile.h5", "--mode", "1", "--seconds", "0.8", "-o", "mode.xyz")
     lines = (tmp_path / "mode.xyz").read_text().splitlines()
-    names = [each.split(":") for each in re.findall(r"(\w+:R:\d)", lines[1])]
+    names = [each.split(":") for each in re.findall(r"(\w+:[SIR]:\d)", lines[1])]
     ends = np.cumsum([int(size) for *_, size in names])
     column = {name: slice(end - int(size), end) for (name, _, size), end in zip(names, ends, strict=True)}
-    frames = np.array([np.loadtxt(lines[k + 2 : k + 5]) for k in range(0, len(lines), 5)])
+    frames = np.array(
+        [np.loadtxt(lines[k + 2 : k + 5], converters={0: lambda _: 0.0}) for k in range(0, len(lines), 5)]
+    )
     assert len(frames) == 8
     moved = frames[..., column["pos"]] - configuration.position
     assert moved == pytest.approx(frames[..., column["displacement"]], abs=1e-15)

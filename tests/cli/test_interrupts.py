@@ -85,6 +85,7 @@ def test_a_run_says_what_is_kept(tmp_path, command, ranks, at, group, number):
         assert not run.complete
     assert says.startswith(f"Error: {ENDS[number][1]}: run.h5 holds {held}")
     assert says.endswith("the same command continues from there.")
+    assert not list(tmp_path.glob(".*"))  # neither a lock nor half a file
 
 
 @pytest.mark.slow

@@ -30,7 +30,7 @@ from faultgouge.analysis.files.formats import (
     write_frames,
     write_packing,
 )
-from faultgouge.analysis.files.formats.configuration_export import export_configuration
+from faultgouge.analysis.files.formats.tables import read_slips
 from faultgouge.pywrap import Scene, SceneError
 
 FILMS = pytest.mark.parametrize("suffix", [".xyz", ".gsd"], indirect=True)
@@ -312,7 +312,7 @@ def test_ase_reads_extended_xyz(tmp_path, ramp, configuration):
         packing = run.packing()
         write_frames(tmp_path / "film.xyz", frames_of(run, range(2)))
     write_packing(tmp_path / "one.xyz", packing)
-    export_configuration(tmp_path / "lammps.xyz", configuration)
+    write_packing(tmp_path / "lammps.xyz", configuration)
     one, film, other = (read(tmp_path / f"{name}.xyz", ":") for name in ("one", "film", "lammps"))
     assert [len(one), len(film), len(other)] == [1, 2, 1]
     for atoms in (one[0], film[1]):
@@ -328,10 +328,10 @@ def test_ase_reads_extended_xyz(tmp_path, ramp, configuration):
 LATER = "format 2 of faultgouge's files, and this version knows 1: a later version wrote it, so update faultgouge"
 
 
-@pytest.mark.parametrize("module", ["xyz", "lammps_data", "gsd_file", "checksummed_file", "configuration_file"])
+@pytest.mark.parametrize("module", ["xyz", "lammps_data", "libraries", "checksummed_file", "configuration_file"])
 def test_a_file_of_a_later_format_is_refused(tmp_path, sheared, configuration, monkeypatch, module):
     """And one without a number, of an older version, is read."""
-    suffix = {"xyz": "xyz", "lammps_data": "data", "gsd_file": "gsd"}.get(module, "h5")
+    suffix = {"xyz": "xyz", "lammps_data": "data", "libraries": "gsd"}.get(module, "h5")
     path = tmp_path / f"a.{suffix}"
     place = "faultgouge.analysis.files." + (f"formats.{module}" if suffix != "h5" else "checksummed_file")
 
@@ -359,3 +359,40 @@ def test_a_file_of_a_later_format_is_refused(tmp_path, sheared, configuration, m
         else:
             path.write_bytes(path.read_bytes().replace(b"faultgouge_format", b"another_name12345"))
     assert len(load(path)) in (len(sheared), len(configuration))
+
+
+def test_pandas_reads_a_table_of_contacts(tmp_path, sheared, configuration):
+    """All digits; the forces of the rows make the net forces; and the slips come back with `import --contacts`."""
+    import pandas
+
+    for packing in (sheared, configuration):
+        write_packing(tmp_path / "contacts.csv", packing)
+        table = pandas.read_csv(tmp_path / "contacts.csv")
+        held = packing.configuration
+        pandas.testing.assert_frame_equal(table[list(held.to_pandas())], held.to_pandas(), check_exact=True)
+        total = held.load[:, 0].copy()
+        force = table[["n_x", "n_y", "n_z"]].mul(table.f_n, axis=0).to_numpy() + table[["t_x", "t_y", "t_z"]].to_numpy()
+        np.add.at(total, table.id1 - 1, force)
+        pair = table.id2 > 0
+        np.subtract.at(total, table.id2[pair] - 1, force[pair])
+        np.testing.assert_allclose(total, held.net_force[:, 0], atol=1e-12)
+        np.testing.assert_allclose(table.f_t, held.configuration.mobilised * held.contacts.friction, rtol=1e-12)
+    write_packing(tmp_path / "contacts.csv", sheared)
+    assert np.array_equal(read_slips(tmp_path / "contacts.csv").slip, sheared.contacts.slip)
+
+
+@pytest.mark.parametrize("suffix", [".data", ".gsd"], indirect=True)
+def test_what_lammps_left_goes_where_a_packing_goes(tmp_path, sheared, configuration, suffix):
+    write_packing(tmp_path / f"a{suffix}", configuration)
+    if suffix == ".data":
+        disks = read_disks(tmp_path / "a.data")
+        assert np.array_equal(disks.position, sheared.position)
+        np.testing.assert_allclose(disks.mass, sheared.mass, rtol=1e-15)
+        return
+    with pytest.importorskip("gsd.hoomd").open(tmp_path / "a.gsd") as file:
+        frame = file[0]
+    box, middle = configuration.box, configuration.origin + 0.5 * configuration.box.sum(axis=0)
+    moved = frame.particles.position + middle - np.pad(configuration.position, ((0, 0), (0, 1)))
+    moved[:, 0] -= box[0, 0] * np.rint(moved[:, 0] / box[0, 0])  # whatever the image
+    assert moved == pytest.approx(0, abs=1e-6)  # float32
+    assert np.array_equal(frame.log["particles/net_force"], configuration.net_force[:, 0])

@@ -244,9 +244,13 @@ REFUSED_RUNS = [
 def test_what_cannot_be_driven_is_refused_before_it_begins(settled, change, says):
     """Scenes that make no sense, and drives that are not slow, or that time steps do not follow."""
     sections = {**BASE, "drive": DRAWN, **change}
-    with pytest.raises(SceneError, match=says):
+
+    def check() -> None:
         wanted = Scene.from_mapping({key: each for key, each in sections.items() if each}, command="drive")
         check_drive(wanted, settle_for_drive(wanted) if "damping" in change else settled)
+
+    with pytest.raises(SceneError, match=says):
+        check()
 
 
 def test_drive_that_is_fast_or_stiff_is_warned(scene, settled):

@@ -18,7 +18,7 @@ from faultgouge.analysis import RunFile
 from faultgouge.analysis.files import checksummed_file
 from faultgouge.pywrap import Equilibrium, Record, Scene, SceneError, perturb, reach, settle
 from faultgouge.pywrap.runs import undamped
-from faultgouge.pywrap.runs.drive_recorder import DriveRecord
+from faultgouge.pywrap.runs.drive import DriveRecord
 from faultgouge.pywrap.runs.undamped import sample_steps, weakening_of
 from faultgouge.pywrap.scenes.validation import digest_of
 

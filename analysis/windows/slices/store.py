@@ -42,7 +42,7 @@ Take = Callable[[tuple[int, int]], bool]
 SHIFTS_FILE = "shifts.npz"
 """The file of all shifts: to find these, eigenvalues are counted, which takes minutes for 100,000 disks."""
 
-DIGITS = 16
+NAMES_OF_SLICES = 16
 """Hexadecimal digits of the name of a pass's folder."""
 
 LOCK_FILE = "taken"
@@ -188,12 +188,12 @@ def pass_folder(parent: Path, places: Sequence[System], modes: tuple[int, int], 
         for matrix in place.matrices:
             for array in (matrix.data, matrix.indices, matrix.indptr):
                 digest.update(np.ascontiguousarray(array).data)
-    return parent / digest.hexdigest()[:DIGITS]
+    return parent / digest.hexdigest()[:NAMES_OF_SLICES]
 
 
 def remove_passes(parent: Path) -> None:
     """Remove the folders of passes, which have nothing else in them, and the folder that they are in if it is empty."""
-    for folder in parent.glob("[0-9a-f]" * DIGITS):
+    for folder in parent.glob("[0-9a-f]" * NAMES_OF_SLICES):
         if (folder / LOCK_FILE).is_file():
             for path in folder.iterdir():
                 if path.name in (LOCK_FILE, SHIFTS_FILE) or re.fullmatch(r"\d+-\d+\.npz|[0-9a-f]{32}\.new", path.name):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from ..analysis.table_display import table_of
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
 from .terminal import (
@@ -23,7 +24,6 @@ from .terminal import (
     say_remark,
     status,
     stored_files,
-    table_of,
 )
 
 if TYPE_CHECKING:

@@ -6,22 +6,24 @@ alone speaks.
 
 from __future__ import annotations
 
+import inspect
 import json
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sized
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
+from contextlib import contextmanager, nullcontext
+from functools import wraps
 from math import isfinite
 from pathlib import Path
 from threading import Event, Thread
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, ParamSpec, TypeVar, get_type_hints
 
 import typer
 
 from ..analysis.counted import counted
 from ..mpi_rank import is_root
-from ..signal_guard import holds
+from ..signal_guard import holds, keeps
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from faultgouge.pywrap.scenes.impossible import Task
 
 T = TypeVar("T")
+P = ParamSpec("P")
 
 SECONDS_BETWEEN_LINES = 60.0
 """Seconds between two lines of progress off a terminal."""
@@ -66,12 +69,106 @@ PackingFile = Annotated[
 ]
 Time = Annotated[float | None, typer.Option("--time", metavar="T", help="Of drive.h5: the state nearest to this time.")]
 Frame = Annotated[int, typer.Option(help="Number of the equilibrium; negative numbers count from the last.")]
+if TYPE_CHECKING:
+    SceneFile = Scene
+else:
+    SceneFile = ScenePath
+"""The argument SCENE of a `command` that reads its scene."""
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+
+
+class Answer(NamedTuple):
+    """What a command has to say.
+
+    Attributes
+    ----------
+    says : sequence of str
+        Lines of the result for people, in place of which --json prints `result`.
+    result : dict, optional
+        The result for programs.
+    written : str
+        What was written: a line after the result, with --json on standard error.
+    fails : callable, optional
+        Called in the end; raises the error of a result that is a failure.
+    """
+
+    says: Sequence[str] = ()
+    result: dict[str, Any] | None = None
+    written: str = ""
+    fails: Callable[[], object] | None = None
+
+
+def command(
+    app: typer.Typer,
+    example: str,
+    *,
+    name: str | None = None,
+    reads: str | None = None,
+    task: Task | None = None,
+    kept: str | None = None,
+    as_json: bool = True,
+    hidden: bool = False,
+) -> Callable[[Callable[P, Answer | None]], Callable[P, Answer | None]]:
+    """Make a function a command: its scene is read, its folder is locked, and its answer is printed, on rank 0.
+
+    An error that the function raises is printed in one sentence by :mod:`faultgouge.exit_status`; `say`, `status` and
+    `progress` show how far the work is.
+
+    Parameters
+    ----------
+    app : typer.Typer
+        The commands of the module.
+    example : str
+        Of the help.
+    name : str, optional
+        Of the command; by default that of the function.
+    reads, task : str, optional
+        The argument `scene`, of type `SceneFile`, is read as this command reads it, before anything is written; a task
+        that would never end is refused.
+    kept : str, optional
+        The option `output` is a folder, which is made and kept from other runs; and what an interrupt leaves in it, in
+        words that name it as {output}.
+    as_json : bool
+        Whether the command has the option --json.
+    """
+
+    def register(work: Callable[P, Answer | None]) -> Callable[P, Answer | None]:
+        own = inspect.signature(work)
+
+        @wraps(work)
+        def run(*args: Any, as_json: bool = False, **options: Any) -> None:
+            given = own.bind(*args, **options)
+            given.apply_defaults()
+            if reads is not None:
+                given.arguments["scene"] = read_scene(given.arguments["scene"], reads, task)
+            if kept is not None:
+                keeps(kept.format(**given.arguments), given.arguments["output"])
+            with nullcontext() if kept is None else lock_folder(given.arguments["output"]):
+                answer = work(*given.args, **given.kwargs) or Answer()
+            if as_json and answer.result is not None:
+                print_json(answer.result)
+            for line in () if as_json else answer.says:
+                print_line(line)
+            if answer.written:
+                (say if as_json else print_line)(answer.written)
+            if answer.fails is not None:
+                answer.fails()
+
+        flag = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=AsJson)
+        hints = get_type_hints(work, include_extras=True)
+        parameters = [each.replace(annotation=hints[key]) for key, each in own.parameters.items()]
+        parameters += [flag] if as_json else []
+        vars(run)["__signature__"] = own.replace(parameters=parameters, return_annotation=None)
+        run.__annotations__ = {each.name: each.annotation for each in parameters}
+        app.command(name, epilog=f"Example: {example}", hidden=hidden)(run)
+        return work
+
+    return register
 
 
 def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
     """The part of a scene file that a command reads; a task that would never end is refused."""
-    from faultgouge.analysis.files.formats.registry import READERS
+    from faultgouge.analysis.files.formats import READERS
     from faultgouge.pywrap.scenes.impossible import refuse_endless
     from faultgouge.pywrap.scenes.scene import Scene
 
@@ -298,10 +395,3 @@ def progress(items: Iterable[T], what: str, total: int | None = None, done: int 
         for item in items:
             bar.advance(task)
             yield item
-
-
-def table_of(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """A table as lines of text; a column is as wide as its widest entry."""
-    lines = [list(headings), *map(list, rows)]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join("   ".join(map(str.ljust, line, widths)).rstrip() for line in lines)

@@ -11,8 +11,7 @@ from ..mpi_rank import is_root
 from .terminal import AsJson, Frame, NewFolder, lock_folder, print_json, print_line, refuse_scene, say, status
 
 if TYPE_CHECKING:
-    from ..analysis import Configuration, ElasticModuli, Vibrations, PlaneWave
-    from ..analysis.has_configuration import HasConfiguration
+    from ..analysis import Configuration, ElasticModuli, Packing, PlaneWave, Vibrations
 
 app = typer.Typer()
 
@@ -95,7 +94,6 @@ def vibrations(
     packing = _packing(file, frame, material)
     if not is_root():
         return
-    configuration = packing.configuration
     with lock_folder(output), status(f"{file}: vibrations") as show, show_progress(show):
         found = vibrations_of(packing)
         soft, error = softness(packing)
@@ -109,7 +107,7 @@ def vibrations(
                     plane = compute(packing, "xyz".index(along), waves)
             except BadInputError as reason:
                 say(f"no {name}: {reason}")
-        _write(output, configuration, found, soft, error, plane, moduli)
+        _write(output, packing, found, soft, error, plane, moduli)
         _draw(output, found, plane, moduli)
     few = "all modes" if found.modes is not None else f"window {found.resolution[0] / found.largest:.2g} of the largest"
     print_line(
@@ -120,11 +118,13 @@ def vibrations(
         print_line(repr(moduli).strip("<>"))
 
 
-def _packing(file: Path, frame: int, material: str | None) -> HasConfiguration:
+def _packing(file: Path, frame: int, material: str | None) -> Packing | Configuration:
     """A stored packing, or the spheres of a table."""
     from faultgouge.analysis.files.contact_tables import material_of, read_spheres
     from faultgouge.stored_files import load
 
+    if material is None and file.suffix in (".csv", ".txt", ".dump", ".data"):
+        raise typer.BadParameter(f"{file} is a table: give its --material, as in young=7e10,poisson=0.25,density=2500")
     return load(file, frame) if material is None else read_spheres(file, frame).of_material(material_of(material))
 
 
@@ -134,14 +134,14 @@ def _columns(found: Vibrations) -> dict[str, Any]:
 
 
 def _write(
-    folder: Path, configuration: Configuration, found: Vibrations, soft: Any, error: Any, plane: list[PlaneWave],
+    folder: Path, packing: Packing | Configuration, found: Vibrations, soft: Any, error: Any, plane: list[PlaneWave],
     moduli: ElasticModuli | None,
 ) -> None:  # fmt: skip
     import json
     from math import isfinite
 
     from faultgouge.analysis.files.atomic_write import write_whole
-    from faultgouge.analysis.files.formats.configuration_export import export_configuration
+    from faultgouge.analysis.files.formats import write_packing
 
     def plain(values: Any) -> list[float | None]:
         return [each if isfinite(each) else None for each in values.tolist()]
@@ -166,7 +166,7 @@ def _write(
         rows = [",".join(map(repr, map(float, row))) for row in zip(*columns.values(), strict=True)]
         write_whole(folder / f"{name}.csv", "\n".join([",".join(columns), *rows, ""]).encode())
     for suffix in (".xyz", ".vtp"):
-        export_configuration(folder / f"softness{suffix}", configuration, values={"softness": soft})
+        write_packing(folder / f"softness{suffix}", packing, values={"softness": soft})
 
 
 def _draw(folder: Path, found: Vibrations, plane: list[PlaneWave], moduli: ElasticModuli | None) -> None:

@@ -1,5 +1,7 @@
 """K and C by differences of LAMMPS's forces: beside the measured laws, beside LAMMPS's motion, and through a file."""
 
+import re
+
 import numpy as np
 import pytest
 from granular_packings import LAWS, command, head, instance
@@ -183,6 +185,8 @@ def test_spheres_in_an_edge_and_in_a_corner_of_a_region(lammps_with, kisses):
     if kisses:  # nothing presses the sphere along x
         assert list(found.ids[found.one_sided_particles]) == [1]
         assert verdict.stable is None
+        left = re.search(r"LAMMPS itself, pushed by .* has (\S+) of the kinetic energy of the push", found.remarks[-1])
+        assert 0 < float(left[1]) < 1
     else:
         assert found.operator_error < 1e-6
         assert found.proof < 1e-5

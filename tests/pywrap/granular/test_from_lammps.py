@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from granular_packings import ALMOST_NONE, HERTZ, LAWS, MOVES, RESCALED, command, start, with_law
+from granular_packings import ALMOST_NONE, HERTZ, LAWS, MOVES, RESCALED, TWO, command, start, with_law
 from packing_snapshot import snapshot_of
 
 from faultgouge.analysis import damping_matrix, largest_frequency, spectrum, stable_timestep, stiffness_matrix
@@ -199,7 +199,7 @@ def test_a_lammps_without_the_plugin(tmp_path):
     assert done.stdout.split() == ["2"], done.stderr
 
 
-@pytest.mark.parametrize("kt", [10.0, 1e9])
+@pytest.mark.parametrize("kt", [1e-12, 10.0, 1e9])
 @pytest.mark.parametrize("model", ["mindlin", "mindlin_classic"])
 def test_soft_and_stiff_springs(two, model, kt):
     """Coulomb's bound of a spring 1e4 times softer than the normal one, and stiffness of one 1e4 times stiffer."""
@@ -208,12 +208,77 @@ def test_soft_and_stiff_springs(two, model, kt):
     law = f"hertz 1e5 0 tangential {model} {kt} 0 0.5"
     wall = f"fix w all wall/gran granular {law} zplane 0 NULL contacts"
     lmp, told = two("granular", f"* * {law}", wall + MOVES)
-    c = from_lammps(lmp, told, balance=np.inf).contacts
+    found = from_lammps(lmp, told, balance=np.inf)
+    c = found.contacts
+    assert found.remarks == ()
     assert len(c) == 2
     radius = np.where(c.wall, 0.5, 0.25)
     # roundings of forces
     assert c.friction == pytest.approx(0.5 * c.normal_force, rel=1e-9)
     assert c.tangential_stiffness == pytest.approx(kt * np.sqrt(radius * c.overlap), rel=1e-9)
+
+
+def test_the_last_line_of_two_types_holds(two):
+    """The first let the particles settle without friction; and a dashpot of 0 is none, with any way to take steps."""
+    from faultgouge.pywrap import from_lammps
+
+    last = "* * hertz 1e5 0 tangential mindlin 3e4 1.0 0.5 damping mass_velocity synchronized_verlet"
+    found = []
+    for first in ("* * hertz 1e5 1 tangential linear_nohistory 1.0 0.0;", ""):
+        lmp, told = two("granular", first + last, MOVES.strip())
+        found.append(from_lammps(lmp, told, balance=np.inf))
+    assert found[0] == found[1]
+    assert found[0].operators == "laws"
+    assert not found[0].damped
+
+
+def test_why_differences_are_taken(two):
+    from faultgouge.pywrap import from_lammps
+
+    lmp, told = two("granular", "* * hertz 1e5 1 tangential linear_nohistory 1.0 0.5", MOVES.strip())
+    found = from_lammps(lmp, told, balance=np.inf)
+    assert found.operators == "differences"
+    assert "tangential linear_nohistory keeps no history" in found.remarks[0]
+
+
+def test_a_lattice_whose_spheres_just_touch(lammps_with):
+    """Overlaps of rounding are no contacts, and there is nothing to compare a motion with."""
+    from faultgouge.pywrap import NotTakenError, compare_motion, from_lammps
+
+    lmp = lammps_with(f"""
+units si
+atom_style sphere
+boundary p p p
+newton off
+comm_modify vel yes
+lattice fcc {2**0.5}
+region box block 0 2 0 2 0 2
+create_box 1 box
+create_atoms 1 box
+set group all diameter 1.0 density 1.0
+pair_style {HERTZ}
+pair_coeff * *
+fix move all nve/sphere
+run 0
+""")
+    found = from_lammps(lmp)
+    assert len(found) == 32
+    assert len(found.contacts) == 0
+    with pytest.raises(NotTakenError, match="Nothing that moves has a contact"):
+        compare_motion(lmp, found, 1.0, 1e-6)
+
+
+def test_what_is_said_of_spheres_that_fall_or_grow(lammps_with):
+    """No histories are lost where friction cannot bear the weight, and fix adapt may do anything in the next run."""
+    from faultgouge.pywrap import NotTakenError, from_lammps
+
+    deck = TWO.replace("atom_style sphere", "atom_style sphere 1") + f"pair_style {HERTZ}\npair_coeff * *{MOVES}\n"
+    lmp = lammps_with(deck + "fix load all gravity 1e9 vector 0 0 -1\nrun 0")
+    with pytest.raises(NotTakenError, match="The packing moves") as refusal:
+        from_lammps(lmp)
+    assert "histories" not in str(refusal.value)
+    command(lmp, "variable size equal 1+1e-9*step\nfix grow all adapt 1 atom diameter v_size\nrun 0")
+    assert from_lammps(lmp, balance=np.inf).remarks[0].startswith("fix grow (adapt) may change sizes or laws as LAMMPS")
 
 
 def test_two_spheres_that_touch_twice(lammps_with):
