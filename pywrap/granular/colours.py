@@ -41,12 +41,12 @@ def neighbouring_pairs(lmp: Any, c: Configuration) -> Pairs:
     gap = np.linalg.norm(x[i] - x[j], axis=1) - radius[i] - radius[j]
     others = _acting(lmp)
     if lmp.extract_setting("molecule_flag"):
-        for each in (lmp.numpy.gather_bonds(), lmp.numpy.gather_angles()):
+        for each in filter(len, (lmp.numpy.gather_bonds(), lmp.numpy.gather_angles())):
             members = np.asarray(each).reshape(len(each), -1)[:, 1:]
             others += [members[:, pair] for pair in combinations(range(members.shape[1]), 2)]
-    bonded = np.concatenate(others).astype(np.int64)
+    bonded = np.concatenate(others)
     pairs = np.searchsorted(c.ids, np.concatenate([ids[np.column_stack([i, j])], bonded]))
-    return Pairs(*pairs.T, np.concatenate([gap, np.full(len(bonded), -np.inf)]))
+    return Pairs(pairs[:, 0], pairs[:, 1], np.concatenate([gap, np.full(len(bonded), -np.inf)]))
 
 
 def _acting(lmp: Any) -> list[Indices]:
@@ -61,7 +61,7 @@ def _acting(lmp: Any) -> list[Indices]:
         lmp.command("run 0 post no")
         acts = None
     rows = lmp.numpy.extract_compute("faultgouge_i", 2, 2)
-    pairs = np.zeros((0, 2)) if rows is None else np.array(rows).reshape(-1, 2)
+    pairs = np.zeros((0, 2), int) if rows is None else np.array(rows).reshape(-1, 2).astype(np.int64)
     return [pairs if acts is None else pairs[acts[: len(pairs)]]]
 
 

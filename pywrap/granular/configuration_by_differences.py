@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 from ...analysis import Configuration, LinearisedContacts
 from ...analysis.arrays import Floats, derive_frozen
 from .balance import TWICE, force_scale, touch_twice
-from .contact_geometry import OneLaw, contacts_of_pairs
+from .configuration_by_laws import OneLaw, contacts_of_pairs
 from .force_differences import measure_operators
 from .granular_commands import BODIES, OWN, Commands, NotTakenError, without_suffix
 from .instance_queries import open_files

@@ -180,11 +180,11 @@ def _measure(
     unexplained = np.where(jump > 0, 0.0, error)
     worst = int(np.argmax(unexplained))
     if unexplained[worst] > LARGEST_OPERATOR_ERROR:
-        place = ", ".join(f"{x:.6g}" for x in c.position[worst])
+        there = ", ".join(f"{x:.6g}" for x in c.position[worst])
         others = int(np.sum(unexplained > LARGEST_OPERATOR_ERROR)) - 1
         raise NotTakenError(
             f"K and C by differences of forces are {unexplained[worst]:.2g} of their largest entry from the forces of "
-            f"a displacement of all particles at particle {c.ids[worst]} at ({place})"
+            f"a displacement of all particles at particle {c.ids[worst]} at ({there})"
             f"{f', and at {others} more' if others else ''}: contacts there are about to open, to close or to slide, "
             "or lie between both planes of one fix wall/gran, of which LAMMPS has the nearer act alone (write a fix "
             "for each plane), or something couples particles that are no neighbours; run on with drag under a load "

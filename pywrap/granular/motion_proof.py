@@ -31,6 +31,7 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...analysis import Configuration
 from ...analysis.arrays import Floats
@@ -259,7 +260,7 @@ class _Comparison:
         return overlap if len(overlap) else np.array([USUAL_OVERLAP * self.configuration.radius.mean()])
 
     @property
-    def _rattle(self) -> Floats:
+    def _rattle(self) -> NDArray[np.bool_]:
         c = self.configuration
         return np.tile(np.isin(np.arange(len(c)), c.rattlers), c.axes)
 

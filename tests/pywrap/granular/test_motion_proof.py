@@ -250,32 +250,6 @@ run 60000
     lmp.close()
 
 
-def test_log_of_another_instance(tmp_path):
-    """Two instances of one process with one log: the commands of the second are found for the first."""
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
-    made = []
-    for kt in ("NULL", "2e3"):
-        lmp = instance(tmp_path / "log.lammps")
-        start(lmp, 3, 20)
-        command(lmp, f"""
-pair_style gran/hertz/history 3e3 {kt} 40 40 0.5 1
-pair_coeff * *
-fix floor all wall/gran hertz/history 3e3 {kt} 40 40 0.5 1 zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0.1 0 -1
-fix move all nve/sphere
-fix drag all viscous 1.5
-timestep 0.002
-run 60000
-""")  # fmt: skip
-        made.append(lmp)
-    with pytest.raises(NotTakenError, match=r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
-        from_lammps(made[0])
-    assert from_lammps(made[1]).proof < 1e-5
-    for lmp in made:
-        lmp.close()
-
-
 def test_bonds(tmp_path):
     """The laws have none: four spheres on a floor, two of them bonded, and no force in the bond but a small one."""
     from faultgouge.analysis import stiffness_matrix
