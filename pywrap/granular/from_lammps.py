@@ -36,8 +36,9 @@ def from_lammps(
 ) -> Configuration:
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
 
-    The instance does not change: its next run is the same to the bit as without the look, on any number of ranks, and
-    with the threads of `package omp`.
+    The instance does not change: its next run is the same to the bit as without the look. On several ranks, or with the
+    threads of `package omp`, LAMMPS itself runs zero steps: fixes and variables that these would change are refused by
+    their names before.
 
     Parameters
     ----------
@@ -63,13 +64,14 @@ def from_lammps(
     -------
     Configuration
         With its contacts' laws, as they are measured; or, where these do not apply (`operators` says which), with K and
-        C by differences of forces, on one rank. Its `remarks` name the drag and the velocities that are left out.
+        C by differences of forces, on one rank. Its `remarks` name the drag and the velocities that are left out, and
+        say why differences are taken.
 
     Raises
     ------
     NotTakenError
         If the packing cannot be taken: it moves, or has moving walls or bodies that rotate; or the commands are not
-        those of the instance; or LAMMPS's forces do not change as K says.
+        those of the instance; or LAMMPS's forces do not change as K says; or the look would change the next run.
     """
     return take_configuration(lmp, commands, {}, slides=slides, balance=balance, prove=prove, differences=differences)
 
@@ -102,7 +104,7 @@ def take_configuration(
 def _instead_of_laws(
     lmp: Any, given: Commands | None, reason: NotLinearisedError, *, slides: bool, balance: float, prove: bool
 ) -> Configuration:
-    """A Configuration by differences, with the reason among its remarks; or that by laws, where it is as close."""
+    """A Configuration by differences, with the reason among its remarks; or the reason, where it is not proved."""
     why = str(reason).rstrip(".")
     if not can_copy(lmp):
         raise NotLinearisedError(with_one_rank(reason)) from reason
