@@ -20,7 +20,7 @@ from .configuration_by_laws import KnownLaws, check_friction, configuration_by_l
 from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError, read_commands, with_one_rank
 from .instance_queries import open_files, require_instance
 from .look_in_a_copy import can_copy, in_a_copy
-from .looks import look_at_contacts
+from .looks import look
 from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError, OtherStiffnessError, push_remark
 from .motion_proof import prove as prove_motion
 
@@ -134,8 +134,8 @@ def _instead_of_laws(
 
 def _by_laws(lmp: Any, given: Commands | None, laws: KnownLaws, *, balance: float, prove: bool) -> Configuration:
     """A Configuration whose contacts have the laws that LAMMPS shows; a NotLinearisedError if something else acts."""
-    look = partial(look_at_contacts, lmp, given, open_files())
-    deck, fixes, found = in_a_copy(look) if can_copy(lmp) else look()
+    work = partial(look, lmp, given, open_files())
+    deck, fixes, found = in_a_copy(work) if can_copy(lmp) else work()
     try:
         configuration = configuration_by_laws(lmp, deck, found, laws)
     except ValueError as error:  # numbers that no contact at rest has
