@@ -232,7 +232,6 @@ DOORS = {
 INSIDE = {
     "analysis.files.formats.lammps_data": "the box of a data file for LAMMPS's own styles",
     "analysis.motion.one_sided": "the pages compare starts and steps of that motion",
-    "analysis.motion.one_sided_outcome": "the pages state the lengths with which the outcome is decided",
     "analysis.motion.rising_load": "the pages state the drag and the windows of a load that rises, and follow them",
     "analysis.windows.slices.slices": "the bases of a way of counting pairs that a page compares with all eigenvalues",
     "pywrap.granular.lammps_arrays": "velocities of a live LAMMPS are set in a unit that the Configuration has",

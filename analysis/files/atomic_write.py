@@ -51,7 +51,7 @@ MARK_BYTES = 1 << 16
 
 _COMMENT = f"{FORMAT_KEY}={FORMAT}".encode()
 _XML = b"<!-- " + _COMMENT + b" -->\n"
-_TEXT = b"tEXt" + b"Software\0" + _COMMENT
+_TEXT = b"tEXt" + b"Comment\0" + _COMMENT
 TRAILERS = {
     **dict.fromkeys((".md", ".html", ".svg", ".vtp", ".pvd"), _XML),
     ".pdf": b"%" + _COMMENT + b"\n",

@@ -27,7 +27,7 @@ from .motion_proof import prove as prove_motion
 
 def from_lammps(
     lmp: Any,
-    commands: Iterable[str] | None = None,
+    commands: Iterable[str] | Commands | None = None,
     *,
     slides: bool = False,
     balance: float = BALANCE,
@@ -78,7 +78,7 @@ def from_lammps(
 
 def take_configuration(
     lmp: Any,
-    commands: Iterable[str] | None,
+    commands: Iterable[str] | Commands | None,
     laws: KnownLaws,
     *,
     slides: bool,

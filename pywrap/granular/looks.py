@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.arrays import Floats
+from .balance import moving_region
 from .force_differences import HOLDS, MOVES
 from .granular_commands import (
     BODIES,
@@ -28,7 +29,6 @@ from .granular_commands import (
 from .instance_queries import OpenFile, Styles, communicator, log_of, only_log, said, styles_of
 from .lammps_arrays import Arrays, arrays_at_rest, contacts_of_plane, forces_in_order, given_back
 from .look_in_a_copy import can_copy, quieten
-from .moving_regions import moving_region
 from .translating_bodies import translating_bodies
 
 BY_CONTACT = ("contacts", "partners")

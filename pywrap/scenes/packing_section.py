@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis import BadInputError, MindlinLaw, Packing, PackingFileError, RunFile
 from ...analysis.arrays import Floats
-from ...analysis.files.formats import Disks, UpperLayerError, format_of, is_hdf5, packing_of, upper_layer
+from ...analysis.files.formats import Disks, format_of, is_hdf5, packing_of, upper_layer
 from ..lammps.restart_file import read_disks
 from .random_start import layer_size, random_start
 from .validation import NamesFile, Positive, Section, refusal_sentence
@@ -173,10 +173,9 @@ class StoredPacking(Section):
                     )
             return self
         try:
-            upper_layer(read_disks(self.file, self.frame), self.top)
+            upper_layer(read_disks(self.file, self.frame), self.top, "packing.top = ")
         except BadInputError as error:
-            says = error.sentence("packing.top", " = ") if isinstance(error, UpperLayerError) else str(error)
-            says = says.rstrip(".")
+            says = str(error).rstrip(".")
             raise refusal_sentence("file", f'= "{self.file.name}" is refused: {says}') from None
         return self
 

@@ -5,8 +5,12 @@ import os
 import signal
 import subprocess
 import sys
+from xml.etree import ElementTree
 
+import imageio_ffmpeg
+import numpy as np
 import pytest
+from PIL import Image
 from reference_layer import LAYER, REFERENCE, SMALL, toml
 
 from faultgouge.analysis import RunFile
@@ -15,7 +19,7 @@ from faultgouge.analysis.files.atomic_write import lock_output, write_json, writ
 from faultgouge.analysis.files.formats import write_packing
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.lammps.plain_file_names import plain_name, temporary_folder
-from faultgouge.studies.sweep.table import write_csv
+from faultgouge.studies.result_rows import write_csv
 
 SCENE = LAYER + toml({"ramp": {"step": 1e-3, "until": 2e-3}, "output": {"dumps": True}})
 STRANGE = """a 'b' "c" & <d> $x ${y} #"""
@@ -217,9 +221,23 @@ def test_what_others_have_written_is_kept(refusal, stored, command):
     "command", [each for each in OTHERS if each.split()[0] in ("draw", "movie", "view", "export") and "pvd" not in each]
 )
 def test_what_the_program_has_written_is_replaced(faultgouge_here, stored, command):
+    """And its mark is in no reader's way."""
+    path = stored / OTHERS[command]
     for _ in range(2):
         faultgouge_here(*command.split())
-        assert (stored / OTHERS[command]).stat().st_size > 1000
+        assert path.stat().st_size > 1000
+    if path.suffix in (".png", ".gif"):
+        with Image.open(path) as picture:
+            picture.verify()
+        with Image.open(path) as picture:
+            assert np.asarray(picture.convert("RGB")).std() > 1
+            assert path.suffix == ".gif" or picture.text["Comment"] == "faultgouge_format=1"
+    elif path.suffix in (".svg", ".vtp"):
+        assert ElementTree.parse(path).getroot().tag
+    elif path.suffix == ".mp4":
+        frames = imageio_ffmpeg.read_frames(str(path))
+        assert next(frames)["duration"] > 1
+        assert len(list(frames)) > 10
 
 
 def test_tables_of_the_program_are_known_by_their_first_line(tmp_path):

@@ -34,6 +34,7 @@ from ...packing.compensated import exact_sum
 from ...packing.geometry import nearest_image
 from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
+from ..atomic_write import FORMAT_KEY, check_format
 from ..plain_file import open_text, read_plain_text
 from ..runfile import law_of_parameters
 from .disks import Disks, Slips, of_columns, packing_of
@@ -264,12 +265,13 @@ def _sidecar(path: Path) -> dict[str, float]:
     if not path.is_file():
         return {}
     try:
-        return {
-            key: float(value)
-            for key, value in (line.split() for line in read_plain_text(path).splitlines() if line.strip())
-        }
+        lines = (line.split() for line in read_plain_text(path).splitlines() if line.strip())
+        found = {key: float(value) for key, value in lines}
     except ValueError as error:
         raise PackingFileError(f"{path} must have one key and one number a line.") from error
+    number = found.pop(FORMAT_KEY, None)
+    check_format(None if number is None else f"{number:g}", path)
+    return found
 
 
 def read_custom_dump(path: Path, frame: int | None = None) -> Disks:

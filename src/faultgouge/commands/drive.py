@@ -12,13 +12,12 @@ from ..analysis.table_display import table_of
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
 from .terminal import (
-    AsJson,
+    Answer,
     Out,
     ScenePath,
     check_output,
+    command,
     hold_lock,
-    print_json,
-    print_line,
     read_scene,
     say,
     say_remark,
@@ -38,8 +37,8 @@ SLIP_COLUMNS = (
 """Columns of the table of slips."""
 
 
-@app.command(epilog="Example: faultgouge drive drive.toml -o drive.h5")
-def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = False) -> None:
+@command(app, "faultgouge drive drive.toml -o drive.h5")
+def drive(scene: ScenePath, output: Out = Path("drive.h5")) -> Answer | None:
     """Draw the upper layer with a spring whose far end moves: the layer sticks and slips.
 
     The packing settles at F_x = 0; then the spring of [drive] draws, with the dashpots
@@ -66,21 +65,17 @@ def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = Fa
     for name, (path, scene_of_other) in others.items():
         _run(path, scene_of_other, f"driving {name}", start)
     if not is_root():
-        return
+        return None
     result = _result(output, wanted) | _advances(output, {name: path for name, (path, _) in others.items()})
     _write_table(table, result["slips"])
-    if as_json:
-        print_json(result)
-        return
-    print_line(_in_words(result, settings.spring == "rigid"))
     if result["strays"]:
         say(
             f"squeezed out of the bed, above the layer, where no force acts: disks "
             f"{', '.join(map(str, result['strays']))}; they were stopped there"
         )
-    if others:
-        print_line(_advance_in_words(result))
-    print_line(f"written to {', '.join(map(str, [output, *(path for path, _ in others.values())]))} and {table}")
+    says = [_in_words(result, settings.spring == "rigid"), *([_advance_in_words(result)] if others else [])]
+    files = ", ".join(map(str, [output, *(path for path, _ in others.values())]))
+    return Answer(says, result, f"written to {files} and {table}")
 
 
 def _run(

@@ -96,6 +96,7 @@ def test_names_as_lammps_has_them(dump_path, cluster):
         (".contacts", " slip", " other", "no column slip"),
         (".params", "mu 0", "nu 0", "does not name 'mu'"),
         (".params", "fx 0.5", "fx half", "one number a line"),
+        (".params", "fx 0.5", "fx 0.5\nfaultgouge_format 2", "has format 2 of faultgouge's files"),
         (".disks", "ITEM: TIMESTEP", "hello", "not a complete LAMMPS text dump"),
         (".disks", "OF ATOMS\n6", "OF ATOMS\n7", "7 rows are announced"),
         (".contacts", "ITEM: TIMESTEP\n0", "ITEM: TIMESTEP\n5", "no snapshot of step 0"),

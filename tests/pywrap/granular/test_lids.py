@@ -7,7 +7,7 @@ from pushes import in_steps, pushed
 
 from faultgouge.analysis import damping_matrix, stability, stiffness_matrix
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
-from faultgouge.analysis.motion.one_sided_outcome import random_pushes
+from faultgouge.analysis.motion.pushes import random_pushes
 
 CELL = """
 units lj
