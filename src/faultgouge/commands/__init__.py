@@ -16,7 +16,10 @@ import typer
 from .on_demand import CommandGroup, CommandsByName
 from .studies import find_command, names_of_commands
 
-FAMILIES = ("runs", "drive", "spectrum", "onset", "pictures", "import_command", "export_command", "studies", "sweeps", "examples")
+FAMILIES = (
+    "runs", "drive", "spectrum", "onset", "pictures", "vibrations", "import_command", "export_command", "studies",
+    "sweeps", "examples",
+)  # fmt: skip
 """Modules with commands."""
 
 
