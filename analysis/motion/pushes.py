@@ -7,8 +7,8 @@ odd (:mod:`~faultgouge.analysis.motion.one_sided`). Six numbers decide:
 - a motion *grows* if its kinetic energy, a mean over a tenth of a chunk, has grown to `GROWN_ENERGY` times that of the
   first tenth. No motion that no force opposes does: the energy of a particle that sliders have let go grows as the
   square of the time;
-- a motion *rests* if sticking contacts do not grow, and the sliders have come to rest: with the slips of two halves of
-  the second half of the time, and the ratio by which these fall, a share below `STILL_SHARE` of all slip is left to come;
+- a motion *rests* if sticking contacts do not grow, and the sliders have come to rest: with the slips of the last three
+  quarters of the time, and the ratio by which these fall, a share below `STILL_SHARE` of all slip is left to come;
 - it *has not settled* otherwise, after `CHUNKS` chunks, or `WORK_OF_MOTION` multiplications.
 
 Growth rate, amplification, the smallest push and the creep of laws with two derivatives are read from the same steps.

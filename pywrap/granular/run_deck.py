@@ -150,13 +150,17 @@ def carry_out_deck(path: Path, notice: Notice | None = None) -> EndedDeck:
             plugin.faultgouge_end_watch(lmp.lmp, int(complete))
     finally:
         os.chdir(here)
+    carried_out = communicator(lmp).bcast(carried_out, root=0)
     if lmp.extract_setting("box_exist"):
-        _close_files(lmp)
-    return EndedDeck(lmp, communicator(lmp).bcast(carried_out, root=0), stopped)
+        _close_files(lmp, carried_out)
+    return EndedDeck(lmp, carried_out, stopped)
 
 
-def _close_files(lmp: Any) -> None:
-    """Close the files that a deck has open, and have no run of this program end early."""
+def _close_files(lmp: Any, carried_out: list[list[str]]) -> None:
+    """Close the files that a deck has open; and have no run of this program end early, or need what is taken away."""
+    lost = [words[words.index("lost") + 1] for words in carried_out if "lost" in words and words[0] == "thermo_modify"]
+    lmp.command("thermo_style custom step")
+    lmp.command(f"thermo_modify lost {lost[-1] if lost else 'error'}")
     for name in lmp.available_ids("dump"):
         lmp.command(f"undump {name}")
     for name, style in styles_of(lmp).fixes.items():

@@ -12,8 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .analysis import BadInputError, Configuration, MindlinLaw, Packing, RunFile, Stability, read_dump
+from .analysis import elastic_moduli as moduli_of_packing
 from .analysis import spectrum as spectrum_of_packing
 from .analysis import stability as stability_of_packing
+from .analysis import stress as stress_of_packing
+from .analysis import vibrations as vibrations_of_packing
 from .analysis.files.configuration_file import holds_configuration, read_configuration
 from .analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
 from .analysis.files.runfile import law_of_parameters
@@ -156,6 +159,9 @@ def stability(
 
 
 spectrum = takes_file(spectrum_of_packing)
+stress = takes_file(stress_of_packing)
+elastic_moduli = takes_file(moduli_of_packing)
+vibrations = takes_file(vibrations_of_packing)
 
 
 def packing_in(run: RunFile, frame: int = -1) -> Packing:
