@@ -123,7 +123,7 @@ def test_a_rested_packing_holds_for_every_push_below_its_energy():
     told = stability(stuck_at_rest(exponent=1.0))
     assert told.stable is True
     assert told.push_time is None
-    assert "holds for every push up to the energy" in str(told)
+    assert "holds for every push of an energy up to" in str(told)
 
 
 @pytest.mark.parametrize(
