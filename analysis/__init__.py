@@ -27,8 +27,8 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .files.dumps import read_dump
     from .files.runfile import RunFile
     from .motion.buckling import negative_eigenvalues
-    from .motion.eigenvalues import mass_weighted
-    from .motion.fastest_growing import FastestGrowth, fastest_growing
+    from .motion.eigenvalues import Linear, mass_weighted
+    from .motion.growing import fastest_growing
     from .motion.growth import Growth, fit_growth, mean_square_displacement
     from .motion.growth_of_run import growth_of_run
     from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_modes
@@ -63,8 +63,9 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .windows.pair_over_load import pair_eigenvalues
 
 __all__ = [
-    "FLOOR", "BadInputError", "Complexes", "Configuration", "ContactGeometry", "Contacts", "FastestGrowth",
-    "FaultgougeError", "Floats", "Growth", "Indices", "LinearisedContacts", "MindlinLaw", "Mode", "Modes", "Motion",
+    "FLOOR", "BadInputError", "Complexes", "Configuration", "ContactGeometry", "Contacts",
+    "FaultgougeError", "Floats", "Growth", "Indices", "Linear", "LinearisedContacts", "MindlinLaw", "Mode", "Modes",
+    "Motion",
     "NoEquilibriumError", "NoGainError", "OneSidedMotion", "OneSidedOutcome", "Onset", "OnsetError", "OutputError",
     "Packing", "PackingFileError", "PowerLaw", "RisingMotion", "RunFile", "Signal", "Slip", "Snapshot", "Spectrum",
     "Stability", "TransientGain", "Window", "closest_to_meeting", "complex_windows", "damping_matrix",

@@ -33,8 +33,8 @@ from ..configuration import Configuration
 from ..fields_by_name import FieldsByName
 from ..progress import report_progress
 from .contact_reach import ContactReach
-from .fastest_growing import CHANCE
 from .one_sided import OneSidedState, OneSidedSystem
+from .random_state import CHANCE
 
 PUSHES = 2
 """Random pushes; the opposite of each is followed, too, since one-sided motion is not odd."""

@@ -12,11 +12,11 @@ import numpy as np
 from ..configuration import Configuration
 from .contact_reach import PUSH_OVER_RESIDUAL, ContactReach
 from .creep import Creep, follow_creep
-from .decay import Decay, follow_decay
+from .eigenvalues import Linear
+from .linear import LAPACK_UP_TO, linear_verdict
 from .motion import Motion
 from .one_sided import OneSidedSystem
 from .one_sided_outcome import OneSidedOutcome, follow_pushes, random_pushes
-from .rates import SLICED, Rates, rates_of
 from .spectrum import Spectrum, spectrum
 from .verdict import LinearNeighbour, WithoutDissipation
 
@@ -41,42 +41,42 @@ class LinearRates:
     ----------
     undamped : WithoutDissipation
         Of sticking contacts, without dissipation.
-    sticking, sliding : Rates
+    sticking, sliding : Linear
         With the dissipation, if all contacts at the bound stick, and if all slide on.
     one_sided : bool
         Whether contacts at the bound slide on ahead and stick on the way back.
     """
 
     undamped: WithoutDissipation
-    sticking: Rates
-    sliding: Rates
+    sticking: Linear
+    sliding: Linear
     one_sided: bool
 
     @classmethod
-    def of(cls, configuration: Configuration, known: Spectrum | None, large: bool) -> "LinearRates":
+    def of(
+        cls, configuration: Configuration, known: Spectrum | None, large: bool, time: float | None = None
+    ) -> "LinearRates":
         """Compute the rates; K's spectrum may be known.
 
         This spectrum decides without dissipation. With dissipation the spectrum is a remark, and where it takes longer
         than all else, the fastest motion without dissipation stands for it.
         """
-        wanted = configuration.coordinates <= SLICED if configuration.damped else not large
+        wanted = configuration.coordinates <= LAPACK_UP_TO if configuration.damped else not large
         found = spectrum(configuration) if known is None and wanted else known
         undamped, sticking = _without_dissipation(configuration, found)
         if configuration.damped:
-            sticking = rates_of(Motion.of(configuration))
+            sticking = linear_verdict(Motion.of(configuration), time=time)
         one_sided = bool(configuration.contacts.one_sided.any())
-        sliding = rates_of(Motion.of(configuration, sliding=True), decides=False) if one_sided else sticking
+        sliding = linear_verdict(Motion.of(configuration, sliding=True), decides=False) if one_sided else sticking
         return cls(undamped, sticking, sliding, one_sided)
 
 
-def _without_dissipation(configuration: Configuration, found: Spectrum | None) -> tuple[WithoutDissipation, Rates]:
+def _without_dissipation(configuration: Configuration, found: Spectrum | None) -> tuple[WithoutDissipation, Linear]:
     """Of sticking contacts: what grows without dissipation, and its eigenvalues s."""
     if found is None:
-        rates = rates_of(Motion.of(configuration, dissipation=False))
-        return WithoutDissipation(rates.growth_rate, None, None, rates.at_least), rates
-    unstable = 1j * np.sqrt(found.unstable)
-    grows = np.ones(len(unstable), bool)
-    rates = Rates(np.where(unstable.real < 0, -unstable, unstable), grows, found.free)
+        alone = linear_verdict(Motion.of(configuration, dissipation=False), decides=not configuration.damped)
+        return WithoutDissipation(alone.growth_rate, None, None, alone.at_least), alone
+    rates = Linear(not len(found.unstable), found.growth_rate(), free=found.free)
     return WithoutDissipation(found.growth_rate(), len(found.pairs), len(found.negative)), rates
 
 
@@ -99,14 +99,17 @@ class SmallMotion:
     push_time: float = 0.0
     residual_push: float = 0.0
     residual_displacement: float = 0.0
-    decay: Decay | None = None
+    said: str = ""
 
     @classmethod
     def of_linear(cls, linear: LinearRates, doubts: Sequence[str] = ()) -> "SmallMotion":
         """Of linear motion with sticking contacts."""
         sticking = LinearNeighbour.of(linear.sticking)
-        grows = None if doubts else bool(linear.sticking.grows.any())
-        return cls(grows, sticking.growth_rate, sticking, linear.sticking.free, sticking.at_least, doubts)
+        unknown = doubts or linear.sticking.stable is None
+        grows = None if unknown else not linear.sticking.stable
+        reasons = [*doubts, *linear.sticking.reasons]
+        said = linear.sticking.said
+        return cls(grows, sticking.growth_rate, sticking, linear.sticking.free, sticking.at_least, reasons, said=said)
 
     def beside_residual_forces(self, reach: ContactReach) -> "SmallMotion":
         """The outcome with what the residual forces do, beside the motion whose reach is given."""
@@ -122,24 +125,7 @@ def follow_small_motion(system: OneSidedSystem, linear: LinearRates, time: float
         outcome = _after_pushes(outcome, found, reach)
     elif outcome.grows is False:
         outcome = _as_contacts_part(outcome, system, time, pushes)
-    known = linear.sticking.decay if time is None else None
-    if outcome.grows is False and known is None and linear.sticking.searched:
-        known = follow_decay(system.motion, time)
-    return outcome if known is None or outcome.grows else _after_decay(outcome, known)
-
-
-def _after_decay(outcome: SmallMotion, decay: Decay) -> SmallMotion:
-    """The outcome where a random state says whether sticking contacts grow."""
-    says = f"{'with sticking contacts, ' if outcome.one_sided else ''}{decay}"
-    return replace(
-        outcome,
-        grows=decay.grows if outcome.grows is False else outcome.grows,
-        growth_rate=decay.growth_rate,
-        sticking=LinearNeighbour(decay.growth_rate, decay.searched),
-        free=decay.free,
-        reasons=[*outcome.reasons, *([says] if decay.grows is None else [])],
-        decay=decay,
-    )
+    return outcome
 
 
 def _as_contacts_part(linear: SmallMotion, system: OneSidedSystem, time: float | None, pushes: int) -> SmallMotion:
@@ -166,7 +152,7 @@ def _as_contacts_part(linear: SmallMotion, system: OneSidedSystem, time: float |
 
 def _after_pushes(sticks: SmallMotion, found: OneSidedOutcome, reach: ContactReach) -> SmallMotion:
     """The outcome of one-sided motion; unknown, too, if it is the motion after no push of any size."""
-    reasons, (least, most), residual = [], found.scales, reach.residual_scale
+    reasons, (least, most), residual = list(sticks.reasons), found.scales, reach.residual_scale
     if found.grows is None:
         reasons.append(
             f"the motion of contacts at Coulomb's bound has not settled within t = {found.time:.4g}, where D is "
@@ -184,7 +170,7 @@ def _after_pushes(sticks: SmallMotion, found: OneSidedOutcome, reach: ContactRea
         )
     return replace(
         sticks.beside_residual_forces(reach),
-        grows=found.grows,
+        grows=found.grows if found.grows or sticks.grows is not None else None,
         at_least=sticks.at_least and not found.grows,
         growth_rate=sticks.growth_rate if not found.grows or found.growth_rate is None else found.growth_rate,
         reasons=reasons,

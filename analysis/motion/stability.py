@@ -80,7 +80,7 @@ def stability(
         spectrum_of_stiffness = None  # of contacts that slide
     direction = None if rise is None else _direction(configuration, rise)
     large = configuration.coordinates > LARGE
-    linear = LinearRates.of(configuration, spectrum_of_stiffness, large)
+    linear = LinearRates.of(configuration, spectrum_of_stiffness, large, limit)
     doubts = (*reasons, *no_verdict(configuration))
     outcome, rising, not_followed = SmallMotion.of_linear(linear, doubts), None, ""
     if not doubts:
@@ -124,7 +124,7 @@ def _stability(
         stable=not outcome.grows if known else None, growth_rate=outcome.growth_rate, at_least=outcome.at_least,
         undamped=linear.undamped, at_bound=int(contacts.at_bound.sum()), one_sided=outcome.one_sided,
         creep=outcome.creep, largest_push=outcome.largest_push, push_time=outcome.push_time,
-        residual_push=outcome.residual_push, decay=outcome.decay, rising=rising,
+        residual_push=outcome.residual_push, said=outcome.said, rising=rising,
         sticking=outcome.sticking, sliding=LinearNeighbour.of(linear.sliding) if linear.one_sided else outcome.sticking,
         asymmetry={} if given else asymmetry(configuration), dissipative=configuration.damped,
         free=outcome.free, searched=outcome.sticking.searched, contacts=contact_count,

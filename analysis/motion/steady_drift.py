@@ -18,9 +18,9 @@ from ..errors import FaultgougeError
 from ..factors.sparse_lu import general_lu
 from .contact_reach import SAME_WAY
 from .eigenvalues import operator_rounding, zero_uncertainty
+from .linear import linear_verdict
 from .motion import Motion
 from .one_sided import OneSidedSystem
-from .rates import rates_of
 
 DIAGONAL_SHIFT = 1e-11
 """Number added to the diagonal of K, as a share of the largest entry, so that free motions do not divide by zero."""
@@ -70,8 +70,8 @@ def steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Flo
     else:
         return None
     if len(way):
-        found = rates_of(replace(motion, stiffness=stiffness))
-        if found.searched or found.grows.any():
+        found = linear_verdict(replace(motion, stiffness=stiffness))
+        if found.searched or not found.stable:
             return None
     return velocity
 

@@ -10,10 +10,9 @@ import numpy as np
 from ..counted import counted
 from .contact_reach import PUSH_OVER_RESIDUAL
 from .creep import Creep
-from .decay import Decay
+from .eigenvalues import Linear
 from .growth_in_words import exponential
 from .one_sided_outcome import OneSidedOutcome
-from .rates import Rates
 from .rising_load import RisingMotion
 
 WORN = "contacts bear less after they have closed and parted, so that vibration carries particles on"
@@ -39,7 +38,7 @@ class LinearNeighbour:
     at_least: bool = False
 
     @classmethod
-    def of(cls, rates: Rates) -> "LinearNeighbour":
+    def of(cls, rates: Linear) -> "LinearNeighbour":
         """The fastest motion."""
         return cls(rates.growth_rate, rates.searched, rates.at_least)
 
@@ -101,8 +100,8 @@ class Stability:
     residual_push : float
         Velocity of a push along an axis that moves the particles as far as the residual forces do; 0 where no motion
         was followed.
-    decay : Decay or None
-        What became of a random state with sticking contacts; None where eigenvalues decide.
+    said : str
+        How the verdict on sticking contacts is known, where not all eigenvalues are.
     rising : RisingMotion or None
         Drift and vibration over the rate of loading. None unless asked, and where the motion was `not_followed`.
     sticking, sliding : LinearNeighbour
@@ -136,7 +135,7 @@ class Stability:
     largest_push: float | None
     push_time: float
     residual_push: float
-    decay: Decay | None
+    said: str
     rising: RisingMotion | None
     sticking: LinearNeighbour
     sliding: LinearNeighbour
@@ -172,13 +171,11 @@ class Stability:
             return f"not known whether the packing is stable: {'; '.join(self.reasons)}"
         if not self.stable:
             how = " in spite of the dissipation" if self.dissipative else ""
-            if self.decay is not None and self.decay.grows:
-                return f"unstable: small motion grows{how}: {self.decay}"
             return f"unstable: small motion grows{how}, {exponential(self.growth_rate, 6, self.at_least)}"
         if self.one_sided is not None:
             return f"stable: {self._comes_to_rest(self.one_sided, free)}"
-        if self.decay is not None:
-            return f"stable: {self.decay}{free}"
+        if self.said:
+            return f"stable: {self.said}{free}"
         if self.dissipative and self.growth_rate < 0:
             motion = "every vibration" if self.creep else "every motion"
             return f"stable: {motion} decays, the slowest with D as exp({self.growth_rate:.6g} t){free}"
@@ -190,7 +187,7 @@ class Stability:
         left = outcome.slip_left
         until = "until the contacts have stopped sliding" if left == 0 else "while contacts slide"
         on = f", and they slide on by {left:.1%} at most as vibration decays" if left else ""
-        sticks = f"; with sticking contacts, {self.decay}" if self.decay else ""
+        sticks = f"; with sticking contacts, {self.said}" if self.said else ""
         ends = "comes to rest" if self.growth_rate < 0 else "ends in vibration that goes on, but does not grow"
         return (
             f"each of {outcome.pushes} pushes {ends}{free}; D reaches {outcome.amplification:.3g} times the "
@@ -324,7 +321,7 @@ class Stability:
             "largest_push": self.largest_push,
             "push_time": self.push_time,
             "residual_push": self.residual_push,
-            "decay": None if self.decay is None else self.decay.as_dict(),
+            "said": self.said,
             "rising": None if self.rising is None else self.rising.as_dict(),
             "sticking": vars(self.sticking),
             "sliding": vars(self.sliding),

@@ -51,7 +51,7 @@ from ...analysis.motion.eigenvalues import (
     exceeds_rounding,
     unit_rounding,
 )
-from ...analysis.motion.rates import SLICED
+from ...analysis.motion.spectrum import SLICED
 from ...pywrap import Equilibrium, Scene
 from ...pywrap.load_path import LoadPath
 from ...pywrap.scenes.study_sections import ModesSection
