@@ -24,7 +24,7 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .configuration import Configuration, Snapshot
     from .contacts import LinearisedContacts
     from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
-    from .files.dumps import read_dump
+    from .files.formats.lammps_dump import read_dump
     from .files.runfile import RunFile
     from .motion.buckling import negative_eigenvalues
     from .motion.eigenvalues import Linear, mass_weighted
@@ -34,9 +34,8 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_modes
     from .motion.motion import Motion
     from .motion.nearest_modes import nearest_modes
-    from .motion.one_sided_outcome import OneSidedOutcome
     from .motion.power_law import PowerLaw, fit_power_law
-    from .motion.pushed_motion import OneSidedMotion, one_sided_motion
+    from .motion.pushes import OneSidedMotion, OneSidedOutcome, one_sided_motion
     from .motion.response import layer_force, linear_response
     from .motion.rising_load import RisingMotion
     from .motion.signals import Signal

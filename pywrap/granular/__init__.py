@@ -8,11 +8,11 @@
 - `configuration_by_differences`: a Configuration with K and C by differences of LAMMPS's forces (`force_differences`,
   `force_slopes`); `force_probe` displaces the particles of one of the `colours` along the coordinates that `mobility`
   finds to move, bodies among them (`translating_bodies`)
-- `balance`: whether a packing rests; `moving_regions`: whether its walls do
+- `balance`: whether a packing rests, and its walls do
 - `motion_proof`: a few of LAMMPS's own steps (`lammps_steps`) beside those of the Configuration (`linear_steps`);
   `acting_fixes`: what explains a difference
 - `from_lammps`: the choice among all of these; `compare_motion`: a longer motion beside LAMMPS's
-- `relax`: an instance brought to rest; `lammps_path`: its loading path; `run_deck`: the deck of a user, run once;
+- `relax`: an instance brought to rest; `lammps_path`: its loading path; `run_deck`: the deck of a user, carried out by LAMMPS;
   `kept_state`: the last state of a deck that cannot be taken
 
 May import: `lammps`, `load_path`.

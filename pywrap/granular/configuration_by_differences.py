@@ -9,9 +9,8 @@ from scipy.sparse import csr_array
 from ...analysis import Configuration, LinearisedContacts
 from ...analysis.arrays import Floats, derive_frozen
 from .balance import TWICE, force_scale, touch_twice
-from .contact_geometry import OneLaw, contacts_of_pairs
+from .configuration_by_laws import OneLaw, contacts_of_pairs
 from .force_differences import measure_operators
-from .force_probe import ProbedParticles
 from .granular_commands import BODIES, OWN, Commands, NotTakenError, without_suffix
 from .instance_queries import open_files
 from .lammps_arrays import Arrays
@@ -43,12 +42,9 @@ def configuration_by_differences(lmp: Any, still: Still) -> Configuration:
 
     Its contacts are those of pairs that touch, with their forces as far as LAMMPS hands them out.
     """
-    made = still.configuration
-    place = np.zeros((len(made), 3))
-    place[:, : made.dimension] = made.position
-    bodies = tuple(still.commands.fixes[name] for name, style in still.fixes.items() if without_suffix(style) in BODIES)
-    particles = ProbedParticles(made.dimension, made.ids, place, made.radius, still.constraint, bodies)
-    measured = measure_operators(lmp, particles, force_scale(made) or None)
+    made, lines = still.configuration, still.commands.fixes
+    bodies = tuple(lines[name] for name, style in still.fixes.items() if without_suffix(style) in BODIES)
+    measured = measure_operators(lmp, made, still.constraint, bodies, force_scale(made) or None)
     return derive_frozen(
         made,
         stiffness=measured.stiffness,

@@ -1,5 +1,6 @@
 """Particles, contacts and fixes of a LAMMPS instance, read in a copy of the process if there can be one."""
 
+import re
 from contextlib import nullcontext, suppress
 from typing import Any
 
@@ -7,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.arrays import Floats
-from .force_probe import HOLDS, MOVES
+from .balance import moving_region
+from .force_differences import HOLDS, MOVES
 from .granular_commands import (
     BODIES,
     GIVE_LINE,
@@ -24,14 +26,20 @@ from .granular_commands import (
     read_commands,
     without_suffix,
 )
-from .instance_queries import OpenFile, Styles, communicator, log_of, only_log, styles_of
+from .instance_queries import OpenFile, Styles, communicator, log_of, only_log, said, styles_of
 from .lammps_arrays import Arrays, arrays_at_rest, contacts_of_plane, forces_in_order, given_back
 from .look_in_a_copy import can_copy, quieten
-from .moving_regions import moving_region
 from .translating_bodies import translating_bodies
 
 BY_CONTACT = ("contacts", "partners")
 """Arrays with a row for each contact; all others have one for each particle."""
+
+STILL = (
+    *WALLS, *MOBILE, "gravity", "viscous", "enforce2d", "slip/history", "low/parts", "dashpot/velocities", "store",
+    "keep/histories", "property/atom", "addforce", "spring", "indent", "halt", "adapt", "restrain", "NEIGH_HISTORY",
+    "DUMMY", "OMP",
+)  # fmt: skip
+"""Fixes, by the beginnings of their styles, to which zero steps without velocities do nothing that lasts."""
 
 SETTING = ("setforce", "aveforce", "lineforce", "planeforce")
 """Fixes that set forces, of which the force of a wall is then no difference."""
@@ -51,11 +59,13 @@ def look_at_contacts(
     styles = styles_of(lmp)
     check_instance(lmp, styles, given)
     plain = {name: without_suffix(style) for name, style in styles.fixes.items()}
-    groups = {name: given.fixes[name].split()[2] for name in plain if plain[name] in MOBILE}
+    groups = _groups(lmp, {name: given.fixes[name] for name in plain if plain[name] in MOBILE})
     walls = [name for name in plain if plain[name] in WALLS]
     columns = "dx dy dz force p3" if given.style == OWN else "dx dy dz force p1 p2 p3"
     if copied:
         quieten(lmp, drag=True)
+    else:
+        _refuse_changes(lmp, styles, given)
     silent = _silent_walls(styles, given)
     with nullcontext() if copied else given_back(lmp):
         mine = arrays_at_rest(lmp, groups, [name for name in walls if name not in silent], columns)
@@ -72,6 +82,33 @@ def look_at_contacts(
     found = {name: _join_ranks([each[name] for each in every]) for name in mine}
     order = np.argsort(found["id"], kind="stable")
     return given, styles.fixes, {name: rows if name in BY_CONTACT else rows[order] for name, rows in found.items()}
+
+
+def _refuse_changes(lmp: Any, styles: Styles, commands: Commands) -> None:
+    """Refuse a look by zero steps of the instance itself where they would change what is not given back: before any."""
+    cold = [name for name, line in commands.fixes.items() if set(line.split()[4:6]) <= {"0", "0.0"}]
+    changes = [
+        f"fix {name} {style}"
+        for name, style in styles.fixes.items()
+        if not without_suffix(style).startswith(STILL) and not (style.startswith("langevin") and name in cold)
+    ]
+    variables = re.findall(r"(?m)^Variable\[ *\d+\]: *(\w+),.*\b(?:random|normal)\(", said(lmp, "variables"))
+    if changes := [*changes, *(f"variable {name}" for name in variables)]:
+        raise NotTakenError(
+            "On several ranks or with threads a look runs zero steps of LAMMPS itself, by which "
+            f"{' and '.join(changes)} may write, count or draw random numbers, so that the next run would be another "
+            "one: take one rank and one thread, where the look is in a copy, or unfix or delete what is named."
+        )
+
+
+def _groups(lmp: Any, lines: dict[str, str]) -> dict[str, str]:
+    """The groups of fixes by their IDs; and those of the bodies of a fix rigid, by the ID and the group."""
+    groups = {name: line.split()[2] for name, line in lines.items()}
+    for name, line in lines.items():
+        if without_suffix(line.split()[3]) in BODIES:
+            bodies = translating_bodies(line, lmp.extract_setting("dimension"))
+            groups |= {f"{name} {body.group}": body.group for body in bodies}
+    return groups
 
 
 def _logged_commands(lines: list[str] | None) -> Commands:
@@ -108,11 +145,7 @@ def look_at_forces(
             raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINE}.")
     if moves := moving_region(lmp, given):
         raise NotTakenError(moves)
-    groups = {name: line.split()[2] for name, line in given.fixes.items() if name in moving}
-    for name in list(groups):
-        if without_suffix(styles.fixes[name]) in BODIES:
-            bodies = translating_bodies(given.fixes[name], lmp.extract_setting("dimension"))
-            groups |= {f"{name} {body.group}": body.group for body in bodies}
+    groups = _groups(lmp, {name: line for name, line in given.fixes.items() if name in moving})
     quieten(lmp, drag=True)
     found = arrays_at_rest(lmp, groups, [], columns)
     found["at walls"] = _forces_of_walls(lmp, styles, given, found)

@@ -15,7 +15,7 @@ from .analysis import spectrum as spectrum_of_packing
 from .analysis import stability as stability_of_packing
 from .analysis.files.configuration_file import holds_configuration, read_configuration
 from .analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
-from .analysis.files.runfile_header import law_of_parameters
+from .analysis.files.runfile import law_of_parameters
 from .analysis.has_configuration import HasConfiguration
 
 
@@ -134,7 +134,7 @@ def packing_in(run: RunFile, frame: int = -1) -> Packing:
     packing = run.packing(frame)
     if run.attributes.get("task") != "drive":
         return packing
-    from .pywrap.runs.drive_recorder import drive_of
+    from .pywrap.runs.drive import drive_of
 
     settings = drive_of(run)
     return packing if settings is None or settings.spring == "rigid" else replace(packing, spring=settings.spring)

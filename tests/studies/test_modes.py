@@ -10,8 +10,7 @@ from reference_layer import SMALL, toml
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, eigenvalues, spectrum, stiffness_matrix
 from faultgouge.pywrap import Engine, Equilibrium, Scene, equilibrate, settle
-from faultgouge.studies.modes import PairCounts
-from faultgouge.studies.modes.count_pairs import antisymmetric_norm, count_pairs, modes
+from faultgouge.studies.modes import PairCounts, antisymmetric_norm, count_pairs, modes
 from research.modes.sets import sets
 
 SCENE = SMALL | {

@@ -13,7 +13,7 @@ from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
 from faultgouge.pywrap import Engine, LoadPath, Scene, scene_path, settle
 from faultgouge.pywrap.onset import onset_run
 from faultgouge.pywrap.runs.path_error import PathError, PathErrors, squared_gap, with_path_error
-from faultgouge.studies.sweep.onset import onset
+from faultgouge.studies.onset import onset
 
 PAPER = Scene.from_toml(files("faultgouge") / "scenes/paper.toml").resolved()
 HUNDRED = {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}

@@ -23,9 +23,8 @@ from faultgouge.studies.executors import Processes, open_executor
 from faultgouge.studies.statistics import median_interval
 from faultgouge.studies.sweep import workers
 from faultgouge.studies.sweep.draw import draw_sweep, onsets_figure, reach_of
-from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
+from faultgouge.studies.sweep.run_sweep import merge, read_results, remaining_work, run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS, remaining_work
 from faultgouge.studies.sweep.user_function import user_function
 from faultgouge.studies.sweep.workers import WorkerError, compute_points
 
@@ -36,7 +35,7 @@ TOML += toml(SMALL, "scene.")
 
 def sweep_of(axes, task="onset", **changes):
     scene = {section: values | changes.get(section, {}) for section, values in SMALL.items()}
-    return Sweep.from_mapping({"task": task, "sweep": axes, "scene": scene}, TASKS)
+    return Sweep.from_mapping({"task": task, "sweep": axes, "scene": scene})
 
 
 def table(folder):
@@ -91,13 +90,13 @@ def test_what_settles_alike(axes, changes, shared):
 def test_bad_sweeps_are_refused_in_a_sentence(tmp_path, text, says):
     (tmp_path / "sweep.toml").write_text(text)
     with pytest.raises(SceneError, match=says):
-        Sweep.from_toml(tmp_path / "sweep.toml", TASKS)
+        Sweep.from_toml(tmp_path / "sweep.toml")
 
 
 def test_a_stored_packing_is_found_from_another_folder(tmp_path):
     (tmp_path / "packing.json").write_bytes(REFERENCE.read_bytes())
     mapping = {"task": "onset", "sweep": {"law.mu": [1.0]}, "scene": SMALL | {"packing": {"file": "packing.json"}}}
-    sweep = Sweep.from_mapping(mapping, TASKS, tmp_path)
+    sweep = Sweep.from_mapping(mapping, tmp_path)
     assert sweep.points[0].scene.packing.file == tmp_path / "packing.json"
 
 
@@ -120,7 +119,7 @@ def three(scene, settled, more):
 
 def function_sweep(folder, function, axes=None):
     scene = {"task": f"ask.py:{function}", "sweep": axes or {"packing.seed": "1:2"}, "scene": SMALL}
-    return Sweep.from_mapping(scene, TASKS, folder)
+    return Sweep.from_mapping(scene, folder)
 
 
 def test_a_function_of_the_users_is_a_task_and_its_errors_are_rows(tmp_path):
@@ -164,7 +163,7 @@ def test_a_function_that_cannot_be_called_is_refused_before_work(tmp_path, task,
     (tmp_path / "ask.py").write_text(FUNCTIONS)
     (tmp_path / "broken.py").write_text("def")
     with pytest.raises(SceneError, match=says):
-        Sweep.from_mapping({"task": task, "scene": SMALL}, TASKS, tmp_path)
+        Sweep.from_mapping({"task": task, "scene": SMALL}, tmp_path)
 
 
 def test_known_rows_tell_how_long_a_scene_takes(tmp_path):
@@ -345,7 +344,7 @@ def test_trigger_and_eruptions_as_tasks(tmp_path):
     scene = SMALL | more | {"eruptions": {"load": [0.02], "time": 1.0}}
     found = {}
     for task in ("trigger", "eruptions"):
-        wanted = Sweep.from_mapping({"task": task, "sweep": {"packing.seed": [2]}, "scene": scene}, TASKS)
+        wanted = Sweep.from_mapping({"task": task, "sweep": {"packing.seed": [2]}, "scene": scene})
         (row,) = run_sweep(wanted, tmp_path / task, say=id)
         assert draw_sweep([row], tmp_path / task, print).endswith("results.png")
         found[task] = row["result"]
@@ -397,9 +396,8 @@ WITHOUT_GUARD = """
 from pathlib import Path
 from faultgouge.studies.sweep.run_sweep import run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS
 
-run_sweep(Sweep.from_toml("sweep.toml", TASKS), Path("out"), workers=2)
+run_sweep(Sweep.from_toml("sweep.toml"), Path("out"), workers=2)
 """
 
 
@@ -448,7 +446,7 @@ def test_a_distributed_engine_whose_worker_is_killed_loses_nothing(tmp_path):
     """Dask's local cluster, as docs/howto_cluster.md has it."""
     distributed, dask = pytest.importorskip("distributed"), pytest.importorskip("dask")
     (tmp_path / "seeds.toml").write_text(SEEDS)
-    sweep, killed = Sweep.from_toml(tmp_path / "seeds.toml", TASKS), []
+    sweep, killed = Sweep.from_toml(tmp_path / "seeds.toml"), []
     alone = run_sweep(sweep, tmp_path / "alone", say=id, workers=1)
     stored = tmp_path / "cluster" / "results.jsonl"
     # one thread a worker: LAMMPS does not stand several in a process

@@ -9,10 +9,10 @@ from reference_layer import SMALL, toml
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import NoEquilibriumError, Scene, SceneError, settle
 from faultgouge.pywrap.onset import onset_run
+from faultgouge.studies import triggering
 from faultgouge.studies.reproduce import reproduce
 from faultgouge.studies.statistics import distribution, median_interval, quartiles, share, sign_test
-from faultgouge.studies.sweep import triggering
-from faultgouge.studies.sweep.triggering_summary import in_words, summary
+from faultgouge.studies.triggering import in_words, summary_of_rows
 
 SCENE = SMALL | {
     "packing": SMALL["packing"] | {"seed": 2},
@@ -130,7 +130,7 @@ def test_what_was_found_before_a_failure_is_kept(scene, monkeypatch):
 
 
 def test_eruptions_are_counted():
-    result = summary(MEMBERS)
+    result = summary_of_rows(MEMBERS)
     assert {name: (each["count"], each["of"]) for name, each in result["rises"].items()} == {"5": (3, 4), "10": (2, 4)}
     assert [each["count"] for each in result["control_rises"].values()] == [4, 0]
     assert (result["grows"]["count"], result["grows"]["of"]) == (2, 4)
@@ -148,9 +148,9 @@ def test_eruptions_are_counted():
 
 def test_the_summary_keeps_what_was_found_before_a_failure():
     broken = row(8, [end("onset", 0.01)], says="no eruption today")
-    result = summary([broken, row(9, says="did not settle")])
+    result = summary_of_rows([broken, row(9, says="did not settle")])
     assert (result["onsets"][0]["found"]["count"], result["lowered"]["of"], result["lowered_unknown"]) == (1, 0, 0)
-    assert in_words(summary([row(9, says="did not settle")])) == []
+    assert in_words(summary_of_rows([row(9, says="did not settle")])) == []
 
 
 @pytest.mark.slow

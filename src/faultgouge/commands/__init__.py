@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from .on_demand import CommandGroup, CommandsByName
+from .studies import find_command, names_of_commands
 
 FAMILIES = ("runs", "drive", "spectrum", "onset", "pictures", "import_command", "export_command", "studies", "sweeps")
 """Modules with commands."""
@@ -33,7 +34,8 @@ def program() -> Callable[..., object]:
     group = typer.main.get_command(app)
     assert isinstance(group, CommandGroup)
     apps = [import_module(f".{family}", __name__).app for family in FAMILIES]
-    group.commands = CommandsByName([each for app in apps for each in app.registered_commands])
+    described = [each for app in apps for each in app.registered_commands]
+    group.commands = CommandsByName(described, names_of_commands, find_command)
     return group
 
 

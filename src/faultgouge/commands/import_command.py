@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,8 +24,9 @@ SourceFile = Annotated[
     Path,
     typer.Argument(
         metavar="FILE",
-        help="A LAMMPS deck (.in); or LAMMPS data, dump or restart (atom style sphere), NAME.disks, CSV, extended "
-        "XYZ, GSD, packing.json, or a file that MDAnalysis reads with radii.",
+        help="A LAMMPS deck (.in), or a restart that was kept with its deck (NAME.restart beside NAME.restart.in); or "
+        "LAMMPS data, dump or restart (atom style sphere), NAME.disks, CSV, extended XYZ, GSD, packing.json, or a file "
+        "that MDAnalysis reads with radii.",
         show_default=False,
     ),
 ]
@@ -98,16 +100,23 @@ def import_(
     friction then starts with zero slips. If the file has slips, it relaxes with
     friction. The command prints how far the disks moved.
 
-    A LAMMPS deck (NAME.in, in.NAME) is run in its own folder, and its last state is
-    stored unchanged, with LAMMPS's own granular styles, disks or spheres. With --relax
-    LAMMPS first runs on with drag until the packing rests.
+    A LAMMPS deck (NAME.in, in.NAME) is run in its own folder, as lmp -in does there, and
+    its last state is stored unchanged, with LAMMPS's own granular styles, disks or
+    spheres. With --relax LAMMPS first runs on with drag until the packing rests. A state
+    that cannot be taken is kept in a restart file, with a deck that goes on from it.
     """
+    from faultgouge.analysis import BadInputError, PackingFileError
+
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
     lock_output(context, output)
+    given = [top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame]
+    is_bare = not floor and all(each is None for each in given)
+    kept = file.with_name(f"{file.name}.in")
+    if is_bare and file.suffix == ".restart" and kept.is_file():
+        file = kept
     if file.suffix == ".in" or file.name.startswith("in."):
-        given = [top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame]
-        if floor or any(each is not None for each in given):
+        if not is_bare:
             raise typer.BadParameter(
                 f"{file} is a deck, which says all by itself: leave all options but -o, --relax, --slides and --balance"
             )
@@ -116,14 +125,20 @@ def import_(
     if slides or balance is not None:
         raise typer.BadParameter("--slides and --balance are for a LAMMPS deck (.in): leave them out")
     laws = {"kn": kn, "kt": _number_or_text(kt), "mu": mu, "exponent": exponent}
-    disks = _place_disks(file, frame, floor, width, contacts)
-    packing = _packing(disks, top, scene, laws | {"fy": fy, "fx": fx, "inertia_factor": inertia})
+    try:
+        disks = _place_disks(file, frame, floor, width, contacts)
+        packing = _packing(disks, top, scene, laws | {"fy": fy, "fx": fx, "inertia_factor": inertia})
+    except (PackingFileError, BadInputError) as error:
+        lines = _deck_around(file) if is_bare else ""
+        if not lines:
+            raise
+        raise type(error)(f"{error}\n{lines}") from error
     _import_disks(file, output, disks, top, packing, relax)
 
 
 def _import_disks(file: Path, output: Path, disks: Disks, top: str | None, packing: Packing, relax: bool) -> None:
     """Store a packing in balance, and say what it is."""
-    from faultgouge.analysis.files.formats.upper_layer import layer_remark
+    from faultgouge.analysis.files.formats.disks import layer_remark
 
     for remark in (disks.remark, layer_remark(disks, top, packing.top)):
         if remark:
@@ -149,15 +164,50 @@ def _import_deck(file: Path, output: Path, slides: bool, balance: float | None, 
 
     keeps(f"nothing has been written to {output} yet")
     text = file.read_text(errors="replace") if file.is_file() else ""  # a deck may move its own file
-    with status(f"{file}: LAMMPS runs"):
+    with status(f"{file}: LAMMPS runs") as show:
         allowed = BALANCE if balance is None else balance
-        configuration = run_deck(file, slides=slides, balance=allowed, relaxes=relaxes, keep=output)
+        configuration = run_deck(
+            file, slides=slides, balance=allowed, relaxes=relaxes, keep=output, notice=say, show=show
+        )
+    keeps(f"{output} has been written; whether the packing is stable says `faultgouge spectrum {output}`", output)
     if is_root():
         write_configuration(output, configuration, {"deck": text})
-    keeps(f"{output} has been written; whether the packing is stable says `faultgouge spectrum {output}`", output)
     print_line(f"{repr(configuration).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
     print_line(_time_steps(configuration))
     print_line(_verdict(configuration, output))
+
+
+AROUND = """\
+pair_style gran/hertz/history 1e5 NULL 50 NULL 0.5 1   # the contact law: KN KT GAMMA_N GAMMA_T MU
+pair_coeff * *
+fix floor all wall/gran hertz/history 1e5 NULL 50 NULL 0.5 1 zplane 0 NULL contacts
+fix load all gravity 1.0 vector 0 0 -1
+fix move all nve/sphere
+fix drag all viscous 1.0
+timestep 1e-4
+run 100000   # until it rests; 0 for a restart at rest"""
+
+
+def _deck_around(file: Path) -> str:
+    """Lines of a deck for a restart or data file of LAMMPS, to be filled in; empty for other files."""
+    from faultgouge.analysis.files.formats import registry
+
+    if not file.is_file():
+        return ""
+    with file.open("rb") as stream:
+        head = stream.readline(500).decode(errors="replace")
+    if registry.is_restart(file):
+        reads = f"comm_modify vel yes\nread_restart {file.name}"
+    elif head.startswith("LAMMPS data file"):
+        units = (re.findall(r"units = (\w+)", head) or ["lj"])[0]
+        reads = f"units {units}\natom_style sphere\nboundary f f f\ncomm_modify vel yes\nread_data {file.name}"
+    else:
+        return ""
+    deck = file.with_suffix(".in").name
+    return (
+        f"For spheres, or any other law, write a deck beside it, here {deck} with the laws and walls of the run that "
+        f"made the file, and give `faultgouge import {deck}`:\n\n{reads}\n{AROUND}"
+    )
 
 
 def _verdict(configuration: Configuration, output: Path) -> str:
@@ -187,7 +237,7 @@ def _place_disks(file: Path, frame: int | None, floor: float, width: str | None,
     """The disks of the file; options replace numbers of the file."""
     from dataclasses import replace
 
-    from faultgouge.analysis.files.formats.csv_json import read_slips
+    from faultgouge.analysis.files.formats.tables import read_slips
     from faultgouge.pywrap.lammps.restart_file import read_disks
 
     disks = read_disks(file, frame).above(floor)
@@ -235,7 +285,7 @@ def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[st
 def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict[str, Any]) -> None:
     """Say in one sentence all that neither file nor options say, with the command that would do."""
     from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.files.formats.upper_layer import LAYER_WAYS
+    from faultgouge.analysis.files.formats.disks import LAYER_WAYS
 
     gaps = {"--top 10": "which disks are the upper layer"} if top is None and disks.top is None else {}
     if scene is None and "kn" not in values:
