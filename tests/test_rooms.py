@@ -234,7 +234,7 @@ INSIDE = {
     "analysis.motion.one_sided": "the pages compare starts and steps of that motion",
     "analysis.motion.one_sided_outcome": "the pages state the lengths with which the outcome is decided",
     "analysis.motion.rising_load": "the pages state the drag and the windows of a load that rises, and follow them",
-    "analysis.windows.slices.lanczos": "the bases of a way of counting pairs that a page compares with all eigenvalues",
+    "analysis.windows.slices.slices": "the bases of a way of counting pairs that a page compares with all eigenvalues",
     "pywrap.granular.lammps_arrays": "velocities of a live LAMMPS are set in a unit that the Configuration has",
     "pywrap.runs.path_error": "the stated errors that a page compares with true ones, at the windows of its own search",
     "pywrap.runs.drive_recorder": "slips and clock advances from the rows of a drive.h5",

@@ -9,28 +9,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, eye_array
+from scipy.sparse import csc_array
 from scipy.sparse.linalg import eigsh
 
 from ..arrays import Floats
-from .sparse_lu import symmetric_lu
 
-Solve = Callable[[Floats], Floats]
-Factorization = tuple[Solve, int]
 Counting = Callable[[Floats], Sequence[int]]
 """Shifts -> how many eigenvalues are below each."""
-
-
-def factor_shifted(matrix: csc_array, shift: float, mumps: bool = False) -> Factorization:
-    """The inverse of S - shift, and how many eigenvalues of S are below the shift.
-
-    The factors are made without pivoting, so that the signs of the pivots tell the inertia. What stability that costs
-    is for the caller to look at. The coordinates of S are in the order of elimination. `mumps` says whether MUMPS may
-    be used.
-    """
-    shifted = csc_array(matrix - shift * eye_array(matrix.shape[0]))
-    factors = symmetric_lu(shifted, ordered=True, symmetric=True, mumps=mumps)
-    return factors.solve, factors.negative
 
 
 def count_places(

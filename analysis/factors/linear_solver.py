@@ -29,7 +29,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from ..arrays import Floats, Indices
 from ..packing.disk_operators import SIGNS
-from .sparse_lu import Factors, SingularMatrixError, minimum_degree, symmetric_lu
+from .sparse_lu import Factors, SingularMatrixError, elimination_places, symmetric_lu
 
 Booleans = NDArray[np.bool_]
 
@@ -270,13 +270,7 @@ def elimination_order(i: Indices, j: Indices, disks: int, coordinates: Indices) 
         A permutation of range(E).
     """
     every = np.arange(disks)
-    ones = np.ones(len(i))
-    degree = np.bincount(i, minlength=disks) + np.bincount(j, minlength=disks)
-    # diagonally dominant, so that SuperLU, which orders only what it factors, has nothing to pivot
-    graph = coo_array(
-        (np.concatenate([-ones, -ones, degree + 1.0]), (np.concatenate([i, j, every]), np.concatenate([j, i, every]))),
-        shape=(disks, disks),
-    )
-    place = minimum_degree(csc_array(graph))
+    graph = coo_array((np.ones(2 * len(i) + disks), (np.concatenate([i, j, every]), np.concatenate([j, i, every]))))
+    place = elimination_places(csc_array(graph))
     axis, disk = np.divmod(coordinates, disks)
     return np.lexsort((axis, place[disk]))

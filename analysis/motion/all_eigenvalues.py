@@ -30,15 +30,16 @@ from scipy.sparse import csc_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Complexes, Floats
-from ..factors.inertia import count_places, factor_shifted, places_of_numbers
-from ..factors.sparse_lu import minimum_degree
+from ..factors.inertia import count_places, places_of_numbers
+from ..factors.lanczos import factor_shifted
+from ..factors.sparse_lu import elimination_places
 from ..progress import report_progress
 from .block_arnoldi import Reach, ShiftedDisc, SpectrumError
 from .modes import Modes
 
 
 @dataclass(frozen=True)
-class SliceSizes:
+class SpectrumSizes:
     """Sizes and tolerances of slices, with their reasons."""
 
     own: int = 36
@@ -61,7 +62,7 @@ class SliceSizes:
     """Coordinates up to which LAPACK finds all: a space of the largest size would hold them, in no less time."""
 
 
-SIZES = SliceSizes()
+SIZES = SpectrumSizes()
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,14 +107,14 @@ class SpectrumSlice:
         return self.values[(self.values.real >= low) & (self.values.real < high)]
 
 
-def all_eigenvalues(matrix: csr_array, sizes: SliceSizes = SIZES) -> AllEigenvalues:
+def all_eigenvalues(matrix: csr_array, sizes: SpectrumSizes = SIZES) -> AllEigenvalues:
     """All eigenvalues of a sparse matrix that is nearly symmetric.
 
     Parameters
     ----------
     matrix : scipy.sparse.csr_array, shape (n, n)
         A, such as M^(-1/2) K M^(-1/2) of the coordinates that feel a force; its pattern is symmetric.
-    sizes : SliceSizes
+    sizes : SpectrumSizes
         Sizes and tolerances.
 
     Returns
@@ -137,7 +138,7 @@ def all_eigenvalues(matrix: csr_array, sizes: SliceSizes = SIZES) -> AllEigenval
     return AllEigenvalues(every[np.lexsort((every.imag, every.real))], Modes.joined(parts))
 
 
-def _of_island(matrix: csr_array, sizes: SliceSizes) -> AllEigenvalues:
+def _of_island(matrix: csr_array, sizes: SpectrumSizes) -> AllEigenvalues:
     """Of coordinates that are all coupled: in slices, or by LAPACK if they are few."""
     if matrix.shape[0] > sizes.least:
         return _of_slices(matrix, sizes)
@@ -148,7 +149,7 @@ def _of_island(matrix: csr_array, sizes: SliceSizes) -> AllEigenvalues:
     return AllEigenvalues(values[order], Modes(values[marked], right[:, marked], left[:, marked]))
 
 
-def _of_slices(matrix: csr_array, sizes: SliceSizes) -> AllEigenvalues:
+def _of_slices(matrix: csr_array, sizes: SpectrumSizes) -> AllEigenvalues:
     """Of many coordinates."""
     spectrum = _SlicedSpectrum.of(matrix, sizes)
     slices = []
@@ -177,13 +178,13 @@ class _SlicedSpectrum:
     borders: Floats
     numbers: NDArray[np.int64]
     spacing: float
-    sizes: SliceSizes
+    sizes: SpectrumSizes
 
     @classmethod
-    def of(cls, matrix: csr_array, sizes: SliceSizes) -> "_SlicedSpectrum":
+    def of(cls, matrix: csr_array, sizes: SpectrumSizes) -> "_SlicedSpectrum":
         size = matrix.shape[0]
         symmetric = csc_array(0.5 * (matrix + matrix.T))
-        order = np.argsort(minimum_degree(symmetric))
+        order = np.argsort(elimination_places(symmetric))
         symmetric, ordered = csc_array(symmetric[order][:, order]), csc_array(matrix[order][:, order])
 
         def count(shifts: Floats) -> list[int]:

@@ -12,110 +12,29 @@ all that is wanted is in the small matrix :math:`B = (U^T V)^{-1} U^T A V`, whos
 V and U (Stewart and Sun, *Matrix Perturbation Theory*, 1990, ch. V).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eig, qr, schur
+from scipy.linalg import eig, schur
 from scipy.sparse import csc_array, eye_array
 
 from ..arrays import Complexes, Floats
 from ..errors import FaultgougeError
-from ..factors.sparse_lu import Factors, accurate_lu
+from ..factors.lanczos import BlockKrylov
+from ..factors.sparse_lu import Factors, general_lu
 from .modes import Modes
 
 ROOM = 1.06
 """Vectors of the next space, in units of those that would have been enough for the last one."""
-
-DEPENDENT = 1e-10
-"""Length of a new vector, beside the longest of its block, below which its direction is rounding."""
-
-
-PASSES, SHORTENED = 3, 0.5
-"""How often a block is made orthogonal to the whole space at the most, and the share of its length that has to be left
-for this to have been the last time: rounding is then twice that of a unit vector at the most (Daniel, Gragg, Kaufman
-and Stewart, Math. Comput. 30, 772 (1976)). With a share of 0.1 the slow motions of a hundred disks are not found."""
 
 
 class SpectrumError(FaultgougeError):
     """Eigenvalues were not found: one sentence."""
 
 
-class Krylov:
-    """An orthonormal basis Q of the block Krylov space of an operator, and H = Q^T F Q of the operator F.
-
-    A block is made orthogonal to all before it until that no longer shortens it much: once is not enough. Images by a
-    nearly symmetric operator have most of what they share with the space in the last two blocks, which come first, so
-    that the whole space is gone through once, or little more. The vectors are rows, so that the products of many with a
-    few take half of the time.
-
-    Parameters
-    ----------
-    operator : callable
-        F, of columns.
-    start : ndarray, shape (b, n)
-        The first block.
-    most : int
-        Vectors at the most.
-    """
-
-    def __init__(self, operator: Callable[[Floats], Floats], start: Floats, most: int) -> None:
-        self.operator, (self.block, size) = operator, start.shape
-        self.most = min(most, size - size % self.block)
-        self.basis = np.empty((self.most + self.block, size))
-        self.projection = np.zeros((self.most + self.block, self.most))
-        self.basis[: self.block] = qr(start.T, mode="economic")[0].T
-        self.used = 0  # vectors that have an image
-
-    @property
-    def full(self) -> bool:
-        """Whether no block is left."""
-        return self.used + self.block > self.most
-
-    def extend(self, wanted: int) -> None:
-        """So many vectors at least, or all."""
-        while self.used < max(wanted, 1) and not self.full:
-            last, known = slice(self.used, self.used + self.block), self.used + self.block
-            image = np.ascontiguousarray(self.operator(self.basis[last].T).T)
-            self._leave_space(image, known)
-            vectors, rest = qr(image.T, mode="economic", overwrite_a=True, check_finite=False)
-            if np.abs(np.diag(rest)).min() < DEPENDENT * np.abs(np.diag(rest)).max(initial=1e-300):
-                # a direction that rounding has chosen: any serves that is orthogonal to all before
-                part = vectors.T @ self.basis[:known].T
-                image = vectors.T - part @ self.basis[:known]
-                vectors, turned = qr(image.T, mode="economic", overwrite_a=True, check_finite=False)
-                self.projection[:known, last] += part.T @ rest
-                rest = turned @ rest  # the others have changed their signs
-            self.basis[known : known + self.block] = vectors.T
-            self.projection[known : known + self.block, last] = rest
-            self.used = known
-
-    def _leave_space(self, image: Floats, known: int) -> None:
-        """Make the images of the last block orthogonal to all vectors so far; H gets what they had of these."""
-        images = slice(self.used, known)
-
-        def leave(first: int) -> Floats:
-            part = image @ self.basis[first:known].T
-            np.subtract(image, part @ self.basis[first:known], out=image)
-            self.projection[first:known, images] += part.T
-            return np.asarray(np.linalg.norm(image, axis=1))
-
-        length = leave(max(0, known - 2 * self.block))
-        for _ in range(PASSES):
-            before, length = length, leave(0)
-            if np.all(length > SHORTENED * before):
-                return
-
-    @property
-    def square(self) -> Floats:
-        """H, shape (m, m)."""
-        return self.projection[: self.used, : self.used]
-
-    def residuals(self, vectors: Complexes) -> Floats:
-        """Of vectors of H, as of the operator's."""
-        rest = self.projection[self.used : self.used + self.block, self.used - self.block : self.used]
-        return np.asarray(np.linalg.norm(rest @ vectors[self.used - self.block :], axis=0))
+class Krylov(BlockKrylov):
+    """A space with vectors and subspaces of single eigenvalues."""
 
     def vector(self, wanted: complex) -> Complexes:
         """The vector of the space that belongs to one eigenvalue of H, by inverse iteration."""
@@ -224,7 +143,7 @@ class ShiftedDisc:
         SpectrumError
             If the largest space does not hold them.
         """
-        factors = accurate_lu(csc_array(matrix - shift * eye_array(matrix.shape[0])))
+        factors = general_lu(csc_array(matrix - shift * eye_array(matrix.shape[0])), ordered=True)
         start = np.random.default_rng(seed)
         krylov = Krylov(factors.solve, start.standard_normal((block, matrix.shape[0])), reach.most)
         while True:

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.sparse import bsr_array, csc_array, eye_array
 
 from ..arrays import Floats
-from ..factors.sparse_lu import ReorderedFactors
+from ..factors.sparse_lu import Factors, general_lu
 from .motion import Motion
 from .slow_motions import SlowMotions
 
@@ -145,7 +145,7 @@ class ImplicitSteps:
     """
 
     motion: Motion
-    factors: ReorderedFactors
+    factors: Factors
     reference: float
     slow: SlowMotions
     sigma: float
@@ -164,7 +164,7 @@ class ImplicitSteps:
         sigma, size = slow.radius, len(motion.active)
         shifted = motion.stiffness + sigma * motion.damping + sigma**2 * eye_array(size)
         u = slow.without(np.concatenate(random_state(motion)))
-        return cls(motion, ReorderedFactors.of(csc_array(shifted)), reference, slow, sigma, 2 / limit, u)
+        return cls(motion, general_lu(csc_array(shifted)), reference, slow, sigma, 2 / limit, u)
 
     @property
     def time_of_look(self) -> float:

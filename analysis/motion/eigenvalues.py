@@ -6,6 +6,8 @@ eigenvalue s of the first-order matrix Z grows if Re s exceeds :math:`\kappa u |
 :math:`\kappa = 1/|y^H x|` of unit left and right vectors.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
@@ -20,6 +22,45 @@ LAPACK's eigenvalues of one operator with its coordinates in different orders di
 over the 285 eigenvalues of a packing of 100 disks (measured, at five loads), and kappa of a pair that is
 itself noise is uncertain by a factor of two or so.
 """
+
+
+@dataclass(frozen=True)
+class Linear:
+    """What is known of linear motion: the one holder of a growth rate.
+
+    Attributes
+    ----------
+    stable : bool or None
+        Whether no motion grows beyond rounding; None if that is not known, for the `reasons`.
+    growth_rate : float
+        Of D, 1 / time: the largest 2 Re s that is known, negative if every motion decays; zero if that is zero but for
+        rounding, or if none is known.
+    error : float
+        Of the growth rate, 1 / time.
+    free : int
+        Motions that no force opposes, and that drift; they do not count.
+    s : complex
+        Of the fastest motion, Im s >= 0, 1 / time.
+    said : str
+        How it is known, a clause; empty where all eigenvalues are.
+    at_least : bool
+        Whether the growth rate is only known to be no less.
+    searched : float
+        Growth rate of D, 1 / time, below which growth may not have been seen; 0 where nothing else grows.
+    reasons : tuple of str
+        Why it is not known whether the packing is stable, clauses.
+    """
+
+    stable: bool | None
+    growth_rate: float
+    error: float = 0.0
+    free: int = 0
+    s: complex = 0j
+    said: str = ""
+    at_least: bool = False
+    searched: float = 0.0
+    reasons: tuple[str, ...] = ()
+
 
 IN_BALANCE = 1e-4
 """Residual force over the largest force up to which a packing is in equilibrium. Dumps with few digits leave

@@ -40,8 +40,9 @@ from scipy.sparse.linalg import eigs
 
 from ..arrays import Complexes, Floats
 from ..errors import BadInputError
+from ..factors.lanczos import DEPENDENT
 from ..progress import report_progress
-from .block_arnoldi import DEPENDENT, Krylov
+from .block_arnoldi import Krylov
 
 BLOCK = 4
 """Vectors of a start for two motions, and half of those for many. What grows alike, as in a crystal, needs several."""

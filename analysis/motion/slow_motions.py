@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, eye_array, vstack
 
 from ..arrays import Complexes, Floats, Indices
-from ..factors.sparse_lu import ReorderedFactors
+from ..factors.sparse_lu import general_lu
 from ..progress import report_progress
 from .block_arnoldi import Krylov, SpectrumError, ritz_values
 
@@ -148,7 +148,7 @@ def slow_motions(
     size = matrix.shape[0]
     largest = float(np.sqrt(abs(matrix).sum(axis=1).max()))
     shift = SLOW_SHIFT * largest
-    factors = ReorderedFactors.of(csc_array(matrix + shift * damping + shift**2 * eye_array(size)))
+    factors = general_lu(csc_array(matrix + shift * damping + shift**2 * eye_array(size)))
 
     def inverse(columns: Floats) -> Floats:
         place, speed = columns[:size], columns[size:]

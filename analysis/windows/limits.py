@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 
+from ..factors.lanczos import SliceSizes
+
 
 @dataclass(frozen=True)
-class Limits:
+class Limits(SliceSizes):
     """Sizes, shares and tolerances of the search; the defaults are meant for packings."""
 
     # Sizes at which the way changes
@@ -161,29 +163,8 @@ class Limits:
 
     # Slices of the spectrum
 
-    slice_size: int = 120
-    """Eigenvalues of a slice. Fewer cost more factorisations, more cost more orthogonalisation."""
     count_spacing: int = 240
     """Eigenvalues between two places at which they are counted; shifts are interpolated in between."""
-    block: int = 6
-    """Vectors that are solved for at a time: 0.7 ms each at 30,000 coordinates, against 2.6 ms one by one. Larger
-    blocks need more vectors for the same eigenvalues: 288 for a slice, with blocks of eight 304."""
-    first_look: int = 48
-    """Blocks of a Krylov space before its eigenvalues are looked at: enough for most slices."""
-    looks: int = 6
-    """Blocks between two looks. A look costs as much as two blocks of 30,000 coordinates, or as twenty of 3,000."""
-    last_look: int = 200
-    """Blocks at the most."""
-    blocks_together: int = 2
-    """Blocks that are made orthogonal to all before them at a time: three stray too far in most slices."""
-    stray_limit: float = 3e-6
-    """Part of a new vector along the basis, up to which the part is taken away afterwards; some 1e-7 at 29,000
-    coordinates. Its square, 1e-11, then remains in lengths and angles of the basis."""
-    vector_residual: float = 1e-2
-    """Residual of the eigenvectors of a slice, in mean distances of eigenvalues, as of the inverse. It enters an
-    eigenvalue as its square over the distance of modes outside: 4e-6 at the most was measured (29,000 coordinates).
-    An eigenvalue may be off its Rayleigh quotient with S by as much."""
-
     # The search in slices
 
     cluster_reach: float = 0.1
@@ -215,9 +196,6 @@ class Limits:
     clusters miss some: the time grows as their square."""
     wait_seconds: float = 2.0
     """Seconds between two looks at the results of other searches, when these have taken all slices that are left."""
-    chunk_rows: int = 1024
-    """Rows of a basis that are multiplied at a time: the product stays in the cache."""
-
     # Growth with dissipation, in slices
 
     bearing_share: float = 0.5
@@ -250,7 +228,7 @@ class Limits:
     """Residual of an eigenvalue that counts as found, in units of its own: that of single precision is some
     1e-4."""
     pivot: float = 0.01
-    """Share of the largest entry of a column from which on the diagonal entry is the pivot: MUMPS's default."""
+    """Share of the largest entry of a column from which on the diagonal entry is the pivot."""
     covered_share: float = 0.9
     """Share of the radius on the axis that counts as covered."""
     next_disc: float = 0.8
@@ -262,10 +240,6 @@ class Limits:
     """Share to which norms are found, and by which they are taken larger."""
     smallest_disc: float = 1e-6
     """Radius, in units of the largest frequency, below which the axis cannot be covered."""
-
-    def chunks(self, size: int) -> list[slice]:
-        """The rows of a basis, so many at a time."""
-        return [slice(first, first + self.chunk_rows) for first in range(0, size, self.chunk_rows)]
 
 
 LIMITS = Limits()

@@ -191,7 +191,7 @@ def _positive(packing: Packing, sigma: float) -> Factors | None:
     try:
         # symmetric, and without pivoting: the pivots are positive if and only if the matrix is positive definite; by
         # SuperLU, so that a seed gives the same packing whatever is installed
-        factors = symmetric_lu(matrix, mumps=False)
+        factors = symmetric_lu(matrix)
     except SingularMatrixError:
         return None
     return None if factors.negative else factors

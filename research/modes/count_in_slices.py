@@ -28,7 +28,7 @@ from scipy.sparse.linalg import splu
 
 from faultgouge.analysis import Packing, dynamical_matrix
 from faultgouge.analysis.windows import LIMITS, Limits
-from faultgouge.analysis.windows.slices.lanczos import slices
+from faultgouge.analysis.windows.slices.slices import slices
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

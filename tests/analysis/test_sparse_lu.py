@@ -5,16 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import csc_array, diags_array, eye_array, kron
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 
 from faultgouge.analysis.factors import sparse_lu
 from faultgouge.analysis.factors.ldu import CompiledFactors
 from faultgouge.analysis.factors.sparse_lu import (
-    ReorderedFactors,
     SingularMatrixError,
-    SuperLUFactors,
+    elimination_places,
     general_lu,
-    minimum_degree,
     symmetric_lu,
 )
 
@@ -27,18 +25,9 @@ def lattice(side):
     return csc_array(pattern + pattern.T)
 
 
-@pytest.fixture(params=["SuperLU", "MUMPS"])
-def backend(request, monkeypatch):
-    """Both back ends; SuperLU is the one up to many coordinates, and MUMPS one from none on."""
-    if request.param == "MUMPS":
-        pytest.importorskip("mumps")
-        monkeypatch.setattr(sparse_lu, "MUMPS_FROM", 0)
-    return request.param
-
-
 @pytest.mark.parametrize("ordered", [False, True])
 @pytest.mark.parametrize("shift", [-20.0, -3.0, 0.1, 4.0, 20.0])
-def test_pivots_tell_how_many_eigenvalues_are_negative(shift, ordered, backend):
+def test_pivots_tell_how_many_eigenvalues_are_negative(shift, ordered):
     matrix = lattice(10)
     factors = symmetric_lu(csc_array(matrix - shift * eye_array(300)), ordered=ordered, symmetric=True)
     assert factors.negative == np.count_nonzero(np.linalg.eigvalsh(matrix.toarray()) < shift)
@@ -47,7 +36,7 @@ def test_pivots_tell_how_many_eigenvalues_are_negative(shift, ordered, backend):
 @pytest.mark.parametrize("ordered", [False, True])
 @pytest.mark.parametrize("pivoting", [0.0, 0.01])
 @pytest.mark.parametrize("unit", [0.0, 1.0, 1j])
-def test_solutions_of_a_matrix_and_its_transpose(unit, pivoting, ordered, backend):
+def test_solutions_of_a_matrix_and_its_transpose(unit, pivoting, ordered):
     matrix = csc_array(lattice(12) + diags_array(20 + unit * np.arange(432.0)) + diags_array(np.ones(431), offsets=1))
     right = np.random.default_rng(1).standard_normal((432, 3))
     factors = symmetric_lu(matrix, ordered=ordered, pivoting=pivoting)
@@ -61,7 +50,7 @@ def test_order_of_particles_is_that_of_their_coordinates():
     matrix = csc_array(lattice(20) + 40 * eye_array(1200))
     mixed = np.random.default_rng(0).permutation(1200)
     shuffled = csc_array(matrix[mixed][:, mixed])
-    order = np.argsort(minimum_degree(shuffled))
+    order = np.argsort(elimination_places(shuffled))
     assert np.array_equal(np.sort(order), np.arange(1200))
     point = mixed[order] // 3
     assert np.array_equal(point, np.repeat(point[::3], 3))
@@ -69,7 +58,7 @@ def test_order_of_particles_is_that_of_their_coordinates():
         splu(each, permc_spec=name, diag_pivot_thresh=0.0, relax=1, options={"SymmetricMode": True}).nnz
         for each, name in ((csc_array(shuffled[order][:, order]), "NATURAL"), (shuffled, "MMD_AT_PLUS_A"))
     ]
-    assert entries[0] < 1.15 * entries[1]
+    assert entries[0] < 1.05 * entries[1]  # of larger matrices nested dissection leaves fewer
 
 
 def test_general_factors_of_a_matrix_without_a_diagonal():
@@ -85,7 +74,7 @@ def test_general_factors_of_a_matrix_without_a_diagonal():
 
 
 @pytest.mark.parametrize("ordered", [False, True])
-def test_singular_matrix_is_said_to_be_one(ordered, backend):
+def test_singular_matrix_is_said_to_be_one(ordered):
     matrix = lattice(12).tolil()
     matrix[7, :] = matrix[:, 7] = 0
     with pytest.raises(SingularMatrixError, match="432 rows"):
@@ -106,14 +95,14 @@ def dense(factors):
 @pytest.mark.parametrize("shape", [(432,), (432, 1), (432, 3), (432, 4), (432, 15)])
 def test_compiled_factors_solve(shape, symmetric):
     """An indefinite matrix, and numbers of right sides below, at and above the four that are solved for at a time."""
-    order = np.argsort(minimum_degree(lattice(12)))
+    order = np.argsort(elimination_places(lattice(12)))
     matrix = csc_array(lattice(12) - 3 * eye_array(432))[order][:, order]
     if not symmetric:
         matrix.data *= np.random.default_rng(5).uniform(0.9, 1.1, matrix.nnz)
     right = np.random.default_rng(2).standard_normal(shape)
     factors = symmetric_lu(matrix, ordered=True, symmetric=symmetric)
-    assert isinstance(factors, CompiledFactors)
-    lower, diagonal, upper = (np.abs(each) for each in dense(factors))
+    assert isinstance(factors.made, CompiledFactors)
+    lower, diagonal, upper = (np.abs(each) for each in dense(factors.made))
     # |A x - b| <= 5 n u |L| |D| |U| |x| (Higham, Accuracy and Stability of Numerical Algorithms, 2002, theorems 9.3
     # and 9.4, which count 3 n for L U)
     product = lower @ diagonal @ upper
@@ -133,8 +122,8 @@ def test_compiled_factors_are_those_of_the_matrix(size, entries, seed, symmetric
     if not symmetric:
         matrix *= rng.integers(0, 3, (size, size)) + 2 * size * np.eye(size)
     factors = symmetric_lu(csc_array(matrix), ordered=True, symmetric=symmetric)
-    assert isinstance(factors, CompiledFactors)
-    lower, diagonal, upper = dense(factors)
+    assert isinstance(factors.made, CompiledFactors)
+    lower, diagonal, upper = dense(factors.made)
     # |L D U - A| <= n u |L| |D| |U| (Higham, theorem 9.3)
     bound = (size + 2) * np.finfo(float).eps * np.abs(lower) @ np.abs(diagonal) @ np.abs(upper)
     assert np.all(np.abs(lower @ diagonal @ upper - matrix) <= 2 * bound)  # the product here is off by as much
@@ -151,8 +140,8 @@ def test_factors_of_rows_in_any_order(diagonal):
     moved = np.random.default_rng(4).permutation(432)
     matrix = csc_array(matrix[moved][:, moved])
     right = np.random.default_rng(5).standard_normal((432, 3))
-    factors = ReorderedFactors.of(matrix)
-    assert isinstance(factors.factors, CompiledFactors if diagonal else SuperLUFactors)
+    factors = general_lu(matrix)
+    assert isinstance(factors.made, CompiledFactors if diagonal else SuperLU)
     found = factors.solve(right)
     # other right sides than that for which the factors were looked at: ten times as far off at the most
     size = np.abs(matrix.data).max() * np.linalg.norm(found, axis=0)
@@ -163,9 +152,3 @@ def test_pivots_off_the_diagonal_are_left_to_superlu():
     matrix = csc_array(np.array([[0.0, 1.0], [1.0, 0.0]]))
     found = symmetric_lu(matrix, ordered=True, symmetric=True).solve(np.array([2.0, 3.0]))
     np.testing.assert_array_equal(found, [3.0, 2.0])
-
-
-def test_mumps_is_left_alone_where_it_may_not_be_used(backend):
-    matrix = csc_array(lattice(8) + 20 * eye_array(192))
-    assert isinstance(symmetric_lu(matrix, mumps=False), SuperLUFactors)
-    assert isinstance(symmetric_lu(matrix), SuperLUFactors) == (backend == "SuperLU")

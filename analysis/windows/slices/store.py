@@ -14,11 +14,11 @@ import fcntl
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from uuid import uuid4
 from zipfile import BadZipFile
 
@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Floats
 from ...errors import BadInputError
+from ...factors.lanczos import Border
 from ...files.atomic_write import make_folder, write_whole
 from ..limits import Limits
 from ..system import System
@@ -46,66 +47,6 @@ LOCK_FILE = "taken"
 
 class DamagedSliceError(BadInputError):
     """The file of a slice cannot be read: one sentence."""
-
-
-class Border(NamedTuple):
-    """The eigenvalues at the border of a slice, on which neighbouring slices must agree.
-
-    Attributes
-    ----------
-    modes : tuple of (int, int)
-        Numbers in the whole spectrum of the slice's first eigenvalue and of the first one beyond.
-    first, beyond : float
-        These eigenvalues, 1 / time^2; nan beyond the end of the spectrum.
-    spacing : float
-        Mean distance of the slice's eigenvalues and of the next ones on either side, 1 / time^2.
-    """
-
-    modes: tuple[int, int]
-    first: float
-    beyond: float
-    spacing: float
-
-    @property
-    def size(self) -> int:
-        """Number of modes in the slice."""
-        return self.modes[1] - self.modes[0]
-
-    @classmethod
-    def of(cls, number: int, values: Floats, own: slice) -> "Border":
-        """The border of a slice, from increasing eigenvalues, the number of the first, and which are its own."""
-        near = values[max(0, own.start - 1) : own.stop + 1]
-        beyond = float(values[own.stop]) if own.stop < len(values) else float("nan")
-        modes = number + own.start, number + own.stop
-        return cls(modes, float(values[own.start]), beyond, float(np.ptp(near)) / len(near))
-
-
-@dataclass(frozen=True, eq=False)
-class Slice:
-    """A run of neighbouring eigenvalues.
-
-    Attributes
-    ----------
-    first : int
-        Number in the whole spectrum of the first of `values`.
-    values : ndarray, shape (M,)
-        Eigenvalues, increasing: first those of a margin, then the slice's own ones, then another margin. Those farther
-        out in the margins are not converged.
-    vectors : ndarray, shape (E, M)
-        Orthonormal eigenvectors in columns.
-    own : slice
-        Which of the M belong to this slice and to no other.
-    """
-
-    first: int
-    values: Floats = field(repr=False)
-    vectors: Floats = field(repr=False)
-    own: slice
-
-    @property
-    def border(self) -> Border:
-        """The border, on which its neighbours must agree."""
-        return Border.of(self.first, self.values, self.own)
 
 
 @dataclass(frozen=True, eq=False)

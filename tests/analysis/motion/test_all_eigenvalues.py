@@ -15,11 +15,11 @@ from scipy.sparse import block_diag, csr_array
 from faultgouge.analysis import Configuration, LinearisedContacts, spectrum
 from faultgouge.analysis.contacts import BOOLEAN, PER_CONTACT
 from faultgouge.analysis.motion import spectrum as spectrum_module
-from faultgouge.analysis.motion.all_eigenvalues import SliceSizes, all_eigenvalues
+from faultgouge.analysis.motion.all_eigenvalues import SpectrumSizes, all_eigenvalues
 from faultgouge.analysis.motion.block_arnoldi import ShiftedDisc, SpectrumError
 from faultgouge.analysis.progress import show_progress
 
-SMALL = SliceSizes(own=24, block=4, least=30)
+SMALL = SpectrumSizes(own=24, block=4, least=30)
 
 
 def nearest(one, other):
@@ -76,7 +76,7 @@ def test_vectors_are_those_of_lapack():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("copies", "others", "sizes"),
-    [(5, 300, SMALL), pytest.param(20, 300, SMALL, marks=pytest.mark.long), (20, 150, SliceSizes())],
+    [(5, 300, SMALL), pytest.param(20, 300, SMALL, marks=pytest.mark.long), (20, 150, SpectrumSizes())],
 )
 def test_more_equal_eigenvalues_than_a_block_has_vectors(copies, others, sizes):
     """As of spheres that spin without a force. A slice that lacks some is found again with larger blocks."""
@@ -126,7 +126,7 @@ def test_forty_equal_pairs_and_forty_equal_negative_ones_are_counted(coupled, sl
     others = [np.array([[value]]) for value in rng.uniform(1, 50, 120)]
     whole = turned([*cells, *others], rng) if coupled else csr_array(block_diag([*cells, turned(others, rng)]))
     if sliced:
-        sizes = SliceSizes(own=24, least=30)
+        sizes = SpectrumSizes(own=24, least=30)
         monkeypatch.setattr(spectrum_module, "SLICED", 0)
         monkeypatch.setattr(spectrum_module, "all_eigenvalues", lambda matrix: all_eigenvalues(matrix, sizes))
     found = spectrum(of_stiffness(whole))

@@ -13,10 +13,10 @@ from test_slicing import FEW, on_ranks
 
 from faultgouge.analysis import FaultgougeError
 from faultgouge.analysis.errors import OutputError
+from faultgouge.analysis.factors.lanczos import SliceError
 from faultgouge.analysis.progress import show_progress
 from faultgouge.analysis.windows import Ranks, System, full_operator
 from faultgouge.analysis.windows.slices.first_window import first_window
-from faultgouge.analysis.windows.slices.lanczos import SliceError
 from faultgouge.analysis.windows.slices.store import Border, Candidate, DamagedSliceError, SlicePass, SliceResult
 
 PASSING = replace(FEW, largest_basis=0, wait_seconds=0.1)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.sparse import csc_array, diags_array
 
-from faultgouge.analysis.factors.inertia import factor_shifted
+from faultgouge.analysis.factors.lanczos import SliceError, factor_shifted
 from faultgouge.analysis.windows import LIMITS, Limits, Ranks
-from faultgouge.analysis.windows.slices.lanczos import SliceError, slices
+from faultgouge.analysis.windows.slices.slices import slices
 
 FEW = Limits(slice_size=24, count_spacing=60, first_look=20, one_basis=50)
 
