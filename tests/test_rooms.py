@@ -43,6 +43,7 @@ FLOORS = {
         ("operators",),
         ("factors",),
         ("motion",),
+        ("elasticity",),
         ("files",),
         ("windows",),
     ),
