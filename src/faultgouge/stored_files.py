@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
@@ -18,6 +18,7 @@ from .analysis import stress as stress_of_packing
 from .analysis import vibrations as vibrations_of_packing
 from .analysis.files.configuration_file import holds_configuration, read_configuration
 from .analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
+from .analysis.files.formats.lammps_dump import dump_frames
 from .analysis.files.runfile import law_of_parameters
 from .analysis.has_configuration import HasConfiguration
 
@@ -94,6 +95,41 @@ def load(
     else:
         layer = disks.top if top is None and disks.top is not None else upper_layer(disks, top)
     return packing_of(disks, law, layer, drag_time=drag_time, **load)
+
+
+class frames(Sequence["Packing | Configuration"]):  # noqa: N801  # a function to its users, as `range` is
+    """The packings of a file, each read when it is asked for.
+
+    Parameters
+    ----------
+    file : str or Path
+        As for `load`.
+
+    Examples
+    --------
+    ``len(frames("run.h5"))``, ``frames("run.h5")[-1]``, ``[packing.fx for packing in frames("run.h5")]``.
+    """
+
+    def __init__(self, file: str | Path) -> None:
+        self.path = path_of(file, "frames")
+        if self.path.suffix == ".disks":
+            self._count = sum(1 for _ in dump_frames(self.path))
+        elif self.path.suffix == ".h5" and not holds_configuration(self.path):
+            with RunFile(self.path) as run:
+                self._count = len(run)
+        else:
+            load(self.path)
+            self._count = 1
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, number: Any) -> Any:
+        chosen = range(self._count)[number]
+        return [load(self.path, each) for each in chosen] if isinstance(number, slice) else load(self.path, chosen)
+
+    def __repr__(self) -> str:
+        return f"<frames of {self.path}: {self._count}>"
 
 
 def path_of(file: object, caller: str) -> Path:

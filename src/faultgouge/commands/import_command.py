@@ -176,9 +176,9 @@ def _import_spheres(
     write_configuration(output, found, {"deck": ""})
     keeps(f"{output} has been written", output)
     print_line(f"{repr(found).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
-    for remark in found.remarks:
-        print_line(remark)
-    if contacts is not None:
+    if contacts is None:
+        print_line("\n".join(found.remarks))
+    else:
         with status("stability") as show, show_progress(show):
             verdict, says = verdict_within_digits(found)
         print_line(f"{verdict}\n{says}")
