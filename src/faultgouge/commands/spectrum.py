@@ -29,8 +29,8 @@ app = typer.Typer()
 MOST_PAIRS = 20
 """Lines of complex pairs: a packing of a thousand has hundreds."""
 
-SLOW_COORDINATES = 6000
-"""Coordinates from which a spectrum takes minutes, and a gigabyte or more."""
+VERDICT_FIRST = 2000
+"""Coordinates beyond which the eigenvalues take longer than the verdict, which does not need them."""
 
 
 @app.command(epilog="Example: faultgouge spectrum run.h5 --json")
@@ -74,15 +74,20 @@ def spectrum(
     if not is_root():
         return
     size = packing.configuration.coordinates
-    if size > SLOW_COORDINATES:
-        # four matrices of doubles; 18000 coordinates took 10.2 GB
-        say(f"{size} coordinates: their spectrum needs {32e-9 * size**2:.2g} GB, and a time that grows as their cube")
+    large = size > VERDICT_FIRST
     if values:
+        if large:  # four matrices of doubles; 18000 coordinates took 10.2 GB
+            say(f"{size} coordinates: LAPACK needs {32e-9 * size**2:.2g} GB, and a time that grows as their cube")
         _values(packing, as_json)
         return
-    result = eigenvalues_of(packing)
+    result = None if large else eigenvalues_of(packing)
     with status("stability") as show, show_progress(show):
         verdict = stability(packing, "fx" if rise else None, spectrum_of_stiffness=result)
+    if not as_json:
+        print(verdict, flush=True)
+    if result is None:
+        with status("eigenvalues of K") as show, show_progress(show):
+            result = eigenvalues_of(packing)
     gains = _gain_of(packing) if gain else None
     if not as_json:
         _print_spectrum(packing, result, verdict, gains, verbose)
@@ -138,7 +143,6 @@ def _print_spectrum(
     gain: dict[str, Any] | None,
     verbose: bool,
 ) -> None:
-    print(verdict)
     _print_size(packing, result)
     _print_growing_motions(result, verdict.dissipative, verbose)
     if gain is not None:
@@ -197,7 +201,7 @@ def _print_growing_motions(result: Spectrum, dissipative: bool, verbose: bool) -
 
 def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None, with the reason, if unstable, too large, or where it fails."""
-    from faultgouge.analysis.motion.transient import GAIN_DISKS, NoGainError, transient_gains
+    from faultgouge.analysis.responses.transient import GAIN_DISKS, NoGainError, transient_gains
 
     most, size = 3 * GAIN_DISKS, packing.configuration.coordinates
     if size > most:
