@@ -23,7 +23,6 @@ from .search import Look, SystemOfLoad
 from .slices.ranks import ALONE, Ranks
 from .system import System, force_bearing, full_operator
 
-
 ALL_WINDOWS = 300
 """Disks up to which all windows are sought, from all eigenvalues: half a second for a decomposition, which grows with
 the cube of the number. Beyond, the first window is sought in slices of the spectrum."""
@@ -281,9 +280,7 @@ class _Branch:
 
     def _buckles(self, packing: HasConfiguration, system: System) -> bool:
         """Whether an eigenvalue is negative."""
-        return not surely_positive(system.stiffness) and bool(
-            len(negative_eigenvalues(force_bearing(packing)))
-        )
+        return not surely_positive(system.stiffness) and bool(len(negative_eigenvalues(force_bearing(packing))))
 
 
 def _complex_at_start(start: HasConfiguration) -> Spectrum | None:

@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..motion.eigenvalues import Complexes
-from ..motion.normal_form import NormalForm
 from ..packing.packing import Packing
+from ..responses.normal_form import NormalForm
 from .space import Space
 from .system import System
 from .system_modes import SystemModes

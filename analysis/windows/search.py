@@ -33,8 +33,8 @@ from ..arrays import Complexes, Floats, Indices
 from ..errors import NoEquilibriumError, TurningPointError
 from .edges import Edge, Window, sign_change
 from .states import State
-from .tracks import Doubt, Point, Track, nearest_pair
 from .system import System
+from .tracks import Doubt, Point, Track, nearest_pair
 
 SystemOfLoad = Callable[[float], System]
 """Load -> the system there."""
@@ -322,7 +322,7 @@ class Search:
                 raise Doubt
             return track.edge(change)
         left, right = (track.at(fx) for fx in (change.loads[0], change.loads[-1]))
-        jump = float(np.abs((left.stiffness - right.stiffness)).max())
+        jump = float(np.abs(left.stiffness - right.stiffness).max())
         largest, usual = (max(abs(track.growth(fx)) for fx in loads) for loads in (change.loads, ends))
         if jump < 1e-7 * left.frequency**2 and largest > 1e-3 * usual:
             raise Doubt(change.fx)  # the equilibrium does not jump: the motion has become another one on the way
