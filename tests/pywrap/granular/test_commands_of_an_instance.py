@@ -102,4 +102,6 @@ def test_what_runs_write_into_a_log_is_no_command(two, tmp_path):
     lmp.command(f'log "{tmp_path}/own.log"')
     prints = 'fix says all print 1 "unfix move"\nrun 2\nrun 2\nunfix says\nrun 4 every 2 "print done"\nrun 1 post no'
     command(lmp, "\n".join([*told, prints]))
-    assert len(from_lammps(lmp, balance=np.inf).contacts) == 1
+    found = from_lammps(lmp, balance=np.inf)
+    assert len(found) == 2
+    assert found.free.all()  # by fix move
