@@ -307,9 +307,9 @@ def dispersion(packing: HasConfiguration, axis: int = 0, waves: int = 4) -> list
         every = max(1, int(2 * np.pi / rough / WAVE_SAMPLES / limit))
         samples = _followed(start, stiffness, damping, mass, limit, every, WAVE_PERIODS * WAVE_SAMPLES)
         kept = np.asarray(np.mean((samples / size).reshape(-1, d, 2), axis=2), dtype=np.float64)
-        time = every * limit * np.arange(len(kept))
+        time = np.arange(len(kept), dtype=np.float64) * (every * limit)
         for k in range(d):
-            omega, gamma, misfit = _fit(time, kept[:, k], float(rough))
+            omega, gamma, misfit = _fit(time, np.ascontiguousarray(kept[:, k], dtype=np.float64), float(rough))
             # Verlet's own frequency of a motion is (2/dt) arcsin(omega dt/2)
             true = 2 / limit * np.sin(omega * limit / 2)
             found.append(PlaneWave(float(np.linalg.norm(number * reciprocal)), k, float(true), gamma, misfit))
