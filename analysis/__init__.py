@@ -32,8 +32,8 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .files.formats.lammps_dump import read_dump
     from .files.runfile import RunFile
     from .motion.buckling import negative_eigenvalues
-    from .motion.eigenvalues import mass_weighted
-    from .motion.fastest_growing import FastestGrowth, fastest_growing
+    from .motion.eigenvalues import Linear, mass_weighted
+    from .motion.growing import fastest_growing
     from .motion.growth import Growth, fit_growth, mean_square_displacement
     from .motion.growth_of_run import growth_of_run
     from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_modes
@@ -68,7 +68,7 @@ if TYPE_CHECKING:  # each is imported when it is used
 
 __all__ = [
     "FLOOR", "BadInputError", "Complexes", "Configuration", "ContactGeometry", "Contacts", "ElasticModuli",
-    "FastestGrowth", "FaultgougeError", "Floats", "Growth", "Indices", "LinearisedContacts", "LostEnergy", "Material",
+    "FaultgougeError", "Floats", "Growth", "Indices", "Linear", "LinearisedContacts", "LostEnergy", "Material",
     "MindlinLaw", "Mode", "Modes", "Motion", "NoEquilibriumError", "NoGainError", "OneSidedMotion", "OneSidedOutcome",
     "Onset", "OnsetError", "OutputError", "Packing", "PackingFileError", "PlaneWave", "PowerLaw", "RisingMotion",
     "RunFile", "Signal", "Slip", "Snapshot", "Spectrum", "Stability", "TransientGain", "Vibrations", "Window",

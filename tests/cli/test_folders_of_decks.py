@@ -112,9 +112,7 @@ def folders(tmp_path_factory):
         [sys.executable, "-c", RUN_THEM, *decks], capture_output=True, text=True, check=True, timeout=300
     )
     found = dict(json.loads(line) for line in done.stdout.splitlines() if line.startswith('["'))
-    return {
-        name: (folder.parent / "lmp", folder, found.get(str(folder / "deck.in"), None)) for name, folder in here.items()
-    }
+    return {name: (folder.parent / "lmp", folder, found.get(str(folder / "deck.in"))) for name, folder in here.items()}
 
 
 @pytest.mark.parametrize("name", DECKS)

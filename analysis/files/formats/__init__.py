@@ -110,6 +110,8 @@ READERS = {suffix: each for each in FORMATS for suffix in each.suffixes}
 WRITERS = {".vtp": ("vtp", "write_vtp"), ".xyz": ("xyz", "write_xyz"), ".gsd": ("libraries", "write_gsd")}
 FILMS = {name: WRITERS[name] for name in (".xyz", ".gsd")} | {".pvd": ("vtp", "write_pvd")}
 """Module and function by suffix: of one packing, with modes; of several frames."""
+HEAD_OF_CONTACTS = "id1,id2,n_x,n_y,n_z,f_n,f_t,"
+"""How a table of contacts begins."""
 WITHOUT_MODES = {".data": "LAMMPS data", ".csv": "a table of contacts"}
 
 
@@ -259,7 +261,7 @@ def write_packing(
     if path.suffix == ".data":
         return str(_function("lammps_data", "write_data" if alone else "write_spheres")(path, packing))
     if path.suffix == ".csv":
-        return str(_function("tables", "write_contacts")(path, packing))
+        return str(_function("tables", "write_contacts")(path, packing, HEAD_OF_CONTACTS))
     if isinstance(packing, Packing):
         exported = exported_packing(Frame(packing), modes)
     else:
