@@ -13,7 +13,7 @@ bound is infinite, since neither is known.
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,6 +34,9 @@ from .assembly import ContactBlocks, as_springs, spring_of_layer
 from .contacts import UNIT_ERROR, LinearisedContacts, refuse_first
 from .counted import counted
 from .particles import Particles
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 UNKNOWN_SLIPS = (
     "the tangential forces were not given, and the slips began at zero: K depends on both (`faultgouge import "
@@ -245,6 +248,29 @@ class Configuration(Particles):
         """|f_t|/(mu f_n): the share of Coulomb's bound that each contact uses, shape (C,); zero without friction."""
         size, limit = np.linalg.norm(self.contacts.tangential_force, axis=1), self.contacts.friction
         return np.divide(size, limit, out=np.zeros_like(limit), where=limit > 0)
+
+    def contact_columns(self) -> dict[str, NDArray]:
+        """A row for each contact: IDs, normal, forces, overlap and the share of Coulomb's bound.
+
+        Returns
+        -------
+        dict of ndarray, each of shape (C,)
+            id1 and id2, IDs of both partners, 0 for a wall; n_x, n_y, n_z, the normal, which points to the first; f_n,
+            the normal force; f_t_x, f_t_y, f_t_z, the tangential force on the first; f_t, its size; overlap, length;
+            mobilised, |f_t|/(mu f_n).
+        """
+        c, axes = self.contacts, "xyz"
+        columns = {"id1": self.ids[c.i], "id2": np.where(c.wall, 0, self.ids[np.maximum(c.j, 0)])}
+        columns |= {f"n_{axis}": c.normal[:, k] for k, axis in enumerate(axes)}
+        columns |= {"f_n": c.normal_force, "f_t": np.linalg.norm(c.tangential_force, axis=1)}
+        columns |= {f"f_t_{axis}": c.tangential_force[:, k] for k, axis in enumerate(axes)}
+        return columns | {"overlap": c.overlap, "mobilised": self.mobilised}
+
+    def to_pandas(self) -> "DataFrame":
+        """The contacts as a table of pandas, with the columns of `contact_columns`; an ImportError without pandas."""
+        from pandas import DataFrame
+
+        return DataFrame(self.contact_columns())
 
     @cached_property
     def rattlers(self) -> Indices:

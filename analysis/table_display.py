@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -30,3 +30,16 @@ class TableDisplay:
         for name, value in self._rows().items():
             table.add_row(name, value)
         return table
+
+
+def table_of(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table as lines of text; a column is as wide as its widest entry.
+
+    >>> print(table_of(("load", "pairs"), [("0.1", "2"), ("0.25", "13")]))
+    load   pairs
+    0.1    2
+    0.25   13
+    """
+    lines = [list(headings), *map(list, rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return "\n".join("   ".join(map(str.ljust, line, widths)).rstrip() for line in lines)

@@ -10,7 +10,6 @@ again, so that one of them can be measured anew alone.
 
 import argparse
 import datetime
-import json
 import os
 import shlex
 import subprocess
@@ -27,7 +26,7 @@ ROOT = HERE.parent
 BENCHMARKS = {
     "answer": "python benchmarks/first_answer.py",
     "step": "python benchmarks/time_per_step.py",
-    "parts": "faultgouge explain scenes/paper.toml --json",
+    "parts": "python benchmarks/parts.py scenes/paper.toml",
     "increment": "python benchmarks/increment.py",
     "size": "python benchmarks/scale.py",
     "spectra": "python benchmarks/spectra.py --disks 100 300 1000 --spheres 150",
@@ -79,20 +78,7 @@ def measure(name: str) -> Table:
     first = {"python": [sys.executable], "faultgouge": [sys.executable, "-m", "faultgouge"]}[words[0]]
     done = subprocess.run([*first, *words[1:]], cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
     printed = done.stdout.strip("\n")
-    return Table(command, where, parts_table(printed) if name == "parts" else printed)
-
-
-def parts_table(text: str) -> str:
-    """The parts of a scene, from the JSON of `explain`, as rows of Markdown."""
-    rows = ["| feature | | with it : without it [quartiles] | per |", "|---|---|---|---|"]
-    for part in json.loads(text)["parts"]:
-        cost = part["cost"]
-        if cost is not None:
-            low, high = cost["quartiles"]
-            included = "in" if part["included"] else "out"
-            ratio = f"{cost['ratio']:.2f} [{low:.2f}, {high:.2f}]"
-            rows.append(f"| {part['name']} | {included} | {ratio} | {cost['per']} |")
-    return "\n".join(rows)
+    return Table(command, where, printed)
 
 
 def page() -> str:

@@ -1,13 +1,14 @@
-"""How the verdict on contacts at Coulomb's bound depends on the numbers by which it is made, beside LAMMPS's motion.
+"""The verdict on packings beside LAMMPS's own motion, and how it depends on the numbers by which it is made.
 
-Small packings of LAMMPS's own laws come to rest on slopes. Of those with contacts at the bound, one-sided motion is
-followed for `MOST_CHUNKS`, and the verdict is made of it as `stability` makes it within this time: with its numbers,
-and with each of them halved and doubled. Beside it LAMMPS is followed after the same pushes, for 60 units of time or
-more. The table `tables/verdict_numbers.csv` has a row a packing. `time` is when the verdict is made, and D is over the
-square of the push. `lammps` is the largest D in the last fifth of LAMMPS's motion over that in its first half. The last
-column says which verdicts are others: "DECADES x 2: unknown" for instance.
+Packings of LAMMPS's own laws come to rest on slopes: 100 to 179 are those on which the numbers were chosen, with
+contacts at Coulomb's bound; 200 to 299 are others, of all laws, in two and three dimensions, with weak and strong
+dashpots, with lids that move as one, and of up to 200 particles. LAMMPS is followed after the pushes of the verdict,
+for 60 units of time or more. The table `tables/verdict_numbers.csv` has a row a packing. `time` is how long one-sided
+motion was followed, 0 where linear motion decides, and D is over the square of the push. `lammps` is the largest D in
+the last fifth of LAMMPS's motion over that in its first half. The last column says which verdicts of the first packings
+are others with one of the numbers halved or doubled: "STILL_SHARE x 2: unknown" for instance.
 
-    nice python benchmarks/verdict_numbers.py [--packings 100:180] [--keep FOLDER]
+    nice python benchmarks/verdict_numbers.py [--packings 100:180 200:300] [--keep FOLDER]
 """
 
 import os
@@ -25,23 +26,21 @@ from typing import Any
 import numpy as np
 
 from faultgouge.analysis import Configuration, stability
-from faultgouge.analysis.motion import one_sided_outcome as module
-from faultgouge.analysis.motion.one_sided import OneSidedSystem
+from faultgouge.analysis.motion import pushes as module
 from faultgouge.pywrap import from_lammps, in_a_copy
 from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of, set_velocity
 from faultgouge.pywrap.granular.look_in_a_copy import quieten
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
+from research.lammps_laws.compute import LAWS as ALL_LAWS
 from research.lammps_laws.compute import pour
 
 LAWS = (
     "granular hertz, mindlin/force", "gran/hertz/history", "granular hertz, mindlin_rescale/force",
     "granular hooke, linear_history", "granular hertz, mindlin",
 )  # fmt: skip
-NUMBERS = (
-    "SLIP_LEFT_SHARE", "DECADES", "GAIN_SHARE", "EXPONENTIAL_RATIO", "SLIP_CHANGE", "DECAY_SHARE", "CHUNKS_BEFORE_SUM"
-)  # fmt: skip
-NAMES = {True: "grows", False: "rests", None: "unknown"}
+NUMBERS = "STILL_SHARE", "GROWN_ENERGY", "CHUNK"
+NAMES = {False: "grows", True: "rests", None: "unknown"}
 COLUMNS = (
     "packing", "law", "dimension", "particles", "at_bound", "verdict", "time", "amplification", "amplification_lammps",
     "lammps", "others",
@@ -57,6 +56,32 @@ def packing(number: int, log: Path) -> tuple[Any, str, Configuration] | None:
     mu = float(random.choice([0.3, 0.5]))
     slope = mu * float(random.choice([0.2, 0.35, 0.5]))
     lmp = pour(law, 3 if number % 3 else 2, count, mu, number, log, dashpot / 10 if "hooke" in law else dashpot)
+    return at_rest(lmp, law, slope)
+
+
+def other_packing(number: int, log: Path) -> tuple[Any, str, Configuration] | None:
+    """The same of the other packings, on which no number was chosen."""
+    random, law = np.random.default_rng(number), tuple(ALL_LAWS)[number % len(ALL_LAWS)]
+    count = int(random.choice([20, 40, 60])) if number % 10 else 200
+    dashpot = float(random.choice([1.0, 10.0, 60.0, 400.0]))
+    mu = float(random.choice([0.2, 0.5, 0.8]))
+    slope = mu * float(random.choice([0.1, 0.3, 0.55]))
+    d = 3 if number % 2 else 2
+    lmp = pour(law, d, count, mu, number, log, dashpot / 10 if "hooke" in law else dashpot)
+    if number % 4 == 3:  # the highest spheres are a lid
+        lmp.command("run 20000 post no")
+        high = np.argsort(owned_array(lmp, "x")[:, 2])[-max(3, count // 8) :]
+        lmp.command("group lid id " + " ".join(map(str, owned_array(lmp, "id")[high])))
+        for line in (
+            "group filling subtract all lid", "neigh_modify exclude group lid lid", "unfix move",
+            "fix move filling nve/sphere", "fix body lid nve", "fix stiff lid aveforce 0.0 0.0 0.0",
+        ):  # fmt: skip
+            lmp.command(line)
+    return at_rest(lmp, law, slope)
+
+
+def at_rest(lmp: Any, law: str, slope: float) -> tuple[Any, str, Configuration] | None:
+    """LAMMPS with its packing brought to rest on a slope, as of `packing`."""
     for part in np.linspace(0.0, slope, 6):
         lmp.command(f"variable slope equal {part}")
         lmp.command("run 10000 post no")
@@ -97,71 +122,41 @@ def in_lammps(lmp: Any, here: Configuration, push: np.ndarray, size: float, time
 def record(number: int) -> dict[str, Any] | None:
     """A packing with its motion in LAMMPS."""
     with TemporaryDirectory() as folder:
-        found = packing(number, Path(folder) / "log")
+        found = (packing if number < 200 else other_packing)(number, Path(folder) / "log")
         if found is None:
             return None
         lmp, law, here = found
         told = stability(here)
         most = 0.0 if told.one_sided is None else told.one_sided.time
-        least, largest = (1e-9, 1e-9) if told.one_sided is None else told.one_sided.scales
+        least, largest = (1e-9, 1e-7) if told.one_sided is None else told.one_sided.scales
         size = np.sqrt(max(least, 1e-13) * min(largest, 1e-4)) if least < largest else 3 * least
-        times = np.linspace(0, np.clip(2 * most, 60.0, 400.0), 121)[1:].round(1)
-        push = module.random_pushes(here, module.PUSHES)
-        size = float(np.clip(size, 1e-11, 1e-6)) if np.isfinite(size) else 1e-9
-        msd = in_lammps(lmp, here, push, size, times)
+        size = 1e-9 if told.stable is False or not np.isfinite(size) else float(np.clip(size, 1e-11, 1e-6))
+        slow = 25 / told.growth_rate if told.stable is False else 0.0
+        times = np.linspace(0, np.clip(max(2 * most, slow), 60.0, 400.0), 121)[1:].round(1)
+        msd = in_lammps(lmp, here, module.random_pushes(here, module.PUSHES), size, times)
         lmp.close()
     return {"law": law, "here": here, "D": msd}
 
 
-def looks_of(here: Configuration) -> module.Looks:
-    """Looks at the one-sided motion for as long as `stability` would follow it."""
-    system = OneSidedSystem.of(here, module.VERDICT_STEP)
-    state = system.start(module.random_pushes(here, module.PUSHES))
-    chunk, most = module.window_and_most(system, 2 * module.PUSHES, None)
-    seen = module.Looks([], [], [state.p.copy()], wears=bool(len(state.r)))
-    for look in range(most * module.LOOKS_PER_CHUNK):
-        system.advance(state, chunk * (look + 1) / module.LOOKS_PER_CHUNK)
-        seen.look(system, state)
-        if not np.all(np.isfinite(seen.sizes[-1])):
-            break
-    return seen
-
-
-def verdict_of(seen: module.Looks, sticking: float, grows: bool) -> tuple[bool | None, int]:
-    """The verdict, and after how many looks it is made."""
-    found, each = None, module.LOOKS_PER_CHUNK
-    for count in range(each, len(seen.times) + 1, each):
-        part = module.Looks(seen.times[:count], seen.sizes[:count], seen.slid[: count + 1], seen.wears)
-        found, _ = module.outcome_and_slip_left(part, sticking, grows, rested=found is False)
-        if found is not None:
-            return found, count
-    return None, len(seen.times)
-
-
 def row_of(number: int, kept: dict[str, Any]) -> dict[str, Any] | None:
-    """The row of a packing; None without contacts at the bound."""
-    here = kept["here"]
-    told = stability(here, time=1.0)  # for the motion with sticking contacts alone
-    if told.one_sided is None:
+    """The row of a packing; None of those of the first kind without contacts at the bound."""
+    here, others = kept["here"], []
+    if number < 200 and not here.contacts.one_sided.any():
         return None
-    sticking = told.sticking.growth_rate, told.sticking.growth_rate > 0
-    seen, others = looks_of(here), []
-    found, count = verdict_of(seen, *sticking)
-    for name in NUMBERS:
-        usual = getattr(module, name)
-        for factor in (0.5, 2):
-            # 1 is the ratio of exact exponential growth
-            setattr(
-                module, name, 1 - (1 - usual) / factor if name == "EXPONENTIAL_RATIO" else type(usual)(usual * factor)
-            )
-            other, _ = verdict_of(seen, *sticking)
-            if other is not found:
-                others.append(f"{name} x {factor}: {NAMES[other]}")
-        setattr(module, name, usual)
-    msd = kept["D"].max(axis=1)
+    found = stability(here)
+    if number < 200:
+        for name in NUMBERS:
+            usual = getattr(module, name)
+            for factor in (0.5, 2):
+                setattr(module, name, type(usual)(usual * factor))
+                other = stability(here).stable
+                if other is not found.stable:
+                    others.append(f"{name} x {factor}: {NAMES[other]}")
+            setattr(module, name, usual)
+    msd, outcome = kept["D"].max(axis=1), found.one_sided
     values = (
-        number, kept["law"], here.dimension, len(here), told.at_bound, NAMES[found], f"{seen.times[count - 1]:.4g}",
-        f"{np.max(seen.sizes[:count]):.3g}", f"{msd.max():.3g}",
+        number, kept["law"], here.dimension, len(here), found.at_bound, NAMES[found.stable],
+        f"{outcome.time:.4g}" if outcome else 0, f"{outcome.amplification:.3g}" if outcome else "", f"{msd.max():.3g}",
         f"{msd[-len(msd) // 5 :].max() / msd[: len(msd) // 2].max():.3g}", "; ".join(others),
     )  # fmt: skip
     return dict(zip(COLUMNS, values, strict=True))
@@ -170,13 +165,13 @@ def row_of(number: int, kept: dict[str, Any]) -> dict[str, Any] | None:
 def main() -> None:
     """Write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--packings", default="100:180", help="FIRST:STOP")
+    parser.add_argument("--packings", nargs="*", default=["100:180", "200:300"], help="FIRST:STOP")
     parser.add_argument("--keep", type=Path, help="folder in which packings and LAMMPS's motion are kept")
     options = parser.parse_args()
     with (Path(__file__).parent / "tables" / "verdict_numbers.csv").open("w", newline="") as file:
         table = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         table.writeheader()
-        for number in range(*map(int, options.packings.split(":"))):
+        for number in (k for each in options.packings for k in range(*map(int, each.split(":")))):
             place = None if options.keep is None else options.keep / f"{number}.pkl"
             kept = pickle.loads(place.read_bytes()) if place is not None and place.exists() else record(number)
             if place is not None:

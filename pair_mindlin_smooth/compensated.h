@@ -23,7 +23,8 @@
 #include <cmath>
 
 // Into functions that are compiled for another processor GCC inlines no other functions than these.
-#define FAULTGOUGE_INLINE inline __attribute__((always_inline))
+#define FAULTGOUGE_INLINED __attribute__((always_inline))
+#define FAULTGOUGE_INLINE inline FAULTGOUGE_INLINED
 
 namespace faultgouge {
 

@@ -40,14 +40,14 @@ struct alignas(64) CompensatedColumn {
 enum class Friction { NONE, LOOKED_AT, ADVANCED, RESCALED, SLIDER_LOOKED_AT, SLIDER };
 
 // What is known at compile time
-template <class NUMBER, Exponent P, Friction SLIPS, bool HAS_DASHPOTS> struct Variant {
+template <class NUMBER, class P, Friction SLIPS, bool HAS_DASHPOTS> struct Variant {
   using Number = NUMBER;
   static constexpr bool COMPENSATED = std::is_same_v<Number, Compensated>;
-  static constexpr Exponent EXPONENT = P;
+  using Power = P;
   static constexpr bool FRICTION = SLIPS != Friction::NONE, DAMPED = HAS_DASHPOTS;
   static constexpr bool SLIDER = SLIPS == Friction::SLIDER || SLIPS == Friction::SLIDER_LOOKED_AT;
   static constexpr bool ADVANCE = FRICTION && SLIPS != Friction::LOOKED_AT && SLIPS != Friction::SLIDER_LOOKED_AT;
-  static constexpr bool RESCALE = P == Exponent::HERTZ && ADVANCE && SLIPS != Friction::ADVANCED;
+  static constexpr bool RESCALE = P::EXPONENT > 1.0 && ADVANCE &&SLIPS != Friction::ADVANCED;
 };
 
 struct alignas(64) DashpotColumns {
@@ -155,7 +155,7 @@ template <class V> FAULTGOUGE_INLINE void normal_forces(Batch<V> &batch, const M
   for (int k = 0; k < batch.count; k++) {
     const Branch<Number> r{batch.branch_x.load(k), batch.branch_y.load(k)};
     const Geometry<Number> contact = geometry(r, batch.radius_i[k], batch.radius_j[k]);
-    const Number normal = law.normal_force<V::EXPONENT>(contact.overlap);
+    const Number normal = law.normal_force<typename V::Power>(contact.overlap);
     batch.overlap.store(k, contact.overlap);
     batch.normal.store(k, normal);
     batch.normal_x.store(k, contact.direction(r.x));
@@ -169,8 +169,8 @@ template <class V> FAULTGOUGE_INLINE double slip_increment(const Batch<V> &batch
   const Vector moved{batch.moved_x[k], batch.moved_y[k]};
   const double increment = midpoint_slip(r, moved) - batch.rolled[k];
   if constexpr (!V::RESCALE) return increment;
-  return rescaled_increment(value(batch.slip.load(k)), increment, overlap_change(r, moved),
-                            value(batch.overlap.load(k)));
+  return rescaled_increment<typename V::Power>(value(batch.slip.load(k)), increment, overlap_change(r, moved),
+                                               value(batch.overlap.load(k)));
 }
 
 // slips, advanced if wanted, and tangential forces
@@ -214,15 +214,15 @@ template <class V, bool ENERGY> FAULTGOUGE_INLINE void add_dashpots(Batch<V> &ba
     const double overlap = value(batch.overlap.load(k)), rate_x = batch.rate_x[k], rate_y = batch.rate_y[k];
     const Number normal = batch.normal.load(k);
     const double opening = nx * rate_x + ny * rate_y;
-    batch.normal.store(k, law.damped_normal<V::EXPONENT>(normal, overlap, opening));
+    batch.normal.store(k, law.damped_normal<typename V::Power>(normal, overlap, opening));
     if constexpr (V::FRICTION) {
       const double slip_rate = (nx * rate_y - ny * rate_x) - batch.rolling[k];
       const Number elastic = batch.tangential.load(k);
-      const Number sum = law.damped_tangential<V::EXPONENT>(elastic, normal, overlap, slip_rate);
+      const Number sum = law.damped_tangential<typename V::Power>(elastic, normal, overlap, slip_rate);
       batch.tangential.store(k, sum);
       if constexpr (ENERGY)
         batch.dissipated[k] +=
-            dt * law.dashpot_power<V::EXPONENT>(overlap, opening, slip_rate, value(elastic), value(sum));
+            dt * law.dashpot_power<typename V::Power>(overlap, opening, slip_rate, value(elastic), value(sum));
     }
   }
 }

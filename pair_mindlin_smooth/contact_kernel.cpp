@@ -9,7 +9,7 @@ namespace faultgouge {
 
 namespace {
 
-template <Exponent P, class Number>
+template <class P, class Number>
 FAULTGOUGE_INLINE FloorContact<Number> on_floor(const MindlinLaw &law, Number overlap, Number slip, double increment,
                                                 const FloorRates &rates, Features features)
 {
@@ -59,18 +59,18 @@ FAULTGOUGE_DISPATCH
 FloorContact<double> floor_contact(const MindlinLaw &law, double overlap, double slip, double increment,
                                    const FloorRates &rates, Features features)
 {
-  if (law.exponent == Exponent::HARMONIC)
-    return on_floor<Exponent::HARMONIC>(law, overlap, slip, increment, rates, features);
-  return on_floor<Exponent::HERTZ>(law, overlap, slip, increment, rates, features);
+  return Exponents::at(law.exponent, [&](auto p) FAULTGOUGE_INLINED {
+    return on_floor<decltype(p)>(law, overlap, slip, increment, rates, features);
+  });
 }
 
 FAULTGOUGE_DISPATCH
 FloorContact<Compensated> floor_contact(const MindlinLaw &law, Compensated overlap, Compensated slip, double increment,
                                         const FloorRates &rates, Features features)
 {
-  if (law.exponent == Exponent::HARMONIC)
-    return on_floor<Exponent::HARMONIC>(law, overlap, slip, increment, rates, features);
-  return on_floor<Exponent::HERTZ>(law, overlap, slip, increment, rates, features);
+  return Exponents::at(law.exponent, [&](auto p) FAULTGOUGE_INLINED {
+    return on_floor<decltype(p)>(law, overlap, slip, increment, rates, features);
+  });
 }
 
 }    // namespace faultgouge

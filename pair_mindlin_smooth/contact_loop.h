@@ -89,7 +89,7 @@ FAULTGOUGE_INLINE int all_forces(ContactPairs &pairs, const Disks &disks, const 
   return crushed;
 }
 
-template <class Number, Exponent P, bool DAMPED, class... Rest>
+template <class Number, class P, bool DAMPED, class... Rest>
 FAULTGOUGE_INLINE int with_friction(Features features, ContactPairs &pairs, const Rest &...rest)
 {
   if (!features.friction) return all_forces<Variant<Number, P, Friction::NONE, DAMPED>>(pairs, rest...);
@@ -97,7 +97,7 @@ FAULTGOUGE_INLINE int with_friction(Features features, ContactPairs &pairs, cons
     return features.advance ? all_forces<Variant<Number, P, Friction::SLIDER, DAMPED>>(pairs, rest...)
                             : all_forces<Variant<Number, P, Friction::SLIDER_LOOKED_AT, DAMPED>>(pairs, rest...);
   if (!features.advance) return all_forces<Variant<Number, P, Friction::LOOKED_AT, DAMPED>>(pairs, rest...);
-  if constexpr (P == Exponent::HERTZ)
+  if constexpr (P::EXPONENT > 1.0)
     if (features.history == History::RESCALED)
       return all_forces<Variant<Number, P, Friction::RESCALED, DAMPED>>(pairs, rest...);
   return all_forces<Variant<Number, P, Friction::ADVANCED, DAMPED>>(pairs, rest...);
@@ -108,13 +108,11 @@ FAULTGOUGE_INLINE int with_law(ContactPairs &pairs, const Disks &disks, const Pe
                                double dt, Features features, const Grids &grids)
 {
   const bool energy = features.energy;
-  if (law.exponent == Exponent::HARMONIC)
-    return features.damped
-               ? with_friction<Number, Exponent::HARMONIC, true>(features, pairs, disks, box, law, dt, energy, grids)
-               : with_friction<Number, Exponent::HARMONIC, false>(features, pairs, disks, box, law, dt, energy, grids);
-  return features.damped
-             ? with_friction<Number, Exponent::HERTZ, true>(features, pairs, disks, box, law, dt, energy, grids)
-             : with_friction<Number, Exponent::HERTZ, false>(features, pairs, disks, box, law, dt, energy, grids);
+  return Exponents::at(law.exponent, [&](auto p) FAULTGOUGE_INLINED {
+    using P = decltype(p);
+    return features.damped ? with_friction<Number, P, true>(features, pairs, disks, box, law, dt, energy, grids)
+                           : with_friction<Number, P, false>(features, pairs, disks, box, law, dt, energy, grids);
+  });
 }
 
 }    // namespace faultgouge

@@ -257,7 +257,7 @@ template <class NUMBER, bool FRICTION, bool DAMPED> void FixWallMindlinSmooth::c
   if constexpr (COMPENSATED && FRICTION) slip.low = known ? contact[SLIP_LOW] : 0.0;
   double increment = known && FRICTION ? -(atom->v[i][0] + radius * atom->omega[i][2]) * update->dt : 0.0;
   if (known && FRICTION && law.rescales())
-    increment = faultgouge::rescaled_increment(value(slip), increment, -atom->v[i][1] * update->dt, value(overlap));
+    increment = law.rescaled_increment(value(slip), increment, -atom->v[i][1] * update->dt, value(overlap));
   faultgouge::FloorRates rates{};
   if constexpr (DAMPED) {
     const double *const felt = dashpots->array_atom[i];

@@ -9,8 +9,19 @@
 #include "utils.h"
 
 #include <cstring>
+#include <string>
 
 using namespace LAMMPS_NS;
+
+// "1.5 or 1"
+static std::string known_exponents()
+{
+  std::string found;
+  for (int place = 0; place < faultgouge::Exponents::SIZE; place++)
+    found +=
+        fmt::format("{}{:g}", place ? " or " : "", faultgouge::Exponents::at(place, [](auto p) { return p.EXPONENT; }));
+  return found;
+}
 
 LawKeywords LawReader::read(int first, int narg, char **arg)
 {
@@ -20,7 +31,8 @@ LawKeywords LawReader::read(int first, int narg, char **arg)
       found.compensated = true;
     } else if (strcmp(arg[k], "exponent") == 0) {
       if (++k >= narg || !law.set_exponent(utils::numeric(FLERR, arg[k], false, lmp)))
-        error->all(FLERR, "{}: exponent must be 1.5 or 1, not {}", command, k < narg ? arg[k] : "left out");
+        error->all(FLERR, "{}: exponent must be {}, not {}", command, known_exponents(),
+                   k < narg ? arg[k] : "left out");
     } else if (strcmp(arg[k], "history") == 0) {
       if (++k >= narg || !law.set_history(arg[k]))
         error->all(FLERR, "{}: history must be total, rescaled or coulomb, not {}", command,
@@ -39,10 +51,11 @@ LawKeywords LawReader::read(int first, int narg, char **arg)
     }
   }
   if (!law.valid_history())
-    error->all(FLERR,
-               "{}: history rescaled needs exponent 1.5, since the stiffness of harmonic disks does not depend on the "
-               "overlap",
-               command);
+    error->all(
+        FLERR,
+        "{}: history rescaled needs an exponent of {} or more: with less the stiffness depends too little on the "
+        "overlap, and the smoothed force creates energy all the same",
+        command, faultgouge::MindlinLaw::LEAST_RESCALED);
   return found;
 }
 

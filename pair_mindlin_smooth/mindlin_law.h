@@ -5,7 +5,7 @@
 
 // The contact law of two disks, and of a disk on the floor. No LAMMPS types.
 //
-// n points from j to i and tau = z x n; overlap delta > 0; slip s along tau; the exponent p is 3/2 or 1.
+// n points from j to i and tau = z x n; overlap delta > 0; slip s along tau; the exponent p is one of `Exponents`.
 //
 //   normal force on i      f_n = k_n delta^p
 //   tangential force on i  f_t = -k_t delta^(p-1) (1 + x - x^2) s,  x = |s|/s*,  s* = mu (k_n/k_t) delta
@@ -15,8 +15,8 @@
 // never exceeds mu f_n, not even by a rounding, and equals it at x = 1. With a dashpot it is cut off at mu f_n, where
 // f_n is the elastic force. Numbers are double or Compensated; velocities, and so the forces of dashpots, are double.
 //
-// Rescaled, the slip becomes s (delta_old/delta_new)^(p-1) while the overlap grows, and stays while it falls. Growth of
-// a contact then adds no tangential force to what the contact carries.
+// Rescaled, the slip becomes s (delta_old/delta_new)^(p-1) while the overlap grows, and stays while it falls, for every
+// p > 1. Growth of a contact then adds no tangential force to what the contact carries.
 //
 // Coulomb's slider behind a spring (Cundall and Strack) has f_t = -k_t delta^(p-1) s up to the bound, with rescaled
 // slips. Its slip is -f_t/(k_t delta^(p-1)), the elastic part of the displacement.
@@ -43,13 +43,48 @@ struct Vector {
 // pulls Coulomb's slider
 enum class History { TOTAL, RESCALED, COULOMB };
 
-// of the repulsion: 3/2 (Hertz) and 1 (harmonic disks)
-enum class Exponent { HERTZ, HARMONIC };
+// A power of the overlap delta, p = EXPONENT. A law of another exponent is one more of these, in `Exponents`: code that
+// lacks one of its members does not compile.
+struct Hertz {
+  static constexpr double EXPONENT = 1.5;
+  // delta^(p-1)
+  static FAULTGOUGE_INLINE double growth(double overlap) { return std::sqrt(overlap); }
+  // k_n delta^p
+  static FAULTGOUGE_INLINE double force(double kn, double overlap) { return kn * overlap * std::sqrt(overlap); }
+  static FAULTGOUGE_INLINE Compensated force(double kn, Compensated overlap)
+  {
+    return kn * three_halves_power(overlap);
+  }
+  // 1 - (1 - share)^(p-1): what is lost of a rescaled slip while the overlap grows by a share of its last value
+  static FAULTGOUGE_INLINE double lost(double share) { return share / (1.0 + std::sqrt(1.0 - share)); }
+};
+
+struct Harmonic {
+  static constexpr double EXPONENT = 1.0;
+  static FAULTGOUGE_INLINE double growth(double) { return 1.0; }
+  static FAULTGOUGE_INLINE double force(double kn, double overlap) { return kn * overlap; }
+  static FAULTGOUGE_INLINE Compensated force(double kn, Compensated overlap) { return kn * overlap; }
+  static FAULTGOUGE_INLINE double lost(double) { return 0.0; }
+};
+
+// The place of a power in the list stands for it while the program runs, and in restart files.
+template <class First, class... Rest> struct PowerList {
+  // work(power) with the power at a place
+  template <class Work> static FAULTGOUGE_INLINE auto at(int place, const Work &work)
+  {
+    if constexpr (sizeof...(Rest) > 0)
+      if (place > 0) return PowerList<Rest...>::at(place - 1, work);
+    return work(First());
+  }
+  static constexpr int SIZE = 1 + sizeof...(Rest);
+};
+
+using Exponents = PowerList<Hertz, Harmonic>;
 
 struct MindlinLaw {
   double kn = 0.0, kt = 0.0, mu = 0.0;
   double cn = 0.0, ct = 0.0;
-  Exponent exponent = Exponent::HERTZ;
+  int exponent = 0;    // its place in `Exponents`
   History history = History::TOTAL;
 
   bool frictional() const { return mu > 0.0 && kt > 0.0; }
@@ -57,16 +92,23 @@ struct MindlinLaw {
   {
     return std::isfinite(kn) && std::isfinite(kt) && std::isfinite(mu) && kn > 0.0 && kt >= 0.0 && mu >= 0.0;
   }
-  // the stiffness of harmonic disks does not depend on the overlap
-  bool valid_history() const { return history != History::RESCALED || exponent == Exponent::HERTZ; }
-  bool rescales() const { return history != History::TOTAL && exponent == Exponent::HERTZ; }
+  // below this exponent the smoothed force creates energy with rescaled slips, too
+  static constexpr double LEAST_RESCALED = 1.4;
+  double power() const
+  {
+    return Exponents::at(exponent, [](auto p) { return p.EXPONENT; });
+  }
+  bool valid_history() const { return history != History::RESCALED || power() >= LEAST_RESCALED; }
+  bool rescales() const { return history != History::TOTAL && power() > 1.0; }
   bool valid_dashpots() const { return std::isfinite(cn) && std::isfinite(ct) && cn >= 0.0 && ct >= 0.0; }
 
   // false: there is no such exponent
   bool set_exponent(double p)
   {
-    exponent = p == 1.0 ? Exponent::HARMONIC : Exponent::HERTZ;
-    return p == 1.0 || p == 1.5;
+    for (exponent = 0; exponent < Exponents::SIZE; exponent++)
+      if (power() == p) return true;
+    exponent = 0;
+    return false;
   }
 
   // false: there is no such history
@@ -83,27 +125,9 @@ struct MindlinLaw {
     return Number(mu) * Number(kn) / Number(kt);
   }
 
-  // delta^(p-1)
-  template <Exponent P> FAULTGOUGE_INLINE static double growth(double overlap)
+  template <class P, class Number> FAULTGOUGE_INLINE Number normal_force(Number overlap) const
   {
-    return P == Exponent::HERTZ ? std::sqrt(overlap) : 1.0;
-  }
-
-  template <Exponent P> FAULTGOUGE_INLINE double normal_force(double overlap) const
-  {
-    if constexpr (P == Exponent::HERTZ) return kn * overlap * std::sqrt(overlap);
-    return kn * overlap;
-  }
-  template <Exponent P> FAULTGOUGE_INLINE Compensated normal_force(Compensated overlap) const
-  {
-    if constexpr (P == Exponent::HERTZ) return kn * three_halves_power(overlap);
-    return kn * overlap;
-  }
-
-  // k_n delta^(p+1) / (p+1)
-  template <Exponent P> double normal_energy(double overlap) const
-  {
-    return (P == Exponent::HERTZ ? 0.4 : 0.5) * normal_force<P>(overlap) * overlap;
+    return P::force(kn, overlap);
   }
 
   // Where friction has weakened to nothing slip_limit is zero, and so is the bound.
@@ -123,58 +147,51 @@ struct MindlinLaw {
   }
 
   // f_n with the dashpot's force while n . v_ij is so large
-  template <Exponent P, class Number>
+  template <class P, class Number>
   FAULTGOUGE_INLINE Number damped_normal(Number normal, double overlap, double rate) const
   {
-    return normal - Number(cn * growth<P>(overlap) * rate);
+    return normal - Number(cn * P::growth(overlap) * rate);
   }
 
   // f_t with the dashpot's force while the slip grows at a rate, within the bound of the elastic normal force
-  template <Exponent P, class Number>
+  template <class P, class Number>
   FAULTGOUGE_INLINE Number damped_tangential(Number tangential, Number normal, double overlap, double rate) const
   {
     using std::fabs;
-    const Number sum = tangential - Number(ct * growth<P>(overlap) * rate), bound = mu * normal;
+    const Number sum = tangential - Number(ct * P::growth(overlap) * rate), bound = mu * normal;
     return select(fabs(sum) < bound, sum, times_sign(bound, std::copysign(1.0, leading(sum))));
   }
 
   // power that dashpots take at rates of opening and of slip, with the elastic normal force and both tangential ones:
   // beyond the bound they take as much as the bound leaves them
-  template <Exponent P>
+  template <class P>
   FAULTGOUGE_INLINE double dashpot_power(double overlap, double opening, double slip_rate, double elastic_tangential,
                                          double tangential) const
   {
-    return cn * growth<P>(overlap) * opening * opening + (elastic_tangential - tangential) * slip_rate;
+    return cn * P::growth(overlap) * opening * opening + (elastic_tangential - tangential) * slip_rate;
   }
 
   // the same with the exponent looked up, for what is not done in every step
   double growth(double overlap) const
   {
-    return with_exponent([&](auto p) { return growth<p()>(overlap); });
+    return Exponents::at(exponent, [&](auto p) { return p.growth(overlap); });
   }
   double normal_force(double overlap) const
   {
-    return with_exponent([&](auto p) { return normal_force<p()>(overlap); });
+    return Exponents::at(exponent, [&](auto p) { return p.force(kn, overlap); });
   }
-  double normal_energy(double overlap) const
-  {
-    return with_exponent([&](auto p) { return normal_energy<p()>(overlap); });
-  }
+  // k_n delta^(p+1) / (p+1)
+  double normal_energy(double overlap) const { return 1.0 / (power() + 1.0) * normal_force(overlap) * overlap; }
   double damped_normal(double normal, double overlap, double rate) const
   {
-    return with_exponent([&](auto p) { return damped_normal<p()>(normal, overlap, rate); });
+    return Exponents::at(exponent, [&](auto p) { return damped_normal<decltype(p)>(normal, overlap, rate); });
   }
   double damped_tangential(double tangential, double normal, double overlap, double rate) const
   {
-    return with_exponent([&](auto p) { return damped_tangential<p()>(tangential, normal, overlap, rate); });
+    return Exponents::at(exponent,
+                         [&](auto p) { return damped_tangential<decltype(p)>(tangential, normal, overlap, rate); });
   }
-
-private:
-  template <class Work> double with_exponent(Work work) const
-  {
-    if (exponent == Exponent::HARMONIC) return work(std::integral_constant<Exponent, Exponent::HARMONIC>());
-    return work(std::integral_constant<Exponent, Exponent::HERTZ>());
-  }
+  double rescaled_increment(double slip, double increment, double change, double overlap) const;
 };
 
 // Slip of a contact while its branch vector moves by d to r: d along the tangent at the middle of the
@@ -196,13 +213,20 @@ FAULTGOUGE_INLINE double overlap_change(Vector r, Vector d)
 }
 
 // What a rescaled slip gains while a contact slips by an increment and its overlap changes by some length to a positive
-// overlap. The exponent is 3/2. With the ratio q <= 1 of the stiffnesses before and after, the new slip is q s and
-// (1 + q)/2 times the increment, as the trapezoidal rule has it.
+// overlap. With the ratio q <= 1 of the stiffnesses before and after, the new slip is q s and (1 + q)/2 times the
+// increment, as the trapezoidal rule has it.
+template <class P>
 FAULTGOUGE_INLINE double rescaled_increment(double slip, double increment, double change, double overlap)
 {
   const double share = std::min(std::max(change / overlap, 0.0), 1.0);
-  const double loss = share / (1.0 + std::sqrt(1.0 - share));    // 1 - q
+  const double loss = P::lost(share);    // 1 - q
   return (1.0 - 0.5 * loss) * increment - loss * slip;
+}
+
+inline double MindlinLaw::rescaled_increment(double slip, double increment, double change, double overlap) const
+{
+  return Exponents::at(
+      exponent, [&](auto p) { return faultgouge::rescaled_increment<decltype(p)>(slip, increment, change, overlap); });
 }
 
 // the slip after an increment, within [-limit, limit]

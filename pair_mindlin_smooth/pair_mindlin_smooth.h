@@ -10,7 +10,7 @@
 // MU = 0 or KT = 0 there is no tangential force, no history and no fix.
 //
 //   exponent      3/2 by default, or 1
-//   history       total by default, or rescaled: slips are rescaled while overlaps grow (exponent 3/2 alone), or
+//   history       total by default, or rescaled: slips are rescaled while overlaps grow (not with exponent 1), or
 //                 coulomb: a spring behind Coulomb's slider
 //   damping       dashpots at the contacts, which feel the velocities of fix dashpot/velocities; none by default, and
 //                 none while fix displace/disc moves the disks

@@ -302,7 +302,7 @@ void PairMindlinSmooth::write_restart_settings(FILE *fp)
 {
   const int head[2] = {RESTART_MARK, RESTART_LAYOUT};
   const double numbers[5] = {law.kn, law.kt, law.mu, law.cn, law.ct};
-  const int words[4] = {static_cast<int>(law.exponent), static_cast<int>(law.history), compensated ? 1 : 0,
+  const int words[4] = {law.exponent, static_cast<int>(law.history), compensated ? 1 : 0,
                         (damping ? 1 : 0) + (energy ? 2 : 0)};
   fwrite(head, sizeof(int), 2, fp);
   fwrite(numbers, sizeof(double), 5, fp);
@@ -330,7 +330,7 @@ void PairMindlinSmooth::read_restart_settings(FILE *fp)
   law.mu = numbers[2];
   law.cn = numbers[3];
   law.ct = numbers[4];
-  law.exponent = static_cast<decltype(law.exponent)>(words[0]);
+  law.exponent = words[0];
   law.history = static_cast<decltype(law.history)>(words[1]);
   compensated = words[2] != 0;
   damping = words[3] & 1;

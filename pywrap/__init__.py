@@ -26,9 +26,7 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .lammps.instance import EngineError, lammps_instance
     from .load_path import LoadPath
     from .onset import onset_run
-    from .runs.drive import drive
-    from .runs.drive_setup import settle_for_drive
-    from .runs.drive_states import DriveCheckpoint, DriveSample, DriveStep
+    from .runs.drive import DriveCheckpoint, DriveSample, DriveStep, drive, settle_for_drive
     from .runs.ramp import ramp, reach
     from .runs.ramp_loads import ramp_loads
     from .runs.run_recorder import Record

@@ -22,14 +22,17 @@ DRAWS = 2000
 """Resampled packings of which an interval is made."""
 
 
-def share(count: int, of: int) -> dict[str, Any]:
-    """count/of with Wilson's interval: {"count", "of", "share", "low", "high"}, the last three None for of = 0."""
+def share(count: int, of: int, unknown: int = 0) -> dict[str, Any]:
+    """count/of with Wilson's interval: {"count", "of", "share", "low", "high"}, the last three None for of = 0.
+
+    Of `unknown` more of these it is not known whether they count: the interval is that of none and of all of them.
+    """
     if of == 0:
         return {"count": 0, "of": 0, "share": None, "low": None, "high": None}
     from scipy.stats import binomtest  # half a second to import
 
-    interval = binomtest(count, of).proportion_ci(0.95, method="wilson")
-    return {"count": count, "of": of, "share": count / of, "low": float(interval.low), "high": float(interval.high)}
+    low, high = (binomtest(k, of).proportion_ci(0.95, method="wilson") for k in (count, count + unknown))
+    return {"count": count, "of": of, "share": count / of, "low": float(low.low), "high": float(high.high)}
 
 
 def median(values: Sequence[float] | Floats) -> list[float]:

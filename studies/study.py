@@ -1,39 +1,50 @@
-"""The frame of studies: the files that every study writes, and the continuation of an interrupted study of one scene.
+"""The frame of studies: how a study registers itself, the files that it writes, and how it goes on after an interrupt.
 
-A study of one scene stores its results row by row in NAME.jsonl, and does not compute rows of the same scene again.
-NAME.json, pictures and NAME.md are written at the end.
+A study is one file of this folder, with its page beside it. In the file stand its physics, its section of a scene, the
+numbers, the pictures, and a function of the name of the file with one of two decorators:
+
+- `study`: the function takes a scene and its `Work`, and returns the contents of NAME.json. The command ``faultgouge
+  NAME SCENE -o FOLDER`` is there without further lines. Results are stored row by row in NAME.jsonl, and rows of the
+  same scene are not computed again. NAME.json, pictures and NAME.md are written at the end.
+- `task`: the function takes a scene and its settled packing, and returns one row: a task of ``faultgouge sweep``.
+
+:mod:`faultgouge.registered` finds studies by the names of their files. To draw, a study imports matplotlib within its
+functions: a scene with the section of a study imports the study's file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from ..analysis.files.atomic_write import make_folder, write_json, write_text
-from ..figures.pages import render
-from ..figures.style import report_failure, save
 from ..pywrap import Scene
 from ..pywrap.scenes.units import real_units
+from ..pywrap.scenes.validation import Section
 from .executors import MapRows, Progress, Say, open_executor
-from .result_rows import Rows
+from .packing_tools import Start
+from .result_rows import Row, Rows
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .sweep.sweep_plan import Sweep
 
 Result = dict[str, Any]
 
-Figures = Mapping[str, Callable[[], Figure]]
+Figures = Mapping[str, Callable[[], "Figure"]]
 """Functions that draw the pictures, by file name."""
 
+TaskRow = Callable[[Scene, Start], Row]
+"""A task: a scene, and the function mu -> settled packing -> a row."""
 
-def draw_all(figures: Figures, folder: Path, say: Say) -> None:
-    """Draw and save pictures; a picture that fails is reported, and the others are drawn."""
-    for name, figure in figures.items():
-        with report_failure(f"{name}.png", say):
-            save(figure(), folder / name)
+Gather = Callable[["Sweep", Sequence[Row], Path, Say], Sequence[str]]
+"""What a task makes of all rows of a sweep in a folder; it returns lines for a terminal."""
 
 
 class Work(NamedTuple):
@@ -45,33 +56,76 @@ class Work(NamedTuple):
     progress: Progress
 
 
-@dataclass(frozen=True)
-class SceneStudy:
-    """A study of one scene, which is called with the scene and a folder.
+def draw_all(figures: Figures, folder: Path, say: Say) -> None:
+    """Draw in the style of the package and save pictures; one that fails is reported, and the others are drawn."""
+    from ..figures.style import report_failure, save, styled
+
+    for name, figure in figures.items():
+        with report_failure(f"{name}.png", say):
+            save(styled(figure)(), folder / name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegisteredStudy:
+    """A study, which is called with a scene and a folder; or, of a task, its `row` with a scene and its packing.
+
+    The decorators take all attributes but the first three.
 
     Attributes
     ----------
-    package, name : str
-        `__package__` of the study, whose folder has the template NAME.md.j2, and NAME.
-    beside : str
-        A section of the scene that may change while the stored rows remain valid.
+    name : str
+        The name of the function and of its file; its docstring is the help of the command.
+    compute : callable, optional
+        Scene, `Work` -> the contents of NAME.json but the scene and its units.
+    row : callable, optional
+        The task of a sweep: scene, function mu -> settled packing -> a row. A study may have it, too.
+    reads, needs : tuple of str
+        Sections of a scene that are read besides its own, and those that it cannot do without.
+    section : type of Section, optional
+        Its own section, [NAME].
     check : callable
         Raises SceneError for a scene without what is needed.
-    compute : callable
-        Scene, `Work` -> the contents of NAME.json but the scene and its units.
     figures : callable
-        Contents of NAME.json, rows -> the functions that draw the pictures.
-    page : callable
-        Contents of NAME.json -> the names of the template but `result`, which is these contents, and `units`.
+        Contents of NAME.json, rows -> the functions that draw the pictures, by file name.
+    page : callable, optional
+        For a page NAME.md: contents of NAME.json -> the names of the template NAME.md.j2, beside the file, but
+        `result`, which is these contents, and `units`.
+    beside : str
+        A section of the scene that may change while the stored rows remain valid.
+    counts, kept : str
+        What the progress counts, and what an interrupt leaves.
+    example : str, optional
+        The example of the help. A task with one is a command, too, which takes a scene or a sweep of this task.
+    gather : callable, optional
+        What a task makes of all rows of a sweep.
+    writes : mapping
+        The files that `gather` writes besides pictures, and the heads of those that are tables: files of others of
+        these names are refused before work begins.
+    of_run : callable, optional
+        What the command of a task does with a stored run, FILE.h5, in place of a scene.
     """
 
-    package: str
     name: str
-    beside: str
-    check: Callable[[Scene], object]
-    compute: Callable[[Scene, Work], Result]
-    figures: Callable[[Result, Rows], Figures]
-    page: Callable[[Result], Result]
+    compute: Callable[[Scene, Work], Result] | None = None
+    row: TaskRow | None = None
+    reads: tuple[str, ...]
+    needs: tuple[str, ...] = ()
+    section: type[Section] | None = None
+    check: Callable[[Scene], object] = lambda scene: None
+    figures: Callable[[Result, Rows], Figures] = lambda result, rows: {}
+    page: Callable[[Result], Result] | None = None
+    beside: str = "output"
+    counts: str = "rows"
+    kept: str = "what was found so far"
+    example: str | None = None
+    gather: Gather | None = None
+    writes: Mapping[str, str] = field(default_factory=dict)
+    of_run: Callable[[Path, Path, Say, Progress], Sequence[str]] | None = None
+
+    @property
+    def sections(self) -> tuple[str, ...]:
+        """All sections of a scene that are read."""
+        return (*self.reads, self.name) if self.section else self.reads
 
     def __call__(
         self, scene: Scene, output: Path, say: Say = print, progress: Progress = lambda results, _: results
@@ -92,19 +146,33 @@ class SceneStudy:
         OnsetError, NoEquilibriumError
             If the packing has no onset, or bears none of the loads.
         """
+        from ..figures.pages import render
+
+        assert self.compute is not None
         self.check(scene)
         pool: Any
         with open_executor(workers=1) as pool:
             if MPI.COMM_WORLD.rank != 0:
                 return {}
             map_rows: MapRows = map if pool is None else partial(pool.map, unordered=True)
-            make_folder(output)
+            make_folder(output, f"{self.name}.json", f"{self.name}.md")
             rows = Rows(output / f"{self.name}.jsonl", scene, self.beside)
             found = self.compute(scene, Work(rows, map_rows, say, progress))
         real = real_units(scene)
         result = {"scene": scene.resolved(), "units": None if real is None else real.as_dict()} | found
-        names = {"result": result, "units": result["units"], **self.page(result)}
         write_json(output / f"{self.name}.json", result)
         draw_all(self.figures(result, rows), output, say)
-        write_text(output / f"{self.name}.md", render(self.package, f"{self.name}.md.j2", **names))
+        if self.page is not None:
+            names = {"result": result, "units": result["units"], **self.page(result)}
+            write_text(output / f"{self.name}.md", render(__package__ or "", f"{self.name}.md.j2", **names))
         return result
+
+
+def study(**given: Any) -> Callable[[Callable[[Scene, Work], Result]], RegisteredStudy]:
+    """Register the function of a study of one scene; keywords are the attributes of `RegisteredStudy`."""
+    return lambda compute: RegisteredStudy(name=compute.__name__, compute=compute, **given)
+
+
+def task(**given: Any) -> Callable[[TaskRow], RegisteredStudy]:
+    """Register the function of a task of a sweep; keywords are the attributes of `RegisteredStudy`."""
+    return lambda row: RegisteredStudy(name=row.__name__, row=row, **given)

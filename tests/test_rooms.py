@@ -21,7 +21,7 @@ ROOT = Path(faultgouge.__file__).parent
 
 FLOORS = {
     "faultgouge": (
-        ("lammps_inputs", "parent_death", "plugin", "mpi_rank"),
+        ("lammps_inputs", "parent_death", "plugin", "mpi_rank", "registered"),
         ("analysis",),
         ("figures", "pywrap"),
         ("assessment", "studies"),
@@ -43,6 +43,7 @@ FLOORS = {
         ("operators",),
         ("factors",),
         ("motion",),
+        ("elasticity",),
         ("files",),
         ("windows",),
     ),
@@ -66,6 +67,8 @@ def modules() -> dict[str, Path]:
     """Every module with its file; the folders of the package are links, which `glob` follows."""
     found = {}
     for path in glob("**/*.py", root_dir=ROOT, recursive=True):
+        if path.startswith("scenes/"):  # examples that are copied for a user
+            continue
         names = ["faultgouge", *Path(path).with_suffix("").parts]
         found[".".join(names[:-1] if names[-1] == "__init__" else names)] = ROOT / path
     return found
@@ -232,16 +235,14 @@ DOORS = {
 INSIDE = {
     "analysis.files.formats.lammps_data": "the box of a data file for LAMMPS's own styles",
     "analysis.motion.one_sided": "the pages compare starts and steps of that motion",
-    "analysis.motion.one_sided_outcome": "the pages state the lengths with which the outcome is decided",
     "analysis.motion.rising_load": "the pages state the drag and the windows of a load that rises, and follow them",
     "analysis.windows.pair_over_load": "the plane of a pair, on which weak dashpots act",
     "analysis.windows.slices": "the bases of a way of counting pairs that a page compares with all eigenvalues",
     "pywrap.granular.lammps_arrays": "velocities of a live LAMMPS are set in a unit that the Configuration has",
     "pywrap.runs.path_error": "the stated errors that a page compares with true ones, at the windows of its own search",
-    "pywrap.runs.drive_recorder": "slips and clock advances from the rows of a drive.h5",
+    "pywrap.runs.drive": "slips and clock advances from the rows of a drive.h5",
     "pywrap.scenes.drive_section": "the scale of the probe that a page states",
     "pywrap.scenes.validation": "read_toml, as Python 3.10 has no reader; require_section",
-    "studies.modes.draw": "the page goes on with curves of that study",
 }
 """Modules behind the doors that research uses for all that, and what for."""
 

@@ -20,11 +20,10 @@ from scipy.sparse import csr_array
 from ..configuration import Configuration
 from ..contacts import PER_CONTACT, LinearisedContacts
 from ..errors import PackingFileError
-from .atomic_write import SEAL, check_checksum
-from .checksummed_file import new_file, open_checksummed, write
+from .atomic_write import SEAL
+from .checksummed_file import new_file, open_sealed, write
 from .plain_file import open_plain
-from .runfile_header import CHECKSUM, CREATOR, program_version
-from .runfile_validation import check_places
+from .runfile import CHECKSUM, write_h5md
 
 if TYPE_CHECKING:
     import h5py
@@ -34,11 +33,6 @@ ARRAYS = (
     "position", "radius", "mass", "inertia", "box", "origin", "periodic", "load", "free", "ids", "kind", "top", "jump",
     "wall_force",
 )  # fmt: skip
-LATER_KEYS = (
-    "slider", "viscous_slider", "top", "drag_rate", "spring", "operator_error", "jump", "wall_force", "slips_known",
-)  # fmt: skip
-"""Keys that files of version 1 do not have."""
-
 MATRICES = ("stiffness", "damping", "constraint")
 MATRIX_PARTS = ("data", "indices", "indptr")
 
@@ -59,10 +53,7 @@ def write_configuration(
         If the file cannot be written.
     """
     with new_file() as file:
-        header = file.create_group("h5md")
-        header.attrs["version"] = np.array([1, 1])
-        header.create_group("author").attrs["name"] = CREATOR
-        header.create_group("creator").attrs.update({"name": CREATOR, "version": program_version()})
+        write_h5md(file)
         particles = file.create_group("particles/particles")
         position = np.zeros((1, len(configuration), 3))
         position[0, :, : configuration.dimension] = configuration.position
@@ -102,30 +93,22 @@ def holds_configuration(path: Path) -> bool:
                 return False
     except OSError:
         return False
-    check_checksum(path)  # before HDF5 sees what has changed
-    with open_checksummed(path) as file:
+    with open_sealed(path) as file:
         return "snapshot" in file
 
 
 def read_configuration(path: Path) -> Configuration:
     """The configuration of a file. Raises PackingFileError if the file is missing, damaged, or holds none."""
-    if not path.is_file():
-        raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
-    check_checksum(path)
-    with open_checksummed(path) as file:
+    with open_sealed(path) as file:
         try:
-            check_places(file)
             group, given = file["snapshot"], file["snapshot/contacts"]
-            contacts = LinearisedContacts(
-                **{name: given[name][()] for name in PER_CONTACT if name in given or name not in LATER_KEYS}
-            )
-            arrays = {name: group[name][()] for name in ARRAYS if name in group or name not in LATER_KEYS}
-            stored = [name for name in SCALARS if name in group.attrs or name not in LATER_KEYS]
-            numbers = {name: group.attrs[name].item() for name in stored}
+            # what version 1 did not store has a default
+            contacts = LinearisedContacts(**{name: given[name][()] for name in PER_CONTACT if name in given})
+            arrays = {name: group[name][()] for name in ARRAYS if name in group}
+            numbers = {name: group.attrs[name].item() for name in (*SCALARS, "proof") if name in group.attrs}
             matrices = {name: _matrix(group[name]) for name in MATRICES if name in group}
-            proof = group.attrs["proof"].item() if "proof" in group.attrs else None
             remarks = [str(each) for each in group.attrs.get("remarks", ())]
-            return Configuration(contacts=contacts, **arrays, **numbers, **matrices, proof=proof, remarks=remarks)
+            return Configuration(contacts=contacts, **arrays, **numbers, **matrices, remarks=remarks)
         except Exception as error:  # h5py raises nearly every exception there is, depending on what is damaged
             said = (str(error).strip() or type(error).__name__).rstrip(".")
             raise PackingFileError(f"{path} holds no configuration that can be read: {said}.") from error

@@ -97,7 +97,7 @@ def linear_verdict(motion: Motion, *, decides: bool = True, time: float | None =
     zero = zero_uncertainty(motion.configuration, operator_rounding(motion.configuration, motion.stiffness.data))
     try:
         proof = prove(a, g, zero)
-    except NoProofError as why:
+    except NoProofError as failure:
         return (
             _by_lapack(motion)
             if size <= LAPACK_UP_TO

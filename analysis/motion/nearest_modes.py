@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import csc_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from ..factors.sparse_lu import general_lu
+from ..factors.sparse_lu import DIAGONAL_PIVOT, symmetric_lu
 from ..has_configuration import HasConfiguration
 from .eigenvalues import Complexes
 from .modes import Modes
@@ -51,7 +51,7 @@ def nearest_modes(packing: HasConfiguration, near: complex, count: int, toleranc
     shift = near if number is np.complex128 else complex(near).real
     matrix = matrix.astype(number)
     shifted = csc_array(matrix - shift * eye_array(size, dtype=number))
-    factor = general_lu(shifted)
+    factor = symmetric_lu(shifted, pivoting=DIAGONAL_PIVOT)  # the shift may be next to an eigenvalue
     # A fixed start vector makes ARPACK, and with it every result, reproducible.
     start = np.ones(size, dtype=number)
     solves = 0

@@ -1,28 +1,28 @@
-"""Motion under a load that rises at a constant rate: drift, vibration, and how far this motion goes on.
+r"""Motion under a load that rises at a constant rate: drift, vibration, and how far this motion goes on.
 
 The motion is proportional to the rate. Over a span of time its *drift* is the mean velocity of each particle, and its
-*vibration* what is left of the velocities: root mean squares over particles and axes.
+*vibration* what is left of the velocities: root mean squares over particles and axes. A packing *vibrates* if its
+vibration is steady, and more than `VIBRATION_SHARE` of its drift.
 
-**Without contacts at Coulomb's bound** one solution of a sparse system says the drift
-(:mod:`~faultgouge.analysis.motion.steady_drift`). The packing does not vibrate unless motion about the drift grows.
+**Without contacts at Coulomb's bound** the drift under the load :math:`t\, \mathbf g` solves :math:`K \dot u = \mathbf
+g`. If a law has two derivatives, one while a contact closes and one while it parts, K has for each contact the
+derivative of its own way. A force that is left over belongs to a motion that no force opposes, which the load
+accelerates for ever: then there is no drift. The packing does not vibrate unless motion about the drift grows.
 
 **With contacts at the bound** the motion is followed in windows of time. The beginning of the rise alone makes a
 packing vibrate until its dashpots have taken the energy. A drag in the first windows takes this vibration away, and
 fades out: a vibration that is left sustains itself. Contacts may stick and slide in a cycle of several windows. So
-drift and vibration are means over a span of many windows: over all windows after the drag or, if these differ too much,
-over the last half of them. The motion is steady if the two halves of this span agree. The error of a number is the
-error of the mean of the four quarters of the span, and at least the error of the time steps.
+drift and vibration are means over all windows after the drag or, if their halves differ too much, over the last half of
+them. The error of a number is the spread of the four quarters of this span, and at least the error of the time steps.
+Vibration may grow slowly from almost nothing: at least half of the time is followed, from two starts, with a drag on
+all coordinates, and with one that leaves rotations alone.
 
-Vibration may grow slowly from almost nothing. A packing is therefore said to follow the load only after the whole time.
-One vibration was steady for ten windows and then grew to another one. So at least half of the time is followed, from
-two starts: with a drag on all coordinates, and with a drag that leaves rotations alone. A packing may vibrate in two
-ways, one from each start.
-
-**Range.** While the load rises the drift takes sticking contacts to Coulomb's bound, and opens or closes others
-(:mod:`~faultgouge.analysis.motion.next_change`). From then on the packing is another one. A contact that counts as at
-the bound may lack a little force, and slides once the load has risen enough. The residual forces move the packing, too,
-and count until the load has moved the packing ten times as far. If another contact reaches the bound or opens before,
-there is no motion of this kind.
+**Range.** While the load rises the drift takes sticking contacts to Coulomb's bound, and opens or closes others. From
+then on the packing is another one. A contact that counts as at the bound may lack a little force, and slides once the
+load has risen enough. The residual forces move the packing, too, and count until the load has moved the packing ten
+times as far. If another contact changes before, there is no motion of this kind. A force at the bound that turns by
+:math:`a_c / \mu f_n` lets its contact pass the bound by :math:`a_c^2 / 2 \mu f_n`, and the packing in which it slides
+then moves on until other contacts bear this.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,28 +30,34 @@ from dataclasses import dataclass, replace
 from itertools import count, islice
 
 import numpy as np
+from scipy.sparse import csc_array, csr_array, diags_array, eye_array
 
 from ..arrays import Floats
+from ..counted import counted
+from ..errors import FaultgougeError
+from ..factors.sparse_lu import general_lu
 from ..fields_by_name import FieldsByName
 from ..progress import report_progress
-from .contact_reach import PUSH_OVER_RESIDUAL, reaching_scale
-from .next_change import next_change
-from .one_sided import OneSidedSystem
-from .one_sided_outcome import WINDOWS_OF_TIME, window_and_most
-from .steady_drift import NotFollowedError, refuse_flight, steady_velocity
+from .eigenvalues import operator_rounding, zero_uncertainty
+from .linear import linear_verdict
+from .motion import Motion
+from .one_sided import WORK_OF_MOTION, OneSidedSystem
 
-SAMPLES_OF_WINDOW = 400
-"""Velocities that a window of a load that rises has."""
-
-HALVES_DIFFERENCE = 0.2
-"""Relative difference of the vibrations of two halves of the last half of the time, below which a motion is steady."""
-
-TREND = 0.1
-"""Relative difference of the vibrations of two halves of the whole time after the drag, below which all of this time
-counts, and not the last half alone: in a packing whose vibration grew slowly for a third of the time it is 0.18."""
+LOAD_STEP = 0.1
+"""Time step of motion under a load, as a share of the largest stable one."""
 
 ERROR_OF_STEPS = 0.02
-"""Relative error of drift and vibration by time steps of a tenth of the stable one."""
+"""Relative error of drift and vibration by these steps."""
+
+WINDOW, WINDOWS = 300, 40
+"""Stable time steps of a window, some ten periods of a slow mode, and how many windows are followed at the most."""
+
+SAMPLES_OF_WINDOW = 400
+"""Velocities that a window has."""
+
+HALVES_DIFFERENCE, TREND = 0.2, 0.1
+"""Relative differences of the vibrations of two halves below which a motion is steady: of the last half of the time,
+and of all of it, which then counts. In a packing whose vibration grew slowly for a third of the time it is 0.18."""
 
 VIBRATION_ERROR = 0.1
 """Relative error of the vibration from which on a motion is not followed any longer."""
@@ -65,8 +71,8 @@ DRAG = 20.0
 ONE_START = 6000
 """Coordinates beyond which one start stands for two: each takes a minute or more."""
 
-VIBRATION_SHARE = 1e-2
-"""Vibration over drift of a packing that follows the load."""
+VIBRATION_SHARE = 0.05
+"""Vibration over drift above which a packing vibrates, and below which it follows the load."""
 
 VIBRATION_ROUNDING = 1e-6
 """Vibration over drift that may be rounding: the root of a difference of squares, whose digits are 1e-13 of these."""
@@ -80,6 +86,28 @@ ACCELERATION_POWER = 0.5
 
 LARGEST_GROWTH = 1e12
 """Growth of the vibration of a motion that has no drift."""
+
+DIAGONAL_SHIFT, REFINEMENTS = 1e-11, 3
+"""Share of the largest entry of K that is added to its diagonal, so that free motions do not divide by zero, and steps
+of refinement, each of which takes this shift out once more."""
+
+UNBORNE_SHARE = 1e-6
+"""Share of the load that may be left over where K bears the load."""
+
+WAY_CHANGES = 60
+"""How often the ways that contacts go may be changed: a few times are enough where the solution is unique."""
+
+LOAD_OVER_RESIDUAL = 10.0
+"""Displacement by the load over that by the residual forces, from which on the load counts."""
+
+TURNED_SHARE = 0.1
+"""Change of the drift by forces that have turned, from which on it is another drift."""
+
+EVENTS = "reaches Coulomb's bound", "opens", "closes", "at Coulomb's bound turns its force", "slides back"
+
+
+class NotFollowedError(FaultgougeError):
+    """The motion under a load that rises has no constant drift and no vibration about it."""
 
 
 @dataclass(frozen=True)
@@ -191,7 +219,7 @@ class Span:
 
 
 def motion_under_load(
-    system: OneSidedSystem,
+    motion: Motion,
     direction: Floats,
     time: float | None = None,
     *,
@@ -203,8 +231,8 @@ def motion_under_load(
 
     Parameters
     ----------
-    system : OneSidedSystem
-        Of a configuration in which no small motion is known to grow.
+    motion : Motion
+        With sticking contacts, of a configuration in which no small motion is known to grow.
     direction : ndarray, shape (coordinates, 1)
         Forces per unit of time.
     time : float, optional
@@ -221,22 +249,83 @@ def motion_under_load(
     NotFollowedError
         If the load accelerates a motion that no force opposes, or particles that touch nothing.
     """
-    refuse_flight(system, direction)
-    velocity = steady_velocity(system, direction, free) if decays else None
+    system = OneSidedSystem(motion, LOAD_STEP)
+    loaded = motion.configuration.coordinate_free & (direction[:, 0] != 0)
+    loaded[motion.active] = False
+    if flying := len(np.unique(np.flatnonzero(loaded) % len(motion.configuration))):
+        raise NotFollowedError(
+            f"the load accelerates {counted(flying, 'particle')} that nothing touches: give no forces on these"
+        )
+    velocity = _steady_velocity(system, direction, free) if decays else None
     if velocity is None:
         return follow_load(system, direction, time, residual)
     paths = np.abs(system.rescaled[0] @ velocity)
     moves = system.displacement(velocity)
     still = Span(1.0, velocity, paths, moves, moves**2, np.zeros((0, 1)))
     drift = float(still.drift_and_vibration(system)[0, 0])
-    return _rising_motion(DriftAndVibration(drift, 0.0, 0.0, 0.0, True), system, still, residual)
+    return _with_range(DriftAndVibration(drift, 0.0, 0.0, 0.0, True), system, still, residual)
+
+
+def _steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Floats | None:
+    """The drift, mass-weighted, shape (E, 1); None if the motion is to be followed.
+
+    Raises NotFollowedError if the load accelerates a motion that no force opposes.
+    """
+    if system.sliders[1].shape[0]:
+        return None
+    motion, load = system.motion, system.on_active(direction)
+    rates, forces, _ = system.rescaled
+    way = np.zeros(rates.shape[0])
+    for _ in range(WAY_CHANGES):
+        a = csr_array(motion.stiffness - forces @ diags_array(way) @ rates) if len(way) else motion.stiffness
+        velocity = static_response(replace(motion, stiffness=a), load, free)
+        if np.linalg.norm(load - a @ velocity) > UNBORNE_SHARE * np.linalg.norm(load):
+            moves = f"{counted(free, 'motion')} that no" if free else "a motion that next to no"
+            raise NotFollowedError(f"the load accelerates {moves} force opposes")
+        before, way = way, np.sign(rates @ velocity)[:, 0]
+        if np.array_equal(before, way):
+            break
+    else:
+        return None
+    if len(way) and linear_verdict(replace(motion, stiffness=a)).stable is not True:
+        return None
+    return velocity
+
+
+def static_response(motion: Motion, load: Floats, free: int = 0) -> Floats:
+    """v of A v = load, without the motions that no force opposes, shape (E, P).
+
+    Parameters
+    ----------
+    motion : Motion
+        A.
+    load : ndarray, shape (E, P)
+        Mass-weighted forces.
+    free : int
+        Motions that no force opposes.
+    """
+    matrix = motion.stiffness
+    shift = DIAGONAL_SHIFT * float(np.abs(matrix.data).max(initial=0.0))
+    if free:
+        rounding = operator_rounding(motion.configuration, matrix.data)
+        shift = max(shift, 10 * zero_uncertainty(motion.configuration, rounding))
+    factors = general_lu(csc_array(matrix + shift * eye_array(matrix.shape[0])))
+    moved = np.zeros_like(load)
+    for _ in range(1 + REFINEMENTS):
+        moved += factors.solve(load - matrix @ moved)
+    return moved
 
 
 def follow_load(
     system: OneSidedSystem, direction: Floats, time: float | None = None, residual: float = 0.0
 ) -> RisingMotion:
     """Drift and vibration of a motion that is followed, as of `motion_under_load`; `residual` as there."""
-    length, most = window_and_most(system, 1, time)
+    length = WINDOW * system.time_step / system.step_share
+    entries = system.motion.stiffness.nnz + system.motion.damping.nnz
+    most = int(np.clip(WORK_OF_MOTION / (entries * WINDOW / system.step_share), 4, WINDOWS))
+    if time is not None:
+        most = max(16, int(np.ceil(time / length)))
+        length = time / most
     windows: list[Span] = []
     for window in islice(windows_under_load(system, direction, length), most):
         windows.append(window)
@@ -250,7 +339,7 @@ def follow_load(
             break
     _refuse_acceleration(system, windows, length)
     span, (first, *others) = _of_starts(system, windows)
-    motion = _rising_motion(first, system, span, residual)
+    motion = _with_range(first, system, span, residual)
     return replace(motion, time=length * len(windows), span=span.time, other_start=others[0] if others else None)
 
 
@@ -258,8 +347,6 @@ def _refuse_acceleration(system: OneSidedSystem, windows: list[Span], length: fl
     """Refuse a motion whose mean velocity rises on, as of contacts that slide on and on."""
     span = windows[FADE_WINDOWS:] or windows
     quarters, time = _parts(system, span)[0, 3:, 0], length * len(windows)
-    if time < WINDOWS_OF_TIME * window_and_most(system, 1, None)[0]:
-        return  # a slow vibration begins like that
     first, last = len(windows) - np.array([0.875, 0.125]) * len(span)  # the middles of two quarters
     if np.all(np.diff(quarters) > 0) and quarters[-1] > (last / first) ** ACCELERATION_POWER * quarters[0]:
         raise NotFollowedError(
@@ -269,27 +356,15 @@ def _refuse_acceleration(system: OneSidedSystem, windows: list[Span], length: fl
         )
 
 
-def _rising_motion(moves: DriftAndVibration, system: OneSidedSystem, span: Span, residual: float) -> RisingMotion:
-    """A motion with the increases of the load between which the motion of a span holds.
-
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of the configuration.
-    span : Span
-        The motion at the rate 1.
-    residual : float
-        Root mean square displacement of the particles by the residual forces, length.
-
-    Raises
-    ------
-    NotFollowedError
-        If there are none.
-    """
+def _with_range(moves: DriftAndVibration, system: OneSidedSystem, span: Span, residual: float) -> RisingMotion:
+    """A motion with the increases of the load between which the motion of a span holds; NotFollowedError if there are
+    none."""
     velocity, paths, slid = (each[:, :1] / span.time for each in (span.displacement, span.paths, span.slid))
-    reached, (change, event) = reaching_scale(system, slid), next_change(system, velocity, slid, paths)
+    counts = slid > 0.1 * slid.max(initial=0.0)
+    reached = float((system.missing_forces[counts] / slid[counts]).max(initial=0.0))
+    change, event = next_change(system, velocity, slid, paths)
     drift = float(np.sqrt(system.mean_square_displacement(velocity)[0]))
-    moved = PUSH_OVER_RESIDUAL * residual / drift if drift else 0.0
+    moved = LOAD_OVER_RESIDUAL * residual / drift if drift else 0.0
     least = max(reached, moved)
     if change is not None and least >= change:
         what = "contacts that count as at Coulomb's bound reach it" if reached > moved else "residual forces count less"
@@ -298,6 +373,54 @@ def _rising_motion(moves: DriftAndVibration, system: OneSidedSystem, span: Span,
             "bring the packing to rest more closely"
         )
     return RisingMotion(**moves, least_rise=least, next_change=change, next_event=event)
+
+
+def next_change(
+    system: OneSidedSystem, velocity: Floats, slid: Floats, paths: Floats
+) -> tuple[float | None, str | None]:
+    """At which increase of the load a contact changes first, and what it does; None twice if none is known.
+
+    Parameters
+    ----------
+    system : OneSidedSystem
+        Of the configuration.
+    velocity : ndarray, shape (E, 1)
+        Mean mass-weighted velocity at the rate 1.
+    slid : ndarray, shape (B, 1)
+        Mean rates at which contacts at the bound slide, force.
+    paths : ndarray, shape (R, 1)
+        Mean rates of the paths of the overlaps of contacts with two derivatives.
+
+    Raises
+    ------
+    NotFollowedError
+        If nothing holds the particles after the force of a contact has turned.
+    """
+    if system.motion.configuration.stiffness is not None:
+        return None, None
+    changes, slowly = system.contact_changes, np.zeros_like(velocity)  # dashpots do not count
+    multiples = changes.multiples(velocity, slowly, slid, paths)
+    back = multiples.reaches[changes.slides].min(initial=np.inf)
+    multiples.reaches[changes.slides] = np.inf
+    found = [float(each.min(initial=np.inf)) for each in multiples] + [float(back)]
+    first, event = min(zip(found, EVENTS, strict=True))
+    if event == EVENTS[3]:
+        first = min(first, _change_by_turning(system, velocity, np.isfinite(multiples.turns[:, 0])))
+    return (first, event) if first < np.inf else (None, None)
+
+
+def _change_by_turning(system: OneSidedSystem, velocity: Floats, turns: np.ndarray) -> float:
+    """Increase of the load at which contacts that slide on, since their forces have turned, change the drift."""
+    grip, excess = (csr_array(each) for each in system.sliders[:2])
+    load = grip @ np.where(turns[:, None], system.sideways @ velocity, 0.0) ** 2
+    a = csr_array(system.motion.stiffness + grip[:, turns] @ excess[turns])
+    moves = static_response(replace(system.motion, stiffness=a), load, 1)
+    if np.linalg.norm(load - a @ moves) > UNBORNE_SHARE * np.linalg.norm(load):
+        raise NotFollowedError(
+            "the load turns the forces of contacts at Coulomb's bound, and nothing holds the particles that slide then"
+        )
+    size, change = (system.mean_square_displacement(each)[0] for each in (velocity, moves))
+    return float(TURNED_SHARE * np.sqrt(size / change)) if change else np.inf
 
 
 def windows_under_load(system: OneSidedSystem, direction: Floats, length: float) -> Iterator[Span]:

@@ -1,54 +1,24 @@
 """The verdict on a packing at rest: whether it moves, in numbers and in sentences."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import chain
 from typing import Any
 
 import numpy as np
 
 from ..counted import counted
-from .contact_reach import PUSH_OVER_RESIDUAL
-from .creep import Creep
-from .decay import Decay
+from .eigenvalues import Linear
 from .growth_in_words import exponential
-from .one_sided_outcome import OneSidedOutcome
-from .rates import Rates
+from .pushes import PUSH_OVER_RESIDUAL, Creep, OneSidedOutcome
 from .rising_load import RisingMotion
 
 WORN = "contacts bear less after they have closed and parted, so that vibration carries particles on"
 """The sentence on contacts with two derivatives."""
 
 
-@dataclass(frozen=True)
-class LinearNeighbour:
-    """The linear motion with all contacts at the bound alike.
-
-    Attributes
-    ----------
-    growth_rate : float
-        Largest 2 Re s, 1 / time; zero if none was found in a large packing.
-    searched : float
-        Growth rate of D, 1 / time, below which growth was not looked for; 0 if all eigenvalues are known.
-    at_least : bool
-        Whether the growth rate is only known to be no less.
-    """
-
-    growth_rate: float
-    searched: float = 0.0
-    at_least: bool = False
-
-    @classmethod
-    def of(cls, rates: Rates) -> "LinearNeighbour":
-        """The fastest motion."""
-        return cls(rates.growth_rate, rates.searched, rates.at_least)
-
-    def __str__(self) -> str:
-        if self.searched and self.growth_rate <= 0:
-            return f"no growth of D faster than exp({self.searched:.2g} t)"
-        if self.growth_rate == 0:
-            return "D neither grows nor decays"
-        return exponential(self.growth_rate, 4, self.at_least)
+class NoVerdictError(ValueError):
+    """Truth was asked of a verdict that is not known."""
 
 
 @dataclass(frozen=True)
@@ -73,13 +43,13 @@ class WithoutDissipation:
 
 @dataclass(frozen=True)
 class Stability:
-    """Whether a packing moves.
+    """Whether a packing moves. `bool()` of it is the verdict, or a NoVerdictError.
 
     Attributes
     ----------
     stable : bool or None
         None: unknown, for the `reasons`.
-    growth_rate : float
+    growth_rate, error : float
         Of D, 1 / time, with dissipation: largest 2 Re s, negative if every motion decays, and zero if that is zero but
         for rounding. Where contacts at the bound make the packing grow, the rate of the one-sided motion.
     at_least : bool
@@ -88,24 +58,7 @@ class Stability:
         Without dissipation.
     at_bound : int
         Contacts at Coulomb's bound.
-    one_sided : OneSidedOutcome or None
-        What became of motion after pushes; None without contacts that slide on one side. Its fields have two spellings,
-        `one_sided.grows` and `one_sided["grows"]`, as JSON has them; those of `rising` have, too.
-    creep : Creep or None
-        How far a push carries particles if contacts have two derivatives, and none is at the bound.
-    largest_push : float or None
-        Where motion does not grow, and no contact slides on one side: velocity of a push along an axis up to which
-        contacts neither reach the bound nor open, and no others close. None where K is given.
-    push_time : float
-        Within which time; other motion than that which no force opposes has gone farthest by then.
-    residual_push : float
-        Velocity of a push along an axis that moves the particles as far as the residual forces do; 0 where no motion
-        was followed.
-    decay : Decay or None
-        What became of a random state with sticking contacts; None where eigenvalues decide.
-    rising : RisingMotion or None
-        Drift and vibration over the rate of loading. None unless asked, and where the motion was `not_followed`.
-    sticking, sliding : LinearNeighbour
+    sticking, sliding : Linear
         If all contacts at the bound stuck, and if all slid on; no bounds of what they do.
     asymmetry : dict
         Shares of what makes K asymmetric: tangential_force, lever_arm, overlap; empty where K is given.
@@ -113,41 +66,65 @@ class Stability:
         Whether there are dashpots or drag.
     free : int
         Motions that no force opposes.
-    searched : float
-        Growth rate of D, 1 / time, below which linear growth may not have been seen; 0 if all eigenvalues are known, or
-        if a random state has decayed so far that nothing grows.
     contacts : int
         Number of contacts; where K is given, and walls hand out no contacts, of particles that feel something.
+    one_sided : OneSidedOutcome or None
+        What became of motion after pushes; None without contacts that slide on one side. Its fields have two spellings,
+        `one_sided.grows` and `one_sided["grows"]`, as JSON has them; those of `creep` and `rising` have, too.
+    creep : Creep or None
+        How far a push carries particles if contacts have two derivatives, and none is at the bound.
+    largest_energy, largest_push : float or None
+        Where linear motion does not grow, and no contact slides on one side: energy of a push below which no contact
+        changes, whatever the push; and the velocity of one particle, whichever it is, with that energy: that of the
+        largest mass. None where K is given, if the energy of K is not positive, or if nothing can change.
+    push_time : float or None
+        Up to which time; None if for ever.
+    residual_push : float
+        Velocity of one particle, that of the smallest mass, with the energy of the displacement by the residual forces.
+    first_change : float or None
+        Where motion grows: D at which it takes the first contact to another state.
+    follow : dict or None
+        Where motion grows, and LAMMPS went on: "displacement", the root of D where it ends, and "ends", "vibrates",
+        "creeps" or "flows".
+    rising : RisingMotion or None
+        Drift and vibration over the rate of loading. None unless asked, and where the motion was `not_followed`.
     reasons : tuple of str
         Why the verdict is unknown.
     not_followed : str
         Why the motion under a rising load was not followed, where it was asked for.
     remarks : tuple of str
-        Those of the Configuration: what of its origin is left out, or other than it seems.
+        Those of the Configuration, what of its origin is left out, or other than it seems; and others.
     """
 
     stable: bool | None
     growth_rate: float
+    error: float
     at_least: bool
     undamped: WithoutDissipation
     at_bound: int
-    one_sided: OneSidedOutcome | None
-    creep: Creep | None
-    largest_push: float | None
-    push_time: float
-    residual_push: float
-    decay: Decay | None
-    rising: RisingMotion | None
-    sticking: LinearNeighbour
-    sliding: LinearNeighbour
+    sticking: Linear
+    sliding: Linear
     asymmetry: dict[str, float]
     dissipative: bool
     free: int
-    searched: float
     contacts: int
+    one_sided: OneSidedOutcome | None = None
+    creep: Creep | None = None
+    largest_energy: float | None = None
+    largest_push: float | None = None
+    push_time: float | None = None
+    residual_push: float = 0.0
+    first_change: float | None = None
+    follow: dict[str, Any] | None = None
+    rising: RisingMotion | None = None
     reasons: tuple[str, ...] = ()
     not_followed: str = ""
     remarks: tuple[str, ...] = ()
+
+    def __bool__(self) -> bool:
+        if self.stable is None:
+            raise NoVerdictError(f"{self._verdict}: ask for .stable, which is None here.")
+        return self.stable
 
     def __str__(self) -> str:
         """The verdict in sentences, the verdict first."""
@@ -156,12 +133,23 @@ class Stability:
     __repr__ = __str__
 
     @property
+    def searched(self) -> float:
+        """Growth rate of D, 1 / time, below which linear growth may not have been seen; 0 if nothing is hidden."""
+        return self.sticking.searched
+
+    @property
     def sentences(self) -> tuple[str, ...]:
         """The verdict, what holds without dissipation, what contacts at the bound do, and remarks on the origin."""
         parts = (
-            self._without_loss, self._at_the_bound, self._by_vibration, self._scales, self._under_the_load, self.remarks
+            self._without_loss, self._at_the_bound, self._by_vibration, self._range, self._when_it_grows,
+            self._under_the_load, self.remarks,
         )  # fmt: skip
         return (self._verdict, *chain.from_iterable(parts))
+
+    @property
+    def _rate(self) -> str:
+        """D as an exponential, with the digits that are known."""
+        return exponential(self.growth_rate, _digits(self.growth_rate, self.error), self.at_least)
 
     @property
     def _verdict(self) -> str:
@@ -172,29 +160,26 @@ class Stability:
             return f"not known whether the packing is stable: {'; '.join(self.reasons)}"
         if not self.stable:
             how = " in spite of the dissipation" if self.dissipative else ""
-            if self.decay is not None and self.decay.grows:
-                return f"unstable: small motion grows{how}: {self.decay}"
-            return f"unstable: small motion grows{how}, {exponential(self.growth_rate, 6, self.at_least)}"
+            return f"unstable: small motion grows{how}, {self._rate}"
         if self.one_sided is not None:
             return f"stable: {self._comes_to_rest(self.one_sided, free)}"
-        if self.decay is not None:
-            return f"stable: {self.decay}{free}"
+        if self.sticking.said:
+            return f"stable: {self.sticking.said}{free}"
         if self.dissipative and self.growth_rate < 0:
             motion = "every vibration" if self.creep else "every motion"
-            return f"stable: {motion} decays, the slowest with D as exp({self.growth_rate:.6g} t){free}"
+            return f"stable: {motion} decays, the slowest with {self._rate}{free}"
         if self.creep and not self.dissipative:
             return f"stable but for creep: no motion grows exponentially{free}"
         return f"stable: no motion grows{free}"
 
     def _comes_to_rest(self, outcome: OneSidedOutcome, free: str) -> str:
-        left = outcome.slip_left
-        until = "until the contacts have stopped sliding" if left == 0 else "while contacts slide"
-        on = f", and they slide on by {left:.1%} at most as vibration decays" if left else ""
-        sticks = f"; with sticking contacts, {self.decay}" if self.decay else ""
+        left = f", where {outcome.slip_left:.1%} of their slip is left" if outcome.slip_left else ""
         ends = "comes to rest" if self.growth_rate < 0 else "ends in vibration that goes on, but does not grow"
+        size = as_known(outcome.least_amplification, outcome.amplification)
         return (
-            f"each of {outcome.pushes} pushes {ends}{free}; D reaches {outcome.amplification:.3g} times the "
-            f"mean square velocity of the push {until} (followed for t = {outcome.time:.4g}{on}){sticks}"
+            f"each of {outcome.pushes} pushes {ends}{free}; D reaches {size} times the mean square velocity of the "
+            f"push while contacts slide (followed for t = {outcome.time:.4g}{left})"
+            + (f"; with sticking contacts, {self.sticking.said}" if self.sticking.said else "")
         )
 
     @property
@@ -203,26 +188,24 @@ class Stability:
         if self.dissipative and u.growth_rate > 0:
             counts = {"complex pair": u.pairs, "negative eigenvalue": u.negative}
             what = " and ".join(counted(count, name) for name, count in counts.items() if count)
-            yield f"without dissipation: {what or 'small motion grows'}, {exponential(u.growth_rate, 6, u.at_least)}"
-
-    @property
-    def _has_two_neighbours(self) -> bool:
-        """Whether contacts at the bound slide on ahead and stick on the way back."""
-        return self.one_sided is not None or self.sliding != self.sticking
+            yield (f"without dissipation: {what or 'small motion grows'}, {exponential(u.growth_rate, 6, u.at_least)}")
 
     @property
     def _at_the_bound(self) -> Iterator[str]:
         if self.at_bound == 0:
             return
-        yield f"{self.at_bound} of {counted(self.contacts, 'contact')} {_is(self.at_bound)} at Coulomb's bound" + (
-            ": each slides on ahead and sticks on the way back"
-            if self._has_two_neighbours
-            else f" and {'slides' if self.at_bound == 1 else 'slide'}"
+        sided = self.one_sided is not None or self.sliding != self.sticking
+        slide = "slides" if self.at_bound == 1 else "slide"
+        yield (
+            f"{self.at_bound} of {counted(self.contacts, 'contact')} {'is' if self.at_bound == 1 else 'are'} at "
+            f"Coulomb's bound{': each slides on ahead and sticks on the way back' if sided else f' and {slide}'}"
         )
-        if self._has_two_neighbours:
+        if sided:
+            on = max(self.sliding.free - self.sticking.free, 0)
+            ever = f"{counted(on, 'motion')} would go on for ever, and " if on else ""
             yield (
-                f"neither of two linear motions decides: if all of them stuck, {self.sticking}; if all slid on, "
-                f"{self.sliding}"
+                f"neither of two linear motions decides: if all of them stuck, {_neighbour(self.sticking)}; if all "
+                f"slid on, {ever}{_neighbour(self.sliding)}"
             )
 
     @property
@@ -232,67 +215,59 @@ class Stability:
             yield WORN + ": as long as vibration lasts, contacts may slide again, and D may rise further"
         if creep is None or not self.stable:
             return
-        says = f": D as ({creep.velocity:.2g} t)^2 times the mean square velocity of the push"
         if self.dissipative:
-            says = (
-                f", and they stay displaced, by D up to {creep.amplification:.2g} times the mean square velocity of "
-                f"the push within t = {creep.time:.4g}{_later(creep)}"
+            yield (
+                f"{WORN}, and they stay displaced, by D up to {creep.amplification:.2g} times the mean square velocity "
+                f"of the push within t = {creep.time:.4g}{_later(creep)}"
             )
-        yield f"{WORN}{says}"
+            return
+        yield (
+            f"{WORN}: D as ({as_known(creep.least_velocity, creep.velocity)} t)^2 times the mean square velocity of "
+            "the push"
+        )
 
     @property
-    def _scales(self) -> Iterator[str]:
-        if self.stable and self.one_sided is None:
-            yield from self._scales_of_linear_motion
-        if self.one_sided is None or self.one_sided.grows is None:
-            return
-        least, most = self.one_sided.scales
-        if self.one_sided.grows:
-            yield (
-                f"this growth is seen after pushes from {least:.1g} on (velocity along an axis): after smaller "
-                "ones contacts that count as at the bound may stay below it, or residual forces count"
-                if np.isfinite(least)
-                else "from which push on this growth is seen is not known: contacts that count as at the bound may "
-                "stay below it, and residual forces count"
+    def _range(self) -> Iterator[str]:
+        least, most = PUSH_OVER_RESIDUAL * self.residual_push, self.largest_push
+        if self.one_sided is not None:
+            yield from _range_of_pushes(self.one_sided, bool(self.stable))
+        elif self.stable and most is None and not self.asymmetry:
+            above = (
+                f" from {least:.1g} on (velocity of one particle), below which residual forces count" if least else ""
             )
-            return
-        if least < most:
+            says = "which push changes a contact, K by differences of forces does not say"
+            yield f"holds for small pushes{above}: {says}"
+        elif self.stable and most is None:
+            if self.contacts and not self.residual_push:
+                yield "which push changes a contact is not known, since K's symmetric part is not positive"
+        elif self.stable and most is not None and least >= most:
             yield (
-                f"this is the motion after pushes of {least:.1g} to {most:.1g} (velocity along an axis): below, "
-                "contacts that count as at the bound do not reach it, or residual forces count; above, others reach "
-                "it, open or close, or one of these turns"
+                f"holds for no push: below {least:.1g} (velocity of one particle) residual forces count, and above "
+                f"{most:.1g} a contact may open, close or slide"
             )
         elif self.stable:
+            below = f"; below a velocity of {least:.1g} residual forces count" if least else ""
+            worn = ", but for what vibration wears down" if self.creep else ""
+            within = f", until t = {self.push_time:.3g}" if self.push_time else ""
             yield (
-                f"no push is small enough for this motion (below {most:.1g}, where no other contact reaches the bound, "
-                f"opens or closes) and large enough (above {least:.1g}, where residual forces do not count)"
+                f"holds for every push of an energy up to {self.largest_energy:.2g}, as of one particle at {most:.2g}"
+                f"{within}: no contact opens, closes or slides{worn}{below}"
             )
+            if self.creep and np.isfinite(self.creep.first_change[1]):
+                yield (
+                    f"of random pushes, a contact changes from {self.creep.first_change[0]:.1g} to "
+                    f"{self.creep.first_change[1]:.1g} on (velocity along an axis)"
+                )
 
     @property
-    def _scales_of_linear_motion(self) -> Iterator[str]:
-        least, most = PUSH_OVER_RESIDUAL * self.residual_push, self.largest_push
-        if most is None and not self.asymmetry:  # K is given
-            above = (
-                f"above {least:.1g} (velocity along an axis), if small: below, residual forces count; " if least else ""
-            )
-            yield (
-                f"holds for {'pushes ' + above if above else 'small pushes: '}from which push on contacts open, close, "
-                "slide or roll, K by differences of forces does not say"
-            )
-        elif most is None:
-            if least:
-                yield f"holds for pushes above {least:.1g} (velocity along an axis): below, residual forces count"
-        elif least < most:
-            within, later = (f", up to t = {self.push_time:.2g}", " or later") if self.free else ("", "")
-            yield (
-                f"holds for pushes of {least:.1g} to {most:.1g} (velocity along an axis){within}: below, residual "
-                f"forces count; above{later}, contacts open, close or slide"
-            )
-        else:
-            yield (
-                f"holds for no push (velocity along an axis): below {least:.1g}, residual forces count; above "
-                f"{most:.1g}, contacts open, close or slide"
-            )
+    def _when_it_grows(self) -> Iterator[str]:
+        if self.stable is not False:
+            return
+        if self.first_change is not None:
+            size = self.first_change**0.5
+            yield f"as it grows, the first contact changes at a displacement of {size:.2g} (root of D)"
+        if self.follow is not None:
+            yield f"LAMMPS goes on from there, and {_ENDS[self.follow['ends']]} {self.follow['displacement']:.2g}"
 
     @property
     def _under_the_load(self) -> Iterator[str]:
@@ -304,37 +279,48 @@ class Stability:
             says = f"{self.rising}, and from another start {other}" if differs else str(self.rising)
             slide = "all contacts at the bound have reached it and " if self.one_sided is not None else ""
             since = f"; from a rise of {least:.1g} on, where {slide}residual forces do not count" if least else ""
-            until = (
-                ""
-                if change is None
-                else f"; until the load has risen by {change:.2g} (a contact {self.rising.next_event})"
-            )
+            event = f" (a contact {self.rising.next_event})"
+            until = "" if change is None else f"; until the load has risen by {change:.2g}{event}"
             yield f"under a load that rises at the rate 1: {says}{since}{until}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
-        return {
-            "stable": self.stable,
-            "growth_rate": self.growth_rate,
-            "at_least": self.at_least,
-            "undamped": vars(self.undamped),
-            "at_bound": self.at_bound,
-            "one_sided": None if self.one_sided is None else self.one_sided.as_dict(),
-            "creep": None if self.creep is None else vars(self.creep),
-            "largest_push": self.largest_push,
-            "push_time": self.push_time,
-            "residual_push": self.residual_push,
-            "decay": None if self.decay is None else self.decay.as_dict(),
-            "rising": None if self.rising is None else self.rising.as_dict(),
-            "sticking": vars(self.sticking),
-            "sliding": vars(self.sliding),
-            "asymmetry": self.asymmetry,
-            "free": self.free,
-            "searched": self.searched,
-            "reasons": list(self.reasons),
-            "not_followed": self.not_followed,
+        found = {name: value for name, value in vars(self).items() if name not in ("dissipative", "contacts")}
+        for name in ("one_sided", "creep", "rising"):
+            found[name] = None if found[name] is None else found[name].as_dict()
+        for name in ("sticking", "sliding"):
+            found[name] = {key: value for key, value in asdict(found[name]).items() if key != "s"}
+        return found | {
+            "undamped": vars(self.undamped), "searched": self.searched, "reasons": list(self.reasons),
             "remarks": list(self.remarks),
-        }
+        }  # fmt: skip
+
+
+_ENDS = {
+    "vibrates": "vibrates at a displacement of",
+    "creeps": "creeps on, at a displacement of",
+    "flows": "flows, at a displacement of",
+}
+
+
+def as_known(least: float, most: float) -> str:
+    """The larger of two numbers, with as many digits as these agree in."""
+    return f"{most:.{_digits(most, most - least)}g}"
+
+
+def _digits(number: float, error: float) -> int:
+    """How many digits of a number are larger than its error, one to six."""
+    share = abs(error / number) if number else 0.0
+    return 6 if share < 1e-6 else int(np.clip(np.ceil(-np.log10(share)), 1, 6))
+
+
+def _neighbour(linear: Linear) -> str:
+    """What a linear motion does."""
+    if linear.searched and linear.growth_rate <= 0:
+        return f"no growth of D faster than exp({linear.searched:.2g} t)"
+    if linear.growth_rate == 0:
+        return "D neither grows nor decays"
+    return exponential(linear.growth_rate, 4, linear.at_least)
 
 
 def _later(creep: Creep) -> str:
@@ -346,5 +332,20 @@ def _later(creep: Creep) -> str:
     return f"; D may reach {creep.limit:.2g} times before the slowest motion has decayed"
 
 
-def _is(count: int) -> str:
-    return "is" if count == 1 else "are"
+def _range_of_pushes(outcome: OneSidedOutcome, stable: bool) -> Iterator[str]:
+    """Between which pushes one-sided motion is what was followed."""
+    (least, most), changes = outcome.scales, outcome.first_change
+    if outcome.grows:
+        yield (
+            f"this growth is seen after pushes from {least:.1g} on (velocity along an axis): after smaller ones "
+            "contacts that count as at the bound may stay below it, or residual forces count"
+            if np.isfinite(least)
+            else "from which push on this growth is seen is not known: residual forces alone change a contact"
+        )
+    elif stable and least < most:
+        upto = f"{most:.1g}" if changes[1] < 1.5 * most or np.isinf(changes[1]) else f"{most:.1g} to {changes[1]:.1g}"
+        yield (
+            f"this is the motion after these pushes from {least:.1g} on (velocity along an axis), where contacts that "
+            f"count as at the bound reach it and residual forces do not count, up to {upto}, where another contact "
+            "changes or one of these turns; other pushes may differ"
+        )

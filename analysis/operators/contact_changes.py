@@ -134,9 +134,10 @@ class ContactChanges:
             closes = np.where(gains > 0, self.gap / gains, np.inf)
         return Multiples(reaches, opens, closes, turns)
 
-    def first(self, displacement: Floats, velocity: Floats, slid: Floats, paths: Floats) -> float:
-        """The smallest of all these multiples."""
-        return min(float(each.min(initial=np.inf)) for each in self.multiples(displacement, velocity, slid, paths))
+    def first(self, displacement: Floats, velocity: Floats, slid: Floats, paths: Floats) -> Floats:
+        """The smallest of all these multiples for each motion, shape (P,)."""
+        found = self.multiples(displacement, velocity, slid, paths)
+        return np.min([each.min(axis=0, initial=np.inf) for each in found], axis=0)
 
     def _reaches_and_turns(self, along: Floats, across: Floats, bound: Floats) -> tuple[Floats, Floats]:
         """Where |f_t + x g| = mu f_n + x h, and where the force of a contact at the bound turns."""

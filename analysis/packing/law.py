@@ -59,6 +59,9 @@ contact slips out, is compressed, and slips back (Elata and Berryman, Mech. Mate
 
   which creates no energy.
 
+For any p > 1 it is :math:`s\,\delta^{p-1}` that stays constant, and W then changes as :math:`-(p - 1) - p\,g(x)`, where
+:math:`g \ge -2/7`: no energy is created from p = 7/5 on.
+
 **Coulomb's slider.** Without the smoothing,
 
 .. math:: f_t = -k_t \delta^{p-1} s, \qquad |s| \le t^*,
@@ -122,7 +125,10 @@ AT_THE_BOUND = 1 - 1e-8
 of an overlap that is computed again by rounding: 2e-15 for coordinates of 10, of overlaps from 2e-7 on."""
 
 EXPONENTS = (1.5, 1.0)
-"""Exponents of the repulsion that the law, and the plugin, have."""
+"""Exponents of the repulsion of the plugin, in the order of its list; the formulas here hold for any from 1 on."""
+
+LEAST_RESCALED = 1.4
+"""Exponent from which rescaled slips create no energy with the smoothed force: 7/5, see above."""
 
 
 class Derivatives(NamedTuple):
@@ -158,19 +164,19 @@ class MindlinLaw:
     mu : float
         Coulomb's coefficient of friction, not negative.
     exponent : float
-        p, 3/2 (Hertz) or 1 (harmonic).
+        p, one of `EXPONENTS`: 3/2 (Hertz) or 1 (harmonic).
     cn, ct : float
         Normal and tangential dashpots, force time / length^p, not negative; none by default.
     rescaled : bool
-        Whether slips are rescaled while overlaps grow, which needs p = 3/2.
+        Whether slips are rescaled while overlaps grow, which needs p = 7/5 or more.
     coulomb : bool
         Whether the tangential force is a spring in series with Coulomb's slider, not smoothed, with rescaled slips.
 
     Raises
     ------
     ValueError
-        If a parameter is not finite or has the wrong sign, the exponent is neither 3/2 nor 1, slips cannot be rescaled,
-        or two histories are given.
+        If a parameter is not finite or has the wrong sign, the plugin does not have the exponent, slips cannot be
+        rescaled, or two histories are given.
     """
 
     kn: float
@@ -190,12 +196,14 @@ class MindlinLaw:
                 sign = "positive" if name == "kn" else "not negative"
                 raise ValueError(f"{name} = {value} must be finite and {sign}.")
         if self.exponent not in EXPONENTS:
-            raise ValueError(f"exponent = {self.exponent:g} must be 1.5 (Hertz) or 1 (harmonic).")
+            raise ValueError(f"exponent = {self.exponent:g} must be {known_exponents()}.")
         set_frozen(self, rescaled=bool(self.rescaled), coulomb=bool(self.coulomb))
         if self.rescaled and self.coulomb:
             raise ValueError("rescaled and coulomb are two histories: a law has one of them.")
-        if self.rescaled and self.exponent != 1.5:
-            raise ValueError("a rescaled history needs exponent = 1.5: harmonic disks have one stiffness.")
+        if self.rescaled and self.exponent < LEAST_RESCALED:
+            raise ValueError(
+                f"a rescaled history needs an exponent of {LEAST_RESCALED} or more: with less, energy is created."
+            )
 
     @property
     def frictional(self) -> bool:
@@ -210,7 +218,7 @@ class MindlinLaw:
     @property
     def rescales(self) -> bool:
         """Whether slips fall while overlaps grow, so that b depends on whether a contact closes or opens."""
-        return self.history != "total" and self.exponent == 1.5
+        return self.history != "total" and self.exponent > 1
 
     @property
     def damped(self) -> bool:
@@ -255,7 +263,7 @@ class MindlinLaw:
         """
         kept = np.asarray(slip, dtype=np.result_type(slip, np.float64))
         if self.rescales:
-            kept = kept * np.sqrt(np.minimum(np.divide(before, after), 1.0))
+            kept = kept * self.growth(np.minimum(np.divide(before, after), 1.0))
         return self.clamped(after, kept)
 
     def normal_force(self, overlap: ArrayLike) -> Floats:
@@ -379,12 +387,23 @@ class MindlinLaw:
 
     def growth(self, overlap: Floats) -> Floats:
         """overlap^(p-1), proportional to stiffnesses and dashpots; overlaps may be complex, but not negative."""
-        return np.sqrt(overlap) if self.exponent != 1 else np.asarray(overlap != 0, dtype=overlap.dtype)
+        if self.exponent == 1.5:
+            return np.sqrt(overlap)
+        if self.exponent == 1:
+            return np.asarray(overlap != 0, dtype=overlap.dtype)
+        return np.power(overlap, self.exponent - 1)
 
     def _powers(self, overlap: Floats) -> tuple[Floats, Floats]:
         """overlap^(p-1) and overlap^(2-p) of overlaps that are not negative."""
         growth = self.growth(overlap)
-        return growth, overlap if self.exponent == 1 else growth
+        if self.exponent == 1.5:
+            return growth, growth
+        return growth, overlap if self.exponent == 1 else np.power(overlap, 2 - self.exponent)
+
+
+def known_exponents() -> str:
+    """The exponents of the plugin, for a sentence: "1.5 or 1"."""
+    return " or ".join(f"{each:g}" for each in EXPONENTS)
 
 
 def _closed_overlap(overlap: ArrayLike) -> Floats:

@@ -12,8 +12,9 @@ this program, so that results of another packing or version are never used.
 import errno
 import fcntl
 import hashlib
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from io import BytesIO
@@ -39,6 +40,9 @@ Take = Callable[[tuple[int, int]], bool]
 
 SHIFTS_FILE = "shifts.npz"
 """The file of all shifts: to find these, eigenvalues are counted, which takes minutes for 100,000 disks."""
+
+NAMES_OF_SLICES = 16
+"""Hexadecimal digits of the name of a pass's folder."""
 
 LOCK_FILE = "taken"
 """The file whose bytes are locked, each by the search that has taken the slice which begins at so many modes."""
@@ -181,7 +185,20 @@ def pass_folder(parent: Path, places: Sequence[System], modes: tuple[int, int], 
         for matrix in [each for each in (place.stiffness, place.damping) if each is not None]:
             for array in (matrix.data, matrix.indices, matrix.indptr):
                 digest.update(np.ascontiguousarray(array).data)
-    return parent / digest.hexdigest()[:16]
+    return parent / digest.hexdigest()[:NAMES_OF_SLICES]
+
+
+def remove_passes(parent: Path) -> None:
+    """Remove the folders of passes, which have nothing else in them, and the folder that they are in if it is empty."""
+    for folder in parent.glob("[0-9a-f]" * NAMES_OF_SLICES):
+        if (folder / LOCK_FILE).is_file():
+            for path in folder.iterdir():
+                if path.name in (LOCK_FILE, SHIFTS_FILE) or re.fullmatch(r"\d+-\d+\.npz|[0-9a-f]{32}\.new", path.name):
+                    path.unlink(missing_ok=True)
+            with suppress(OSError):  # it holds what others have put there
+                folder.rmdir()
+    with suppress(OSError):
+        parent.rmdir()
 
 
 def _name(modes: tuple[int, int]) -> str:

@@ -8,7 +8,6 @@ figure. Rank 0 writes.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
 from itertools import groupby
@@ -18,7 +17,7 @@ from typing import Any
 from mpi4py import MPI
 
 from ...analysis import FaultgougeError
-from ...analysis.files.atomic_write import make_folder, write_text
+from ...analysis.files.atomic_write import make_folder, write_json, write_text
 from ...figures.pages import render
 from ...figures.style import report_failure, save
 from .cases import dynamics, eigenvalues, geometry, loads, restarts
@@ -59,7 +58,7 @@ def extremes(
     """
     root = MPI.COMM_WORLD.rank == 0
     if root:
-        make_folder(output)
+        make_folder(output, "extremes.json", "extremes.md")
     chosen = [case for case in cases if case.quick or not quick]
     done: list[tuple[Case, Outcome]] = []
     for case in progress(chosen):
@@ -84,7 +83,7 @@ def check(result: dict[str, Any]) -> None:
 
 def _write(done: Sequence[tuple[Case, Outcome]], output: Path) -> None:
     """Write extremes.json and extremes.md with the results so far."""
-    write_text(output / "extremes.json", json.dumps(_as_dict(done), indent=1, allow_nan=False) + "\n")
+    write_json(output / "extremes.json", _as_dict(done), allow_nan=False)
     statuses = [outcome.status for _, outcome in done]
     groups = [(name, list(members)) for name, members in groupby(done, lambda each: each[0].group)]
     drawn = output / "ramps.txt"  # of `python -m fuzz.ramps`, beside its picture

@@ -21,14 +21,14 @@ import numpy as np
 from threadpoolctl import threadpool_info
 
 from ...analysis import FaultgougeError
-from ...analysis.files.atomic_write import make_folder, write_text
+from ...analysis.files.atomic_write import make_folder, write_json, write_text
 from ...figures.pages import render
 from ...figures.style import report_failure, save
 from ...pywrap import Scene, ramp
-from .draw import coverage_figure, figure_of
+from .draw import figure_of
 from .methods.dumps import dumps
-from .methods.eigenvalues import far, near
-from .methods.frequency_and_growth import frequency, growth
+from .methods.eigenvalues import near
+from .methods.growth import growth
 from .methods.jacobian import jacobian
 from .methods.onset import onset
 from .methods.relaxation import relaxation
@@ -40,12 +40,10 @@ Ask = Callable[[Settings], Study]
 
 STUDIES: dict[str, Ask] = {
     "time step: trajectory": trajectory,
-    "time step: frequency": frequency,
     "time step: growth rate": growth,
     "relaxation": relaxation,
     "onset": onset,
     "Jacobian": jacobian,
-    "eigenvalues, far from an exceptional point": far,
     "eigenvalues, near an exceptional point": near,
     "files": dumps,
 }
@@ -81,7 +79,7 @@ def report(
     ReportError
         After all studies, if one has failed.
     """
-    make_folder(output)
+    make_folder(output, "report.json", "report.md")
     scene = Scene.from_toml(SCENE)
     equilibria = tuple(ramp(scene))
     done: list[Study] = []
@@ -102,8 +100,6 @@ def report(
         if name not in failed:
             with report_failure(f"{name}: the figure", say):
                 save(figure_of(found), output / stem(name))
-                if found.covered:
-                    save(coverage_figure(found.covered), output / f"{stem(name)}-coverage")
     if failed:
         raise ReportError(
             f"{len(failed)} of {len(studies)} studies failed ({', '.join(failed)}): {output}/report.md says why, "
@@ -146,7 +142,7 @@ def _write_report(output: Path, quick: bool, done: list[Study], failed: dict[str
         "studies": [asdict(study) for study in done],
         "failed": [{"name": name, "says": says} for name, says in failed.items()],
     }
-    write_text(output / "report.json", json.dumps(result, indent=1, allow_nan=False) + "\n")
+    write_json(output / "report.json", result, allow_nan=False)
     page = render(__package__ or "", "report.md.j2", where=where, quick=quick, done=done, failed=failed, stem=stem)
     write_text(output / "report.md", page)
     return result

@@ -29,7 +29,6 @@ ACTING = HOLDING | {
     "temp/": "changes velocities: unfix it",
     "oneway": "changes velocities: unfix it",
     "recenter": "moves particles: unfix it",
-    "damping/cundall": "damps as the forces on particles tell, which is not linearised here: use fix viscous",
 }
 """Clauses on fixes, by the beginnings of their styles: without such a fix LAMMPS moves as K says."""
 

@@ -1,11 +1,15 @@
 """Is a packing at rest? Forces that are out of balance, and the reasons if nothing moves all the same."""
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 
 from ...analysis import BadInputError, Configuration, LinearisedContacts
 from ...analysis.arrays import Floats, Indices
 from ...analysis.counted import counted
 from .granular_commands import OWN, Commands, NotTakenError, without_suffix
+from .look_in_a_copy import in_a_copy, quieten
 
 BALANCE = 1e-4
 """Share of the mean contact force that may be out of balance. Beyond, the packing moves to another place of rest, and K
@@ -43,14 +47,18 @@ def refuse_motion(configuration: Configuration, balance: float, commands: Comman
     size = configuration.particle_residual
     worst = int(np.argmax(size))
     place = ", ".join(f"{x:.6g}" for x in configuration.position[worst])
+    who = f"particle {configuration.ids[worst]} at ({place})"
+    if configuration.constraint is not None and worst in configuration.joined:
+        led = np.diff((configuration.constraint != 0).tocsc().indptr).reshape(configuration.axes, -1)[:, worst].max()
+        who = f"the lid of {led} particles that move as one, with {who} among them,"
     others = int(np.sum(size > balance * force)) - 1
     also = f", and {others} more {'are' if others > 1 else 'is'} out of balance" if others else ""
-    advice = known_cause(commands, configuration.contacts) or (
+    advice = known_cause(commands, configuration.contacts, size) or (
         "bring it to rest by faultgouge.relax(lmp), in a command --relax, or a longer run with drag (fix viscous, and "
         "fix viscous/sphere for rotation), or allow more by from_lammps(lmp, balance=...), in a command --balance"
     )
     raise NotTakenError(
-        f"The packing moves: the residual of particle {configuration.ids[worst]} at ({place}) is "
+        f"The packing moves: the residual of {who} is "
         f"{size[worst] / force:.3g} of the mean contact force, and {balance:g} is allowed{also}; {advice}."
     )
 
@@ -159,8 +167,11 @@ def lost_histories(commands: Commands) -> str:
     return ""
 
 
-def known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
-    """Why forces are out of balance though the packing may be at rest; empty if no cause is known."""
+def known_cause(commands: Commands, contacts: LinearisedContacts, residual: Floats | None = None) -> str:
+    """Why forces are out of balance though the packing may be at rest; empty if no cause is known.
+
+    Histories may be lost where friction can bear the residual force on the particle that has most, shape (N,).
+    """
     if says := restless_fix(commands):
         return f"{says}, and run on"
     if says := creeping_law(commands):
@@ -170,5 +181,43 @@ def known_cause(commands: Commands, contacts: LinearisedContacts) -> str:
     if says := lost_histories(commands):
         return says
     has_friction = (contacts.friction > 0) & np.isfinite(contacts.friction)  # infinite where no law is known
+    if residual is not None:
+        at = (contacts.i == np.argmax(residual)) | (contacts.j == np.argmax(residual))
+        has_friction &= bool(contacts.friction[at].sum() >= residual.max())
     lost = np.count_nonzero(has_friction & ~contacts.tangential_force.any(axis=1))
     return f"{lost} of {len(contacts)} contacts {LOST}" if lost else ""
+
+
+def moving_region(lmp: Any, commands: Commands) -> str:
+    """The sentence on a wall whose region moves; empty if none does.
+
+    A region may have `move` and `rotate` with variables. Whether these change in time, or have come to a constant, is
+    seen in a few steps of a copy.
+    """
+    found: dict[str, tuple[str, str]] = {}
+    for name, line in commands.fixes.items():
+        regions = [line.split()[line.split().index("region") + 1]] if " wall/gran/region" in line else []
+        for region in regions:
+            words = commands.regions.get(region, f"region {region} ?").split()
+            if words[2] in ("union", "intersect"):
+                regions += words[4 : 4 + int(words[3])]
+            at = [k for k, word in enumerate(words) if word in ("move", "rotate")]
+            moved = [word[2:] for k in at for word in words[k + 1 : k + 4] if word.startswith("v_")]
+            found |= {variable: (region, name) for variable in moved}
+    moving = in_a_copy(partial(_changing, lmp, list(found))) if found else []
+    for variable in moving:
+        region, name = found[variable]
+        return (
+            f"Region {region} of fix {name} moves with v_{variable}: give this variable a constant before the last "
+            "run, and run on until the packing rests."
+        )
+    return ""
+
+
+def _changing(lmp: Any, variables: list[str]) -> list[str]:
+    """Variables that change in three steps, in a copy."""
+    quieten(lmp)  # LAMMPS knows some variables during runs alone
+    lmp.command(f"fix faultgouge_v all vector 1 {' '.join(f'v_{name}' for name in [*variables, variables[0]])}")
+    lmp.command("run 3 post no")
+    values = [[lmp.extract_fix("faultgouge_v", 0, 2, row, k) for row in (0, 3)] for k in range(len(variables))]
+    return [name for name, (first, last) in zip(variables, values, strict=True) if first != last]

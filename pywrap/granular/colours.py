@@ -4,88 +4,65 @@ A particle feels only the particles that it touches, so that the number of displ
 neighbours, not of particles (Curtis, Powell and Reid, J. Inst. Math. Appl. 13, 117, 1974).
 """
 
-from dataclasses import dataclass
 from itertools import combinations
 from itertools import count as count_from
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye_array
-from scipy.spatial import cKDTree
 
+from ...analysis import Configuration
 from ...analysis.arrays import Floats, Indices
-from .force_probe import ProbedParticles
 
 GAP_OF_NEIGHBOURS = 1e-3
-"""Gap between particles, as a share of a radius, up to which they are looked for: far beyond all displacements."""
+"""Gap between particles, as a share of the largest diameter, up to which they are looked for: far beyond all
+displacements."""
 
 
-@dataclass(frozen=True)
-class Pairs:
-    """Pairs of particles that LAMMPS knows as neighbours or as bonded: their indices, the gap between their surfaces,
-    negative where they overlap, and whether a force acts; shape (P,) each."""
+class Pairs(NamedTuple):
+    """Pairs of particles that may feel each other: their indices, and the gap between their surfaces, negative where
+    they overlap and minus infinity where something else may act between them; shape (P,) each."""
 
     i: Indices
     j: Indices
     gap: Floats
-    acts: NDArray[np.bool_]
 
 
-def neighbouring_pairs(lmp: Any, particles: ProbedParticles) -> Pairs:
-    """Pairs that touch or nearly touch, and pairs of bonds and angles. The instance is a copy, and runs zero steps."""
+def neighbouring_pairs(lmp: Any, c: Configuration) -> Pairs:
+    """Pairs that touch or nearly touch, others of LAMMPS's neighbours between which a force acts, and pairs of bonds
+    and angles. The instance is a copy, which has been set up."""
+    from scipy.spatial import cKDTree  # which takes as long to import as all of `scipy.sparse`
+
+    # LAMMPS has ghosts of particles across a periodic boundary
+    every = [np.array(lmp.numpy.extract_atom(name)) for name in ("id", "x", "radius")]
+    ids, x, radius = (each[: lmp.extract_setting("nlocal") + lmp.extract_setting("nghost")] for each in every)
+    reach = 2 * float(radius.max()) * (1 + GAP_OF_NEIGHBOURS)
+    i, j = cKDTree(x).query_pairs(reach, output_type="ndarray").T
+    gap = np.linalg.norm(x[i] - x[j], axis=1) - radius[i] - radius[j]
+    others = _acting(lmp)
+    if lmp.extract_setting("molecule_flag"):
+        for each in filter(len, (lmp.numpy.gather_bonds(), lmp.numpy.gather_angles())):
+            members = np.asarray(each).reshape(len(each), -1)[:, 1:]
+            others += [members[:, pair] for pair in combinations(range(members.shape[1]), 2)]
+    bonded = np.concatenate(others)
+    pairs = np.searchsorted(c.ids, np.concatenate([ids[np.column_stack([i, j])], bonded]))
+    return Pairs(pairs[:, 0], pairs[:, 1], np.concatenate([gap, np.full(len(bonded), -np.inf)]))
+
+
+def _acting(lmp: Any) -> list[Indices]:
+    """IDs of the neighbours between which a force acts, or of all where a pair style hands out no forces of pairs."""
     lmp.command("compute faultgouge_i all property/local patom1 patom2")
     try:
-        lmp.command("compute faultgouge_c all pair/local dist force")
+        lmp.command("compute faultgouge_c all pair/local force")
         lmp.command("run 0 post no")
-        distance, force = _local(lmp, "c", 2).T
-    except Exception:  # a pair style that hands out no forces of pairs: all neighbours may act
+        acts = np.array(lmp.numpy.extract_compute("faultgouge_c", 2, 1)).ravel() != 0
+    except Exception:
         lmp.command("uncompute faultgouge_c")
         lmp.command("run 0 post no")
-        distance, force = None, None
-    i, j = np.searchsorted(particles.ids, _local(lmp, "i", 2).astype(np.int64)).T
-    if distance is None or force is None:
-        gap, acts = np.full(len(i), np.inf), np.ones(len(i), np.bool_)
-    else:
-        gap, acts = distance - particles.radius[i] - particles.radius[j], force != 0
-    bonded, near = _bonded(lmp, particles.ids), _nearly_touching(lmp, particles)
-    return Pairs(
-        np.concatenate([i, bonded[0], near.i]),
-        np.concatenate([j, bonded[1], near.j]),
-        np.concatenate([gap, np.full(len(bonded[0]), np.inf), near.gap]),
-        np.concatenate([acts, np.ones(len(bonded[0]), np.bool_), near.acts]),
-    )
-
-
-def _nearly_touching(lmp: Any, particles: ProbedParticles) -> Pairs:
-    """Pairs a little apart: compute pair/local hands none of them out. LAMMPS has ghosts of particles across a periodic
-    boundary."""
-    every = [np.array(lmp.numpy.extract_atom(name)) for name in ("id", "x", "radius")]
-    count = lmp.extract_setting("nlocal") + lmp.extract_setting("nghost")
-    ids, x, radius = (values[:count] for values in every)
-    i, j = cKDTree(x).query_pairs(2 * float(radius.max()) * (1 + GAP_OF_NEIGHBOURS), output_type="ndarray").T
-    gap = np.linalg.norm(x[i] - x[j], axis=1) - radius[i] - radius[j]
-    near = (gap >= 0) & (gap < GAP_OF_NEIGHBOURS * radius[i])
-    i, j = (np.searchsorted(particles.ids, ids[each[near]]) for each in (i, j))
-    return Pairs(i, j, gap[near], np.zeros(len(i), np.bool_))
-
-
-def _local(lmp: Any, name: str, columns: int) -> Floats:
-    rows = lmp.numpy.extract_compute(f"faultgouge_{name}", 2, 2)
-    return np.zeros((0, columns)) if rows is None else np.array(rows).reshape(-1, columns)
-
-
-def _bonded(lmp: Any, ids: Indices) -> tuple[Indices, Indices]:
-    """Pairs of particles of one bond or angle."""
-    found = [np.zeros((0, 2), np.int64)]
-    if lmp.extract_setting("molecule_flag"):
-        for each in (lmp.numpy.gather_bonds(), lmp.numpy.gather_angles()):
-            if not len(each):
-                continue
-            members = np.asarray(each).reshape(len(each), -1)[:, 1:]
-            found += [members[:, pair] for pair in combinations(range(members.shape[1]), 2)]
-    i, j = np.searchsorted(ids, np.concatenate(found)).T
-    return i, j
+        acts = None
+    rows = lmp.numpy.extract_compute("faultgouge_i", 2, 2)
+    pairs = np.zeros((0, 2), int) if rows is None else np.array(rows).reshape(-1, 2).astype(np.int64)
+    return [pairs if acts is None else pairs[acts[: len(pairs)]]]
 
 
 class Colours:
@@ -101,15 +78,14 @@ class Colours:
         The body that each particle feels, -1 if it feels none.
     """
 
-    def __init__(self, particles: ProbedParticles, pairs: Pairs, near: float, reach: int = 1) -> None:
-        count = len(particles.ids)
-        moved = particles.constraint.tocoo()
+    def __init__(self, c: Configuration, constraint: csr_array, pairs: Pairs, near: float, reach: int = 1) -> None:
+        count, moved = len(c), constraint.tocoo()
         leads: list[set[int]] = [set() for _ in range(count)]
         for particle, leader in zip(moved.row % count, moved.col % count, strict=True):
             leads[leader].add(int(particle))
         free = np.zeros(count, np.bool_)
         free[moved.row % count] = True
-        touch = pairs.acts | (pairs.gap < near)
+        touch = pairs.gap < near
         one, other = np.concatenate([pairs.i[touch], pairs.j[touch]]), np.concatenate([pairs.j[touch], pairs.i[touch]])
         neighbours = csr_array((np.ones(len(one)), (one, other)), shape=(count, count)) + eye_array(count, format="csr")
         reached = neighbours

@@ -38,8 +38,8 @@ from ...analysis.motion.eigenvalues import active_coordinates, mass_weighted
 from ...analysis.operators.linearised_contacts import rescaling_operators
 from .granular_commands import NotTakenError
 from .instance_queries import require_instance
-from .lammps_steps import steps_in_a_copy
 from .look_in_a_copy import can_copy
+from .motion_proof import steps_in_a_copy
 
 STEP_ERROR = 1e-10
 """Error of a step in the motion with two derivatives, as a share of the largest velocity."""
@@ -117,7 +117,8 @@ def compare_motion(
     Raises
     ------
     NotTakenError
-        If the instance has several ranks or threads, or other particles than the configuration.
+        If the instance has several ranks or threads, or other particles than the configuration, or none of these feels
+        a force.
     BadInputError
         If a time, the step or the amplitude is not positive and finite: nothing would move, and nothing be compared.
     """
@@ -131,10 +132,12 @@ def compare_motion(
     steps = max(1, round(time / step))
     stiffness = mass_weighted(stiffness_matrix(configuration), configuration)
     active = active_coordinates(stiffness)
+    if not len(active):
+        raise NotTakenError("Nothing that moves has a contact: there is no motion to compare with.")
     root = np.sqrt(configuration.coordinate_mass)
     start = np.zeros(configuration.coordinates)
     start[active] = amplitude * np.random.Generator(np.random.PCG64(seed)).standard_normal(len(active))
-    there, back = (steps_in_a_copy(lmp, configuration, sign * start, step, steps).velocity for sign in (1, -1))
+    there, back = (steps_in_a_copy(lmp, configuration, sign * start, step, steps) for sign in (1, -1))
     velocity = (0.5 * (there - back) * root)[active]
     linear = _linear_velocity(configuration, stiffness, active, (start * root)[active], step * steps)
     difference = float(np.linalg.norm(velocity - linear) / np.linalg.norm(linear))

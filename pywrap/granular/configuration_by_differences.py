@@ -9,14 +9,13 @@ from scipy.sparse import csr_array
 from ...analysis import Configuration, LinearisedContacts
 from ...analysis.arrays import Floats, derive_frozen
 from .balance import TWICE, force_scale, touch_twice
-from .contact_geometry import OneLaw, contacts_of_pairs
+from .configuration_by_laws import OneLaw, contacts_of_pairs
 from .force_differences import measure_operators
-from .force_probe import ProbedParticles
 from .granular_commands import BODIES, OWN, Commands, NotTakenError, without_suffix
 from .instance_queries import open_files
 from .lammps_arrays import Arrays
 from .look_in_a_copy import in_a_copy
-from .looks import box_of, look_at_forces, particles_of
+from .looks import box_of, look, members_of, particles_of
 from .mobility import mobility
 
 NORMAL_PART = 1e-6
@@ -43,12 +42,9 @@ def configuration_by_differences(lmp: Any, still: Still) -> Configuration:
 
     Its contacts are those of pairs that touch, with their forces as far as LAMMPS hands them out.
     """
-    made = still.configuration
-    place = np.zeros((len(made), 3))
-    place[:, : made.dimension] = made.position
-    bodies = tuple(still.commands.fixes[name] for name, style in still.fixes.items() if without_suffix(style) in BODIES)
-    particles = ProbedParticles(made.dimension, made.ids, place, made.radius, still.constraint, bodies)
-    measured = measure_operators(lmp, particles, force_scale(made) or None)
+    made, lines = still.configuration, still.commands.fixes
+    bodies = tuple(lines[name] for name, style in still.fixes.items() if without_suffix(style) in BODIES)
+    measured = measure_operators(lmp, made, still.constraint, bodies, force_scale(made) or None)
     return derive_frozen(
         made,
         stiffness=measured.stiffness,
@@ -64,8 +60,7 @@ def still_particles(lmp: Any, given: Commands | None) -> Still:
     columns = ["dx dy dz force p1 p2 p3", "dx dy dz force", "dx dy dz"]
     while True:  # not every pair style hands all of these out
         try:
-            look = partial(look_at_forces, lmp, given, files, columns[0])
-            commands, fixes, found, members = in_a_copy(look)
+            commands, fixes, found = in_a_copy(partial(look, lmp, given, files, columns[0]))
             break
         except NotTakenError:
             columns.pop(0)
@@ -74,6 +69,7 @@ def still_particles(lmp: Any, given: Commands | None) -> Still:
     count, dimension = len(found["id"]), lmp.extract_setting("dimension")
     if count == 0:
         raise NotTakenError("This LAMMPS has no particles.")
+    members = members_of(found)
     lines = {name: line for name, line in commands.fixes.items() if name in members}
     moved = mobility(lines, members, found["rmass"], dimension)
     empty = csr_array(moved.constraint.shape)

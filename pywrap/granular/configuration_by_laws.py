@@ -26,29 +26,20 @@ linear_history_classic in the release of 22 Jul 2025. A contact at Coulomb's bou
 is for :mod:`~faultgouge.analysis.motion.one_sided`.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis import Configuration, LinearisedContacts, MindlinLaw
-from ...analysis.arrays import Floats, derive_frozen
+from ...analysis.arrays import Floats, Indices, derive_frozen
 from ...analysis.contacts import BOOLEAN, PER_CONTACT, WALL
 from ...analysis.packing.linearise import linearise_contacts
 from .balance import known_cause
-from .contact_geometry import (
-    OneLaw,
-    by_types,
-    contacts_of_floor,
-    contacts_of_pairs,
-    contacts_of_wall,
-    median_state,
-)
-from .contact_law_measurement import MeasuredLaw, measure_law
+from .contact_law_measurement import MeasuredLaw, State, measure_law, remark_on
 from .granular_commands import GIVE_LINES, OWN, Commands, NotLinearisedError, NotTakenError, without_suffix
 from .lammps_arrays import Arrays
-from .law_remarks import remark_on
-from .looks import box_of, particles_of
+from .looks import box_of, members_of, particles_of
 from .mobility import mobility
 
 FORCE_AGREEMENT = 1e-6
@@ -58,6 +49,23 @@ OVERLAP_ROUNDING = 1e-14
 """Rounding of an overlap, as a share of the distance of two centres: some units in the last place of coordinates that
 may be ten times as large."""
 
+
+class OneLaw(NamedTuple):
+    """Contacts that have one law, as LAMMPS says them: between particles of two types, or with one wall.
+
+    `geometry` has the fields of LinearisedContacts that no law enters. `forces` has f_n and the vector f_t of LAMMPS's
+    own styles, shape (C, 4), or f_n and the slip of ours, shape (C, 2).
+    """
+
+    who: str
+    geometry: dict[str, Any]
+    forces: Floats
+
+    def chosen(self, which: NDArray[np.bool_]) -> "OneLaw":
+        """Some of the contacts."""
+        return OneLaw(self.who, {name: values[which] for name, values in self.geometry.items()}, self.forces[which])
+
+
 KnownLaws = dict[tuple[Any, ...], MeasuredLaw]
 """By their commands, and the two types or the ID of a wall's fix."""
 
@@ -66,13 +74,14 @@ def configuration_by_laws(lmp: Any, commands: Commands, found: Arrays, laws: Kno
     """The configuration of the arrays of a look; laws that are known are not measured, and new ones are added."""
     if not len(found["id"]):
         raise NotTakenError("This LAMMPS has no particles.")
-    lines = {name: line for name, line in commands.fixes.items() if f"group {name}" in found}
-    members = {name: found[f"group {name}"] for name in lines}
+    members = members_of(found)
+    lines = {name: line for name, line in commands.fixes.items() if name in members}
     moved = mobility(lines, members, found["rmass"], lmp.extract_setting("dimension"))
     free, frozen = moved.free, np.zeros(len(found["id"]), bool)
     for name, line in lines.items():
         frozen |= members[name] & (without_suffix(line.split()[3]) == "freeze")
-    contacts, remarks = _linearised_contacts(lmp, commands, found, frozen, laws, box_of(lmp)[0])
+    felt = np.where(frozen, np.inf, moved.felt_mass)
+    contacts, remarks = _linearised_contacts(lmp, commands, found, felt, laws, box_of(lmp)[0])
     made = Configuration(
         **particles_of(lmp, found, free, moved.factor), contacts=contacts, constraint=moved.needed, remarks=remarks
     )
@@ -115,9 +124,10 @@ def _check_torques(others: Floats, commands: Commands, contacts: LinearisedConta
 
 
 def _linearised_contacts(
-    lmp: Any, commands: Commands, found: Arrays, frozen: NDArray[np.bool_], laws: KnownLaws, box: Floats
+    lmp: Any, commands: Commands, found: Arrays, mass: Floats, laws: KnownLaws, box: Floats
 ) -> tuple[LinearisedContacts, tuple[str, ...]]:
-    """Contacts between particles, then those with each wall; and remarks on their laws."""
+    """Contacts between particles, then those with each wall; and remarks on their laws. `mass` is what dashpots feel,
+    infinite where frozen."""
     pairs, walls = (
         contacts_of_pairs(found, box),
         [name.removeprefix("wall ") for name in found if name.startswith("wall ")],
@@ -133,7 +143,9 @@ def _linearised_contacts(
         groups: dict[Any, OneLaw] = by_types(pairs, found["type"]) | {
             name: contacts_of_wall(found, name) for name in walls
         }
-        for name, group in groups.items():
+        for name, every in groups.items():
+            # what overlaps by rounding alone, as in a lattice whose spheres just touch, is no contact
+            group = every.chosen(every.geometry["overlap"] > OVERLAP_ROUNDING * every.geometry["slip_arm"].sum(axis=1))
             if len(group.forces) == 0:
                 continue
             # laws belong to commands, which a user may change
@@ -142,7 +154,7 @@ def _linearised_contacts(
             if key not in laws:
                 laws[key] = measure_law(lmp, commands, name, state, group.who)
             remarks.append(remark_on(laws[key], commands, name, state))
-            parts.append(_linearise_measured(laws[key], group, found, frozen))
+            parts.append(_linearise_measured(laws[key], group, found, mass))
     values = {name: [getattr(each, name) for each in parts] for name in PER_CONTACT}
     if not parts:
         values = {
@@ -175,20 +187,17 @@ def _linearise_smooth(law: MindlinLaw, contacts: OneLaw) -> LinearisedContacts:
     return made
 
 
-def _linearise_measured(
-    law: MeasuredLaw, contacts: OneLaw, found: Arrays, frozen: NDArray[np.bool_]
-) -> LinearisedContacts:
-    """Contacts of a law that has been measured."""
+def _linearise_measured(law: MeasuredLaw, contacts: OneLaw, found: Arrays, mass: Floats) -> LinearisedContacts:
+    """Contacts of a law that has been measured; `mass` as above."""
     i, j, overlap, arms = (contacts.geometry[name] for name in ("i", "j", "overlap", "slip_arm"))
     normal_force, tangential_force = contacts.forces[:, 0], contacts.forces[:, 1:]
-    wall, radius, mass = j == WALL, found["radius"], found["rmass"]
+    wall, radius = j == WALL, found["radius"]
     stiffness = (1 + law.stiffness.overlap) * normal_force / overlap
     reduced_radius = np.where(wall, radius[i], radius[i] * radius[j] / (radius[i] + radius[j]))
     # frozen particles weigh infinitely much in LAMMPS's dashpots, but not at walls; two frozen ones matter to nobody
-    inverse = np.where(frozen, 0.0, 1 / mass)
-    inverse_mass = inverse[i] + inverse[j]
-    reduced_mass = np.divide(1.0, inverse_mass, out=np.zeros(len(i)), where=inverse_mass > 0)
-    reduced_mass = np.where(wall, mass[i], reduced_mass)
+    inverse = 1 / mass[i] + 1 / mass[j]
+    reduced_mass = np.divide(1.0, inverse, out=np.zeros(len(i)), where=inverse > 0)
+    reduced_mass = np.where(wall, np.where(np.isinf(mass), found["rmass"], mass)[i], reduced_mass)
     _agree(law.stiffness.at(reduced_radius, overlap) * overlap, stiffness, contacts)
     per_overlap = tangential_force / overlap[:, None]
     return LinearisedContacts(
@@ -215,3 +224,83 @@ def _agree(computed: Floats, stiffness: Floats, contacts: OneLaw) -> None:
         raise NotTakenError(
             f"The normal forces of the {contacts.who} are not those of the commands: {GIVE_LINES}, as they hold now."
         )
+
+
+def _geometry(
+    found: Arrays, i: Indices, j: Indices, normal: Floats, distance: Floats, overlap: Floats
+) -> dict[str, Any]:
+    arms = np.column_stack([found["radius"][i], np.where(j == WALL, 0.0, found["radius"][j])])
+    return {"i": i, "j": j, "normal": normal, "distance": distance, "overlap": overlap, "slip_arm": arms}
+
+
+def contacts_of_pairs(found: Arrays, box: Floats) -> OneLaw:
+    """All contacts between particles, of whatever types."""
+    rows, partners = found["contacts"], found["partners"]
+    if not len(rows):
+        rows, partners = np.zeros((0, 7)), np.zeros((0, 2))
+    i, j = np.searchsorted(found["id"], partners).T
+    if np.any(i == j):
+        raise NotTakenError(
+            f"Particle {int(partners[i == j][0, 0])} touches its own periodic image: take a box that is wider."
+        )
+    branch = _towards_first(rows[:, :3], found["x"][i] - found["x"][j], box)
+    distance = np.linalg.norm(branch, axis=1)
+    overlap = found["radius"][i] + found["radius"][j] - distance
+    geometry = _geometry(found, i, j, branch / distance[:, None], distance, overlap)
+    return OneLaw("contacts of mindlin/smooth", geometry, rows[:, 3:])
+
+
+def _towards_first(branch: Floats, between: Floats, box: Floats) -> Floats:
+    """Branch vectors with the sign of another vector but for periods of the box: in LAMMPS of 2024 dx, dy and dz may
+    point to the second of the partners."""
+    beside = [(between - sign * branch) @ np.linalg.inv(box) for sign in (1, -1)]
+    right, wrong = (np.abs(each - np.round(each)).max(axis=1) for each in beside)
+    return np.where((right <= wrong)[:, None], branch, -branch)
+
+
+def by_types(pairs: OneLaw, kind: Indices) -> dict[Any, OneLaw]:
+    """Contacts between particles by their two types, the smaller first."""
+    low, high = np.sort([kind[pairs.geometry["i"]], kind[pairs.geometry["j"]]], axis=0)
+    count = 1 + int(kind.max(initial=0))
+    codes, found = low * count + high, {}
+    for code in np.unique(codes).tolist():
+        (first, second), which = divmod(code, count), codes == code
+        found[first, second] = pairs.chosen(which)._replace(who=f"contacts of types {first} and {second}")
+    return found
+
+
+def _at_wall(found: Arrays, name: str, i: Indices, normal: Floats, overlap: Floats, forces: Floats) -> OneLaw:
+    geometry = _geometry(found, i, np.full(len(i), WALL), normal, np.full(len(i), np.inf), overlap)
+    return OneLaw(f"contacts of fix {name}", geometry, forces)
+
+
+def contacts_of_wall(found: Arrays, name: str) -> OneLaw:
+    """Contacts with a wall of LAMMPS's own."""
+    rows = found[f"wall {name}"]
+    i = np.flatnonzero(rows[:, 0] > 0)
+    branch, force = found["x"][i] - rows[i, 4:7], rows[i, 1:4]
+    every, axis = np.arange(len(i)), np.argmax(np.abs(branch), axis=1)
+    distance, normal = branch[every, axis], np.zeros_like(branch)
+    normal[every, axis] = np.sign(distance)
+    along = np.einsum("ca,ca->c", force, normal)[:, None]
+    forces = np.hstack([along, force - along * normal])
+    return _at_wall(found, name, i, normal, found["radius"][i] - np.abs(distance), forces)
+
+
+def contacts_of_floor(found: Arrays, name: str, height: float) -> OneLaw:
+    """Contacts with a floor of mindlin/smooth."""
+    overlap = found["radius"] - (found["x"][:, 1] - height)
+    i = np.flatnonzero(overlap > 0)
+    normal, forces = np.tile([0.0, 1.0, 0.0], (len(i), 1)), found[f"wall {name}"][i][:, [0, 2]]
+    return _at_wall(found, name, i, normal, overlap[i], forces)
+
+
+def median_state(contacts: OneLaw, found: Arrays) -> State:
+    """The contact of the median overlap, its partner of the smaller type first."""
+    i, j, overlap = (contacts.geometry[name] for name in ("i", "j", "overlap"))
+    k = np.argsort(overlap)[len(overlap) // 2]
+    radius, mass = found["radius"], found["rmass"]
+    if j[k] == WALL:
+        return State((radius[i[k]], 0.0), (mass[i[k]], np.inf), overlap[k])
+    first, second = sorted((i[k], j[k]), key=lambda each: found["type"][each])
+    return State((radius[first], radius[second]), (mass[first], mass[second]), overlap[k])

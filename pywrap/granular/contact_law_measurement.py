@@ -26,7 +26,7 @@ from mpi4py import MPI
 
 from ...analysis.arrays import Floats
 from ..lammps.instance import start_lammps
-from .granular_commands import GIVE_LINES, PLANES, Commands, NotTakenError
+from .granular_commands import GIVE_LINES, PLANES, Commands, NotTakenError, without_suffix
 from .instance_queries import explain_error
 
 EXPONENT_ERROR = 1e-6
@@ -263,7 +263,7 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
     bench.run(f"timestep {step:.17g}")
     normal_dashpot = _dashpot(bench, "closing", fn, 0.1 * delta / step)
     bench.place_at(wanted)
-    bench.move(slipping=1e12 * delta / step)  # far beyond Coulomb's bound, of soft springs too
+    bench.move(slipping=1e60 * delta / step)  # far beyond Coulomb's bound, of the softest spring, too
     bench.run("run 1 post no")
     mu = bench.force()[1] / fn  # while the contact slides: dashpots bear a part of the force
     if mu == 0:
@@ -325,7 +325,7 @@ def _dashpot(bench: TwoParticleLammps, direction: Literal["closing", "slipping"]
     """Force per velocity of a contact without slip: first at some speed, then where the force is a tenth of scale."""
     component = 0 if direction == "closing" else 1
     bench.rest()
-    rest, found = bench.force()[component], 0.0
+    rest, found, force = bench.force()[component], 0.0, 0.0
     for _ in range(6):  # a speed whose force is lost in rounding, or is cut at the bound, comes nearer
         bench.move(**{direction: speed})
         bench.run("run 0 post no")
@@ -336,4 +336,33 @@ def _dashpot(bench: TwoParticleLammps, direction: Literal["closing", "slipping"]
         speed *= 0.1 * scale / abs(force) if abs(force) > 1e-9 * scale else 1e6
         if abs(force) <= 1e-9 * scale and speed > 1e30:
             break
-    return found if abs(found) * speed > 1e-12 * scale else 0.0
+    return found if abs(force) > 1e-9 * scale else 0.0
+
+
+LAW_DIFFERENCE = 0.01
+"""Relative difference of a number from that of its line from which on it is remarked."""
+
+
+def remark_on(law: MeasuredLaw, commands: Commands, name: tuple[int, int] | str, state: State) -> str | None:
+    """A sentence on what the law of a gran/*/history style, at a state, has of other numbers than its line; None if it
+    has the same. The line has k_n and k_t of k (R delta)^q, with q = 0 for hooke and q = 1/2 for hertz."""
+    words = commands.fixes[name].split()[4:] if isinstance(name, str) else commands.pair[0].split()[1:]
+    style = without_suffix(words[0]).removeprefix("gran/")
+    if style not in ("hooke/history", "hertz/history"):
+        return None
+    size = (state.radius * state.overlap) ** (0.5 if style.startswith("hertz") else 0.0)
+    kn, kt, mu = float(words[1]), 2 / 7 * float(words[1]) if words[2] == "NULL" else float(words[2]), float(words[5])
+    radius, overlap = np.array(state.radius), np.array(state.overlap)
+    found = [
+        ("a normal stiffness", kn * size, law.stiffness.at(radius, overlap)),
+        ("a friction coefficient", mu, law.mu),
+    ]
+    if law.mu:  # without friction there is no tangential force
+        found.append(("a tangential stiffness", kt * size, float(law.tangential.at(radius, overlap))))
+    says = [
+        f"{what} {measured / said:.3g} times that of the line"
+        for what, said, measured in found
+        if said > 0 and abs(measured / said - 1) > LAW_DIFFERENCE
+    ]
+    who = f"fix {name}" if isinstance(name, str) else f"Contacts of types {name[0]} and {name[1]}"
+    return f"{who}: LAMMPS has {' and '.join(says)} {' '.join(words)!r}, and K has LAMMPS's" if says else None

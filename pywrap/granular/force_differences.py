@@ -6,8 +6,10 @@ With q the coordinates of :mod:`~faultgouge.analysis.configuration` and F the fo
 
     K e_k = -\frac{F(h e_k) - F(-h e_k)}{2h} + O(h^2), \qquad C e_k = -\frac{F(v e_k) - F(-v e_k)}{2v} .
 
-All of it happens in copies of the process (:mod:`~faultgouge.pywrap.granular.force_probe`): the instance itself stays
-as it is. Particles without a common neighbour are displaced together (:mod:`~faultgouge.pywrap.granular.colours`).
+All of it happens in a copy of the process. A displacement is one step of LAMMPS, so slow that dashpots exert nothing:
+histories of contacts follow as in any step. A velocity is a run of zero steps, in which histories do not change. Before
+each, positions and, by fix keep/histories of the plugin, histories are put back to the bit. Particles without a common
+neighbour are displaced together (:mod:`~faultgouge.pywrap.granular.colours`).
 
 **Error.** Slopes of both sides are extrapolated from the steps h/2 and h. A displacement and a velocity of all
 particles at once in random directions are then compared with K q and C v, and the difference is the error. Some models
@@ -18,26 +20,38 @@ the error shows such forces, particles are displaced together only if they are f
 derivatives have another derivative forwards than backwards. K is the mean of both, and `jump` their difference. The
 forces of two displacements do not add up there, so that an error there is no reason to refuse K.
 
-**Weak contacts.** The random direction is taken at the shortest displacement, too. Where the forces then differ from
-K q, or are not linear, shorter displacements are tried (:mod:`~faultgouge.pywrap.granular.force_slopes`).
+**Weak contacts.** A displacement may be too long for a contact whose force is far below the mean one: the contact opens
+within it, or slides, and then its stiffness seems to be next to nothing. So the random direction is taken at the
+shortest displacement, too. Where the forces then differ from K q, or are not linear, shorter displacements are tried.
 
 **Bodies.** q = P Q, where several coordinates move as one. Column k of K belongs to a displacement of Q_k, and its rows
-are sums of the forces on the coordinates that each Q moves.
+are sums of the forces on the coordinates that each Q moves. Dashpots feel the masses of the bodies of fix rigid. So
+these bodies stay in the copy, and hold the velocities that they take from their particles where a run begins.
 """
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from ...analysis import Configuration
 from ...analysis.arrays import Floats, Indices
+from ..lammps.instance import load_plugin
 from .colours import Colours, Pairs, neighbouring_pairs
-from .force_probe import Probe, ProbedParticles, hold_still, set_coordinate_velocity
-from .force_slopes import Slope, slopes_along, slopes_by_shorter_steps
-from .granular_commands import NotTakenError
-from .look_in_a_copy import in_a_copy
+from .granular_commands import BODIES, NotTakenError, without_suffix
+from .instance_queries import styles_of
+from .lammps_arrays import on_coordinates, owned_array, rows_of, set_velocity
+from .look_in_a_copy import in_a_copy, quieten
+from .translating_bodies import HELD, translating_bodies
+
+MOVES = ("nve", "rigid", "move", "overdamped", "nvt", "nph", "npt")
+"""Fixes that move particles, by the beginnings of their styles."""
+
+HOLDS = ("freeze", "setforce", "aveforce", "lineforce", "planeforce", "momentum", "recenter", "temp/")
+"""Fixes that change forces or velocities of coordinates that are held, or that move as one."""
 
 LENGTH_OF_STEP = 1e12
 """Length of a step in which particles are displaced, in time steps: dashpots exert nothing, however strong."""
@@ -104,15 +118,21 @@ class ForceDifferences:
     jump: Floats
 
 
-def measure_operators(lmp: Any, particles: ProbedParticles, force: float | None) -> ForceDifferences:
+def measure_operators(
+    lmp: Any, configuration: Configuration, constraint: csr_array, bodies: tuple[str, ...], force: float | None
+) -> ForceDifferences:
     """K and C at rest; the process must be one that can be copied, and nothing of the instance changes.
 
     Parameters
     ----------
     lmp : lammps.lammps
         The instance, on one rank.
-    particles : ProbedParticles
+    configuration : Configuration
         Its particles.
+    constraint : scipy.sparse.csr_array, shape (coordinates, coordinates)
+        P of q = P Q.
+    bodies : tuple of str
+        The commands of fix rigid.
     force : float, optional
         The mean contact force, by which velocities are chosen; by default by the forces of the displacements.
 
@@ -121,52 +141,162 @@ def measure_operators(lmp: Any, particles: ProbedParticles, force: float | None)
     NotTakenError
         If LAMMPS's forces are not functions of displacements and velocities of neighbours.
     """
-    return in_a_copy(partial(_measure, lmp, particles, force))
+    return in_a_copy(partial(_measure, lmp, configuration, constraint, bodies, force))
 
 
-def _measure(lmp: Any, particles: ProbedParticles, force: float | None) -> ForceDifferences:
+def _measure(
+    lmp: Any, c: Configuration, constraint: csr_array, bodies: tuple[str, ...], force: float | None
+) -> ForceDifferences:
     """K and C, in a copy that may change."""
     lmp.command("log none")
-    hold_still(lmp, particles.bodies)
-    set_coordinate_velocity(lmp, particles, np.zeros(particles.constraint.shape[0]))
-    pairs = neighbouring_pairs(lmp, particles)
-    step = probe_displacement(particles, pairs)
-    colours = Colours(particles, pairs, 4 * step)
-    timestep = float(lmp.extract_global("dt"))
-    lmp.command(f"timestep {LENGTH_OF_STEP * timestep:.17g}")
+    _hold_still(lmp, bodies)
+    rows, timestep = rows_of(lmp, c), float(lmp.extract_global("dt"))
+    place = {name: np.array(owned_array(lmp, name)[rows]) for name in ("x", "image")}
+    by_place = Probe(lmp, c, constraint, place, LENGTH_OF_STEP * timestep, (0.5, 1.0))
+    lmp.command(f"timestep {by_place.duration:.17g}")
     lmp.command("thermo_style custom step")
-    by_place = Probe(lmp, particles, LENGTH_OF_STEP * timestep, (0.5, 1.0))
-    lengths = _sizes(step, _shortest(particles, pairs))
+    by_place.forces(np.zeros(c.coordinates))
+    pairs = neighbouring_pairs(lmp, c)
+    largest, overlaps = float(np.abs(c.position).max()), -pairs.gap[np.isfinite(pairs.gap) & (pairs.gap < 0)]
+    usual = float(np.median(overlaps)) if len(overlaps) else 0.0
+    step = _displacement(c, pairs, usual, LEAST_OF_COORDINATE * largest)
+    lengths = _sizes(step, max(SHORTEST_OF_COORDINATE * largest, SHORTEST_OF_OVERLAP * usual))
+    colours = Colours(c, constraint, pairs, 4 * step)
     stiffness = _derivative(by_place, colours, lengths)
     if stiffness.unexplained > LEAST_JUMP:
-        farther = Colours(particles, pairs, 4 * step, reach=2)
+        farther = Colours(c, constraint, pairs, 4 * step, reach=2)
         other = _derivative(replace(by_place, settles=True), farther, lengths)
         if other.unexplained < 0.5 * stiffness.unexplained:
             colours, stiffness = farther, other
     if force is None:
         force = step * float(np.abs(stiffness.matrix.data).max(initial=0.0)) / SHARE_OF_OVERLAP
-    by_velocity = Probe(lmp, particles, None, (1.0,))
+    by_velocity = replace(by_place, duration=None, sizes=(1.0,))
     speed = _speed(by_velocity, step / timestep, DASHPOT_FORCE * force)
     if speed == 0.0:
         damping = stiffness._replace(matrix=csr_array(stiffness.matrix.shape))
     else:
         damping = _derivative(by_velocity, colours, _sizes(speed, SHORTEST_VELOCITY * speed))
     jump, error = np.maximum(stiffness.jump, damping.jump), np.maximum(stiffness.error, damping.error)
-    _refuse_errors(particles, jump, error)
+    unexplained = np.where(jump > 0, 0.0, error)
+    worst = int(np.argmax(unexplained))
+    if unexplained[worst] > LARGEST_OPERATOR_ERROR:
+        there = ", ".join(f"{x:.6g}" for x in c.position[worst])
+        others = int(np.sum(unexplained > LARGEST_OPERATOR_ERROR)) - 1
+        raise NotTakenError(
+            f"K and C by differences of forces are {unexplained[worst]:.2g} of their largest entry from the forces of "
+            f"a displacement of all particles at particle {c.ids[worst]} at ({there})"
+            f"{f', and at {others} more' if others else ''}: contacts there are about to open, to close or to slide, "
+            "or lie between both planes of one fix wall/gran, of which LAMMPS has the nearer act alone (write a fix "
+            "for each plane), or something couples particles that are no neighbours; run on with drag under a load "
+            "that presses them together."
+        )
     return ForceDifferences(stiffness.matrix, damping.matrix, float(error.max()), jump)
 
 
-def _sizes(first: float, last: float) -> list[float]:
-    """Ever shorter displacements, or lower velocities, from the first to the last one."""
-    count = max(0, int(np.ceil(np.log(last / first) / np.log(NEXT_SIZE))))
-    return [float(each) for each in np.geomspace(first, last, count + 1)] if count else [first]
+def _hold_still(lmp: Any, bodies: tuple[str, ...]) -> None:
+    """Leave what exerts forces in a copy alone: no output, no drag, and nothing that moves or holds particles by
+    itself; what has a velocity moves by it. Dashpots feel the masses of bodies, and of frozen particles, which stay.
+    Histories are kept."""
+    quieten(lmp, drag=True)
+    for name, style in styles_of(lmp).fixes.items():
+        if style.startswith((*MOVES, *HOLDS)) and without_suffix(style) not in (*BODIES, "freeze"):
+            lmp.command(f"unfix {name}")
+    for line in bodies:
+        lmp.command(f"{line} {HELD}")
+    group = "all"
+    if bodies:
+        group = "faultgouge_m"
+        groups = {body.group for line in bodies for body in translating_bodies(line, lmp.extract_setting("dimension"))}
+        lmp.command(f"group {group} subtract all {' '.join(sorted(groups))}")
+    lmp.command(f"fix faultgouge_moves {group} nve/noforce")
+    load_plugin(lmp)
+    lmp.command("fix faultgouge_h all keep/histories")
 
 
-def _shortest(particles: ProbedParticles, pairs: Pairs) -> float:
-    """The shortest displacement with which forces are not rounded."""
-    overlaps = -pairs.gap[pairs.gap < 0]
-    usual = float(np.median(overlaps)) if len(overlaps) else 0.0
-    return max(SHORTEST_OF_COORDINATE * float(np.abs(particles.position).max()), SHORTEST_OF_OVERLAP * usual)
+@dataclass(frozen=True)
+class Probe:
+    """Forces of a LAMMPS, which is a copy, along displacements, or velocities where `duration` is None.
+
+    `place` has positions and images of the particles at rest, by their IDs; `duration` is the length of a step, and
+    `sizes` are the shares of a displacement at which forces are taken. If
+    `settles`, a step without motion follows each displacement, for models that act one step late.
+    """
+
+    lmp: Any
+    configuration: Configuration
+    constraint: csr_array
+    place: dict[str, Floats]
+    duration: float | None
+    sizes: tuple[float, ...]
+    settles: bool = False
+
+    @cached_property
+    def rest(self) -> Floats:
+        """Forces on the coordinates at rest, shape (axes N,)."""
+        return self.forces(np.zeros(self.configuration.coordinates))
+
+    def forces(self, q: Floats) -> Floats:
+        """Forces (F, T/R) after a displacement or with a velocity Q, from rest; shape (axes N,)."""
+        lmp, c = self.lmp, self.configuration
+        rows = rows_of(lmp, c)
+        for name, values in self.place.items():
+            owned_array(lmp, name)[rows] = values
+        lmp.command("fix_modify faultgouge_h restore")
+        set_velocity(lmp, c, q / (self.duration or 1.0))
+        lmp.command("run 1 post no" if self.duration else "run 0 post no")
+        if self.settles:
+            set_velocity(lmp, c, 0.0 * q)
+            lmp.command("run 1 post no")
+        return on_coordinates(lmp, c, "f", "torque")
+
+    def slope(self, q: Floats, size: float) -> "Slope":
+        """Slopes of each side along a unit direction, extrapolated to a step of zero by Lagrange's polynomial."""
+        sides, means = np.zeros((2, len(self.rest))), []
+        for share in self.sizes:
+            step = share * size
+            slopes = np.array([self.forces(way * step * q) - self.rest for way in (1, -1)]) / step
+            sides += slopes * np.prod([other / (other - share) for other in self.sizes if other != share])
+            means.append((slopes[0] - slopes[1]) / 2)
+        return Slope((sides[0] - sides[1]) / 2, sides[0] + sides[1], means[-1] - means[0])
+
+
+class Slope(NamedTuple):
+    """dF along a direction, over the size of the displacement or velocity; shape (axes N,) each: the mean of the slopes
+    ahead and behind, the jump from one to the other, and the difference of the means at the two sizes."""
+
+    mean: Floats
+    jump: Floats
+    bend: Floats
+
+    @property
+    def uneven(self) -> Floats:
+        """How far the force is from a linear function of the size, shape (axes N,)."""
+        return np.maximum(np.abs(self.jump), np.abs(self.bend))
+
+    def by_shorter_steps(
+        self, probe: Probe, q: Floats, owner: Indices, sizes: list[float], differs: NDArray[np.bool_], same: float
+    ) -> "Slope":
+        """The slope by ever shorter steps, the longest first.
+
+        A shorter step is taken for all particles that feel a body where it makes the forces far more linear, or where
+        it is linear and a particle `differs`, shape (N,): on which the shortest steps exert other forces than K says. A
+        shorter step that says the same to `same`, as at a contact which slides on one side, ends the search.
+        """
+        probe = replace(probe, sizes=(0.5, 1.0))  # how far a force is from a linear one
+        bodies, seen = np.tile(owner, len(q) // len(owner)), owner[differs & (owner >= 0)]
+        best = last = probe.slope(q, sizes[0])
+        for size in sizes[1:]:
+            slope = probe.slope(q, size)
+            most = np.zeros((2, len(owner) + 1))  # the last column stands for no body
+            for uneven, each in zip(most, (best, slope), strict=True):
+                np.maximum.at(uneven, bodies, each.uneven)
+            better = (most[1] < 0.5 * most[0]) | (np.isin(np.arange(len(owner) + 1), seen) & (most[1] <= same))
+            best = Slope(*(np.where(better[bodies], new, old) for old, new in zip(best, slope, strict=True)))
+            apart = np.abs(slope.mean - last.mean) + np.abs(slope.jump - last.jump)
+            if not len(seen) and apart.max() <= same:
+                break
+            last = slope
+        return best
 
 
 class _Derivative(NamedTuple):
@@ -182,111 +312,82 @@ class _Derivative(NamedTuple):
         return float(np.where(self.jump > 0, 0.0, self.error).max())
 
 
-def _refuse_errors(particles: ProbedParticles, jump: Floats, error: Floats) -> None:
-    """Refuse operators that describe nothing, with the particle where the error is largest; shape (N,) both."""
-    error = np.where(jump > 0, 0.0, error)
-    worst = int(np.argmax(error))
-    if error[worst] <= LARGEST_OPERATOR_ERROR:
-        return
-    place = ", ".join(f"{x:.6g}" for x in particles.position[worst, : particles.dimension])
-    others = int(np.sum(error > LARGEST_OPERATOR_ERROR)) - 1
-    raise NotTakenError(
-        f"K and C by differences of forces are {error[worst]:.2g} of their largest entry from the forces of a "
-        f"displacement of all particles at particle {particles.ids[worst]} at ({place})"
-        f"{f', and at {others} more' if others else ''}: contacts there are about to open, to close or to slide, or "
-        "lie between both planes of one fix wall/gran, of which LAMMPS has the nearer act alone (write a fix for each "
-        "plane), or something couples particles that are no neighbours; run on with drag under a load that presses "
-        "them together."
-    )
+def _sizes(first: float, last: float) -> list[float]:
+    """Ever shorter displacements, or lower velocities, from the first to the last one."""
+    count = max(0, int(np.ceil(np.log(last / first) / np.log(NEXT_SIZE))))
+    return [float(each) for each in np.geomspace(first, last, count + 1)] if count else [first]
 
 
-def probe_displacement(particles: ProbedParticles, pairs: Pairs) -> float:
-    """A step far below the smallest overlap and gap, as far as rounding allows."""
+def _displacement(c: Configuration, pairs: Pairs, usual: float, least: float) -> float:
+    """A step far below the smallest overlap and gap, as far as rounding allows; `usual` is the median overlap."""
     gaps = np.abs(pairs.gap[np.isfinite(pairs.gap)])
-    overlaps = -pairs.gap[pairs.gap < 0]
-    least = LEAST_OF_COORDINATE * float(np.abs(particles.position).max())
-    if not len(overlaps):
-        return max(least, FREE_DISPLACEMENT * float(particles.radius.min()))
-    usual = float(np.median(overlaps))
-    return float(
-        min(max(SHARE_OF_OVERLAP * gaps.min(), least, LEAST_OF_OVERLAP * usual), max(SHARE_OF_OVERLAP * usual, least))
-    )
+    if not usual:
+        return max(least, FREE_DISPLACEMENT * float(c.radius.min()))
+    step = max(SHARE_OF_OVERLAP * float(gaps.min()), least, LEAST_OF_OVERLAP * usual)
+    return min(step, max(SHARE_OF_OVERLAP * usual, least))
 
 
-def _speed(by_velocity: "Probe", speed: float, force: float) -> float:
+def _speed(by_velocity: Probe, speed: float, force: float) -> float:
     """A velocity at which dashpots exert a force; zero if there are none."""
-    direction = np.random.Generator(np.random.PCG64(1)).uniform(-1, 1, by_velocity.particles.constraint.shape[0])
+    direction = _random(by_velocity.configuration, 1)
     for _ in range(3):  # a velocity far too large has contacts slide
-        rest, sides = by_velocity.each([speed * direction])[0]
-        change = float(np.abs(sides[0][0] - rest).max())
-        if change <= np.finfo(float).eps * np.abs(rest).max():
+        change = float(np.abs(by_velocity.forces(speed * direction) - by_velocity.rest).max())
+        if change <= np.finfo(float).eps * np.abs(by_velocity.rest).max():
             return 0.0
         speed *= force / change
     return speed
 
 
+def _random(c: Configuration, seed: int) -> Floats:
+    return np.asarray(c.coordinate_free * np.random.Generator(np.random.PCG64(seed)).uniform(-1, 1, c.coordinates))
+
+
 def _derivative(probe: Probe, colours: Colours, sizes: list[float]) -> _Derivative:
     """-dF/dQ by steps of the first size, and by shorter ones where the forces of the first are not linear."""
-    particles = probe.particles
-    count, size = len(particles.ids), particles.constraint.shape[0]
-    directions, owners = _directions(colours, count, size // count)
-    random = np.random.Generator(np.random.PCG64(0)).uniform(-1, 1, size)
-    *found, first = slopes_along(probe, [*directions, random], sizes[0])
-    last = slopes_along(probe, [random], sizes[-1])[0]
-    matrix, jump = _assemble(particles, found, owners)
-    differs = _error(particles, matrix, random, last) > SHORTEST_ERROR
-    largest = max(np.abs(each.mean).max() for each in (*found, first))
-    rough = [
-        k for k, each in enumerate(found) if each.uneven.max() > LEAST_JUMP * largest or np.any(owners[k][differs] >= 0)
-    ]
+    c, count = probe.configuration, len(probe.configuration)
+    owners = [owner for owner in colours.owner for _ in range(c.axes)]
+    directions = np.zeros((len(owners), c.axes * count))
+    for k, members in enumerate(colours.members):
+        for axis in range(c.axes):
+            directions[c.axes * k + axis, axis * count + np.array(members)] = 1.0
+    random = _random(c, 0)
+    found = [probe.slope(q, sizes[0]) for q in directions]
+    checks = [probe.slope(random, size) for size in (sizes[0], sizes[-1])]
+    matrix, jump = _assemble(probe, found, owners)
+    differs = _error(probe, matrix, random, checks[1]) > SHORTEST_ERROR
+    same = LEAST_JUMP * max(np.abs(each.mean).max() for each in (*found, checks[0]))
+    rough = [k for k, each in enumerate(found) if each.uneven.max() > same or np.any(owners[k][differs] >= 0)]
+    for k in rough:
+        found[k] = found[k].by_shorter_steps(probe, directions[k], owners[k], sizes, differs, same)
     if rough:
-        shorter = slopes_by_shorter_steps(
-            probe, {k: directions[k] for k in rough}, owners, sizes, differs, LEAST_JUMP * largest
-        )
-        found = [shorter.get(k, each) for k, each in enumerate(found)]
-        matrix, jump = _assemble(particles, found, owners)
-    errors = [_error(particles, matrix, random, slope) for slope in (first, last)]
-    return _Derivative(matrix, jump, np.minimum(*errors))
+        matrix, jump = _assemble(probe, found, owners)
+    return _Derivative(matrix, jump, np.minimum(*(_error(probe, matrix, random, each) for each in checks)))
 
 
-def _directions(colours: Colours, count: int, axes: int) -> tuple[list[Floats], list[Indices]]:
-    """A unit displacement of each colour along each axis, shape (axes N,), and the body that each particle feels in it,
-    shape (N,), -1 for none."""
-    directions = []
-    for members in colours.members:
-        for axis in range(axes):
-            directions.append(np.zeros(axes * count))
-            directions[-1][axis * count + np.array(members)] = 1.0
-    return directions, [owner for owner in colours.owner for _ in range(axes)]
-
-
-def _assemble(particles: ProbedParticles, found: list[Slope], owners: list[Indices]) -> tuple[csr_array, Floats]:
+def _assemble(probe: Probe, found: list[Slope], owners: list[Indices]) -> tuple[csr_array, Floats]:
     """-dF/dQ of the slopes along all directions, and its jumps."""
-    size, count = particles.constraint.shape[0], len(particles.ids)
-    axis = count * np.arange(size // count)
+    c, count = probe.configuration, len(probe.configuration)
+    axis = count * np.arange(c.axes)
     rows, columns, values, jump = [], [], [], np.zeros(count)
     for k, (slope, owner) in enumerate(zip(found, owners, strict=True)):
         felt = np.flatnonzero(owner >= 0)
         where = axis[:, None] + felt
         rows.append(where.ravel())
-        columns.append(np.broadcast_to(axis[k % len(axis)] + owner[felt], where.shape).ravel())
+        columns.append(np.broadcast_to(axis[k % c.axes] + owner[felt], where.shape).ravel())
         values.append(-slope.mean[where].ravel())
         jump[felt] = np.maximum(jump[felt], np.abs(slope.jump[where]).max(axis=0))
-    raw = coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(size, size))
-    matrix = csr_array(_sums(particles) @ raw.tocsr())
+    every = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    matrix = csr_array((probe.constraint != 0).T @ coo_array(every, shape=probe.constraint.shape).tocsr())
     matrix.eliminate_zeros()
     matrix.sort_indices()
     largest = np.abs(matrix.data).max(initial=0.0)
     return matrix, np.where(jump > LEAST_JUMP * largest, jump, 0.0) / (largest or 1.0)
 
 
-def _sums(particles: ProbedParticles) -> csr_array:
-    """P_1^T, which sums the forces on coordinates that move as one."""
-    return csr_array(csr_array(particles.constraint != 0).astype(np.float64).T)
-
-
-def _error(particles: ProbedParticles, matrix: csr_array, direction: Floats, slope: Slope) -> Floats:
+def _error(probe: Probe, matrix: csr_array, direction: Floats, slope: Slope) -> Floats:
     """Difference of the forces along a direction from those of the matrix, as a share of the largest; shape (N,)."""
-    forces = _sums(particles) @ slope.mean
+    forces = (probe.constraint != 0).T @ slope.mean
     felt = float(np.abs(forces).max(initial=0.0))
-    return np.asarray(np.abs(forces + matrix @ direction).reshape(-1, len(particles.ids)).max(axis=0) / (felt or 1.0))
+    return np.asarray(
+        np.abs(forces + matrix @ direction).reshape(probe.configuration.axes, -1).max(axis=0) / (felt or 1.0)
+    )

@@ -8,7 +8,6 @@ regions, bonds, springs, a lid that moves as one) K and C are differences of LAM
 """
 
 from collections.abc import Iterable
-from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -21,14 +20,14 @@ from .configuration_by_laws import KnownLaws, check_friction, configuration_by_l
 from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError, read_commands, with_one_rank
 from .instance_queries import open_files, require_instance
 from .look_in_a_copy import can_copy, in_a_copy
-from .looks import look_at_contacts
-from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError, OtherStiffnessError
+from .looks import look
+from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError, OtherStiffnessError, push_remark
 from .motion_proof import prove as prove_motion
 
 
 def from_lammps(
     lmp: Any,
-    commands: Iterable[str] | None = None,
+    commands: Iterable[str] | Commands | None = None,
     *,
     slides: bool = False,
     balance: float = BALANCE,
@@ -37,8 +36,9 @@ def from_lammps(
 ) -> Configuration:
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
 
-    The instance does not change: its next run is the same to the bit as without the look, on any number of ranks, and
-    with the threads of `package omp`.
+    The instance does not change: its next run is the same to the bit as without the look. On several ranks, or with the
+    threads of `package omp`, LAMMPS itself runs zero steps: fixes and variables that these would change are refused by
+    their names before.
 
     Parameters
     ----------
@@ -64,20 +64,21 @@ def from_lammps(
     -------
     Configuration
         With its contacts' laws, as they are measured; or, where these do not apply (`operators` says which), with K and
-        C by differences of forces, on one rank. Its `remarks` name the drag and the velocities that are left out.
+        C by differences of forces, on one rank. Its `remarks` name the drag and the velocities that are left out, and
+        say why differences are taken.
 
     Raises
     ------
     NotTakenError
         If the packing cannot be taken: it moves, or has moving walls or bodies that rotate; or the commands are not
-        those of the instance; or LAMMPS's forces do not change as K says.
+        those of the instance; or LAMMPS's forces do not change as K says; or the look would change the next run.
     """
     return take_configuration(lmp, commands, {}, slides=slides, balance=balance, prove=prove, differences=differences)
 
 
 def take_configuration(
     lmp: Any,
-    commands: Iterable[str] | None,
+    commands: Iterable[str] | Commands | None,
     laws: KnownLaws,
     *,
     slides: bool,
@@ -91,36 +92,50 @@ def take_configuration(
     given = None if commands is None else read_commands(commands)
     try:
         if differences:
-            raise NotLinearisedError("K and C by differences of forces are asked for.")
-        return _by_laws(lmp, given, laws, slides=slides, balance=balance, prove=prove)
-    except NotLinearisedError as reason:
-        if not can_copy(lmp):
-            raise NotLinearisedError(with_one_rank(reason)) from reason
-        if slides:
-            raise NotTakenError(
-                f"{str(reason).rstrip('.')}; so K is found by differences of forces, which have no choice between "
-                "sticking and sliding contacts: leave slides out."
-            ) from reason
-        if not isinstance(reason, NotProvedError):
-            return _by_differences(lmp, given, balance=balance, prove=prove)
-        # differences lack forces on velocities, or between particles far apart, too, and these have been named
-        with suppress(NotTakenError):
-            found = _by_differences(lmp, given, balance=balance, prove=prove)
-            proved = found.proof is not None and found.proof <= LARGEST_DIFFERENCE
-            if proved and found.operator_error <= SMALL_DIFFERENCE:
-                return found
-            # contacts that slide on one side have no linear motion, and no verdict is given
-            if isinstance(reason, OtherStiffnessError) and len(found.one_sided_particles):
-                return found
-        raise
+            raise NotLinearisedError("They are asked for.")
+        found = _by_laws(lmp, given, laws, balance=balance, prove=prove)
+    except NotLinearisedError as error:
+        found = _instead_of_laws(lmp, given, error, slides=slides, balance=balance, prove=prove)
+    if slides:
+        return derive_frozen(found, contacts=derive_frozen(found.contacts, sliding=found.contacts.at_bound))
+    return found
 
 
-def _by_laws(
-    lmp: Any, given: Commands | None, laws: KnownLaws, *, slides: bool, balance: float, prove: bool
+def _instead_of_laws(
+    lmp: Any, given: Commands | None, reason: NotLinearisedError, *, slides: bool, balance: float, prove: bool
 ) -> Configuration:
+    """A Configuration by differences, with the reason among its remarks; or the reason, where it is not proved."""
+    why = str(reason).rstrip(".")
+    if not can_copy(lmp):
+        raise NotLinearisedError(with_one_rank(reason)) from reason
+    if slides:
+        raise NotTakenError(
+            f"{why}; so K is found by differences of forces, which have no choice between sticking and sliding "
+            "contacts: leave slides out."
+        ) from reason
+    try:
+        found = _by_differences(lmp, given, balance=balance, prove=prove)
+    except NotTakenError:
+        if isinstance(reason, NotProvedError):
+            raise reason from None
+        raise
+    found = derive_frozen(found, remarks=(f"K and C are differences of LAMMPS's forces: {why}", *found.remarks))
+    if not isinstance(reason, NotProvedError):
+        return found
+    # differences lack forces on velocities, or between particles far apart, too, and these have been named
+    close = found.proof is not None and found.proof <= LARGEST_DIFFERENCE
+    if close and found.operator_error <= SMALL_DIFFERENCE:
+        return found
+    # contacts that slide on one side have no linear motion, and no verdict is given
+    if isinstance(reason, OtherStiffnessError) and len(found.one_sided_particles):
+        return found
+    raise reason
+
+
+def _by_laws(lmp: Any, given: Commands | None, laws: KnownLaws, *, balance: float, prove: bool) -> Configuration:
     """A Configuration whose contacts have the laws that LAMMPS shows; a NotLinearisedError if something else acts."""
-    look = partial(look_at_contacts, lmp, given, open_files())
-    deck, fixes, found = in_a_copy(look) if can_copy(lmp) else look()
+    work = partial(look, lmp, given, open_files())
+    deck, fixes, found = in_a_copy(work) if can_copy(lmp) else work()
     try:
         configuration = configuration_by_laws(lmp, deck, found, laws)
     except ValueError as error:  # numbers that no contact at rest has
@@ -135,11 +150,7 @@ def _by_laws(
         check_holding(fixes)
     check_friction(contacts, rests=rests)
     refuse_motion(configuration, balance, deck)
-    if proves:
-        configuration = _proved(lmp, configuration, deck, fixes)
-    if slides:
-        return derive_frozen(configuration, contacts=derive_frozen(contacts, sliding=contacts.at_bound))
-    return configuration
+    return _proved(lmp, configuration, deck, fixes) if proves else configuration
 
 
 def _remarks(
@@ -147,7 +158,12 @@ def _remarks(
 ) -> tuple[str, ...]:
     """Sentences on what moves, which a packing at rest leaves out; velocities have the shape (N, 3)."""
     held = held_remarks(configuration, velocity, rotation, float(lmp.extract_global("dt")))
-    return (*held, *motion_remarks(configuration, velocity), *drag_remarks(fixes))
+    adapts = (
+        f"fix {name} (adapt) may change sizes or laws as LAMMPS runs on: this is said of those that hold now"
+        for name, style in fixes.items()
+        if style.startswith("adapt")
+    )
+    return (*held, *motion_remarks(configuration, velocity), *adapts, *drag_remarks(fixes))
 
 
 def _proved(lmp: Any, configuration: Configuration, commands: Commands, fixes: dict[str, str]) -> Configuration:
@@ -164,4 +180,9 @@ def _by_differences(lmp: Any, given: Commands | None, *, balance: float, prove: 
     made = derive_frozen(made, remarks=_remarks(lmp, made, still.fixes, still.velocity, still.rotation))
     refuse_motion(made, balance, still.commands)
     proves = prove and made.residual <= BALANCE * force_scale(made)
-    return _proved(lmp, made, still.commands, still.fixes) if proves else made
+    if not proves:
+        return made
+    made = _proved(lmp, made, still.commands, still.fixes)
+    if not len(made.one_sided_particles):
+        return made
+    return derive_frozen(made, remarks=(*made.remarks, push_remark(lmp, made)))

@@ -1,13 +1,14 @@
-"""The commands of a deck that say how particles interact and move, from a log or a list of lines.
+"""The commands of a deck that say how particles interact and move.
 
-LAMMPS hands out neither kn, kt and mu of its granular styles nor the words of its fixes. A log has all of them, with
-variables filled in: a command with a $ stands there twice, as it was written and as LAMMPS understood it.
+LAMMPS hands out neither kn, kt and mu of its granular styles nor the words of its fixes. Of a deck that runs here, it
+tells each command as it carries it out (:mod:`~faultgouge.pywrap.granular.run_deck`). Of another instance, the log has
+the commands, with variables filled in: a command with a $ stands there twice, as it was written and as LAMMPS
+understood it. What is printed stands there, too, and is left out: the output of `print`, and all that a run writes.
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from ...analysis import FaultgougeError
 
@@ -52,6 +53,9 @@ PRINT = re.compile(
 )
 """The command `print` in a log. LAMMPS writes the text into the lines that follow."""
 
+RUN = re.compile(r"(?ms)^[ \t]*(?:(run|minimize|rerun)[ \t][^\n]*\n|Per MPI rank memory ).*?^Loop time of [^\n]*$")
+"""A run in a log, with all that is written meanwhile, by `fix print` among others."""
+
 
 class NotTakenError(FaultgougeError):
     """A packing of LAMMPS cannot be taken as it stands: one sentence with the reason and the way out."""
@@ -87,7 +91,7 @@ def without_suffix(style: str) -> str:
     return re.sub("/(omp|kk|intel|gpu|opt)$", "", style)
 
 
-def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
+def read_commands(lines: "Iterable[str] | Commands", *, log: bool = False) -> Commands:
     """Commands from the lines of a log, or from some that a user gives.
 
     Raises
@@ -95,59 +99,61 @@ def read_commands(lines: Iterable[str], *, log: bool = False) -> Commands:
     NotTakenError
         If no line is a pair_style, or a line that a user gives has a variable in it.
     """
+    if isinstance(lines, Commands):
+        return lines
+    whole = lines if isinstance(lines, str) else "\n".join(lines)
+    found = []
+    for line in re.sub(r"&[ \t]*\n", " ", RUN.sub(r"\1", _without_prints(whole)) if log else whole).splitlines():
+        text = line.split("#")[0]
+        if "$" in text and text.split()[0] in ("pair_style", "pair_coeff", "fix", "region"):
+            if log:
+                continue  # the line that follows has numbers
+            raise NotTakenError(f"{line.strip()!r} has a variable: write its number, as a log of LAMMPS has it.")
+        found.append(text.split())
+    return commands_of(found, "The log of this LAMMPS has" if log else "The commands have")
+
+
+def commands_of(carried_out: Iterable[Sequence[str]], source: str) -> Commands:
+    """Commands that hold after those that LAMMPS has carried out, one after the other, in words; `source` has them.
+
+    Raises
+    ------
+    NotTakenError
+        If no pair_style is among them.
+    """
     style = after = ""
     cleared = False
     coefficients: list[str] = []
     fixes: dict[str, str] = {}
     regions: dict[str, str] = {}
-    whole = lines if isinstance(lines, str) else "\n".join(lines)
-    for line in re.sub(r"&[ \t]*\n", " ", _without_prints(whole) if log else whole).splitlines():
-        text = line.split("#")[0]
-        words = text.split()
-        if not words:
-            continue
-        if "$" in text and words[0] in ("pair_style", "pair_coeff", "fix", "region"):
-            if log:
-                continue  # the line that follows has numbers
-            raise NotTakenError(f"{line.strip()!r} has a variable: write its number, as a log of LAMMPS has it.")
-        if words[0] == "clear":
-            style, coefficients, fixes, regions = "", [], {}, {}
-            cleared = True
-        elif words[0] == "pair_style" and len(words) > 1:
+    for words in carried_out:
+        name, line = words[0] if words else "", " ".join(words)
+        if name == "clear":
+            style, coefficients, fixes, regions, cleared = "", [], {}, {}, True
+        elif name == "pair_style" and len(words) > 1:
             if not style or style.split()[1] != words[1]:
                 coefficients = []
-            style = " ".join(words)
-        elif words[0] == "pair_coeff":
-            coefficients.append(" ".join(words))
-        elif words[0] == "fix" and len(words) > 3:
-            fixes[words[1]] = " ".join(words)
-        elif words[0] == "unfix" and len(words) == 2:
+            style = line
+        elif name == "pair_coeff":
+            # the last line of two types holds; in hybrid styles, of one style
+            mine = list(words[1 : 4 if style.split()[1:2] and style.split()[1].startswith("hybrid") else 3])
+            coefficients = [each for each in coefficients if each.split()[1 : 1 + len(mine)] != mine]
+            coefficients.append(line)
+        elif name == "fix" and len(words) > 3:
+            fixes[words[1]] = line
+        elif name == "unfix" and len(words) == 2:
             fixes.pop(words[1], None)
-        elif words[0] == "region" and len(words) > 2:
-            regions[words[1]] = " ".join(words)
-        elif words[0] in ("run", "minimize"):
+        elif name == "region" and len(words) > 2:
+            regions[words[1]] = line
+        elif name in ("run", "minimize"):
             after = ""
-        elif words[0] in AFTER_RUN and words[-2:] != ["compress", "no"]:
-            after = text.strip()
+        elif name in AFTER_RUN and list(words[-2:]) != ["compress", "no"]:
+            after = line
     if not style:
-        where = "The log of this LAMMPS has" if log else "The commands have"
         if cleared:
-            raise NotTakenError(f"{where} no pair_style after `clear`, which takes all away: leave it out.")
-        raise NotTakenError(f"{where} no pair_style: {GIVE_LINES}.")
+            raise NotTakenError(f"{source} no pair_style after `clear`, which takes all away: leave it out.")
+        raise NotTakenError(f"{source} no pair_style: {GIVE_LINES}.")
     return Commands((style, *(coefficients or ["pair_coeff * *"])), fixes, regions, after)
-
-
-def logged_text(text: str, folder: Path) -> str:
-    """The text of a log, and of those to which a deck in a folder turns by `log`, one after the other."""
-    whole, read = text, set[Path]()
-    while (last := text.rstrip().rpartition("\n")[2].split())[:1] == ["log"] and len(last) > 1:
-        log = folder / last[1]
-        if log in read or not log.is_file():
-            break
-        read.add(log)
-        text = log.read_text(errors="replace")
-        whole += text
-    return whole
 
 
 def _without_prints(text: str) -> str:
@@ -161,18 +167,6 @@ def _without_prints(text: str) -> str:
         output = None if "screen no" in each["more"] else re.compile(rf"{says}(?:\n|\Z)").match(text, each.end())
         at = each.end() if output is None else output.end()
     return kept + text[at:]
-
-
-def commands_in(text: str) -> list[str]:
-    """The commands of a log with variables filled in; a NotTakenError if no pair_style is among them."""
-    lines = [line.split("#")[0] for line in re.sub(r"&[ \t]*\n", " ", _without_prints(text)).splitlines()]
-    lines = [line for line in lines if "$" not in line]
-    if not any(line.split()[:1] == ["pair_style"] for line in lines):
-        raise NotTakenError(
-            "No pair_style is in the log: write one, behind read_restart, too; and leave out log none and echo, which "
-            "keep commands out of the log."
-        )
-    return lines
 
 
 def check_pair(commands: Commands, styles: Iterable[str]) -> None:
@@ -252,8 +246,6 @@ def check_fixes(styles: dict[str, str], commands: Commands) -> None:
             raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINE}.")
         if plain == "wall/gran":
             _check_wall(name, line)
-        if plain in BODIES:
-            raise NotLinearisedError(f"fix {name} {style} has particles move as one.")
 
 
 PLANES = ("xplane", "yplane", "zplane")

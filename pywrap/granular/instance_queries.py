@@ -39,14 +39,19 @@ class Styles(NamedTuple):
 
 def styles_of(lmp: Any) -> Styles:
     """The styles of an instance, as LAMMPS's `info` says them."""
-    with TemporaryFile("w+") as answer:  # of rank 0, which alone writes and reads
-        lmp.command(f'info fixes system out overwrite "{name_of(answer)}"')
-        said = communicator(lmp).bcast(answer.read(), root=0)
-    fixes = re.findall(r"^ *Fix\[ *\d+\]: *(\w+), *style = ([^,\s]+), *group = (\S+)", said, re.MULTILINE)
-    values = dict(re.findall(r"^ *(Atoms|Atom style) *= *(.*?) *$", said, re.MULTILINE))
+    info = said(lmp, "fixes system")
+    fixes = re.findall(r"^ *Fix\[ *\d+\]: *(\w+), *style = ([^,\s]+), *group = (\S+)", info, re.MULTILINE)
+    values = dict(re.findall(r"^ *(Atoms|Atom style) *= *(.*?) *$", info, re.MULTILINE))
     # Atoms = N, types = T, style = the pair style
     styles, groups = ({name: each[k] for name, *each in fixes} for k in (0, 1))
     return Styles(values["Atoms"].rpartition("style = ")[2], styles, groups, values["Atom style"])
+
+
+def said(lmp: Any, topics: str) -> str:
+    """What LAMMPS's command `info` says, on all ranks."""
+    with TemporaryFile("w+") as answer:  # of rank 0, which alone writes and reads
+        lmp.command(f'info {topics} out overwrite "{name_of(answer)}"')
+        return communicator(lmp).bcast(answer.read(), root=0)
 
 
 def of_lammps(error: BaseException) -> bool:

@@ -14,8 +14,8 @@ import numpy as np
 from ...analysis import Configuration
 from ...analysis.arrays import Floats, Indices
 from ..lammps.instance import load_plugin
-from .granular_commands import PLANES, NotLinearisedError, NotTakenError
-from .instance_queries import communicator
+from .granular_commands import BODIES, PLANES, NotLinearisedError, NotTakenError
+from .instance_queries import communicator, styles_of
 
 Arrays = dict[str, Any]
 
@@ -24,6 +24,9 @@ ATOM_ARRAYS = ("x", "image", "v", "omega", "f", "torque")
 
 NO_FORCE = 1.2345678e300
 """A number that is no force."""
+
+STILL_STEP = 1e-12
+"""A step in which nothing moves, as a share of the others."""
 
 
 def owned_array(lmp: Any, name: str) -> Floats:
@@ -48,6 +51,36 @@ def set_velocity(lmp: Any, configuration: Configuration, velocity: Floats) -> No
     translation, rotation = configuration.vectors(velocity)
     owned_array(lmp, "v")[rows] = translation
     owned_array(lmp, "omega")[rows] = rotation / configuration.radius[:, None]
+
+
+def on_coordinates(lmp: Any, c: Configuration, along: str, around: str) -> Floats:
+    """Two arrays of LAMMPS on the coordinates, shape (axes N,): v and R omega, or F and T/R."""
+    rows = rows_of(lmp, c)
+    turns = owned_array(lmp, around)[rows]
+    turns = turns * c.radius[:, None] if around == "omega" else turns / c.radius[:, None]
+    return c.join_vectors(owned_array(lmp, along)[rows], turns)
+
+
+def set_up_run(lmp: Any) -> None:
+    """Set up a run, which goes on without a set-up of its own.
+
+    At a set-up fix rigid does not know what later fixes add to the forces, and pushes its bodies in the first step: in
+    this step nothing moves.
+    """
+    if not has_bodies(lmp):
+        lmp.command("run 0 post no")
+        return
+    timestep = float(lmp.extract_global("dt"))
+    lmp.command(f"timestep {STILL_STEP * timestep:.17g}")
+    try:
+        lmp.command("run 1 post no")
+    finally:
+        lmp.command(f"timestep {timestep:.17g}")
+
+
+def has_bodies(lmp: Any) -> bool:
+    """Whether a fix rigid moves particles."""
+    return any(style.startswith(BODIES) for style in styles_of(lmp).fixes.values())
 
 
 def arrays_at_rest(lmp: Any, groups: dict[str, str], walls: list[str], columns: str) -> Arrays:

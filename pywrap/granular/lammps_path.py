@@ -1,13 +1,9 @@
 """The loading path of a live LAMMPS: at each load its own dynamics relax the packing, with drag.
 
-An equilibrium that the path keeps is a copy of the process (`fork`), which waits with LAMMPS in it. So contact
-histories are kept to the bit, as no restart file of LAMMPS can keep them. The instance of the user stays as it was.
-
-**Newton's method.** If no contact slides, a step of the load displaces the particles by :math:`K^{-1}` times the forces
-that are out of balance. LAMMPS makes this displacement in one long time step, in which slips advance, and returns the
-forces. K of the last equilibrium serves for some iterations. The equilibrium is kept if no contact slides, K has no
-negative eigenvalue, and the balance is as close as that of a relaxation. Otherwise another copy of the last equilibrium
-relaxes.
+An equilibrium from which the path goes on is a copy of the process (`fork`), which waits with LAMMPS in it. So contact
+histories are kept to the bit, as no restart file of LAMMPS can keep them. The instance of the user stays as it was. Of
+many copies most are ended: an equilibrium whose copy is asked for again is reached once more, by the same loads from
+the copy before, and is the same to the bit.
 
 **Relaxation.** The load jumps, and a drag takes the energy that the jump sets free. Motion ends soonest at the critical
 damping of the slowest mode, where the force out of balance is half of the drag. So the rate of the drag is doubled
@@ -30,28 +26,23 @@ from tempfile import TemporaryDirectory
 from typing import Any, NoReturn
 
 import numpy as np
-from scipy.sparse import csc_array, eye_array
 
-from ...analysis import Configuration, negative_eigenvalues, stiffness_matrix
-from ...analysis.arrays import Floats, derive_frozen
+from ...analysis import Configuration
+from ...analysis.arrays import derive_frozen
 from ...analysis.errors import FaultgougeError, place_in_user_code
-from ...analysis.factors.sparse_lu import general_lu
-from ...parent_death import end_with
+from ...parent_death import end_with, outlive
 from ..load_path import LoadPath
 from .balance import check_balance
 from .configuration_by_laws import KnownLaws
 from .from_lammps import take_configuration
-from .granular_commands import INTEGRATORS, NotTakenError, read_commands, without_suffix
-from .instance_queries import OpenFile, explain_error, log_file, log_of, open_files, require_instance
-from .lammps_arrays import owned_array, rows_of, set_velocity
+from .granular_commands import NotTakenError
+from .instance_queries import OpenFile, explain_error, log_file, open_files, require_instance
+from .lammps_arrays import owned_array
 from .look_in_a_copy import can_copy, in_a_copy, interrupts_wait, quieten, silent_copy
 from .relax import DRAG_RATE, REST_SHARE, bring_to_rest
 
-MOST_ITERATIONS = 10
-"""Iterations of Newton's method, each of which must halve the residual until rounding stops it: six are the rule."""
-
-DISPLACEMENT_STEP = 1e6
-"""Length of a step in which particles are displaced, in time steps: so slow that dashpots have no share in forces."""
+MOST_COPIES = 48
+"""Copies of the process that wait: a process and a descriptor each, of which a system may allow some hundreds."""
 
 
 def lammps_path(
@@ -103,12 +94,12 @@ def lammps_path(
     return LoadPath(CopiesSolver(_Relaxation(lmp, apply, given, slides, balance, steps)))
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class RelaxedCopy:
-    """An equilibrium, and the copy of the process that is there."""
+    """An equilibrium, and the copy of the process that is there, if it still waits."""
 
     packing: Configuration
-    process: Connection
+    process: Connection | None
 
     @property
     def fx(self) -> float:
@@ -122,7 +113,7 @@ class CopiesSolver:
     def __init__(self, relaxation: "_Relaxation") -> None:
         folder = TemporaryDirectory(prefix="faultgouge")
         self._first, there = Pipe()
-        self._ahead: list[Connection] = []
+        self._ahead: list[RelaxedCopy] = []
         files = open_files()
         with interrupts_wait():
             first = silent_copy()
@@ -136,35 +127,51 @@ class CopiesSolver:
         """As of :class:`~faultgouge.pywrap.load_path.EquilibriumSolver`: only a copy that is `ahead` waits for more."""
         if not self._end.alive:
             raise NotTakenError("The path is closed: ask it inside of its `with` block, or make a new one.")
-        there = self._first if below is None else below.process
-        here, found = _ask(there, load, relaxes=False)
-        if found is None:
-            here.close()
-            here, found = _ask(there, load, relaxes=True)
+        here, found = _ask(self._process_of(below), load)
         if isinstance(found, FaultgougeError):
             here.close()
             try:
                 raise found
             finally:
                 del found  # its traceback has this frame, and so this solver
+        made = RelaxedCopy(found, here)
         if ahead:
-            self._ahead.append(here)
+            self._ahead.append(made)
+            self._end_some()
         else:
             here.close()
-        return RelaxedCopy(found, here)
+        return made
+
+    def _process_of(self, wanted: RelaxedCopy | None) -> Connection:
+        """The process of an equilibrium; if it has ended, the loads from the last one that waits once more."""
+        if wanted is None:
+            return self._first
+        if wanted.process is None:
+            before = self._ahead.index(wanted) - 1
+            wanted.process, _ = _ask(self._process_of(self._ahead[before] if before >= 0 else None), wanted.fx)
+            self._end_some(wanted)
+        return wanted.process
+
+    def _end_some(self, kept: RelaxedCopy | None = None) -> None:
+        """End every second copy where there are too many, but for the last one."""
+        waits = [each for each in self._ahead if each.process is not None]
+        for each in waits[:-1:2] if len(waits) > MOST_COPIES else []:
+            if each is not kept and each.process is not None:
+                each.process.close()
+                each.process = None
 
     def close(self) -> None:
         """End all copies of the process."""
         self._end()
 
 
-def _ask(there: Connection, value: float, *, relaxes: bool) -> tuple[Connection, Any]:
+def _ask(there: Connection, value: float) -> tuple[Connection, Any]:
     """Have a copy of the process copy itself and go to a load; the new copy, and what it finds."""
     here, end = Pipe()
     copy = 0
     try:
         with interrupts_wait():
-            there.send((value, relaxes))
+            there.send(value)
             send_handle(there, end.fileno(), 0)
             end.close()
             copy = here.recv()
@@ -177,11 +184,13 @@ def _ask(there: Connection, value: float, *, relaxes: bool) -> tuple[Connection,
         return here, NotTakenError(f"LAMMPS ended without a word while it relaxed at {value:g}.")
 
 
-def _end(begin: Connection, ahead: list[Connection], first: int, owner: int, folder: "TemporaryDirectory[str]") -> None:
+def _end(
+    begin: Connection, ahead: list[RelaxedCopy], first: int, owner: int, folder: "TemporaryDirectory[str]"
+) -> None:
     """End the copies of this process, which have this solver, too, and must not end it."""
     if os.getpid() != owner:
         return
-    for copy in (begin, *ahead):
+    for copy in (begin, *(each.process for each in ahead if each.process is not None)):
         with suppress(OSError):
             copy.send(None)  # another copy of this process may keep the connection open
         copy.close()
@@ -196,13 +205,18 @@ def _wait_for_loads(relaxation: "_Relaxation", there: Connection, folder: Path, 
         quieten(relaxation.lmp)
         while (load := there.recv()) is not None:
             end, this, files = Connection(recv_handle(there)), os.getpid(), open_files()
+            with suppress(ChildProcessError):  # copies that have ended
+                while os.waitpid(-1, os.WNOHANG)[0]:
+                    pass
             if silent_copy() == 0:
-                end_with(this)  # which ends with the path, also while this copy relaxes
+                end_with(this)  # which ends with the path, while this copy relaxes
                 there.close()
                 there = end
                 there.send(os.getpid())
                 _own_log(relaxation.lmp, folder, files)
-                there.send(relaxation.result(*load))
+                found = relaxation.result(load)
+                outlive()  # from now on it ends with the path, where the connection ends
+                there.send(found)
             else:
                 end.close()  # else nobody sees that the copy has died
     except (EOFError, OSError):  # the path is closed
@@ -234,22 +248,20 @@ class _Relaxation:
     found: Configuration | None = None  # the equilibrium where LAMMPS stands
     rate: float = DRAG_RATE
 
-    def result(self, value: float, relaxes: bool) -> Configuration | FaultgougeError | None:
-        """The equilibrium at a value, or why there is none; None if Newton's method, when asked for, cannot serve."""
+    def result(self, value: float) -> Configuration | FaultgougeError:
+        """The equilibrium at a value, by a run with drag until the packing rests; or why there is none."""
         try:
             self.set(value)
-            found = self.relax(value) if relaxes else self.displace_to_balance()
-            if found is None:
-                return None
+            found, self.rate = bring_to_rest(
+                self.lmp, self.look, self.look(), self.balance, self.steps, self.rate, f" at {value:.10g}"
+            )
             # the first of all others, which are forked from it
             self.found = found = self.look(prove=True) if self.found is None else found
             change = in_a_copy(lambda: self.force_change(value))
+        except FaultgougeError as error:
+            return error
         except Exception as error:  # LAMMPS, and a user's function, raise any error
-            if not relaxes:
-                return None  # particles that nothing holds fly off: the relaxation has its own words for it
-            return (
-                error if isinstance(error, FaultgougeError) else NotTakenError(f"At {value:g}: {explain_error(error)}")
-            )
+            return NotTakenError(f"At {value:g}: {explain_error(error)}")
         if change == 0.0:
             return NotTakenError(
                 f"No force changes with the load at {value:g}: does apply set it, or a fix read the variable?"
@@ -295,72 +307,3 @@ class _Relaxation:
         change = float(np.linalg.norm(forces[1] - forces[0], axis=1).max())
         # forces have a rounding of 1e-16 of themselves, and of 1e-12 where overlaps are small beside coordinates
         return change / step if change > 1e-11 * np.abs(forces[0]).max() else 0.0
-
-    def displace_to_balance(self) -> Configuration | None:
-        """Newton's method from the equilibrium where LAMMPS stands; None if it cannot serve."""
-        start, lmp = self.found, self.lmp
-        if start is None or start.contacts.at_bound.any() or start.operators == "differences":
-            return None
-        if not np.array_equal(start.contacts.closing, start.contacts.parting):
-            return None
-        stiffness = stiffness_matrix(start)
-        # a coordinate that no contact feels has a zero row, and does not move
-        solver = general_lu(csc_array(stiffness + 1e-9 * abs(stiffness).max() * eye_array(start.coordinates)))
-        files = open_files()
-        given = self.commands or in_a_copy(lambda: log_of(lmp, files)) or []
-        fixes = read_commands(given, log=self.commands is None).fixes
-        moving = {name: line for name, line in fixes.items() if without_suffix(line.split()[3]) in INTEGRATORS}
-        for name in moving:
-            lmp.command(f"unfix {name}")
-        lmp.command("fix faultgouge_moves all nve/noforce")
-        step = float(lmp.extract_global("dt"))
-        lmp.command(f"timestep {DISPLACEMENT_STEP * step:.17g}")
-        allowed = self.balance * float(start.contacts.normal_force.mean())
-        left = _iterate(lmp, start, solver.solve, DISPLACEMENT_STEP * step, 1e-4 * allowed)
-        for line in ("unfix faultgouge_moves", *moving.values(), f"timestep {step:.17g}"):
-            lmp.command(line)
-        if left > allowed:
-            return None
-        found = self.look()
-        good = found.residual <= self.balance * found.contacts.normal_force.mean()
-        good = good and not found.contacts.at_bound.any() and len(negative_eigenvalues(found)) == 0
-        return found if good else None
-
-    def relax(self, value: float) -> Configuration:
-        """Run with drag until the packing rests."""
-        found, self.rate = bring_to_rest(
-            self.lmp, self.look, self.look(), self.balance, self.steps, self.rate, f" at {value:.10g}"
-        )
-        return found
-
-
-def _iterate(lmp: Any, start: Configuration, solve: Callable[[Floats], Floats], step: float, wanted: float) -> float:
-    """Displace the particles by Newton's method until forces are small, or fall slowly; the largest that is left.
-
-    Parameters
-    ----------
-    lmp : lammps.lammps
-        An instance in which nothing but their velocities moves the particles.
-    start : Configuration
-        Where the particles were at first.
-    solve : callable
-        Displacements that would take forces away, by K of the start.
-    step : float
-        Length of a time step: one for each displacement.
-    wanted : float
-        Size of small forces.
-    """
-    sizes: list[float] = []
-    while True:
-        set_velocity(lmp, start, np.zeros(start.coordinates))
-        lmp.command("run 0 post no")
-        rows = rows_of(lmp, start)
-        torque = owned_array(lmp, "torque")[rows] / start.radius[:, None]
-        on_coordinates = start.join_vectors(owned_array(lmp, "f")[rows], torque)
-        forces = np.where(np.tile(start.free, start.axes), on_coordinates, 0.0)
-        sizes.append(float(np.linalg.norm(forces.reshape(start.axes, -1), axis=0).max()))
-        slow = len(sizes) > 1 and sizes[-1] > 0.5 * sizes[-2]
-        if sizes[-1] <= wanted or slow or len(sizes) > MOST_ITERATIONS:
-            return sizes[-1]
-        set_velocity(lmp, start, solve(forces) / step)
-        lmp.command("run 1 post no")

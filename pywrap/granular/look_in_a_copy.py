@@ -38,7 +38,7 @@ PER_STEP = ("ave/", "print", "vector", "halt", "balance", "adapt", "dt/reset", "
 INSERTS = ("pour", "deposit", "evaporate")
 """Fixes that put particles in or take them out, with which no time step may be changed."""
 
-DRAG_STYLES = ("viscous", "langevin", "overdamped")
+DRAG_STYLES = ("viscous", "langevin", "overdamped", "damping/cundall")
 """Fixes that take energy away, and may shake."""
 
 

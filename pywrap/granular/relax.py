@@ -21,10 +21,9 @@ from .acting_fixes import acting_fixes
 from .balance import check_balance, creeping_law, force_scale, held_remarks, restless_fix
 from .configuration_by_differences import still_particles
 from .from_lammps import take_configuration
-from .granular_commands import NotTakenError, read_commands
+from .granular_commands import Commands, NotTakenError, read_commands
 from .instance_queries import explain_error, require_instance
-from .lammps_arrays import owned_array, rows_of, set_velocity
-from .lammps_steps import set_up_run
+from .lammps_arrays import owned_array, rows_of, set_up_run, set_velocity
 from .look_in_a_copy import can_copy
 
 REST_SHARE = 1e-8
@@ -52,7 +51,12 @@ SLOWEST, FASTEST = 1e-4, 0.2
 
 
 def relax(
-    lmp: Any, commands: Iterable[str] | None = None, *, balance: float = REST_SHARE, steps: int = 1_000_000
+    lmp: Any,
+    commands: Iterable[str] | Commands | None = None,
+    *,
+    balance: float = REST_SHARE,
+    steps: int = 1_000_000,
+    watch: Callable[[str], object] | None = None,
 ) -> float:
     """Bring a LAMMPS instance to rest by its own dynamics with drag; the instance runs, and ends without velocities.
 
@@ -67,6 +71,8 @@ def relax(
         coordinates leaves more, this rounding.
     steps : int
         Time steps after which a packing that is not at rest flows.
+    watch : callable, optional
+        Gets a few words now and then: the steps, and the residual.
 
     Returns
     -------
@@ -88,13 +94,14 @@ def relax(
     require_instance(lmp, "relax")
     if not can_copy(lmp):
         raise NotTakenError("relax looks at copies of the process: use one rank and one thread.")
-    given = None if commands is None else list(commands)
-    lines = None if given is None else read_commands(given)
+    lines = None if commands is None else read_commands(commands)
 
     still = still_particles(lmp, lines)
-    look = partial(take_configuration, lmp, given, {}, slides=False, balance=np.inf, prove=False)
+    look = partial(take_configuration, lmp, lines, {}, slides=False, balance=np.inf, prove=False)
     try:
-        found, _ = bring_to_rest(lmp, look, still.configuration, balance, steps, DRAG_RATE, "", far=FARTHEST_DRIFT)
+        found, _ = bring_to_rest(
+            lmp, look, still.configuration, balance, steps, DRAG_RATE, "", far=FARTHEST_DRIFT, watch=watch
+        )
     except NoEquilibriumError as error:
         held = held_remarks(still.configuration, still.velocity, still.rotation, float(lmp.extract_global("dt")))
         says = (
@@ -121,6 +128,7 @@ def bring_to_rest(
     where: str,
     *,
     far: float = 1.0,
+    watch: Callable[[str], object] | None = None,
 ) -> tuple[Configuration, float]:
     """Run with drag until the packing rests.
 
@@ -140,6 +148,8 @@ def bring_to_rest(
         What errors say of the load.
     far : float
         Diameters by which particles move in the mean, and then are said to flow.
+    watch : callable, optional
+        Gets a few words after some steps.
 
     Returns
     -------
@@ -164,6 +174,9 @@ def bring_to_rest(
             residual = float(np.linalg.norm(np.vstack([forces, drag_forces]), axis=0).max())
             speed = np.linalg.norm(owned_array(lmp, "v")[rows_of(lmp, start)][start.free], axis=1)
             way += STEPS_BETWEEN_LOOKS * dt * float(speed.mean())
+            if watch:
+                share = f", {residual / force:.2g} of the mean contact force out of balance" if force else ""
+                watch(f"coming to rest: step {done + STEPS_BETWEEN_LOOKS}{share}")
             if force == 0.0 or residual <= max(balance * force, rounding):
                 found = look()
                 force = force_scale(found)
@@ -179,8 +192,9 @@ def bring_to_rest(
     finally:
         drag.remove()
     raise NoEquilibriumError(
-        f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of balance, and its "
-        f"particles have moved by {way / diameter:.2g} diameters; give more steps, or the packing creeps or flows."
+        f"The packing does not come to rest{where} in {steps} steps: {residual / (force or 1.0):.2g} of the mean "
+        f"contact force is out of balance, and its particles have moved by {way / diameter:.2g} diameters; give more "
+        "steps, or the packing creeps or flows."
     )
 
 

@@ -1,216 +1,214 @@
-"""Run a LAMMPS deck and take its last state as it stands.
+"""Run a LAMMPS deck as `lmp -in` does in its folder, and take its last state as it stands.
 
-LAMMPS carries out each command of a deck once. It reads the deck in two parts. Between them, before the first run, its
-fixes and styles are looked at: what cannot be taken, and stays whatever the rest of the deck does, is refused before
-the runs. LAMMPS's log, and the parts, are files without a name, which no end of this program leaves behind.
+LAMMPS alone reads the deck: loops, includes and labels, `shell cd`, `if ... then ... quit`, logs and files are as
+LAMMPS has them, and no command is left out, added or carried out twice. The plugin watches LAMMPS
+(`pair_mindlin_smooth/deck_watch.cpp`): LAMMPS tells each command that it has carried out, with variables filled in, and
+at `quit` hands the instance back. Once the deck has ended, the log is closed, and no file of the deck is written any
+more.
 """
 
 import ctypes
 import os
-import re
-from contextlib import suppress
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryFile
-from typing import IO, Any, NamedTuple
+from typing import Any
 
 from mpi4py import MPI
 
-from ...analysis import BadInputError, Configuration
+from ...analysis import BadInputError, Configuration, NoEquilibriumError
+from ...plugin import directory
 from ..lammps.instance import lammps_instance
-from .balance import BALANCE, check_balance
-from .granular_commands import (
-    GIVE_LINE,
-    GIVE_LINES,
-    Commands,
-    NotLinearisedError,
-    NotTakenError,
-    commands_in,
-    logged_text,
-    read_commands,
-    with_one_rank,
-)
-from .instance_queries import communicator, explain_error, name_of, styles_of
-from .kept_state import keep_state, take_or_keep
-from .look_in_a_copy import can_copy
+from .balance import BALANCE, check_balance, moving_region
+from .from_lammps import from_lammps
+from .granular_commands import GIVE_LINE, GIVE_LINES, NotLinearisedError, NotTakenError, commands_of
+from .instance_queries import communicator, explain_error, name_of, of_lammps, styles_of
+from .kept_state import keep_state
+from .look_in_a_copy import INSERTS, can_copy, in_a_copy
 from .looks import check_instance
-from .moving_regions import moving_region
+from .relax import relax
 
-MARK = "faultgouge_rest_of_the_deck"
-"""Label of the first line of the second part of a deck."""
+AS_THE_PROGRAM = ("-log", "log.lammps", "-cite", "log")
+"""Words of the command line for what the program lmp does without any."""
 
-RUN = re.compile(r"\s*(run|minimize)\b")
+QUIT = "faultgouge: the deck ends by quit"
+"""What LAMMPS stops with where a deck quits (`deck_watch.cpp`)."""
 
-CHANGES = re.compile(
-    r"\b(unfix|clear|pair_style|pair_coeff|include|python|plugin)\b|\bjump\s+(?!SELF\b)"
-    r"|^\s*\$|\b(then|else|every)\b.*[\"']\s*\$",
-    re.MULTILINE,
-)
-"""Commands that change what has been set up, or stand in a variable and may do so."""
+LIGGGHTS = (
+    "hard_particles", "atom_style granular", "gran model", "property/global", "particletemplate",
+    "particledistribution", "mesh/surface", "insert/", "nve/sphere/", "modify_timing", "coarsegraining",
+)  # fmt: skip
+"""Words of LIGGGHTS's commands that LAMMPS does not have."""
 
-CONDITION = re.compile(r"""\b(el)?if\s+("[^"]*"|'[^']*'|\S+)""")
+WRITERS = ("print", "ave/", "record")
+"""Fixes that write files, by the beginnings of their styles."""
 
-UNFIX = re.compile(r"(?m)^[ \t]*unfix[ \t]+(\w+)[ \t]*(?:#.*)?$")
-"""A command that takes one fix away, named by its ID."""
-
-REDEFINES = re.compile(r"(?<![\w/])(region|variable)\s")
-"""Commands that may bring a region to rest."""
-
-HIDES = re.compile(r"\s*(log|echo)\s")
-"""Commands that keep what follows out of LAMMPS's log."""
+Notice = Callable[[str], None]
 
 
-class Deck(NamedTuple):
-    """The text of a deck up to its first run, and from there on."""
+@dataclass(frozen=True)
+class EndedDeck:
+    """A LAMMPS after its deck: the instance, the commands that it has carried out, in words, and why it stopped, if an
+    error has ended the deck."""
 
-    head: str
-    rest: str
-
-    @property
-    def ahead(self) -> str:
-        """Lines that LAMMPS may still carry out after the head, among them those to which a loop goes back."""
-        loop = re.search(r"(?m)^\s*label\b", self.head)
-        return (self.head[loop.start() :] if loop else "") + self.rest
-
-    @property
-    def second_part(self) -> str:
-        """A deck that begins with the rest, and has the labels of the head for the jumps of the rest."""
-        return f"jump SELF {MARK}\n{self.head}label {MARK}\n{self.rest}"
+    lmp: Any
+    carried_out: list[list[str]]
+    stopped: str
 
 
 def run_deck(
-    path: Path, *, slides: bool = False, balance: float = BALANCE, relaxes: bool = False, keep: Path | None = None
+    path: Path,
+    *,
+    slides: bool = False,
+    balance: float = BALANCE,
+    relaxes: bool = False,
+    keep: Path | None = None,
+    notice: Notice | None = None,
+    show: Notice | None = None,
+    use: Callable[[Any, Configuration], None] | None = None,
 ) -> Configuration:
     """Run a deck in its own folder, as `lmp -in` there, and take its last state as `from_lammps` does.
 
-    If `relaxes`, the last state comes to rest first, by :func:`~faultgouge.pywrap.granular.relax.relax`. A state that
-    cannot be taken, or at which LAMMPS stops, is kept in a restart file beside `keep`.
+    Parameters
+    ----------
+    path : Path
+        The deck.
+    slides, balance
+        As of :func:`~faultgouge.pywrap.from_lammps`.
+    relaxes : bool
+        Whether the last state comes to rest first, by :func:`~faultgouge.pywrap.granular.relax.relax`.
+    keep : Path, optional
+        A state that cannot be taken, or at which LAMMPS stops, is kept in a new restart file beside this one.
+    notice : callable, optional
+        Gets a sentence before the first run if what is set up cannot be taken as it stands; the deck may change that.
+    show : callable, optional
+        Gets how far `relaxes` has come.
+    use : callable, optional
+        Gets the instance and its packing before the instance is closed.
 
     Raises
     ------
     BadInputError
-        If the deck is missing, or before its first run has what cannot be taken.
+        If the deck is missing.
     NotTakenError
-        If LAMMPS stops, or the packing cannot be taken.
+        If LAMMPS stops, or the packing cannot be taken: the sentence says where the state is kept.
     """
     check_balance(balance)
     if not path.is_file():
         raise BadInputError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
-    text = path.read_bytes().decode(errors="surrogateescape")
-    with TemporaryFile("w+", errors="replace") as log:
-        lmp = lammps_instance(MPI.COMM_WORLD, Path(name_of(log)))
-        try:
-            _carry_out_deck(lmp, path, text, log)
-        except NotTakenError as error:
-            ran = bool(lmp.extract_global("ntimestep"))
-            says = keep_state(lmp, str(error), keep if ran else None, ", and without what stopped LAMMPS")
-            raise NotTakenError(says) from error
-        try:
-            commands = commands_in(_text_of_logs(lmp, log, path))
-            found = take_or_keep(lmp, commands, keep, slides=slides, balance=balance, relaxes=relaxes)
-        except NotTakenError as error:
-            if (says := _of_deck(str(error), text)) == str(error):
-                raise
-            raise NotTakenError(says) from error
-        lmp.close()
-    return found
-
-
-def _carry_out_deck(lmp: Any, path: Path, text: str, log: IO[str]) -> None:
-    """Have LAMMPS carry out all of a deck, and look at its fixes and styles before the first run if that is known."""
-    deck = _divide(_before_quit(text))
-    if deck is None:
-        _carry_out(lmp, path, path.name)
-        return
-    _carry_out_text(lmp, path, deck.head)
-    _refuse_what_stays(lmp, path, _text_of_logs(lmp, log, path), deck)
-    _carry_out_text(lmp, path, deck.second_part)
-
-
-def _before_quit(text: str) -> str:
-    """A deck up to the `quit` that ends it, and would end this program, too; all of a deck whose jumps may pass it."""
-    if re.search(r"\bjump\b", text):
-        return text
-    quits = (each.start() for each in re.finditer(r"(?m)^[ \t]*quit\b", text))
-    return text[: next((at for at in quits if text.count('"""', 0, at) % 2 == 0), len(text))]
-
-
-def _divide(text: str) -> Deck | None:
-    """The parts of a deck; None if it jumps before its first run, or to its own beginning."""
-    lines = text.splitlines(keepends=True)
-    at, quoted, continued = 0, False, False
-    while at < len(lines) and (quoted or continued or not RUN.match(lines[at])):
-        quoted ^= lines[at].count('"""') % 2 == 1
-        continued = lines[at].rstrip().endswith("&")
-        at += 1
-    head, rest = "".join(lines[:at]), "".join(lines[at:])
-    if re.search(r"\bjump\b", head) or re.search(r"(?m)\bjump\s+(SELF\s*(?:[\"'#]|$)|\S*\$)", rest):
-        return None
-    return Deck(head if head.endswith("\n") else f"{head}\n", rest)
-
-
-def _carry_out_text(lmp: Any, path: Path, text: str) -> None:
-    """Have LAMMPS carry out a part of a deck."""
-    with TemporaryFile("w+", encoding="utf-8", errors="surrogateescape", newline="") as part:
-        part.write(text)
-        part.flush()
-        _carry_out(lmp, path, name_of(part))
-
-
-def _carry_out(lmp: Any, path: Path, name: str) -> None:
-    """Have LAMMPS read a file in the folder of a deck."""
-    here = Path.cwd()
+    deck = carry_out_deck(path, notice)
     try:
-        os.chdir(path.parent.resolve())
-        lmp.file(name)
-    except Exception as error:  # LAMMPS's bindings raise any error
-        raise NotTakenError(f"{path}: {explain_error(error)}") from error
+        found = _take(deck, path, slides=slides, balance=balance, relaxes=relaxes, show=show)
+        if use is not None:
+            use(deck.lmp, found)
+        return found
+    except (NotTakenError, NoEquilibriumError) as error:
+        kept = keep_state(deck.lmp, deck.carried_out, keep, path) if keep else ""
+        raise NotTakenError(f"{_of_deck(str(error)).rstrip('.')}. {kept}".rstrip()) from error
+    finally:
+        deck.lmp.close()
+
+
+def _of_deck(says: str) -> str:
+    """A sentence about commands that are missing, for a deck in place of a script in Python."""
+    hidden = "leave `echo none` and `echo log` out of the deck, which keep commands from this program"
+    return says.replace(GIVE_LINES, hidden).replace(GIVE_LINE, hidden)
+
+
+def carry_out_deck(path: Path, notice: Notice | None = None) -> EndedDeck:
+    """Have LAMMPS carry out a deck in its folder; the caller closes the instance, whose files are closed."""
+    here, carried_out = os.getcwd(), list[list[str]]()
+    os.chdir(path.parent)
+    try:
+        try:
+            lmp = lammps_instance(MPI.COMM_WORLD, None, *AS_THE_PROGRAM, "-echo", "both")
+        except Exception as error:
+            if not of_lammps(error):
+                raise
+            raise NotTakenError(f"{path}: {explain_error(error)}") from error
+        plugin = ctypes.CDLL(str(Path(directory()) / "mindlinsmoothplugin.so"))
+
+        @ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.POINTER(ctypes.c_char_p))
+        def told(count: int, words: Any) -> None:
+            carried_out.append([os.fsdecode(word) for word in words[:count]])
+
+        @ctypes.CFUNCTYPE(None)
+        def runs() -> None:
+            says = _not_taken_yet(lmp, carried_out) if notice and can_copy(lmp) else ""
+            if notice and says:
+                notice(f"{path}: as it stands before the first run, the packing cannot be taken: {says}")
+
+        stopped, complete = "", False
+        plugin.faultgouge_watch(lmp.lmp, told, runs)
+        try:
+            with open(path.name, "rb") as stream:  # LAMMPS's bindings do not take any name
+                lmp.file(name_of(stream))
+            complete = True
+        except Exception as error:  # LAMMPS's bindings raise any error
+            stopped = "" if QUIT in str(error) else explain_error(error)
+        finally:
+            plugin.faultgouge_end_watch(lmp.lmp, int(complete))
     finally:
         os.chdir(here)
+    carried_out = communicator(lmp).bcast(carried_out, root=0)
+    if lmp.extract_setting("box_exist"):
+        _close_files(lmp, carried_out)
+    return EndedDeck(lmp, carried_out, stopped)
 
 
-def _text_of_logs(lmp: Any, log: IO[str], path: Path) -> str:
-    """LAMMPS's log so far, on all ranks."""
-    ctypes.CDLL(None).fflush(None)
-    log.seek(0)
-    return communicator(lmp).bcast(logged_text(log.read(), path.parent), root=0)
+def _close_files(lmp: Any, carried_out: list[list[str]]) -> None:
+    """Close the files that a deck has open; and have no run of this program end early, or need what is taken away."""
+    lost = [words[words.index("lost") + 1] for words in carried_out if "lost" in words and words[0] == "thermo_modify"]
+    lmp.command("thermo_style custom step")
+    lmp.command(f"thermo_modify lost {lost[-1] if lost else 'error'}")
+    for name in lmp.available_ids("dump"):
+        lmp.command(f"undump {name}")
+    for name, style in styles_of(lmp).fixes.items():
+        if style.startswith(WRITERS):
+            lmp.command(f"unfix {name}")
+    lmp.command("restart 0")
+    lmp.command("timer timeout unlimited")
 
 
-def _refuse_what_stays(lmp: Any, path: Path, text: str, deck: Deck) -> None:
-    """Refuse what an instance cannot be taken with, unless a command ahead may change it."""
-    ahead = CONDITION.sub("", deck.ahead)
-    gone, ahead = set(UNFIX.findall(ahead)), UNFIX.sub("", ahead)
-    if CHANGES.search(ahead):
-        return
+def _not_taken_yet(lmp: Any, carried_out: list[list[str]]) -> str:
+    """Why a packing cannot be taken as it stands before a run; empty if no reason is known yet."""
+
+    def look() -> None:
+        commands = commands_of(carried_out, "The deck has")
+        try:
+            check_instance(lmp, styles_of(lmp), commands)
+        except NotLinearisedError:  # K by differences of forces may serve
+            if says := moving_region(lmp, commands):
+                raise NotTakenError(says) from None
+
     try:
-        commands, styles = read_commands(commands_in(text), log=True), styles_of(lmp)
-        again = re.findall(r"\bfix\s+(\S+)\s", ahead)  # a fix takes the place of one with the same ID
-        if any(name in styles.fixes or "$" in name for name in again):
-            return
-        stay = {name: style for name, style in styles.fixes.items() if name not in gone}
-        commands = replace(commands, fixes={name: commands.fixes[name] for name in commands.fixes if name not in gone})
-        check_instance(lmp, styles._replace(fixes=stay), commands)
-    except NotLinearisedError as error:
-        if not can_copy(lmp):  # for K by differences of forces
-            raise BadInputError(f"{path}: {_of_deck(with_one_rank(error), deck.head)}") from error
-        _refuse_moving_region(lmp, path, commands, ahead)
+        in_a_copy(look)
     except NotTakenError as error:
-        raise BadInputError(f"{path}: {_of_deck(str(error), deck.head)}") from error
+        return _of_deck(str(error)) if "LAMMPS stopped" not in str(error) else ""
+    return ""
 
 
-def _refuse_moving_region(lmp: Any, path: Path, commands: Commands, ahead: str) -> None:
-    """Refuse a region that moves, and stays as it is in the lines ahead."""
-    says = ""
-    if not REDEFINES.search(ahead):
-        with suppress(NotTakenError):  # a deck that LAMMPS cannot run yet tells nothing
-            says = moving_region(lmp, commands)
-    if says:
-        raise BadInputError(f"{path}: {says}")
+def _take(
+    deck: EndedDeck, path: Path, *, slides: bool, balance: float, relaxes: bool, show: Notice | None
+) -> Configuration:
+    """What `from_lammps` takes of an ended deck, after `relax` if that is asked for."""
+    if deck.stopped:
+        raise NotTakenError(f"{path}: {_explain_stop(deck)}")
+    commands = commands_of(deck.carried_out, "The deck has")
+    if relaxes:
+        for name, style in styles_of(deck.lmp).fixes.items():
+            if style.startswith((*INSERTS, "halt")):  # only the particles that there are come to rest
+                deck.lmp.command(f"unfix {name}")
+        relax(deck.lmp, commands, watch=show)
+    return from_lammps(deck.lmp, commands, slides=slides, balance=balance)
 
 
-def _of_deck(says: str, text: str) -> str:
-    """A sentence about commands that are missing, for a deck in place of a script in Python."""
-    hides = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1) if HIDES.match(line)]
-    named = " and ".join(f"line {number}, `{line}`" for number, line in hides)
-    advice = f"{named}, may keep it out of LAMMPS's log: leave that out" if hides else "see that LAMMPS's log has it"
-    return says.replace(GIVE_LINES, advice).replace(GIVE_LINE, advice)
+def _explain_stop(deck: EndedDeck) -> str:
+    """What LAMMPS says, and whether the deck is one of LIGGGHTS."""
+    lines = [" ".join(words) for words in deck.carried_out[-1:]]
+    if any(word in line for line in (deck.stopped, *lines) for word in LIGGGHTS):
+        return (
+            f"{deck.stopped.rstrip('.')}: this is a deck of LIGGGHTS, whose commands LAMMPS does not have; write "
+            "pair_style, fix wall/gran and what makes particles as LAMMPS's manual has them (docs/decks.md)."
+        )
+    return deck.stopped

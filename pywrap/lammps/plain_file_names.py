@@ -20,6 +20,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from ...analysis import FaultgougeError
+from ...analysis.files.atomic_write import check_own
 
 DECKS = Path(str(files("faultgouge.lammps_inputs")))
 
@@ -84,6 +85,20 @@ def decks_folder() -> Path:
 
 
 def move_files(folder: Path, stem: Path) -> None:
-    """Move the files of a folder, KIND each by its suffix, to STEM.KIND."""
-    for file in sorted(folder.iterdir()):
-        shutil.move(file, f"{stem}{file.suffix}")
+    """Move the files of a folder, KIND each by its suffix, to STEM.KIND.
+
+    Raises OutputError if a file of such a name is there that does not begin as the new one: of dumps, with the columns.
+    """
+    moved = {file: Path(f"{stem}{file.suffix}") for file in sorted(folder.iterdir())}
+    for file, target in moved.items():
+        if target.exists() and _head(target) != _head(file):
+            check_own(target)
+    for file, target in moved.items():
+        shutil.move(file, target)
+
+
+def _head(path: Path) -> list[bytes]:
+    """How a dump begins, or a file of parameters: the names that are in it."""
+    with path.open("rb") as stream:
+        lines = [stream.readline(1 << 16) for _ in range(9)]
+    return [line.strip() for line in lines if line.startswith(b"ITEM:")] or [line.split()[:1][0] for line in lines[:3]]

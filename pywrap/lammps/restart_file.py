@@ -15,7 +15,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from ...analysis import PackingFileError
-from ...analysis.files.formats import Disks, registry
+from ...analysis.files import formats
+from ...analysis.files.formats import Disks
 from ...analysis.files.formats.disks import of_columns
 from .instance import lammps_instance
 from .plain_file_names import plain_name
@@ -26,14 +27,14 @@ MOST_GROUPS = 32
 
 def read_disks(path: Path, frame: int | None = None) -> Disks:
     """Disks of a file of any format, restarts included; all else is as in :func:`faultgouge.analysis.files.formats`."""
-    if path.is_file() and frame in (None, 0, -1) and registry.format_of(path) is registry.RESTART:
+    if path.is_file() and frame in (None, 0, -1) and formats.format_of(path) is formats.RESTART:
         return read_restart(path)
-    return registry.read_disks(path, frame)
+    return formats.read_disks(path, frame)
 
 
 def read_restart(path: Path) -> Disks:
     """Disks of a restart."""
-    if not registry.is_restart(path):
+    if not formats.begins_with(path, formats.RESTART_BEGINNING):
         raise PackingFileError(f"{path} is no LAMMPS restart file, or cannot be read.")
     lammps = lammps_instance(MPI.COMM_SELF, None)
     try:

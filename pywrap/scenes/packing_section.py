@@ -11,10 +11,10 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis import BadInputError, MindlinLaw, Packing, PackingFileError, RunFile
 from ...analysis.arrays import Floats
-from ...analysis.files.formats import Disks, UpperLayerError, format_of, is_hdf5, packing_of, upper_layer
+from ...analysis.files.formats import Disks, format_of, is_hdf5, packing_of, upper_layer
 from ..lammps.restart_file import read_disks
 from .random_start import layer_size, random_start
-from .validation import Positive, Section, refusal_sentence
+from .validation import NamesFile, Positive, Section, refusal_sentence
 
 SPARSEST = 10.0
 """Width of the box, in lengths of all disks in one row, beyond which nothing would ever touch."""
@@ -144,8 +144,8 @@ class StoredPacking(Section):
         Which of several frames; by default the last. Not of a run.h5, whose first is taken.
     """
 
-    file: Annotated[Path, Field(strict=False)]
-    top: int | str | None = None
+    file: Annotated[Path, Field(strict=False), NamesFile()]
+    top: Annotated[int | str | None, NamesFile()] = None
     frame: int | None = None
 
     @field_validator("file")
@@ -173,10 +173,9 @@ class StoredPacking(Section):
                     )
             return self
         try:
-            upper_layer(read_disks(self.file, self.frame), self.top)
+            upper_layer(read_disks(self.file, self.frame), self.top, "packing.top = ")
         except BadInputError as error:
-            says = error.sentence("packing.top", " = ") if isinstance(error, UpperLayerError) else str(error)
-            says = says.rstrip(".")
+            says = str(error).rstrip(".")
             raise refusal_sentence("file", f'= "{self.file.name}" is refused: {says}') from None
         return self
 

@@ -20,6 +20,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
+from .study_sections import study_model
 from .units import HERTZ_EXPONENT, MISMATCH, Layer, RealUnits, check_exponent, hertz_stiffness, layer_of, units_of
 from .units_section import Units, is_stress, quantity
 from .validation import SceneError, is_number
@@ -66,10 +67,9 @@ DIMENSIONS: Mapping[str, Mapping[str, Powers | tuple[Powers, Powers]]] = {
         "omega": FREQUENCY,
         "scale": FORCE,
     },
-    "trigger": {"omega": FREQUENCY, "time": TIME},
-    "eruptions": {"load": FORCE, "time": TIME},
 }
-"""Dimension of each number of a scene, or of each pair of numbers; all others have none."""
+"""Dimension of each number of a scene, or of each pair of numbers; all others have none. The sections of studies have
+theirs in the annotations of their keys."""
 
 WAVES = {"perturb": "amplitude", "drive": "scale"}
 """Sections with a wave, and their keys that are a velocity where the wave is on the floor."""
@@ -131,7 +131,17 @@ def as_numbers(scene: Scene, folder: Path, name: str) -> Scene:
 def _is_plain(scene: Scene) -> bool:
     """Whether every number is one already, and none is left to the grains."""
     given = "kn" in _section(scene, "law") and "fy" in _section(scene, "load")
-    return given and not any(_texts(path, key, scene) for path, keys in DIMENSIONS.items() for key in keys)
+    return given and not any(_texts(path, key, scene) for path, keys in _dimensions(scene).items() for key in keys)
+
+
+def _dimensions(scene: Scene) -> Mapping[str, Mapping[str, Powers | tuple[Powers, Powers]]]:
+    """`DIMENSIONS`, with those of the studies' sections that the scene has."""
+    found = dict(DIMENSIONS)
+    for name in scene.keys() - DIMENSIONS.keys():
+        fields = getattr(study_model(str(name)), "model_fields", {})
+        powers = {key: [each for each in field.metadata if isinstance(each, tuple)] for key, field in fields.items()}
+        found[str(name)] = {key: each[0] for key, each in powers.items() if each}
+    return found
 
 
 def _section(scene: Scene, path: str) -> Mapping[str, Any]:
@@ -205,7 +215,7 @@ def _convert(scene: Scene, units: Units, layer: Layer) -> Scene:
     if "fy" not in load and units.overburden is not None:
         load["fy"] = _round(units.si("overburden") / real.overburden)
     found: Scene = {**scene, "law": law, "load": load}
-    for path, keys in DIMENSIONS.items():
+    for path, keys in _dimensions(scene).items():
         texts = {key: powers for key, powers in keys.items() if _texts(path, key, found)}
         if texts:
             found = _put(found, path, _section_in_numbers(path, _section(found, path), texts, real))

@@ -10,11 +10,9 @@
     [perturb]   an undamped run at one F_x, with or without a forcing a cos(omega t)
     [friction]  mu(v) that falls with the velocity v of the upper layer
     [drive]     a spring that draws the upper layer: stick and slip
-    [trigger]   the map of waves that trigger
-    [eruptions] the loads from which undamped runs start that go on until they are over
-    [modes]     the loads at which the complex pairs are counted
     [units]     what the numbers are in SI
     [output]    what is written beside the result
+    [NAME]      the section of the study NAME (:mod:`faultgouge.pywrap.scenes.study_sections`)
 
 packing, law and load are required. Each other section switches on a feature; without the section, the run does not have
 the feature. A command reads only some sections, and requires some of those
@@ -30,13 +28,23 @@ from typing import Any, get_args
 from pydantic import ValidationError, model_validator
 from pydantic_core import InitErrorDetails
 
-from .command_sections import COMMANDS, Command
+from .command_sections import command_of
 from .impossible import refuse_impossible
 from .quantities import as_numbers
 from .scene_keys import SceneKeys
 from .sections import Inertia
+from .study_sections import errors_in, require_sections, study_model, study_models
 from .units import real_units
-from .validation import SceneError, Section, read_toml, refusal_sentence, require_section, sentence
+from .validation import (
+    KEYS_TO_ADD,
+    SceneError,
+    Section,
+    digest_of,
+    files_named,
+    read_toml,
+    refusal_sentence,
+    sentence,
+)
 
 
 class Scene(SceneKeys):
@@ -155,24 +163,39 @@ class Scene(SceneKeys):
 
     @classmethod
     def _check(cls, mapping: Mapping[str, Any], folder: Path, name: str, command: str | None) -> "Scene":
-        wanted = COMMANDS.get(command or "", ALL_SECTIONS)
+        wanted = command_of(command)
         context: dict[str, Any] = {"folder": folder}
         try:
             if isinstance(mapping, Mapping) and "units" in mapping:
                 mapping = as_numbers(mapping, folder, name)
-            if wanted is not ALL_SECTIONS and isinstance(mapping, Mapping):
+            if wanted is not None and isinstance(mapping, Mapping):
                 _check_keys(mapping)
                 mapping = wanted.part(mapping)
                 if "perturb" not in wanted.reads:
                     context["inertia"] = _Part.model_validate({"perturb": mapping.pop("perturb", {})}).perturb
             scene = cls.model_validate(mapping, context=context)
-            for section in wanted.needs:
-                require_section(getattr(scene, section), section)
+            require_sections(scene, wanted.needs if wanted else (), KEYS_TO_ADD)
             return scene
         except ValidationError as error:
             # A misspelled name makes the right one missing, too: the misspelling is the cause.
-            errors = sorted(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
-            raise SceneError(f"{name}: {sentence(errors[0], SECTIONS)}.") from None
+            first = min(errors_in(error), key=lambda each: each["type"] != "extra_forbidden")
+            studies = study_models() if first["type"] == "extra_forbidden" else {}
+            raise SceneError(f"{name}: {sentence(first, SECTIONS | studies)}.") from None
+
+    @property
+    def files(self) -> dict[str, tuple[Path, ...]]:
+        """The files that the scene names, by section.key; of a dump also those beside it."""
+        sections = ((name, getattr(self, name)) for name in type(self).model_fields)
+        return {
+            f"{name}.{key}": paths
+            for name, section in sections
+            if isinstance(section, Section)
+            for key, paths in files_named(section).items()
+        }
+
+    def digests(self) -> dict[str, str]:
+        """SHA-256 of the contents of these files, by section.key."""
+        return {key: digest_of(paths) for key, paths in self.files.items()}
 
     def resolved(self) -> dict[str, Any]:
         """Every key with its value, defaults included, as plain numbers, strings, lists and dicts.
@@ -196,10 +219,12 @@ def _check_keys(mapping: Mapping[str, Any]) -> None:
     errors: list[InitErrorDetails] = []
     for name, section in mapping.items():
         keys = section if isinstance(section, Mapping) else {}
-        known = {key for model in SECTIONS.get(name, ()) for key in model.model_fields}
-        if name not in SceneKeys.model_fields:
+        study = None if name in SceneKeys.model_fields else study_model(str(name))
+        models = SECTIONS.get(name, ()) if study is None else (study,)
+        known = {key for model in models for key in model.model_fields}
+        if name not in SceneKeys.model_fields and study is None:
             errors.append({"type": "extra_forbidden", "loc": (name,), "input": section})
-        elif name in SECTIONS and keys is not section:
+        elif models and keys is not section:
             errors.append({"type": "dict_type", "loc": (name,), "input": section})
         else:
             errors += [{"type": "extra_forbidden", "loc": (name, key), "input": section} for key in keys.keys() - known]
@@ -215,9 +240,6 @@ def _models(annotation: Any) -> tuple[type[Section], ...]:
 
 
 SECTIONS = {name: models for name, field in SceneKeys.model_fields.items() if (models := _models(field.annotation))}
-
-ALL_SECTIONS = Command(tuple(SceneKeys.model_fields))
-"""Every section."""
 
 
 def scene_of(scene: object, command: str) -> Scene:

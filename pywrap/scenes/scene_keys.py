@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, PrivateAttr, Tag, ValidationInfo, field_validator
+from pydantic import ConfigDict, Discriminator, PrivateAttr, Tag, ValidationInfo, field_validator, model_validator
 
 from .drive_section import Drive
 from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
 from .sections import Damping, Friction, Inertia, Law, Load, Output, Perturb, Ramp, Relax
-from .study_sections import Eruptions, ModesSection, Trigger
+from .study_sections import check_study_section
 from .units_section import Units
 from .validation import Section
 
@@ -17,7 +17,7 @@ DEFAULT_INCREMENTS = 3e4
 
 
 class SceneKeys(Section):
-    """All keys of a scene.
+    """All keys of a scene, beside the sections of studies (:mod:`~faultgouge.pywrap.scenes.study_sections`).
 
     Attributes
     ----------
@@ -26,9 +26,11 @@ class SceneKeys(Section):
         1e-17 instead of 1e-11.
     packing, law, load, relax
         Sections that every scene has; relax may be left out in TOML.
-    ramp, perturb, friction, drive, damping, trigger, eruptions, modes, units, output
+    ramp, perturb, friction, drive, damping, units, output
         Sections or None, which means that the feature is not in the run.
     """
+
+    model_config = ConfigDict(extra="allow")
 
     precision: Literal["double", "compensated"] = "double"
     packing: Annotated[
@@ -42,12 +44,20 @@ class SceneKeys(Section):
     perturb: Perturb | None = None
     friction: Friction | None = None
     drive: Drive | None = None
-    trigger: Trigger | None = None
-    eruptions: Eruptions | None = None
-    modes: ModesSection | None = None
     units: Units | None = None
     damping: Damping | None = None
     output: Output | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _sections_of_studies(cls, sections: Any, info: ValidationInfo) -> Any:
+        if not isinstance(sections, Mapping):
+            return sections
+        others = sections.keys() - cls.model_fields.keys()
+        checked = {
+            name: check_study_section(str(name), sections[name], info.context) for name in sorted(others, key=str)
+        }
+        return {**sections, **checked}
 
     @field_validator("ramp", mode="before")
     @classmethod

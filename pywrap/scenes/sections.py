@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from ...analysis.packing.law import EXPONENTS
+from ...analysis.packing.law import EXPONENTS, LEAST_RESCALED, known_exponents
 from .signal_keys import SignalKeys
 from .validation import NotNegative, Positive, Section, is_number, refusal_sentence
 
@@ -83,15 +83,13 @@ class Law(Section):
     @classmethod
     def _known_exponent(cls, exponent: float) -> float:
         if exponent not in EXPONENTS:
-            raise refusal_sentence("", f"= {exponent:g} is refused: give 1.5 (Hertz) or 1 (harmonic disks)")
+            raise refusal_sentence("", f"= {exponent:g} is refused: give {known_exponents()}")
         return exponent
 
     @model_validator(mode="after")
     def _something_to_rescale(self) -> "Law":
-        if self.history == "rescaled" and self.exponent != 1.5:
-            raise refusal_sentence(
-                "history", '= "rescaled" needs law.exponent = 1.5: harmonic disks have one stiffness'
-            )
+        if self.history == "rescaled" and self.exponent < LEAST_RESCALED:
+            raise refusal_sentence("history", f'= "rescaled" needs a law.exponent of {LEAST_RESCALED} or more')
         return self
 
     @property

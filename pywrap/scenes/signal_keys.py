@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis.files.signal_files import read_signal
 from ...analysis.motion.signals import Signal, SignalError, pulse, sweep
-from .validation import NotNegative, Positive, Section, refusal_sentence
+from .validation import NamesFile, NotNegative, Positive, Section, refusal_sentence
 
 KINDS = ("pulse", "sweep")
 OF_FILES = ("channel", "scale", "stretch")
@@ -65,7 +65,7 @@ class SignalKeys(Section):
     amplitude: NotNegative = 0.0
     omega: NotNegative | None = None
     omega_end: Positive | None = None
-    signal: str | None = None
+    signal: Annotated[str | None, NamesFile()] = None
     channel: str | None = None
     scale: Annotated[float, Field(allow_inf_nan=False)] | None = None
     stretch: Positive | None = None

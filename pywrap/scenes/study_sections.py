@@ -1,75 +1,65 @@
-"""The sections of a scene that belong to one study each: [trigger], [eruptions] and [modes]."""
+"""Sections of a scene that belong to one study each, such as [trigger]: the study registers its section in its file.
 
-from typing import Annotated, Literal
+A scene with the section [NAME] imports ``faultgouge/studies/NAME.py``, if there is such a study, and its section is
+checked by the model that the study registers. Numbers of the section that may have a unit say so in their annotation:
+``Annotated[Positive, TIME]`` (:mod:`~faultgouge.pywrap.scenes.quantities`).
+"""
 
-from pydantic import Field
+from collections.abc import Mapping
+from typing import Any, TypeVar
 
-from .validation import Positive, Section
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails, PydanticCustomError
 
-Share = Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)]
+from ... import registered
+from .validation import SceneError, Section
 
-
-class Trigger(Section):
-    """[trigger] which waves trigger how critical a layer.
-
-    Attributes
-    ----------
-    distance : tuple of float
-        Distances 1 - F_x/F_x^c from the onset.
-    omega : tuple of float or None
-        Angular frequencies of the wave, 1 / time. None: `COUNT` of them, evenly over the logarithm, from a tenth of the
-        slowest mode's to the fastest mode's.
-    time : float
-        How long the wave lasts, time.
-    runs : int
-        How many pairs of a distance and a frequency are bisected in LAMMPS.
-    on : {"layer", "floor"}
-        What the wave is: a force a cos(omega t) on each disk of the upper layer, or an acceleration of the floor.
-    """
-
-    distance: Annotated[tuple[Share, ...], Field(min_length=1, strict=False)] = (0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4)
-    omega: Annotated[tuple[Positive, ...], Field(min_length=1, strict=False)] | None = None
-    time: Positive = 20.0
-    runs: int = Field(12, ge=0)
-    on: Literal["layer", "floor"] = "layer"
+S = TypeVar("S", bound=Section)
 
 
-class Eruptions(Section):
-    """[eruptions] undamped runs from rest until they are over.
-
-    Attributes
-    ----------
-    load : tuple of float
-        F_x of the equilibria from which the runs start, force on each disk of the upper layer. Loads beyond the last
-        equilibrium are left out.
-    time : float
-        Length of a run at the most, time.
-    """
-
-    load: Annotated[tuple[Positive, ...], Field(min_length=1, strict=False)]
-    time: Positive = 3000.0
+def study_model(name: str) -> type[Section] | None:
+    """The section that a study has registered; None if there is no such study, or it has no section."""
+    model: type[Section] | None = getattr(registered.study_of(name), "section", None)
+    return model
 
 
-class ModesSection(Section):
-    """[modes] the complex pairs along the ramp.
+def study_models() -> dict[str, tuple[type[Section], ...]]:
+    """The sections of all studies by name."""
+    return {name: (model,) for name in registered.names() if (model := study_model(name)) is not None}
 
-    Attributes
-    ----------
-    fx_over_fy : tuple of float
-        Loads at which all eigenvalues are taken, in units of F_y. Those beyond the last equilibrium are left out.
-    """
 
-    fx_over_fy: Annotated[tuple[Positive, ...], Field(min_length=1, strict=False)] = (
-        0.003,
-        0.01,
-        0.02,
-        0.03,
-        0.05,
-        0.1,
-        0.14,
-        0.2,
-        0.25,
-        0.3,
-        0.35,
-        0.4,
-    )
+def check_study_section(name: str, given: object, context: Any) -> object:
+    """A section of a study, checked; the error of a section that no study has, or that is refused, has its place."""
+    model = study_model(name)
+    if model is None:
+        errors: list[Any] = [{"type": "extra_forbidden", "loc": (), "input": given, "msg": "unknown"}]
+    else:
+        try:
+            return model.model_validate(given, context=context)
+        except ValidationError as error:
+            errors = [*error.errors(include_url=False)]
+    placed = [{**each, "loc": (name, *each["loc"])} for each in errors]
+    raise PydanticCustomError("study_section", "[{name}] is refused", {"name": name, "errors": placed})
+
+
+def errors_in(error: ValidationError) -> list[ErrorDetails]:
+    """The errors of a scene, those of its studies' sections with the others."""
+    found: list[ErrorDetails] = []
+    for each in error.errors():
+        found += each["ctx"]["errors"] if each["type"] == "study_section" else [each]
+    return found
+
+
+def section_of(scene: Any, model: type[S]) -> S | None:
+    """The section of a study in a scene; None of a scene without it."""
+    return next((each for each in (scene.model_extra or {}).values() if isinstance(each, model)), None)
+
+
+def require_sections(scene: Any, needs: tuple[str, ...], advice: Mapping[str, str]) -> None:
+    """Raise SceneError if the scene lacks a section; `advice` has the keys to add, or the model of the study says."""
+    for name in needs:
+        if getattr(scene, name, None) is None:
+            model = study_model(name)
+            fields = {} if model is None else model.model_fields
+            keys = [field.description or key for key, field in fields.items() if field.is_required()]
+            raise SceneError(f"the scene has no section [{name}]: add it, with {advice.get(name, ', '.join(keys))}")

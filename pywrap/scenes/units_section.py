@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from ...analysis.files.formats.table_units import registry
+from ...analysis.files.formats.tables import unit_registry
 from .validation import Section, refusal_sentence
 
 DIMENSIONS = {
@@ -38,7 +38,7 @@ def to_si(text: str, unit: str) -> float:
 
 @lru_cache  # the scenes of a sweep have the same texts, and pint reads each in milliseconds
 def _magnitude(text: str, unit: str) -> float:
-    return float(registry().Quantity(text).to(unit).magnitude)
+    return float(unit_registry().Quantity(text).to(unit).magnitude)
 
 
 def quantity(place: str, text: str, unit: str) -> float:

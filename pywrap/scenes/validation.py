@@ -3,10 +3,13 @@
 pydantic finds the errors in a section; `sentence` describes them in the terms of the scene.
 """
 
+import hashlib
+import os
 import reprlib
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias, TypeGuard, TypeVar
 
@@ -15,7 +18,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ...analysis import BadInputError
 from ...analysis.arrays import LARGEST, SMALLEST
-from ...analysis.files.plain_file import read_plain_text
+from ...analysis.files.plain_file import read_plain, read_plain_text
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -43,7 +46,6 @@ KEYS_TO_ADD = {
     "damping": "cn, ct or tau",
     "drive": "spring, velocity and until",
     "friction": "v0, the velocity at which friction weakens",
-    "eruptions": "load, a list of F_x",
 }
 """Keys that a section must have."""
 
@@ -72,6 +74,35 @@ class Section(BaseModel):
     """A section of a scene: no key is changed, unknown or of another type than its own."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, validate_default=True)
+
+
+class NamesFile:
+    """Marks, in the annotation of a key, that its value may be the path of a file: from the root, or behind "ids:@"."""
+
+
+def files_named(section: BaseModel) -> dict[str, tuple[Path, ...]]:
+    """The files that a section names, by key; of a dump also those of contacts and parameters beside it."""
+    found = {}
+    for key, field in type(section).model_fields.items():
+        name = str(getattr(section, key)).removeprefix("ids:@")
+        if any(isinstance(mark, NamesFile) for mark in field.metadata) and (
+            os.path.isabs(name) or name != str(getattr(section, key))
+        ):
+            path = Path(name)
+            beside = [path.with_suffix(each) for each in (".contacts", ".params")] if path.suffix == ".disks" else []
+            found[key] = (path, *(each for each in beside if each.exists()))
+    return found
+
+
+def digest_of(paths: Iterable[Path]) -> str:
+    """SHA-256 of the contents of files, in hexadecimal digits; each is read once until something about it changes."""
+    places = [(path, os.stat(path)) for path in paths]
+    return _digest(tuple((str(path), at.st_ino, at.st_size, at.st_mtime_ns) for path, at in places))
+
+
+@cache
+def _digest(files: tuple[tuple[str, int, int, int], ...]) -> str:
+    return hashlib.sha256(b"".join(read_plain(name) for name, *_ in files)).hexdigest()
 
 
 RULES = {

@@ -31,7 +31,7 @@ import numpy as np
 
 from faultgouge.analysis import Floats, RunFile, Slip
 from faultgouge.pywrap import Equilibrium, Scene, settle_for_drive
-from faultgouge.pywrap.runs.drive_recorder import DriveRecord, slips_in
+from faultgouge.pywrap.runs.drive import DriveRecord, slips_in
 from faultgouge.studies.cycle import cycle_state
 from faultgouge.studies.result_rows import append_row
 from research.modes.sets import WIDTH

@@ -15,14 +15,12 @@ from research.cycle import clock
 from research.cycle.clock import FREQUENCIES, HEIGHTS, PHASES
 from research.cycle.compute import LAWS
 from research.cycle.springs import SHARES, SPRINGS, row_of
+from research.rising.loaded import VIBRATES
 from research.statistics import count_of, interval, middle
 from research.tables import differing, read_rows
 
 HERE = Path(__file__).parent
 SPRINGS_TABLE, CLOCK_TABLE = "springs.jsonl", "clock.jsonl"
-
-VIBRATES = 0.05
-"""Vibration over drift of a layer that is said to vibrate under a load that rises, as in research/rising."""
 
 STAYS = 0.1
 """Share of the length of a slip by which a layer that comes to rest may move and be said to stay."""
@@ -80,16 +78,17 @@ def verdicts(rows: Sequence[Row], springs: Sequence[float]) -> list[Row]:
         rest = [(state["rest"], slip) for state, slip in states if state["rest"]["found"]]
         stays = [each for each, slip in rest if abs(each["moved"]) <= STAYS * abs(slip)]
         rising = [each["rising"] for each in stays if each["rising"]]
+        unknown = sum(each["stable"] is None for each in stays)
         steady = [each["vibration"] > VIBRATES * each["drift"] for each in rising if each["steady"]]
         found.append(
             {
                 "kind": kind,
                 "states": len(states),
                 "stays": share(len(stays), len(states)),
-                "grows": share(sum(each["stable"] is False for each in stays), len(stays)),
-                "unknown": sum(each["stable"] is None for each in stays),
+                "grows": share(sum(each["stable"] is False for each in stays), len(stays), unknown),
+                "unknown": unknown,
                 "bound": share(sum(each["at_bound"] > 0 for each in stays), len(stays)),
-                "vibrates": share(sum(steady), len(rising)),
+                "vibrates": share(sum(steady), len(rising), len(rising) - len(steady)),
                 "open": len(rising) - len(steady),
             }
         )

@@ -20,7 +20,6 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
 
 from faultgouge.figures import render
 from faultgouge.studies.statistics import share
@@ -50,6 +49,12 @@ FORETELLERS = {
 AGREES = 1e-6
 """Relative difference of numbers that are computed again on the same machine."""
 
+FORCES_DIFFER = 0.2
+"""Share of the force before a slip by which that of its matched control may differ; the median is 0.02."""
+
+NEAR = 10.0
+"""Time before a slip within which a state is no control."""
+
 
 def begins_with(state: Row) -> dict[str, bool]:
     """Which instabilities a state has."""
@@ -72,23 +77,76 @@ def counts(rows: Sequence[Row], law: str, kind: str) -> dict[str, dict[str, Any]
     return {name: share_over_runs([[state[name] for state in run] for run in runs]) for name in names}
 
 
-def before_or_control(rows: Sequence[Row], law: str) -> dict[str, dict[str, Any]]:
-    """Of how many slips an instability is there before the slip and not in its control, and the reverse; sign test.
+QUESTIONS = {
+    "sliding": "growth, bound slides",
+    "fold": "fold, bound slides",
+    "sticking": "growth, bound sticks",
+    "bound": "contacts at the bound",
+}
+"""What a state may have, and its name on the page."""
 
-    Also for how many the force is larger before the slip, and for how many in the control.
+
+def before_or_control(rows: Sequence[Row], law: str, matched: bool = False) -> dict[str, dict[str, Any]]:
+    """Of how many slips an instability is there before the slip alone, or in its control alone.
+
+    Slips of one run depend on each other: p is that of the sums of the runs with signs that are drawn, all of them
+    (a sign-flip test over runs), and `of_all` is p times the number of questions and laws.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        The runs.
+    law : str
+        The law that is asked about.
+    matched : bool
+        Whether the control is the state of the same run whose force is nearest to that before the slip, within
+        `FORCES_DIFFER` of this, of all that are not within `NEAR` of the next slip; slips without one are left out.
     """
     found = {}
-    for name in ("sliding", "fold", "force"):
-        alone = [0, 0]
+    for name in (*QUESTIONS, "force"):
+        sums, alone, of = [], np.zeros(2, dtype=int), 0
         for row in (each for each in rows if each["law"] == law):
-            state = {(each["kind"], each["slip"]): (begins_with(each) | each)[name] for each in row["states"]}
-            for number in (each["slip"] for each in row["states"] if each["kind"] == "before"):
-                before, control = state["before", number], state["control", number]
-                alone[0] += before > control
-                alone[1] += control > before
-        chance = float(binomtest(alone[0], sum(alone)).pvalue) if sum(alone) else None
-        found[name] = {"before": alone[0], "control": alone[1], "p": chance}
+            pairs = [(each, _control(row, each, matched)) for each in row["states"] if each["kind"] == "before"]
+            both = [(_value(state, name), _value(control, name)) for state, control in pairs if control]
+            sums.append(float(sum(np.sign(before - control) for before, control in both)))
+            alone += [
+                sum(before > control for before, control in both),
+                sum(control > before for before, control in both),
+            ]
+            of += len(both)
+        chance = flipped_signs(sums)
+        found[name] = {
+            "before": int(alone[0]),
+            "control": int(alone[1]),
+            "of": of,
+            "p": chance,
+            "of_all": min(1.0, chance * len(LAWS) * len(QUESTIONS)),
+        }
     return found
+
+
+def _value(state: Row, name: str) -> float:
+    return float((begins_with(state) | {"bound": state["at_bound"] > 0, "force": state["force"]})[name])
+
+
+def _control(row: Row, before: Row, matched: bool) -> Row | None:
+    if not matched:
+        return next(each for each in row["states"] if (each["kind"], each["slip"]) == ("control", before["slip"]))
+    others = [
+        each for each in row["states"] if each["kind"] != "before" and (each["until"] is None or each["until"] > NEAR)
+    ]
+    nearest = min(others, key=lambda each: abs(each["force"] - before["force"]), default=None)
+    apart = np.inf if nearest is None else abs(nearest["force"] - before["force"])
+    return nearest if apart < FORCES_DIFFER * before["force"] else None
+
+
+def flipped_signs(sums: Sequence[float]) -> float:
+    """Share of all choices of signs with which the sum of some numbers is as large in size as with their own."""
+    known = [each for each in sums if each]
+    totals = np.zeros(1)
+    for each in known:
+        totals = np.concatenate([totals + each, totals - each])
+    return float(np.mean(np.abs(totals) >= abs(sum(known))))
 
 
 def ordered_pairs(row: Row, name: str) -> tuple[float, int]:
@@ -192,6 +250,7 @@ def of_states(rows: Sequence[Row]) -> dict[str, Any]:
         "before": {law: counts(rows, law, "before") for law in laws},
         "control": {law: counts(rows, law, "control") for law in laws},
         "paired": {law: before_or_control(rows, law) for law in laws},
+        "matched": {law: before_or_control(rows, law, matched=True) for law in laws},
     }
 
 
@@ -212,6 +271,9 @@ def numbers(rows: Sequence[Row], many: Sequence[Row] = ()) -> dict[str, Any]:
         "many": of_states(many),
         "disks": MANY,
         "looked_at": LOOKED_AT,
+        "questions": QUESTIONS,
+        "forces_differ": FORCES_DIFFER,
+        "near": NEAR,
         "residual": float(np.median([state["residual"] for state in states])),
     }
 

@@ -26,7 +26,7 @@ import numpy as np
 
 from faultgouge.analysis import Floats, NoEquilibriumError, Packing, RunFile, Slip, stability
 from faultgouge.pywrap import bring_to_rest
-from faultgouge.pywrap.runs.drive_recorder import slips_in
+from faultgouge.pywrap.runs.drive import slips_in
 from faultgouge.studies.cycle import cycle_state, with_spring
 from research.cycle.compute import LAWS, run, scene, sizes_of, where
 

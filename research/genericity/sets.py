@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from math import ceil
 from typing import Any
 
-from faultgouge.studies.sweep import TASKS, Sweep
+from faultgouge.studies.sweep import Sweep
 
 FRICTION = [0.2, 0.4, 0.6, 0.8, 1.0]
 FEW = [0.2, 0.6, 1.0]
@@ -81,7 +81,7 @@ def _onsets(
     scene = {section: {**values, **changes.get(section, {})} for section, values in STANDARD.items()}
     seeds = f"1:{ceil(share * PACKINGS[name])}"
     axes = {"packing.seed": seeds, "law.mu": friction}
-    return Sweep.from_mapping({"task": task, "sweep": axes, "scene": scene}, TASKS)
+    return Sweep.from_mapping({"task": task, "sweep": axes, "scene": scene})
 
 
 def _sizes(
@@ -107,4 +107,4 @@ def _sizes(
         rows += [[disks, width, top, fy, step, until, seed] for seed in range(1, ceil(share * count) + 1)]
     keys = "packing.disks, packing.width, packing.top, load.fy, ramp.step, ramp.until, packing.seed"
     scene = {"packing": {}, "law": {"kn": 2e5, "mu": 1.0}, "load": {}, "ramp": {}}
-    return Sweep.from_mapping({"task": task, "sweep": {keys: rows}, "scene": scene}, TASKS)
+    return Sweep.from_mapping({"task": task, "sweep": {keys: rows}, "scene": scene})

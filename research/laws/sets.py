@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from faultgouge.studies.sweep import TASKS, Sweep
+from faultgouge.studies.sweep import Sweep
 from research.modes.sets import quartz
 from research.modes.sets import sets as sets_of_modes
 
@@ -52,11 +52,11 @@ def sets() -> dict[str, Sweep]:
 def _onset(scene: dict[str, Any], history: str) -> Sweep:
     fy = scene["load"]["fy"]
     changed = scene | {"law": scene["law"] | {"history": history}, "ramp": {"step": 1e-3 * fy, "until": REACH * fy}}
-    return Sweep.from_mapping({"task": "onset", "sweep": {"packing.seed": f"1:{ONSETS}"}, "scene": changed}, TASKS)
+    return Sweep.from_mapping({"task": "onset", "sweep": {"packing.seed": f"1:{ONSETS}"}, "scene": changed})
 
 
 def _sweep(scene: dict[str, Any], most: int, loads: tuple[float, ...], task: str) -> Sweep:
     fy = scene["load"]["fy"]
     ramp = {"step": 1e-3 * fy, "until": max(loads) * fy}
     changed = scene | {"ramp": ramp, "modes": {"fx_over_fy": list(loads)}}
-    return Sweep.from_mapping({"task": task, "sweep": {"packing.seed": f"1:{most}"}, "scene": changed}, TASKS)
+    return Sweep.from_mapping({"task": task, "sweep": {"packing.seed": f"1:{most}"}, "scene": changed})

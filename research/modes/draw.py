@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from faultgouge.figures import styled
-from faultgouge.studies.modes.draw import LABELS, MediansOverLoad, draw_band
+from faultgouge.studies.modes import LABELS, MediansOverLoad, draw_band
 
 
 @styled

@@ -13,7 +13,7 @@ from math import isclose
 from pathlib import Path
 from typing import Any
 
-from faultgouge.studies.sweep import TASKS, Sweep, run_sweep
+from faultgouge.studies.sweep import Sweep, run_sweep
 from research.modes.packing_rows import computed_again, condense, read_known
 from research.modes.page import write_page
 from research.modes.sets import SHARES, sets
@@ -37,7 +37,7 @@ def compute_seeds(folder: Path, name: str, sweep: Sweep, seeds: list[int], worke
     if seeds:
         print(f"{name}: {len(seeds)} packings", flush=True)
         rest = {"task": sweep.task, "sweep": {"packing.seed": seeds}, "scene": sweep.scene}
-        run_sweep(Sweep.from_mapping(rest, TASKS), folder / name.replace(" ", "_"), workers=workers)
+        run_sweep(Sweep.from_mapping(rest), folder / name.replace(" ", "_"), workers=workers)
 
 
 def check(folder: Path, names: list[str]) -> None:

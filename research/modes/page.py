@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from faultgouge.figures import render
-from faultgouge.studies.modes.draw import over_load
+from faultgouge.studies.modes import over_load
 from research.modes.draw import collapse
 from research.modes.loss import EVERY, RESTITUTIONS
 from research.modes.numbers import COMPARISONS, QUALITIES, numbers

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from faultgouge.pywrap.scenes.validation import read_toml
-from faultgouge.studies.sweep import TASKS, Sweep
+from faultgouge.studies.sweep import Sweep
 
 SIZES = {50: 100, 100: 100, 200: 50, 400: 30, 1000: 15}
 """Packings by number of disks, with a fixed force on each disk of the layer and mu = 1."""
@@ -113,7 +113,7 @@ def quartz(depth: str, disks: int = 100) -> dict[str, Any]:
 
 def _shipped_scene(depth: str, seeds: str, disks: int = 100) -> Sweep:
     return Sweep.from_mapping(
-        {"task": "research.modes.loss:loss", "sweep": {"packing.seed": seeds}, "scene": quartz(depth, disks)}, TASKS
+        {"task": "research.modes.loss:loss", "sweep": {"packing.seed": seeds}, "scene": quartz(depth, disks)}
     )
 
 
@@ -122,4 +122,4 @@ def _sweep(disks: int, seeds: str, changes: Mapping[str, Any], task: str = "mode
     scene: dict[str, Any] = {"packing": packing} | {name: dict(section) for name, section in STANDARD.items()}
     for name, value in changes.items():
         scene[name] = scene.get(name, {}) | dict(value) if isinstance(value, Mapping) else value
-    return Sweep.from_mapping({"task": task, "sweep": {"packing.seed": seeds}, "scene": scene}, TASKS)
+    return Sweep.from_mapping({"task": task, "sweep": {"packing.seed": seeds}, "scene": scene})

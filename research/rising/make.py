@@ -2,6 +2,7 @@
 
 python -m research.rising.make layers    what the table of layers lacks, on one core, resumable; an hour
 python -m research.rising.make poured    what the table of poured spheres lacks; ten minutes
+python -m research.rising.make loaded SEEDS   what the table of layers that are loaded at a rate lacks; a minute a seed
 python -m research.rising.make starts    what the table of two layers for a longer time lacks; a minute
 python -m research.rising.make onsets SEEDS   what the table of onsets lacks; ten seconds a seed
 python -m research.rising.make page      README.md from the tables
@@ -44,12 +45,13 @@ from research.rising.compute import (
     layers,
     poured,
 )
+from research.rising.loaded import SLIP, VIBRATES, compute_loaded, starts_of, summaries
 from research.statistics import count_of
 from research.tables import add_seeds, differing, known_rows
 
 HERE = Path(__file__).parent
-LAYERS, ONE_START, POURED, STARTS, ONSETS = (
-    HERE / "tables" / f"{name}.jsonl" for name in ("layers", "layers_one_start", "poured", "starts", "onsets")
+LAYERS, ONE_START, POURED, STARTS, ONSETS, LOADED = (
+    HERE / "tables" / f"{name}.jsonl" for name in ("layers", "layers_one_start", "poured", "starts", "onsets", "loaded")
 )
 """Rows of `ONE_START` stand for those that `LAYERS` lacks still: drift and vibration from one start, over windows."""
 
@@ -62,9 +64,6 @@ FY = float(STANDARD["load"]["fy"])
 
 LAST_WINDOWS = 8
 """Windows over which the vibration of a start is a mean, and which are compared with as many before."""
-
-VIBRATION_SHARE = 0.05
-"""Vibration over drift of a layer that is said to vibrate; what a start leaves is a hundredth at the most."""
 
 GROWTH_FROM = 1e-4
 """Growth rate of D, 1 / time, from which linear motion is said to grow: fifty times the rounding of eigenvalues."""
@@ -83,16 +82,12 @@ def outcomes(rows: list[Row]) -> dict[str, Any]:
         "sticking": share(sum(row["sticking"] > GROWTH_FROM for row in rows), len(rows)),
         "sliding": share(sum(row["sliding"] > GROWTH_FROM for row in rows), len(rows)),
     }
-    for name, stable in (("rests", True), ("grows", False), ("unknown", None)):
-        found[name] = share(sum(row["stable"] is stable for row in rows), len(rows))
+    found["unknown"] = sum(row["stable"] is None for row in rows)
+    for name, stable in (("rests", True), ("grows", False)):
+        found[name] = share(sum(row["stable"] is stable for row in rows), len(rows), found["unknown"])
     sizes = [row["one_sided"]["amplification"] for row in rows if row["one_sided"] and row["stable"]]
     found["amplification"] = [float(np.median(sizes)), max(sizes)] if sizes else None
     return found
-
-
-def starts_of(rising: Row) -> list[Row]:
-    """Drift and vibration from each start that was followed."""
-    return [rising, *([rising["other_start"]] if rising.get("other_start") else [])]
 
 
 def outcome_of(rising: Row) -> str:
@@ -115,8 +110,8 @@ def under_the_load(rows: list[Row]) -> dict[str, Any]:
     return {
         "asked": len(known),
         "two_starts": sum("span" in each for each in known),
-        "vibrate": share(done.count("vibrate"), len(known)),
-        "follow": share(done.count("follow"), len(known)),
+        "vibrate": share(done.count("vibrate"), len(known), done.count("open")),
+        "follow": share(done.count("follow"), len(known), done.count("open")),
         "open": done.count("open"),
         "ratio": [float(np.median(steady)), min(steady), max(steady)] if steady else None,
     }
@@ -134,7 +129,7 @@ def vibration_in_lammps(rows: list[Row]) -> Row:
 
 
 def _vibrates(motion: Row) -> bool:
-    return bool(motion["vibration"] > VIBRATION_SHARE * motion["drift"])
+    return bool(motion["vibration"] > VIBRATES * motion["drift"])
 
 
 def starts_beside_lammps(rows: list[Row]) -> list[Row]:
@@ -320,6 +315,7 @@ def numbers() -> dict[str, Any]:
         "elsewhere": [row for row in from_both if (row["fx_over_fy"], row["restitution"]) != COMPARED],
         "vibrating": vibrating(from_both),
         "in_lammps": vibration_in_lammps([row for row in rows if "control" in row]),
+        "loaded": summaries(known_rows(LOADED), [row for row in rows if key_of(row)[1:] == ("coulomb", *COMPARED)]),
         "first": FIRST,
         "rates": RATES,
         "starts": longer_runs(starts),
@@ -369,7 +365,10 @@ def write_page(folder: Path = HERE) -> Path:
         "plus_minus": plus_minus,
         "count": count,
         "spread": spread,
+        "in_thousandths": lambda value: spread(value and [1e3 * each for each in value]),
         "part": count_of,
+        "vibrates": VIBRATES,
+        "slip": SLIP,
         "contrast": contrast,
         "at": COMPARED,
     }
@@ -400,6 +399,8 @@ if __name__ == "__main__":
     match sys.argv[1:]:
         case ["layers"]:
             compute_layers(LAYERS)
+        case ["loaded", seeds]:
+            compute_loaded(LOADED, int(seeds))
         case ["poured"]:
             compute_poured(POURED)
         case ["starts"]:

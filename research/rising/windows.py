@@ -17,8 +17,7 @@ from mpi4py import MPI
 
 from faultgouge.analysis import Configuration, Floats, Packing, Signal
 from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
-from faultgouge.analysis.motion.one_sided_outcome import STEPS_OF_CHUNK, VERDICT_STEP
-from faultgouge.analysis.motion.rising_load import DRAG, FADE_WINDOWS, windows_under_load
+from faultgouge.analysis.motion.rising_load import DRAG, FADE_WINDOWS, LOAD_STEP, WINDOW, windows_under_load
 from faultgouge.pywrap import Engine
 
 STEPS_OF_LOOK, LOOKS = 15, 400
@@ -47,7 +46,7 @@ class Windows:
     @classmethod
     def of(cls, configuration: Configuration, rising: Mapping[str, Any]) -> Windows:
         """Those of one-sided motion, `Stability.rising`."""
-        length = _length(OneSidedSystem.of(configuration, VERDICT_STEP))
+        length = _length(OneSidedSystem.of(configuration, LOAD_STEP))
         if rising["time"] is None:
             return cls(length, *DEFAULT)
         return cls(length, round(rising["time"] / length), round(rising["span"] / length))
@@ -59,12 +58,12 @@ class Windows:
 
 
 def _length(system: OneSidedSystem) -> float:
-    return STEPS_OF_CHUNK * system.time_step / system.step_share
+    return WINDOW * system.time_step / system.step_share
 
 
 def follow_one_sided(packing: Packing, count: int) -> tuple[float, Floats]:
     """Length of a window, and drift and vibration of a layer in each window after the drag, shape (windows, 2, S)."""
-    system = OneSidedSystem.of(packing.configuration, VERDICT_STEP)
+    system = OneSidedSystem.of(packing.configuration, LOAD_STEP)
     force = np.zeros((len(packing), 2))
     force[:, 0] = packing.top
     direction = forces_on_coordinates(packing.configuration, force)

@@ -2,7 +2,7 @@
 
 The load is a thousandth below the first onset. The rule: with the weakened friction, D grows by `LEAST_GROWTH` decades
 after its jump in the time of the scene's run, and has `LEAST_ROOM` decades for that, by the linear theory
-(:mod:`~faultgouge.studies.triggering.forecast`); and the packing has an onset for the weakened friction at a lower
+(:mod:`~faultgouge.studies.triggering`); and the packing has an onset for the weakened friction at a lower
 load, below which the control is. No run is made.
 
 python -m research.triggering.make [FIRST] > research/triggering/triggered.jsonl

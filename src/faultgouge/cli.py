@@ -17,7 +17,6 @@ def main() -> NoReturn:
     """Run the command; what goes wrong is said in one sentence."""
     # one thread for BLAS: its threads cost more than they bring at these sizes, and change the last digits of a solve
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
     # threads of a deck's `package omp` sleep while they wait: where other processes want the cores, they wait long
     os.environ.setdefault("OMP_WAIT_POLICY", "passive")
     # pydantic would look for plugins of its own in the metadata of all installed packages

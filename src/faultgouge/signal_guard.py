@@ -26,6 +26,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from types import FrameType
 from typing import NoReturn
 
@@ -164,6 +165,7 @@ def _hand_on(child: int, number: int) -> NoReturn:
     else:
         if not _shared[CLOSED]:
             os.kill(child, signal.SIGSTOP)  # so that it writes no more than is said to be kept
+            _remove_lock(child)
             if sys.stderr.isatty():
                 sys.stderr.write("\x1b[?25h\n")  # the cursor, which a progress bar has hidden
     _interrupted(number, begin)
@@ -203,10 +205,13 @@ def _end(status: int, now: float) -> NoReturn:
     os._exit(code)
 
 
-def _remove_lock() -> None:
-    """Remove the lock file of a work that is gone, unless another work has taken it."""
-    with suppress(OSError), open(_lock[:].rstrip(b"\0"), "rb") as stream:
-        fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+def _remove_lock(stopped: int | None = None) -> None:
+    """Remove the lock file of a work that is gone or stopped, unless another work has taken it."""
+    with suppress(OSError), open(os.fsdecode(_lock[:].rstrip(b"\0")), "rb") as stream:
+        if stopped is None:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        elif not any(each.samefile(stream.name) for each in Path(f"/proc/{stopped}/fd").iterdir() if each.exists()):
+            return
         os.unlink(stream.name)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from ...analysis import Growth, Onset, Packing, RunFile, Spectrum, fit_growth, solid_fraction, spectrum
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
+from ...analysis.files.atomic_write import check_own
 from ...analysis.motion.growth import growing_range
 from ...analysis.motion.growth_of_run import PLATEAU_SHARE
 from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
@@ -24,7 +25,7 @@ from ...pywrap.onset import ONSET_DISTANCES, onset_run
 from ...pywrap.runs.undamped import perturb, time_step
 from ...pywrap.scenes.sections import Perturb
 from ...pywrap.scenes.validation import require_section
-from ..triggering.compute import Triggering, equilibrium_at, series_of, trigger
+from ..triggering import Triggering, equilibrium_at, series_of, trigger
 
 EFOLDS = 48.0
 """Length of the undamped run in units of 1/rate: D grows by up to 20 decades in it."""
@@ -91,6 +92,7 @@ def recorded_ramp(scene: Scene, mu: float, path: Path, bed: Packing | None = Non
     """Ramp and onset for one friction coefficient, from a settled bed; every equilibrium goes to the file."""
     one = scene.model_copy(update={"law": scene.law.model_copy(update={"mu": mu})})
     near = ONSET_DISTANCES * require_section(scene.ramp, "ramp").first
+    check_own(path)
     path.unlink(missing_ok=True)
     with Record(path, one) as record:
         run = onset_run(one, mu, reached=record.append, near_onset=near, bed=bed)

@@ -14,7 +14,7 @@ from ...pywrap import Scene
 from ...pywrap.runs.undamped import ACCURATE_SHARE
 from ...pywrap.scenes.units import dashpot, quality_factor, real_units
 from ...pywrap.scenes.validation import require_section
-from ..triggering.compute import ABOVE_NOISE, Triggering, largest, summary
+from ..triggering import ABOVE_NOISE, Triggering, largest, summary
 from .compute import GrowthRun
 
 

@@ -14,12 +14,12 @@ from ...pywrap.scenes.validation import require_section
 from ...pywrap.settling.settle import settle_bed
 from ..executors import Say
 from ..study import draw_all
-from ..triggering.compute import Triggering
-from ..triggering.compute import summary as triggering_summary
-from ..triggering.draw import figures as triggering_figures
+from ..triggering import Triggering
+from ..triggering import summary as triggering_summary
 from .compute import growth_run, recorded_ramp, summary_of, triggering_run
 from .draw import figures
 from .page import report
+from .triggering_figures import figures as triggering_figures
 
 
 def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | None = None) -> dict[str, Any]:
@@ -42,7 +42,7 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     dict
         The contents of summary.json.
     """
-    make_folder(output)
+    make_folder(output, "summary.json", "report.md")
     runs = _ramps(scene, output / "run.h5", say)
     say("undamped run above the onset")
     growth = growth_run(scene, runs[0], output / "run.h5")

@@ -2,6 +2,5 @@
 
 from .run_sweep import merge, read_results, run_sweep
 from .sweep_plan import Sweep
-from .tasks import TASKS
 
-__all__ = ["TASKS", "Sweep", "merge", "read_results", "run_sweep"]
+__all__ = ["Sweep", "merge", "read_results", "run_sweep"]

@@ -19,8 +19,8 @@ from matplotlib.lines import Line2D
 
 from ...analysis.arrays import Floats
 from ...figures.style import report_failure, save, styled
+from ..result_rows import Row
 from ..statistics import Bools, course, median_interval
-from .table import Row
 
 SEED = "packing.seed"
 

@@ -20,19 +20,19 @@ from concurrent.futures import Executor
 from contextlib import closing
 from importlib.metadata import version
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from mpi4py import MPI
 
 from ...analysis import FaultgougeError
-from ...analysis.files.atomic_write import lock_output, make_folder, write_json
+from ...analysis.files.atomic_write import FORMAT, FORMAT_KEY, check_format, lock_output, make_folder, write_json
 from ...analysis.files.plain_file import read_plain_text
 from ...pywrap import SceneError
 from .. import result_rows
 from ..executors import Progress, Say, open_executor
-from .sweep_plan import Sweep, SweepPoint, shard
-from .table import Row, write_tables
-from .tasks import TASKS
+from ..result_rows import Row, check_table, write_tables
+from .sweep_plan import Sweep, SweepPoint, points_of
 from .workers import compute_points
 
 RESULTS_FILE, REQUEST_FILE = "results.jsonl", "sweep.json"
@@ -71,7 +71,7 @@ def sweep(
         raise SceneError(
             f"sweep takes the path of a SWEEP.toml, or a mapping of its contents, and no {type(request).__name__}."
         )
-    wanted = Sweep.from_mapping(request, TASKS) if isinstance(request, Mapping) else Sweep.from_toml(request, TASKS)
+    wanted = Sweep.from_mapping(request) if isinstance(request, Mapping) else Sweep.from_toml(request)
     return run_sweep(wanted, Path(output), workers=workers, executor=executor, say=say)
 
 
@@ -117,11 +117,12 @@ def run_sweep(
     WorkerError
         If workers are killed repeatedly.
     """
-    points = shard(sweep.points, part)
+    points = points_of(sweep.points, part)
     with open_executor(workers, executor) as pool:
         if MPI.COMM_WORLD.rank != 0:
             return []
-        make_folder(output)
+        make_folder(output, REQUEST_FILE)
+        check_table(sweep.names, output)
         with lock_output(output):
             known = read_results(output / RESULTS_FILE)
             missing = missing_points(points, known)
@@ -131,7 +132,9 @@ def run_sweep(
             if others := known.keys() - {point.key for point in sweep.points}:
                 say(f"{len(others)} rows there are of other scenes, code or versions, and are not in the table")
             with closing(compute_points(pool, sweep.located_task, missing)) as ended:
-                for row in progress(result_rows.keep_rows(output / RESULTS_FILE, ended), len(missing)):
+                rows = result_rows.keep_rows(output / RESULTS_FILE, ({FORMAT_KEY: FORMAT, **row} for row in ended))
+                for row in progress(rows, len(missing)):
+                    del row[FORMAT_KEY]
                     known[row["key"]] = row
             table = [known[point.key] for point in points]
             write_tables(table, sweep.names, output)
@@ -153,6 +156,28 @@ def missing_points(points: Iterable[SweepPoint], known: dict[str, Row]) -> list[
         return row is not None and (row["says"] is None or row["final"])
 
     return [point for point in points if not is_known(point)]
+
+
+def remaining_work(points: Sequence[SweepPoint], known: Iterable[Row] = ()) -> list[str]:
+    """Lines about the points that are not known yet: how many, and how long they take if the known rows are typical."""
+    scenes = [point.scene for point in points if point.scene is not None]
+    settlings = {point.settling_key for point in points if point.scene is not None}
+    seconds = [row["cpu_seconds"] for row in known if row["says"] is None]
+    time = "how long a scene takes is not known before the first of them: begin, and ask again"
+    if seconds:
+        one = median(seconds)
+        time = (
+            f"about {_span(one * len(scenes))} of one core, if a scene takes {_span(one)} as in the {len(seconds)} "
+            "rows that are there"
+        )
+    refused = [f"{len(points) - len(scenes)} points make no scene, and will say why"] * (len(scenes) < len(points))
+    return [f"{len(scenes)} scenes to compute, {len(settlings)} packings to settle", *refused, time]
+
+
+def _span(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.2g} s" if seconds < 10 else f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
 
 
 def require_result(rows: Sequence[Row]) -> None:
@@ -227,7 +252,7 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
         If the parts, and what the folder has, do not belong together, or are not parts of a sweep.
     """
     request = _common_request(parts)
-    make_folder(output)
+    make_folder(output, REQUEST_FILE)
     with lock_output(output):
         if (output / REQUEST_FILE).exists() or (output / RESULTS_FILE).exists():
             _common_request([*parts, output])
@@ -237,7 +262,7 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
         write_json(output / REQUEST_FILE, request | {"shard": [1, 1]})
         for row in table:
             if _as_text(kept.get(row["key"])) != _as_text(row):
-                result_rows.append_row(output / RESULTS_FILE, row)
+                result_rows.append_row(output / RESULTS_FILE, {FORMAT_KEY: FORMAT, **row})
         sweep = Sweep(request["task"], request["sweep"], request["scene"])
         write_tables(table, sweep.names, output)
     count = len(request["keys"])
@@ -288,4 +313,5 @@ def _read(path: Path) -> dict[str, Any]:
         raise SceneError(f"{path} is not valid JSON ({error}): give a file that faultgouge has written") from None
     if not isinstance(value, dict):
         raise SceneError(f"{path} is no result of faultgouge: give a file that it has written")
+    check_format(value.pop(FORMAT_KEY, None), path)
     return value

@@ -18,23 +18,23 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
+from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from importlib.metadata import version
 from itertools import product
 from math import prod
 from pathlib import Path
 from typing import Any
 
+from ... import registered
 from ...pywrap import Scene, SceneError
+from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.validation import read_toml
+from ...pywrap.settling.settle import law_of, settling_units
 from .user_function import is_user_function, locate, user_function
-
-FILES = (("packing", "file"), ("perturb", "signal"))
-"""Keys of a scene that name a file, of which a resolved scene has the path from the root."""
 
 MOST_POINTS = 1_000_000
 """Points of a sweep at the most: more is a slip of the pen."""
@@ -103,19 +103,26 @@ class Sweep:
     folder: Path = Path()
 
     @classmethod
-    def from_toml(cls, path: str | Path, tasks: Mapping[str, object]) -> Sweep:
-        """Read a sweep of one of these tasks from a TOML file; SceneError if unreadable, or no sweep."""
+    def from_toml(cls, path: str | Path) -> Sweep:
+        """Read a sweep from a TOML file; SceneError if unreadable, or no sweep."""
         path = Path(path)
-        return cls.from_mapping(read_toml(path, "sweep"), tasks, path.parent, str(path))
+        return cls.from_mapping(read_toml(path, "sweep"), path.parent, str(path))
 
     @classmethod
-    def from_mapping(
-        cls,
-        mapping: Mapping[str, Any],
-        tasks: Mapping[str, object],
-        folder: Path = Path(),
-        name: str = "sweep",
-    ) -> Sweep:
+    def of_task(cls, path: Path, task: str) -> Sweep:
+        """The sweep of a file that has a sweep of this task, or a scene, which is a sweep of one point."""
+        try:
+            asked = read_toml(path, "sweep").get("task")
+        except SceneError:
+            asked = None  # the reader of scenes says what is wrong
+        if asked is None:
+            return cls.from_mapping({"task": task, "scene": Scene.from_toml(path, command=task).resolved()})
+        if asked != task:
+            raise SceneError(f"{path}: task = {asked!r} is refused: give {task}.")
+        return cls.from_toml(path)
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any], folder: Path = Path(), name: str = "sweep") -> Sweep:
         """Make a sweep from the contents of a TOML file; SceneError if the contents describe no sweep.
 
         Relative names of files count from `folder`.
@@ -126,9 +133,9 @@ class Sweep:
         task, code = mapping.get("task"), ""
         if isinstance(task, str) and is_user_function(task):
             code = user_function(locate(task, folder)).code
-        elif task not in tasks:
+        elif task not in registered.tasks():
             raise SceneError(
-                f"{name}: task = {task!r} is refused: give one of {', '.join(sorted(tasks))}, or a function of "
+                f"{name}: task = {task!r} is refused: give one of {', '.join(registered.tasks())}, or a function of "
                 'yours as "file.py:function".'
             )
         for section in ("sweep", "scene"):
@@ -190,7 +197,7 @@ class Sweep:
         return {"task": self.task, "sweep": self.axes, "scene": self.scene}
 
 
-def shard(points: tuple[SweepPoint, ...], part: tuple[int, int]) -> tuple[SweepPoint, ...]:
+def points_of(points: tuple[SweepPoint, ...], part: tuple[int, int]) -> tuple[SweepPoint, ...]:
     """Part K of N of the points, counted from 1: whole settlings, so that no two parts settle the same packing."""
     mine, of = part
     order: dict[str, int] = {}
@@ -202,18 +209,10 @@ def shard(points: tuple[SweepPoint, ...], part: tuple[int, int]) -> tuple[SweepP
 def with_contents(scene: Scene) -> dict[str, Any]:
     """A resolved scene with the digests of its files in place of their names, which any other file could have."""
     resolved = scene.resolved()
-    for section, key in FILES:
-        name = resolved.get(section, {}).get(key)
-        if isinstance(name, str) and os.path.isabs(name):
-            about = os.stat(name)
-            resolved[section][key] = _file_digest(name, about.st_ino, about.st_size, about.st_mtime_ns)
+    for name, content in scene.digests().items():
+        section, key = name.split(".")
+        resolved[section][key] = content[:16]
     return resolved
-
-
-@cache
-def _file_digest(name: str, *_about: int) -> str:
-    """The digest of a file, read once until something about the file changes."""
-    return hashlib.sha256(Path(name).read_bytes()).hexdigest()[:16]
 
 
 def digest(value: Any) -> str:
@@ -238,3 +237,30 @@ def _values(key: str, values: Any, name: str) -> list[Any]:
     if len(names) > 1 and not all(isinstance(each, list) and len(each) == len(names) for each in values):
         raise SceneError(f'{name}: "{key}" names {len(names)} keys: each value is a list of {len(names)}.')
     return values
+
+
+def other_packings(sweep: Sweep) -> str | None:
+    """A sentence that names the swept keys by which a seed is another packing at each value; None without any.
+
+    Settling is chaotic: it amplifies the last digit of its load and of its stiffness. A seed therefore stands for one
+    packing at one ratio of k_n to F_y alone (in any units, see
+    :func:`~faultgouge.pywrap.settling.settle.settling_units`), and a sweep over load.fy or law.kn compares packings
+    that have only their loose start in common; with `settle_friction`, so does a sweep over friction. Packings that
+    settle at a load of reference (`settle_at`) and are carried to other loads remain one packing. Stored packings have
+    no seed.
+    """
+    settled = defaultdict(set)
+    keys = [name for name in sweep.names if name.split(".")[0] in ("load", "law", "units")]
+    for point in sweep.points if keys else ():
+        scene = point.scene
+        if scene is not None and isinstance(scene.packing, GeneratedPacking):
+            section, own, fy = settling_units(scene, law_of(scene, scene.law.mus[0]))
+            # without friction nothing of the law but k_n and its exponent has a part in settling
+            numbers = own if scene.packing.settle_friction else (own.kn, own.exponent)
+            settled[digest(section.model_dump())].add(digest([str(numbers), fy]))
+    if not any(len(each) > 1 for each in settled.values()):
+        return None
+    return (
+        f"{', '.join(keys)}: settling is chaotic, so that a seed is another packing at each value, and differences "
+        "between values are those of packings, too: compare many seeds, or settle at one load with packing.settle_at"
+    )

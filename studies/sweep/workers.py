@@ -20,15 +20,15 @@ from mpi4py import MPI
 from scipy.sparse.linalg import ArpackError
 from threadpoolctl import threadpool_limits
 
+from ... import registered
 from ...analysis import FaultgougeError, NoEquilibriumError, Packing
 from ...pywrap import Equilibrium, Scene, SceneError, settle
 from ...pywrap.settling.settle import settle_bed
 from ..executors import Processes
 from ..packing_tools import Start
+from ..result_rows import Row
 from .sweep_plan import SweepPoint
-from .table import Row
-from .tasks import task_of
-from .user_function import UserFunctionError
+from .user_function import UserFunctionError, is_user_function, user_function
 
 TRIES = 3
 """Number of successive worker deaths after which the point is considered the cause."""
@@ -137,7 +137,8 @@ def compute_point(task: str, point: SweepPoint, bed: Packing | None, keep: bool)
     if point.scene is not None:
         with threadpool_limits(1):
             try:
-                row["result"] = task_of(task)(point.scene, _starter(point.scene, beds))
+                run = user_function(task).run if is_user_function(task) else registered.study_of(task).row
+                row["result"] = run(point.scene, _starter(point.scene, beds))
                 row["says"] = row["result"].pop("says", None)
             except FAILURES as error:
                 says = str(error) or type(error).__name__

@@ -162,7 +162,7 @@ def test_dumps_that_are_asked_for_hold_the_equilibria(faultgouge_here, beyond):
         (("view", "scene.toml"), "scene.toml is a scene, and this command reads a stored packing"),
         (("onset", "run.h5"), "run.h5 is a stored run, and onset reads a scene: give its .toml file"),
         (("onset", "disks.csv"), "convert it by `faultgouge import disks.csv -o packing.h5`"),
-        (("stability", "run.h5"), "`faultgouge spectrum run.h5` says whether a packing is stable"),
+        (("stability", "scene.toml"), "scene.toml is a scene, and this command reads a stored packing"),
     ],
 )
 def test_a_file_of_the_wrong_kind_is_refused_with_what_to_do(refusal, words, says):
@@ -205,10 +205,10 @@ def test_the_overview_has_the_whole_first_sentence_of_each_command(faultgouge_he
     _, table = faultgouge_here("--help").stdout.split("Commands:")
     text = " ".join(table.split())
     assert "ramp Raise F_x from equilibrium to equilibrium, and store each equilibrium. perturb Run" in text
-    assert "merge Join the shards of a sweep; the table is that of an undivided sweep. modes" in text
+    assert "merge Join the shards of a sweep; the table is that of an undivided sweep. eruptions" in text
     commands = program().commands
     hidden = {name for name in commands if commands[name].hidden}
-    assert hidden == {"stability"}  # the name that `extremes` once had
+    assert hidden == set()
     assert set(re.findall(r"^  (\w+)  ", table, re.MULTILINE)) == set(commands) - hidden
     assert "Did you mean 'onset'?" in refusal("onst")
 
@@ -265,7 +265,7 @@ def test_a_scene_that_cannot_be_run(refusal, tmp_path, command, change, code, sa
         ("draw ramp.h5 --mode pair --frame 0", 2, "no two of them are about to meet"),
         ("movie ramp.h5 -o film.avi", 2, "a .gif or an .mp4"),
         ("movie perturb.h5 --span 5 6", 2, "its times go from 0 to"),
-        ("export ramp.h5 -o packing.pdb", 2, "exports are .vtp, .xyz, .data, .gsd"),
+        ("export ramp.h5 -o packing.pdb", 2, "exports are .vtp, .xyz, .gsd, .data, .csv"),
         ("export ramp.h5 -o packing.data --mode pair", 2, "has no room for modes"),
         ("export ramp.h5 --frame 9", 2, "there is no frame 9"),
         ("export ramp.h5 -o nowhere/packing.vtp", 1, "cannot be written"),

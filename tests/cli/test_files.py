@@ -1,20 +1,25 @@
 """Files as users have them: pipes, names with blanks and quotes, links, files that others write, and read-only ones."""
 
 import errno
-import json
 import os
 import signal
 import subprocess
 import sys
+from xml.etree import ElementTree
 
+import imageio_ffmpeg
+import numpy as np
 import pytest
+from PIL import Image
 from reference_layer import LAYER, REFERENCE, SMALL, toml
 
 from faultgouge.analysis import RunFile
-from faultgouge.analysis.files.atomic_write import lock_output, write_text
+from faultgouge.analysis.errors import OutputError
+from faultgouge.analysis.files.atomic_write import lock_output, write_json, write_text
 from faultgouge.analysis.files.formats import write_packing
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.lammps.plain_file_names import plain_name, temporary_folder
+from faultgouge.studies.result_rows import write_csv
 
 SCENE = LAYER + toml({"ramp": {"step": 1e-3, "until": 2e-3}, "output": {"dumps": True}})
 STRANGE = """a 'b' "c" & <d> $x ${y} #"""
@@ -168,6 +173,113 @@ def test_a_read_only_file_is_kept(refusal, stored, command):
     assert (stored / name).read_text() == "kept"
 
 
+OTHERS = {
+    "ramp scene.toml -o data.h5": "data.1.disks",
+    "drive drive.toml -o data.h5": "data.csv",
+    "onset scene.toml -o data.json": "data.json",
+    "draw run.h5 -o data.png": "data.png",
+    "draw run.h5 -o data.svg": "data.svg",
+    "draw run.h5 -o data.pdf": "data.pdf",
+    "movie run.h5 --mode 0 -o data.gif": "data.gif",
+    "movie run.h5 --mode 0 -o data.mp4": "data.mp4",
+    "view run.h5 -o data.html": "data.html",
+    **{f"export run.h5 -o data.{suffix}": f"data.{suffix}" for suffix in ("vtp", "xyz", "data", "gsd", "csv")},
+    "export run.h5 --frames all -o data.pvd": "data/00000.vtp",
+    "sweep sweep.toml -o out": "out/results.csv",
+    "sweep sweep.toml --workers 1 -o out": "out/sweep.json",
+    "trigger scene.toml -o out": "out/trigger.json",
+    "eruptions scene.toml -o out": "out/eruptions.md",
+    "modes scene.toml -o out": "out/modes.csv",
+    "reproduce -o out": "out/report.md",
+    "report -o out": "out/report.json",
+    "extremes -o out": "out/extremes.json",
+}
+"""Commands, and a file that each would replace."""
+MORE = {"friction": {"v0": 1e-7, "v_ss": "10 v0"}, "eruptions": {"load": [1e-3]}, "modes": {}}
+
+
+@pytest.mark.parametrize("command", OTHERS)
+def test_what_others_have_written_is_kept(refusal, stored, command):
+    """Also a file that the user names nowhere; and it is refused before any work."""
+    drawn = {"damping": {"cn": 60.0}, "drive": {"spring": 3.0, "velocity": 0.1, "until": 1.0}}
+    (stored / "drive.toml").write_text(LAYER + toml(drawn))
+    (stored / "scene.toml").write_text(SCENE + toml(MORE))
+    (stored / "sweep.toml").write_text('task = "onset"\n[sweep]\n"packing.seed" = [1]\n' + toml(SMALL, "scene."))
+    own = stored / OTHERS[command]
+    own.parent.mkdir(exist_ok=True)
+    own.write_text("x,y\n1,2\nwritten by faultgouge, as I believe\n")
+    before = {path: path.read_bytes() for path in stored.rglob("*") if path.is_file()}
+    assert f"{OTHERS[command]} is there already, and faultgouge has not written it" in refusal(
+        *command.split(), code=1
+    ).replace(f"{stored}/", "")
+    assert own.read_bytes() == before[own]
+    assert not {path.suffix for path in set(stored.rglob("*")) - set(before)} & {".csv", ".json", ".png", ".jsonl"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "command", [each for each in OTHERS if each.split()[0] in ("draw", "movie", "view", "export") and "pvd" not in each]
+)
+def test_what_the_program_has_written_is_replaced(faultgouge_here, stored, command):
+    """And its mark is in no reader's way."""
+    path = stored / OTHERS[command]
+    for _ in range(2):
+        faultgouge_here(*command.split())
+        assert path.stat().st_size > 1000
+    if path.suffix in (".png", ".gif"):
+        with Image.open(path) as picture:
+            picture.verify()
+        with Image.open(path) as picture:
+            assert np.asarray(picture.convert("RGB")).std() > 1
+            assert path.suffix == ".gif" or picture.text["Comment"] == "faultgouge_format=1"
+    elif path.suffix in (".svg", ".vtp"):
+        assert ElementTree.parse(path).getroot().tag
+    elif path.suffix == ".mp4":
+        frames = imageio_ffmpeg.read_frames(str(path))
+        assert next(frames)["duration"] > 1
+        assert len(list(frames)) > 10
+
+
+def test_tables_of_the_program_are_known_by_their_first_line(tmp_path):
+    write_csv(tmp_path / "a.csv", ["x", "y"], [{"x": 1, "y": 2}])
+    write_csv(tmp_path / "a.csv", ["x", "y"], [{"x": 1, "y": 3}])
+    write_csv(tmp_path / "a.csv", ["x", "z"], [{"x": 1, "z": 3}], 1)
+    with pytest.raises(OutputError, match="has not written it"):
+        write_csv(tmp_path / "a.csv", ["x", "y"], [{"x": 1, "y": 3}])
+    assert (tmp_path / "a.csv").read_text() == "x,z\n1,3\n"
+
+
+@pytest.mark.slow
+def test_the_folder_of_a_search_keeps_what_others_have_put_there(faultgouge_here, tmp_path):
+    """Nor do links lead out of it; what a search has left goes."""
+    (tmp_path / "scene.toml").write_text(LAYER + toml({"ramp": {"step": 6e-3, "until": 0.024}}))
+    left = tmp_path / "o.json.slices"
+    (left / "0123456789abcdef").mkdir(parents=True)
+    (left / "fedcba9876543210").mkdir()
+    own = [left / "thesis.tex", left / "0123456789abcdef" / "mine.npz", left / "fedcba9876543210" / "1-2.npz"]
+    others = [left / "0123456789abcdef" / name for name in ("taken", "shifts.npz", "0-7.npz", f"{'a' * 32}.new")]
+    for path in (*own, *others):
+        path.write_text("x")
+    faultgouge_here("onset", "scene.toml", "-o", "o.json")
+    assert {path for path in left.rglob("*") if path.is_file()} == set(own)
+    for path in own:
+        path.unlink()
+    (left / "0123456789abcdef" / "taken").write_text("")
+    faultgouge_here("onset", "scene.toml", "-o", "o.json")
+    assert not (left / "0123456789abcdef").exists()
+
+
+def test_a_file_is_on_the_storage_device_before_it_has_its_name(tmp_path, monkeypatch):
+    """The file first, then its name, then the folder that has the name."""
+    happened = []
+    monkeypatch.setattr("os.fsync", lambda number: happened.append(os.readlink(f"/proc/self/fd/{number}")))
+    replace = os.replace
+    monkeypatch.setattr("os.replace", lambda new, old: (happened.append("replace"), replace(new, old)))
+    write_json(tmp_path / "a.json", {"x": 1})
+    part, moved, folder = happened
+    assert (part.endswith(".part.json"), moved, folder) == (True, "replace", str(tmp_path))
+
+
 @pytest.mark.parametrize("buffered", ["", "1"])
 def test_a_full_disk_behind_standard_output_is_named(buffered):
     """Also where the output is short, so that it is written at the end."""
@@ -183,17 +295,17 @@ def test_a_full_disk_behind_standard_output_is_named(buffered):
 def test_a_picture_replaces_a_file_as_a_whole(faultgouge_here, stored, monkeypatch, suffix):
     """What a full disk cuts off is not there; of two hard links one is replaced: nothing is changed in place."""
     command = ("draw" if suffix in (".png", ".svg") else "export", "run.h5", "-o", f"new{suffix}")
-    (stored / f"new{suffix}").write_text("before")
+    (stored / f"new{suffix}").write_text("before, faultgouge_format=1")
     (stored / "link").hardlink_to(stored / f"new{suffix}")
     (stored / f"new{suffix}.part").symlink_to("run.h5")
     with monkeypatch.context() as full:
         full.setattr("os.replace", no_room)
         assert "No space left on device; what it held before is kept" in faultgouge_here(*command, code=1).stderr
-    assert (stored / f"new{suffix}").read_text() == "before"
+    assert (stored / f"new{suffix}").read_text() == "before, faultgouge_format=1"
     before = {path.name for path in stored.iterdir()}
     faultgouge_here(*command)
     assert (stored / f"new{suffix}").stat().st_size > 1000
-    assert (stored / "link").read_text() == "before"
+    assert (stored / "link").read_text() == "before, faultgouge_format=1"
     assert {path.name for path in stored.iterdir()} == before
 
 
@@ -215,29 +327,13 @@ def test_a_folder_that_another_run_writes_is_refused(refusal, tmp_path, study):
 def test_no_link_is_followed_and_the_mode_is_kept(tmp_path):
     (tmp_path / "victim").write_text("untouched")
     (tmp_path / "l.json.part").symlink_to("victim")
-    (tmp_path / "l.json").write_text("{}")
+    (tmp_path / "l.json").write_text('{"faultgouge_format": 1}')
     (tmp_path / "l.json").chmod(0o640)
     write_text(tmp_path / "l.json", "new")
     assert (tmp_path / "victim").read_text() == "untouched"
     assert (tmp_path / "l.json").read_text() == "new"
     assert (tmp_path / "l.json").stat().st_mode & 0o777 == 0o640
     assert {path.name for path in tmp_path.iterdir()} == {"victim", "l.json.part", "l.json"}
-
-
-@pytest.mark.parametrize(
-    ("disk", "says"),
-    [
-        ({"radius": 1e-300}, "The radius of disk 0 is 1e-300: give one between 1e-100 and 1e+100"),
-        ({"x": 1.55, "y": 0.49}, "are 0 apart"),
-    ],
-)
-def test_a_packing_that_is_none(refusal, tmp_path, disk, says):
-    disks = {"x": [0.5, 1.55], "y": [0.49, 0.49], "radius": [0.5, 0.5], "top": [0, 1], "box_length": 4.0}
-    for key, value in disk.items():
-        disks[key][0] = value
-    (tmp_path / "packing.json").write_text(json.dumps(disks))
-    (tmp_path / "scene.toml").write_text(SCENE.replace(str(REFERENCE), "packing.json"))
-    assert says in refusal("onset", "scene.toml")
 
 
 @pytest.mark.slow

@@ -23,6 +23,7 @@ def test_keys_of_commands(faultgouge_here, tmp_path):
     ramp = json.loads(faultgouge_here("ramp", "scene.toml", "--json").stdout)
     spectrum = json.loads(faultgouge_here("spectrum", "run.h5", "--json").stdout)
     onset = json.loads(faultgouge_here("onset", "scene.toml", "--all", "--json").stdout)
+    assert {each.pop("faultgouge_format") for each in (ramp, spectrum, onset)} == {1}
     assert len(ramp["equilibria"]) == 5
     assert len(onset["windows"]) >= 1
     assert {*ramp, *ramp["equilibria"][0]} <= named("ramp")

@@ -14,7 +14,6 @@ from docs.run_page import commands, files, run
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.scenes.validation import read_toml
 from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
@@ -131,7 +130,7 @@ def test_scenes_and_sweeps_of_a_page_are_read(tmp_path, path):
     for text in re.findall(r"^```toml\n(.*?)^```", path.read_text(), re.MULTILINE | re.DOTALL):
         (tmp_path / "block.toml").write_text(text)
         if "[sweep]" in text:
-            points = Sweep.from_toml(tmp_path / "block.toml", TASKS).points
+            points = Sweep.from_toml(tmp_path / "block.toml").points
             assert [point.says for point in points if point.scene is None] == []
         elif "[packing]" in text:
             Scene.from_toml(tmp_path / "block.toml")

@@ -14,9 +14,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from packing_snapshot import snapshot_of
 from reference_layer import LAYER, toml
 
-from faultgouge.analysis import Contacts, MindlinLaw, RunFile, nearest_image, normal_modes
+from faultgouge import load
+from faultgouge.analysis import Contacts, MindlinLaw, PackingFileError, RunFile, nearest_image, normal_modes
+from faultgouge.analysis.files.configuration_file import write_configuration
 from faultgouge.analysis.files.formats import (
     ModeVectors,
     choose_frames,
@@ -27,6 +30,7 @@ from faultgouge.analysis.files.formats import (
     write_frames,
     write_packing,
 )
+from faultgouge.analysis.files.formats.tables import read_slips
 from faultgouge.pywrap import Scene, SceneError
 
 FILMS = pytest.mark.parametrize("suffix", [".xyz", ".gsd"], indirect=True)
@@ -34,6 +38,11 @@ READERS = "needs a large library that is no dependency: make readers"
 
 PUSHED = {"fx": 1e-3, "time": 0.1, "amplitude": 1.0, "omega": 5.0}
 SCENE = LAYER + toml({"ramp": {"step": 1e-3, "until": 2e-3}, "perturb": PUSHED, "output": {"trajectory": True}})
+
+
+@pytest.fixture
+def configuration(sheared):
+    return snapshot_of(sheared)
 
 
 @pytest.fixture
@@ -293,3 +302,100 @@ def test_a_file_that_only_claims_to_be_a_run_is_refused_when_the_parser_is_there
     (tmp_path / "run.h5").write_bytes(b"no HDF5")
     with pytest.raises(SceneError, match="is of no format that is read: give"):
         Scene.from_mapping({"packing": {"file": str(tmp_path / "run.h5")}})
+
+
+def test_ase_reads_extended_xyz(tmp_path, ramp, configuration):
+    """Places, species, box, forces and masses; of several frames each."""
+    from ase.io import read
+
+    with RunFile(ramp) as run:
+        packing = run.packing()
+        write_frames(tmp_path / "film.xyz", frames_of(run, range(2)))
+    write_packing(tmp_path / "one.xyz", packing)
+    write_packing(tmp_path / "lammps.xyz", configuration)
+    one, film, other = (read(tmp_path / f"{name}.xyz", ":") for name in ("one", "film", "lammps"))
+    assert [len(one), len(film), len(other)] == [1, 2, 1]
+    for atoms in (one[0], film[1]):
+        assert np.array_equal(atoms.positions[:, :2], packing.position)
+        assert atoms.pbc.tolist() == [True, False, False]
+        assert atoms.cell[0, 0] == packing.box_length
+        assert np.array_equal(np.array(atoms.get_chemical_symbols()) == "U", packing.top)
+        assert np.array_equal(atoms.arrays["radius"], packing.radius)
+        assert np.array_equal(atoms.get_forces()[:, :2], packing.net_force.reshape(3, -1)[:2].T)
+    assert np.array_equal(other[0].positions[:, : configuration.dimension], configuration.position)
+
+
+LATER = "format 2 of faultgouge's files, and this version knows 1: a later version wrote it, so update faultgouge"
+
+
+@pytest.mark.parametrize("module", ["xyz", "lammps_data", "libraries", "checksummed_file", "configuration_file"])
+def test_a_file_of_a_later_format_is_refused(tmp_path, sheared, configuration, monkeypatch, module):
+    """And one without a number, of an older version, is read."""
+    suffix = {"xyz": "xyz", "lammps_data": "data", "libraries": "gsd"}.get(module, "h5")
+    path = tmp_path / f"a.{suffix}"
+    place = "faultgouge.analysis.files." + (f"formats.{module}" if suffix != "h5" else "checksummed_file")
+
+    def write():
+        if module == "configuration_file":
+            write_configuration(path, configuration)
+        elif suffix == "h5":
+            with RunFile(path, "a") as file:
+                file.append(sheared)
+        else:
+            write_packing(path, sheared)
+
+    RunFile.create(tmp_path / "a.h5", sheared).close()
+    with monkeypatch.context() as later:
+        later.setattr(f"{place}.FORMAT", 2)
+        write()
+    with pytest.raises(PackingFileError, match=LATER):
+        load(path)
+    with monkeypatch.context() as older:
+        older.setattr(f"{place}.FORMAT_KEY", "another_name")
+        if suffix == "h5":
+            path.unlink()
+            RunFile.create(path, sheared).close()
+            write()
+        else:
+            path.write_bytes(path.read_bytes().replace(b"faultgouge_format", b"another_name12345"))
+    assert len(load(path)) in (len(sheared), len(configuration))
+
+
+def test_pandas_reads_a_table_of_contacts(tmp_path, sheared, configuration):
+    """All digits; the forces of the rows make the net forces; and the slips come back with `import --contacts`."""
+    import pandas
+
+    for packing in (sheared, configuration):
+        write_packing(tmp_path / "contacts.csv", packing)
+        table = pandas.read_csv(tmp_path / "contacts.csv")
+        held = packing.configuration
+        pandas.testing.assert_frame_equal(table[list(held.to_pandas())], held.to_pandas(), check_exact=True)
+        total = held.load[:, 0].copy()
+        force = (
+            table[["n_x", "n_y", "n_z"]].mul(table.f_n, axis=0).to_numpy()
+            + table[["f_t_x", "f_t_y", "f_t_z"]].to_numpy()
+        )
+        np.add.at(total, table.id1 - 1, force)
+        pair = table.id2 > 0
+        np.subtract.at(total, table.id2[pair] - 1, force[pair])
+        np.testing.assert_allclose(total, held.net_force[:, 0], atol=1e-12)
+        np.testing.assert_allclose(table.f_t, held.configuration.mobilised * held.contacts.friction, rtol=1e-12)
+    write_packing(tmp_path / "contacts.csv", sheared)
+    assert np.array_equal(read_slips(tmp_path / "contacts.csv").slip, sheared.contacts.slip)
+
+
+@pytest.mark.parametrize("suffix", [".data", ".gsd"], indirect=True)
+def test_what_lammps_left_goes_where_a_packing_goes(tmp_path, sheared, configuration, suffix):
+    write_packing(tmp_path / f"a{suffix}", configuration)
+    if suffix == ".data":
+        disks = read_disks(tmp_path / "a.data")
+        assert np.array_equal(disks.position, sheared.position)
+        np.testing.assert_allclose(disks.mass, sheared.mass, rtol=1e-15)
+        return
+    with pytest.importorskip("gsd.hoomd").open(tmp_path / "a.gsd") as file:
+        frame = file[0]
+    box, middle = configuration.box, configuration.origin + 0.5 * configuration.box.sum(axis=0)
+    moved = frame.particles.position + middle - np.pad(configuration.position, ((0, 0), (0, 1)))
+    moved[:, 0] -= box[0, 0] * np.rint(moved[:, 0] / box[0, 0])  # whatever the image
+    assert moved == pytest.approx(0, abs=1e-6)  # float32
+    assert np.array_equal(frame.log["particles/net_force"], configuration.net_force[:, 0])

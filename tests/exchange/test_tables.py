@@ -7,8 +7,8 @@ import pytest
 
 from faultgouge.analysis import BadInputError, MindlinLaw, PackingFileError
 from faultgouge.analysis.files.formats import packing_of, read_disks, upper_layer
-from faultgouge.analysis.files.formats.csv_json import read_slips
-from faultgouge.analysis.files.formats.upper_layer import layer_remark
+from faultgouge.analysis.files.formats.disks import layer_remark
+from faultgouge.analysis.files.formats.tables import read_slips
 
 LAW = MindlinLaw(2e5, 5e4, 0.5)
 
@@ -44,14 +44,6 @@ def test_tables_as_others_write_them(read, text, name):
     assert disks.remark == ""
 
 
-@pytest.mark.parametrize(
-    "text", ["x;y;radius\n1.234,5;1;1\n", "x,y,radius\n1,25,0,5,0,5\n", "# only\n# words\n", "x y radius\n"]
-)
-def test_what_no_number_and_no_table_is(read, text):
-    with pytest.raises(PackingFileError, match=r"is no number|it has 6 columns|is no table"):
-        read(text)
-
-
 @pytest.mark.parametrize("head", ["x [mm];y [mm];radius [µm]", "x (mm) y (mm) radius (μm)", "x[mm],y[mm],radius[um]"])
 def test_lengths_are_converted_to_the_unit_of_x(read, head):
     mark = ";" if ";" in head else "," if "," in head else " "
@@ -67,19 +59,6 @@ def test_angles_masses_and_densities_are_converted_too(read):
     assert disks.angle[0] == pytest.approx(np.pi / 2, rel=1e-14)
     assert disks.mass[0] == pytest.approx(2.0 * np.pi / 6, rel=1e-14)  # g, of a sphere of 1 cm and 2 g/cm^3
     assert disks.remark == "lengths are in cm and masses in g: give law and load in these units"
-
-
-@pytest.mark.parametrize(
-    ("head", "says"),
-    [
-        ("x [mm],y,radius [um]", "x is in mm, and y has no unit: give every length one, or none"),
-        ("x [mm],y [mm],radius [kg]", "the unit of radius, 'kg', does not convert to mm"),
-        ("x [mm],y [mm],radius [pixels of mine]", "the unit of radius, 'pixels of mine', does not convert to mm"),
-    ],
-)
-def test_units_that_do_not_convert_are_refused(read, head, says):
-    with pytest.raises(PackingFileError, match=says.replace("[", r"\[")):
-        read(f"{head}\n1,1,1\n")
 
 
 ROW = "id,x [mm],y [mm],radius [mm]\n1,1,0.5,0.5\n2,1.999,0.5,0.5\n3,3.2,0.5,0.5\n4,1.5,1.365,0.5\n"
@@ -99,24 +78,25 @@ def test_slips_are_in_the_unit_of_the_disks(read, tmp_path):
     assert found[0, 3] == -0.25e-3
 
 
-@pytest.mark.parametrize(
-    ("rows", "says"),
-    [
-        ("1;2;0,5\n2;3;1\n", "1 slip is of disks that do not touch: 2 and 3 are 0.201 apart: leave such rows out"),
-        ("2;3;1\n4;0;2\n", "2 slips are of disks that do not touch: 2 and 3 are 0.201 apart"),
-        ("4;0;2\n", "4 and the floor are 0.865 apart"),
-    ],
-)
-def test_slips_of_disks_that_do_not_touch_are_refused(read, tmp_path, rows, says):
-    disks = with_slips(read, tmp_path, rows)
+BAD_SLIPS = [
+    (
+        "id1;id2;slip [µm]\n1;2;0,5\n2;3;1\n",
+        "1 slip is of disks that do not touch: 2 and 3 are 0.201 apart: leave such",
+    ),
+    ("id1;id2;slip [µm]\n2;3;1\n4;0;2\n", "2 slips are of disks that do not touch: 2 and 3 are 0.201 apart"),
+    ("id1;id2;slip [µm]\n4;0;2\n", "4 and the floor are 0.865 apart"),
+    ("id1;id2;slip\n1;2;0,5\n", "the disks are in mm, and slip has no unit"),
+    ("id1;id2;slip [kg]\n1;2;0,5\n", "the unit of slip, 'kg', does not convert to mm"),
+    ("id1;id2;other [mm]\n1;2;0,5\n", "has no column slip"),
+    ("id1;id2;slip [mm]\n1;9;0,5\n", "a contact names disk 9, which is not there"),
+]
+
+
+@pytest.mark.parametrize(("table", "says"), BAD_SLIPS)
+def test_slips_that_fit_no_contact_are_refused(read, tmp_path, table, says):
+    head, rows = table.split("\n", 1)
     with pytest.raises(PackingFileError, match=says):
-        packing_of(disks, LAW, upper_layer(disks, 1), fy=1.0)
-
-
-@pytest.mark.parametrize("head", ["id1;id2;slip", "id1;id2;slip [kg]"])
-def test_slips_without_the_unit_of_the_disks_are_refused(read, tmp_path, head):
-    with pytest.raises(PackingFileError, match="slip"):
-        with_slips(read, tmp_path, "1;2;0,5\n", head)
+        packing_of(disks := with_slips(read, tmp_path, rows, head), LAW, upper_layer(disks, 1), fy=1.0)
 
 
 def test_slips_with_a_unit_of_disks_without_are_refused(tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import MindlinLaw, Packing, damping_matrix, touching
-from faultgouge.analysis.files.dumps import dump_frames
+from faultgouge.analysis.files.formats.lammps_dump import dump_frames
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.lammps.engine import Engine
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import read_dump
-from faultgouge.analysis.files.dumps import dump_frames
+from faultgouge.analysis.files.formats.lammps_dump import dump_frames
 from faultgouge.pywrap.lammps.decks import DECKS
 
 KN, KT, MU, FX, FY, WIDTH = 2e5, 2e5 * 2 / 7, 0.5, 2.5, 3.0, 2.8

@@ -13,16 +13,17 @@ from faultgouge.analysis import RunFile, read_dump
 from faultgouge.pywrap import EngineError, Equilibrium, Scene, SceneError
 from faultgouge.pywrap.lammps.data_file import data_file
 from faultgouge.pywrap.lammps.decks import DECKS
-from faultgouge.pywrap.runs.drive import drive
-from faultgouge.pywrap.runs.drive_recorder import (
+from faultgouge.pywrap.runs.drive import (
     CONFIDENCE,
     NOISES,
     DriveRecord,
     advance_error,
+    check_drive,
     clock_advance,
+    drive,
+    settle_for_drive,
     slips_in,
 )
-from faultgouge.pywrap.runs.drive_setup import check_drive, settle_for_drive
 from faultgouge.pywrap.runs.run_recorder import Record
 
 BASE = {
@@ -47,6 +48,12 @@ def scene(tmp_path_factory):
         return Scene.from_mapping(BASE | {"packing": {"file": str(path)}, "precision": precision, "drive": drive})
 
     return make
+
+
+@pytest.fixture(scope="module")
+def settled(scene):
+    """The packing from which all runs start."""
+    return settle_for_drive(scene(**DRAWN))
 
 
 def run_to_end(scene, path, parts=None):
@@ -194,92 +201,69 @@ def test_rigid_layer_has_force_and_no_slips(scene, tmp_path):
     assert slips == []
 
 
-@pytest.mark.parametrize(
-    ("drive", "says"),
-    [
-        ({"spring": 10.0}, "drive.velocity or drive.protocol says how"),
-        ({"spring": 10.0, "velocity": 1e-3, "protocol": [[1, 1]]}, "give one of the two"),
-        ({"spring": "soft", "velocity": 1e-3}, 'give a stiffness above 0, or "rigid"'),
-        ({"spring": 10.0, "velocity": 0.0}, "moves nothing"),
-        ({"spring": 1e-90, "velocity": 1e-300}, "moves nothing"),
-        ({"spring": 10.0, "velocity": 1e-3}, "drive.until is missing"),
-        ({"spring": 10.0, "protocol": [[1e-3, 0.0]]}, "give pairs of a velocity and a time above 0"),
-        ({"spring": "rigid", "velocity": 1e-3, "slips": 3}, "drive.until is missing"),
-        ({"spring": "rigid", "velocity": 1e-3, "slips": 3, "until": 1.0}, "drive.slips needs a spring"),
-        ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "at": 3.0}, "drive.at stands without signal"),
-        ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "signal": "pulse", "omega": 1.0}, "drive.at is missing"),
-        ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "signal": "pulse", "at": 0.5}, "drive.omega is the freq"),
-        ({"spring": 10.0, "velocity": 1e-3, "until": 1.0, "signal": "pulse", "omega": 1.0, "at": 1.0}, "after the end"),
-        ({"spring": 10.0, "protocol": [[1e-3, 2.0]], "signal": "pulse", "omega": 1.0, "at": 3.0}, "after the end"),
-        (
-            {"spring": 10.0, "velocity": 1e-3, "slips": 1, "signal": "pulse", "omega": 1.0, "at": 601.0},
-            "of the run, 600",
-        ),
-        ({"spring": 10.0, "velocity": 1e-3, "untill": 1.0}, "until"),
-    ],
-)
-def test_sections_that_make_no_sense_are_refused(scene, drive, says):
+PULSE = {"signal": "pulse", "omega": 1.0}
+DRAWN = {"spring": 10.0, "velocity": 1e-3, "until": 1.0}
+REFUSED_SCENES = [
+    ({"drive": {"spring": 10.0}}, "drive.velocity or drive.protocol says how"),
+    ({"drive": {"spring": 10.0, "velocity": 1e-3, "protocol": [[1, 1]]}}, "give one of the two"),
+    ({"drive": {"spring": "soft", "velocity": 1e-3}}, 'give a stiffness above 0, or "rigid"'),
+    ({"drive": {"spring": 10.0, "velocity": 0.0}}, "moves nothing"),
+    ({"drive": {"spring": 1e-90, "velocity": 1e-300}}, "moves nothing"),
+    ({"drive": {"spring": 10.0, "velocity": 1e-3}}, "drive.until is missing"),
+    ({"drive": {"spring": 10.0, "protocol": [[1e-3, 0.0]]}}, "give pairs of a velocity and a time above 0"),
+    ({"drive": {"spring": "rigid", "velocity": 1e-3, "slips": 3}}, "drive.until is missing"),
+    ({"drive": DRAWN | {"spring": "rigid", "slips": 3}}, "drive.slips needs a spring"),
+    ({"drive": DRAWN | {"at": 3.0}}, "drive.at stands without signal"),
+    ({"drive": DRAWN | PULSE}, "drive.at is missing"),
+    ({"drive": DRAWN | {"signal": "pulse", "at": 0.5}}, "drive.omega is the freq"),
+    ({"drive": DRAWN | PULSE | {"at": 1.0}}, "after the end"),
+    (
+        {"drive": {"spring": 10.0, "protocol": [[1e-3, 2.0]], "signal": "pulse", "omega": 1.0, "at": 3.0}},
+        "after the end",
+    ),
+    (
+        {"drive": {"spring": 10.0, "velocity": 1e-3, "slips": 1, "signal": "pulse", "omega": 1.0, "at": 601.0}},
+        "of the run, 600",
+    ),
+    ({"drive": DRAWN | {"untill": 1.0}}, "until"),
+    ({"law": {"kn": 2e5, "mu": 0.0}, "damping": {"cn": 60.0}}, "drive needs friction"),
+    ({"damping": {"tau": 10.0}, "drive": {"spring": "rigid", "velocity": 1.0, "until": 1.0}}, "damping.tau would"),
+    ({"damping": None}, r"the scene has no section \[damping\]: add it"),
+]
+REFUSED_RUNS = [
+    ({"drive": DRAWN | {"velocity": 0.1}}, r"periods of its slowest vibration, and slow driving takes 100 or more"),
+    ({"drive": DRAWN | {"spring": 1e9, "velocity": 1e-11}}, "blows up: lower drive.spring"),
+    ({"damping": {"cn": 1e6}}, "blows up: lower damping.cn and damping.ct"),
+    ({"drive": DRAWN | {"spring": "rigid", "velocity": 1e3}}, "the smallest radius 0.5: lower drive.velocity"),
+    ({"drive": DRAWN | {"velocity": 1e-20, "until": 1e50}}, "the run would take .* time steps of"),
+    ({"drive": DRAWN | {"signal": "pulse", "at": 0.5, "omega": 1e9}}, "has a period of 6.28e-09, and the time step is"),
+]
+
+
+@pytest.mark.parametrize(("change", "says"), REFUSED_SCENES + REFUSED_RUNS)
+def test_what_cannot_be_driven_is_refused_before_it_begins(settled, change, says):
+    """Scenes that make no sense, and drives that are not slow, or that time steps do not follow."""
+    sections = {**BASE, "drive": DRAWN, **change}
+
+    def check() -> None:
+        wanted = Scene.from_mapping({key: each for key, each in sections.items() if each}, command="drive")
+        check_drive(wanted, settle_for_drive(wanted) if "damping" in change else settled)
+
     with pytest.raises(SceneError, match=says):
-        scene(**drive)
+        check()
 
 
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ({"law": {"kn": 2e5, "mu": 0.0}, "damping": {"cn": 60.0}}, "drive needs friction"),
-        ({"damping": {"tau": 10.0}, "drive": {"spring": "rigid", "velocity": 1.0, "until": 1.0}}, "damping.tau would"),
-    ],
-)
-def test_scenes_that_make_no_sense_are_refused(change, says):
-    drive = {"spring": 10.0, "velocity": 1e-3, "until": 1.0}
-    with pytest.raises(SceneError, match=says):
-        Scene.from_mapping({**BASE, "packing": {}, "drive": drive, **change})
-
-
-def test_drive_without_damping_is_refused_by_the_command():
-    mapping = {key: value for key, value in BASE.items() if key != "damping"}
-    with pytest.raises(SceneError, match=r"the scene has no section \[damping\]: add it"):
-        Scene.from_mapping(
-            {**mapping, "packing": {}, "drive": {"spring": 1.0, "velocity": 1, "until": 1}}, command="drive"
-        )
-
-
-def test_drive_that_is_fast_or_stiff_is_warned_or_refused(scene):
-    slow = scene(spring=10.0, velocity=1e-3, until=1.0)
-    start = settle_for_drive(slow)
-    assert check_drive(slow, start) == []
-    assert not start.contacts.slip.any()
-    with pytest.raises(SceneError, match=r"periods of its slowest vibration, and slow driving takes 100 or more"):
-        check_drive(scene(spring=10.0, velocity=0.1, until=1.0), start)
-    (fast,) = check_drive(scene(spring=10.0, velocity=5e-3, until=1.0), start)
+def test_drive_that_is_fast_or_stiff_is_warned(scene, settled):
+    """The function in Python warns and refuses as the command does."""
+    assert not settled.contacts.slip.any()
+    assert check_drive(scene(**DRAWN), settled) == []
+    (fast,) = check_drive(scene(**DRAWN | {"velocity": 5e-3}), settled)
     assert "slow driving takes 100 or more" in fast
-    (stiff,) = check_drive(scene(spring=1e4, velocity=1e-6, until=1.0), start)
-    assert "is stiffer than the layer" in stiff
-
-
-def test_drive_in_python_warns_and_refuses_as_the_command_does(scene):
-    with pytest.raises(SceneError, match=r"slow driving takes 100 or more"):
-        next(drive(scene(spring=10.0, velocity=0.1, until=1.0)))
+    stiff = scene(**DRAWN | {"spring": 1e4, "velocity": 1e-6})
     with pytest.warns(UserWarning, match="is stiffer than the layer"):
-        next(drive(scene(spring=1e4, velocity=1e-6, until=1.0)))
-
-
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ({"drive": {"spring": 1e9, "velocity": 1e-11}}, "blows up: lower drive.spring"),
-        ({"damping": {"cn": 1e6}}, "blows up: lower damping.cn and damping.ct"),
-        ({"drive": {"spring": "rigid", "velocity": 1e3}}, "farther than the smallest radius 0.5: lower drive.velocity"),
-        ({"drive": {"velocity": 1e-20, "until": 1e50}}, "the run would take .* time steps of"),
-        ({"drive": {"signal": "pulse", "at": 0.5, "omega": 1e9}}, "has a period of 6.28e-09, and the time step is"),
-    ],
-)
-def test_drive_that_time_steps_do_not_follow_is_refused_before_it_begins(scene, change, says):
-    wanted = scene(**{"spring": 10.0, "velocity": 1e-3, "until": 1.0} | change.get("drive", {}))
-    if "damping" in change:
-        wanted = Scene.from_mapping(wanted.model_dump(exclude_none=True) | change)
-    with pytest.raises(SceneError, match=says):
-        check_drive(wanted, settle_for_drive(wanted))
+        next(drive(stiff))
+    with pytest.raises(SceneError, match=r"slow driving takes 100 or more"):
+        next(drive(scene(**DRAWN | {"velocity": 0.1})))
 
 
 @pytest.mark.parametrize(
@@ -289,11 +273,9 @@ def test_drive_that_time_steps_do_not_follow_is_refused_before_it_begins(scene, 
         {"spring": 10.0, "velocity": 1e-3, "signal": "pulse", "at": 0.1, "omega": 100.0, "scale": 1e6},
     ],
 )
-def test_disks_that_move_through_one_another_end_the_run_with_what_to_change(scene, settings):
-    wanted = scene(**settings, until=1.0)
-    start = settle_for_drive(wanted)
+def test_disks_that_move_through_one_another_end_the_run_with_what_to_change(scene, settled, settings):
     with pytest.raises(EngineError, match=r"ended before t = 0\.\d+: take a slower drive, .* as LAMMPS stopped: "):
-        list(drive(wanted, start))
+        list(drive(scene(**settings, until=1.0), settled))
 
 
 @pytest.mark.ranks

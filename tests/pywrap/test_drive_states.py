@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis.motion.slips import SlipDetector, find_slips
-from faultgouge.pywrap.runs.drive_plan import Plan
-from faultgouge.pywrap.runs.drive_states import DriveSample, DriveState, PendingStates
+from faultgouge.pywrap.runs.drive import DriveSample, DriveState, PendingStates, Plan
 
 VELOCITY, PERIOD, EVERY, ROWS_A_PART = 1e-3, 2.0, 0.1, 24
 
@@ -24,19 +23,23 @@ def is_even(time):
     return round(time / EVERY) % ROWS_A_PART == 0
 
 
+def given(detector, row):
+    return detector.add(row.time, row.force, row.displacement, row.kinetic_energy)
+
+
 def stored_times(series, cuts=()):
     """Times of the states of a run that is handed over, at some rows, from one choice of states to the next."""
     rows = [DriveSample(time, force, moved, 0.0, energy, 0) for time, force, moved, energy in zip(*series, strict=True)]
     detector = SlipDetector(VELOCITY, PERIOD)
     pending, found, most = PendingStates(detector, is_even), [], 0
     for k, row in enumerate(rows):
-        slip = row.given_to(detector)
+        slip = given(detector, row)
         found += pending.take(DriveState(row.time, row.displacement, None), slip, k == len(rows) - 1)
         most = max(most, len(pending.states))
         if k in cuts:
             detector = SlipDetector(VELOCITY, PERIOD)
             for known in rows[: k + 1]:
-                known.given_to(detector)
+                given(detector, known)
             pending = PendingStates(detector, is_even, pending.states)
     assert most <= 4 * PERIOD / EVERY + 2  # no more than the rows in which a slip may begin, and an even state
     return [state.time for state in found]

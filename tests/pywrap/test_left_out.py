@@ -10,9 +10,8 @@ import pytest
 from reference_layer import LAYER, toml
 
 from faultgouge.analysis import MindlinLaw, PackingFileError, RunFile, read_dump
-from faultgouge.analysis.files.dumps import dump_frames
-from faultgouge.assessment.explain.cost_comparison import same_motion
-from faultgouge.assessment.explain.switches import InstanceContents
+from faultgouge.analysis.files.formats.lammps_dump import dump_frames
+from faultgouge.assessment.explain import InstanceContents
 from faultgouge.pywrap import Engine
 from faultgouge.pywrap.lammps.decks import DECKS
 
@@ -52,6 +51,11 @@ def test_what_dynamics_need_is_taken_away_again(reference_packing, tmp_path, mu,
         work(engine)
         here = InstanceContents.of(engine, log)
     assert (set(here.parts), set(here.fixes), here.computes) == ({"system.in", "balance.in"} | parts, fixes, ())
+
+
+def same_motion(one, other):
+    """Whether positions and velocities are the same to the bit."""
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in one._fields)
 
 
 def motion_of(packing, commands=()):

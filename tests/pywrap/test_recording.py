@@ -3,9 +3,11 @@
 An undamped run that is cut off goes on from its last checkpoint, to the bit.
 """
 
+import json
 import math
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +18,9 @@ from faultgouge.analysis import RunFile
 from faultgouge.analysis.files import checksummed_file
 from faultgouge.pywrap import Equilibrium, Record, Scene, SceneError, perturb, reach, settle
 from faultgouge.pywrap.runs import undamped
+from faultgouge.pywrap.runs.drive import DriveRecord
 from faultgouge.pywrap.runs.undamped import sample_steps, weakening_of
+from faultgouge.pywrap.scenes.validation import digest_of
 
 SCENE = {"packing": {"file": str(REFERENCE)}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
 WRITERS = {"run_recorder.py", "runfile.py", "checksummed_file.py", "atomic_write.py"}
@@ -194,3 +198,68 @@ def test_a_ramp_goes_on_from_a_settled_packing_and_its_file_then_has_the_ramp(tm
         assert record.last is not None
     with pytest.raises(SceneError, match=r"ramp\.step is 0\.001 there and 0\.0005 here"):
         Record(path, finer)
+
+
+OTHER_CONTENTS = [
+    ("ramp", "packing.file", {}),
+    ("perturb", "packing.file", {}),
+    ("perturb", "perturb.signal", {}),
+    ("drive", "packing.file", {}),
+    ("drive", "drive.signal", {}),
+    ("ramp", "packing.top", {"top": "ids:@named"}),
+]
+
+
+def scene_of_files(folder, more):
+    """A scene whose files are in a folder: a packing, a signal, and a list of disks."""
+    packing = json.loads(REFERENCE.read_text())
+    (folder / "packing.json").write_text(json.dumps(packing))
+    (folder / "signal").write_text("0 0\n0.1 1e-9\n0.2 0\n")
+    (folder / "named").write_text(" ".join(str(1 + disk) for disk in packing["top"]))
+    return {
+        "packing": {"file": "packing.json", **more},
+        "law": {"kn": 2e5},
+        "load": {"fy": 3.0},
+        "damping": {"cn": 60.0},
+        "ramp": {"step": 1e-3, "until": 2e-3},
+        "perturb": {"fx": 1e-3, "time": 1.0, "signal": "signal"},
+        "drive": {"spring": 3.0, "velocity": 1e-3, "until": 5.0, "signal": "signal", "at": 1.0},
+    }
+
+
+@pytest.mark.parametrize(("task", "key", "more"), OTHER_CONTENTS)
+def test_a_run_does_not_go_on_from_files_of_another_content(equilibria, tmp_path, monkeypatch, task, key, more):
+    """The name is the same, and so are all keys; a run of a version that kept no digests goes on, and says so."""
+    monkeypatch.chdir(tmp_path)
+    mapping = scene_of_files(tmp_path, more)
+    scene = Scene.from_mapping(mapping, tmp_path, command=task)
+    record = (
+        (lambda: DriveRecord(tmp_path / "run.h5", scene))
+        if task == "drive"
+        else partial(Record, tmp_path / "run.h5", scene, task=task)
+    )
+    with record() as run:
+        run.append(equilibria[0])
+    name = {"file": "packing.json", "signal": "signal", "top": "named"}[key.split(".")[1]]
+    before = (tmp_path / name).read_text()
+    (tmp_path / name).write_text(before + "\n")
+    with pytest.raises(SceneError, match=rf"run of another scene \({key}, {name}, has another content now\): give"):
+        record()
+    (tmp_path / name).write_text(before)
+    with record() as run:
+        assert run.last.packing == equilibria[0].packing
+        assert run.remark == ""
+    with RunFile(tmp_path / "run.h5", "a") as file:
+        file.put_attribute("files", "{}")
+    with record() as run:
+        assert f"does not say what {name} held" in run.remark or len(scene.files) > 1
+        assert "it may be another" in run.remark
+
+
+def test_a_dump_is_also_what_lies_beside_it(tmp_path):
+    for suffix in ("disks", "contacts", "params"):
+        (tmp_path / f"a.{suffix}").write_text("1")
+    paths = tuple(tmp_path / f"a.{suffix}" for suffix in ("disks", "contacts", "params"))
+    before = digest_of(paths)
+    paths[1].write_text("2")
+    assert digest_of(paths) != before

@@ -11,6 +11,7 @@ from faultgouge.analysis.files.formats import write_packing
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.scenes.quantities import DIMENSIONS
 from faultgouge.pywrap.scenes.scene import SECTIONS
+from faultgouge.pywrap.scenes.study_sections import study_models
 from faultgouge.pywrap.scenes.units import dashpot, quality_factor, real_units, restitution
 
 QUARTZ = {
@@ -166,12 +167,13 @@ def test_every_number_of_a_scene_has_its_dimension_or_none():
     """A key that is added to a section is added to `DIMENSIONS`, too, or here."""
     plain = {"disks", "top", "seed", "frame", "mu", "exponent", "inertia_factor", "target", "scale", "stretch"}
     plain |= {"B", "w", "mu_ss", "distance", "runs", "fx_over_fy", "slips"}
-    for section, models in SECTIONS.items():
+    for section, models in (SECTIONS | study_models()).items():
         if section in ("units", "output"):
             continue
         for name, field in ((name, field) for model in models for name, field in model.model_fields.items()):
             if any(kind in str(field.annotation) for kind in ("float", "int")):
-                assert name in DIMENSIONS.get(section, ()) or name in plain, f"{section}.{name}"
+                own = any(isinstance(each, tuple) for each in field.metadata)  # of a study's section
+                assert own or name in DIMENSIONS.get(section, ()) or name in plain, f"{section}.{name}"
 
 
 def test_the_mass_of_a_grain_is_that_of_the_scene():

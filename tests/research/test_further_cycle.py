@@ -5,8 +5,8 @@ from itertools import combinations, product
 
 import numpy as np
 
-from faultgouge.pywrap.runs.drive_recorder import CONFIDENCE, advance_error
-from faultgouge.pywrap.runs.drive_recorder import NOISES as RUNS_WITH_NOISE
+from faultgouge.pywrap.runs.drive import CONFIDENCE, advance_error
+from faultgouge.pywrap.runs.drive import NOISES as RUNS_WITH_NOISE
 from research.cycle.clock import NOISES, SLIPS, pulses
 from research.cycle.compute import LAWS
 from research.cycle.further import CLOCK_TABLE, HERE, ROW, SPRINGS_TABLE, advances, numbers, write_further

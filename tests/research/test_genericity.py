@@ -8,7 +8,6 @@ import pytest
 from reference_layer import parted
 
 from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS
 from research.genericity.fits import size_law
 from research.genericity.levels import InterpolatedOperator, entry_factor
 from research.genericity.make import TABLES, check, write_page
@@ -50,7 +49,7 @@ def test_random_matrices_keep_spacings_and_couplings():
 
 @pytest.mark.slow
 def test_the_sweep_that_ships_is_that_of_the_study():
-    shipped = Sweep.from_toml(ROOT / "scenes" / "sweeps" / "genericity.toml", TASKS)
+    shipped = Sweep.from_toml(ROOT / "scenes" / "sweeps" / "genericity.toml")
     assert [point.key for point in shipped.points] == [point.key for point in sets(1.0)["onsets"].points]
 
 

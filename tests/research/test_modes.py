@@ -19,7 +19,6 @@ from faultgouge.studies.modes import count_pairs
 from faultgouge.studies.statistics import median
 from faultgouge.studies.sweep.run_sweep import run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS
 from research.modes.count_in_slices import count_in_slices
 from research.modes.make import different
 from research.modes.packing_rows import computed_again, read_known
@@ -85,7 +84,7 @@ def test_a_seed_is_the_packing_of_the_table(name, tmp_path):
     scene = sweep.scene | {"modes": {"fx_over_fy": first}, "ramp": {"step": 1e-3 * fy, "until": first[-1] * fy}}
     seeds = {"packing.seed": [1]}
     run_sweep(
-        Sweep.from_mapping({"task": sweep.task, "sweep": seeds, "scene": scene}, TASKS),
+        Sweep.from_mapping({"task": sweep.task, "sweep": seeds, "scene": scene}),
         tmp_path / name.replace(" ", "_"),
     )
     [(packing, again, table)] = computed_again(tmp_path, DOCS / "tables")

@@ -5,7 +5,7 @@ import shutil
 import numpy as np
 import pytest
 
-from faultgouge.pywrap.runs.drive_states import DriveSample
+from faultgouge.pywrap.runs.drive import DriveSample
 from research.protocols.compute import EDGES, FACTORS, FY, HOLDS, in_bins
 from research.protocols.make import HERE, TABLE, WEAK, check, holds, mean, numbers, write_page
 from research.statistics import interval

@@ -3,7 +3,7 @@
 import pytest
 
 from research.rising.compute import APART, RATES, RESTITUTIONS
-from research.rising.make import HERE, ONSETS, STARTS, VIBRATION_SHARE, check, numbers, write_page
+from research.rising.make import HERE, ONSETS, STARTS, VIBRATES, check, numbers, write_page
 from research.tables import read_rows
 
 FOUND = numbers()
@@ -31,7 +31,7 @@ def test_from_each_start_and_over_the_same_span_lammps_vibrates_as_one_sided_mot
     for row in (each for each in rows if each["one_sided"]["steady"]):
         moving = row["lammps"][slow]
         assert moving["drift"] == pytest.approx(row["one_sided"]["drift"], abs=2 * row["one_sided"]["drift_error"])
-        assert row["vibrates"] == (moving["vibration"] > VIBRATION_SHARE * moving["drift"])
+        assert row["vibrates"] == (moving["vibration"] > VIBRATES * moving["drift"])
         assert row["within"] or not row["vibrates"]
 
 

@@ -11,10 +11,8 @@ from faultgouge.analysis import FLOOR, Contacts, MindlinLaw, Packing, RunFile, s
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 from faultgouge.analysis.motion.motion import Motion
 from faultgouge.pywrap import Equilibrium, Scene, SceneError
-from faultgouge.pywrap.runs.drive_recorder import SERIES, DriveRecord
-from faultgouge.pywrap.runs.drive_setup import settle_for_drive
-from faultgouge.studies.cycle.compute import cycle_state, null_vector, with_spring
-from faultgouge.studies.cycle.study import CYCLE_COLUMNS, cycle
+from faultgouge.pywrap.runs.drive import SERIES, DriveRecord, settle_for_drive
+from faultgouge.studies.cycle import CYCLE_COLUMNS, cycle, cycle_state, null_vector, with_spring
 
 SPRING = 10.0
 
@@ -106,21 +104,25 @@ def test_a_stored_configuration_keeps_its_spring(slow, tmp_path):
 
 @pytest.mark.long
 def test_the_states_of_a_run_go_on_where_they_were_cut_off(slow, tmp_path):
-    whole = cycle(slow, tmp_path / "whole")
+    def states(folder, **options):
+        cycle(slow, folder, **options)
+        return json.loads((folder / "cycle.json").read_text())["states"]
+
+    whole = states(tmp_path / "whole")
 
     def cut(frames, count):
         yield from list(frames)[:2]
 
     part = tmp_path / "parts"
-    assert len(cycle(slow, part, progress=cut)["states"]) == 2
+    assert len(states(part, progress=cut)) == 2
     asked = []
-    again = cycle(slow, part, progress=lambda frames, count: asked.append(count) or frames)
-    assert again == whole == json.loads((part / "cycle.json").read_text())
-    assert asked == [len(whole["states"]) - 2]
+    again = states(part, progress=lambda frames, count: asked.append(count) or frames)
+    assert again == whole
+    assert asked == [len(whole) - 2]
     with (part / "cycle.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert tuple(rows[0]) == CYCLE_COLUMNS
-    assert [float(row["damped_sticking"]) for row in rows] == [state["damped_sticking"] for state in whole["states"]]
+    assert [float(row["damped_sticking"]) for row in rows] == [state["damped_sticking"] for state in whole]
     assert (part / "cycle.png").stat().st_size > 10_000
 
 

@@ -10,8 +10,7 @@ from faultgouge.analysis.motion.normal_form import NormalForm
 from faultgouge.analysis.motion.power_law import PowerLaw
 from faultgouge.figures.series import draw_growth
 from faultgouge.pywrap.lammps.dynamics import Weakening
-from faultgouge.studies.triggering.compute import Sensitivity
-from faultgouge.studies.triggering.draw import (
+from faultgouge.studies.reproduce.triggering_figures import (
     DAMPING_TIMES,
     amplitude_figure,
     damping_figure,
@@ -22,6 +21,7 @@ from faultgouge.studies.triggering.draw import (
     share,
     weakening_figure,
 )
+from faultgouge.studies.triggering import Sensitivity
 from research.dissipation.draw import dissipation_figure
 
 PAPERS = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=0.0, v_ss=1.0)

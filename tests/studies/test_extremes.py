@@ -59,7 +59,7 @@ def test_failures_are_told_and_the_others_go_on(tmp_path, monkeypatch):
     wrong = dict.fromkeys(("too large", "no number", "crash", "not refused", "two lines", "traceback"), "fails")
     assert status == {"good": "holds", "last": "holds", "refused": "refused"} | wrong
     assert told[2] == "b, crash: ZeroDivisionError: in the middle of it"
-    assert json.loads((tmp_path / "out" / "extremes.json").read_text()) == result
+    assert json.loads((tmp_path / "out" / "extremes.json").read_text()) == result | {"faultgouge_format": 1}
     page = (tmp_path / "out" / "extremes.md").read_text()
     assert "9 cases: 2 hold, 1 are refused" in page
     assert "| too large | fails | 2 | 1 | twice |" in page

@@ -13,7 +13,7 @@ from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
 from faultgouge.pywrap import Engine, LoadPath, Scene, scene_path, settle
 from faultgouge.pywrap.onset import onset_run
 from faultgouge.pywrap.runs.path_error import PathError, PathErrors, squared_gap, with_path_error
-from faultgouge.studies.sweep.onset import onset
+from faultgouge.studies.onset import onset
 
 PAPER = Scene.from_toml(files("faultgouge") / "scenes/paper.toml").resolved()
 HUNDRED = {"packing": {"seed": 1}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
@@ -103,7 +103,7 @@ def test_rows_of_a_sweep_state_the_error_that_onset_states_and_it_covers():
     ramp = {"step": 2e-3, "until": 0.006}
     sections = {"packing": {"disks": 100, "seed": 28}, "law": {"kn": 2e5, "mu": 0.15}, "load": {"fy": 3.0}}
     scene, fine = (Scene.from_mapping(sections | {"ramp": ramp | more}) for more in ({}, {"step": 1e-4}))
-    row = onset(scene, partial(settle, scene))
+    row = onset.row(scene, partial(settle, scene))
     known, limit = (onset_run(each, 0.15, first=True) for each in (scene, fine))
     window = known.windows[0]
     assert (row["fx_c"], row["error"], row["error_of_path"]) == (window.fx_onset, window.error, window.path_error)

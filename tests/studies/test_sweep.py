@@ -23,9 +23,8 @@ from faultgouge.studies.executors import Processes, open_executor
 from faultgouge.studies.statistics import median_interval
 from faultgouge.studies.sweep import workers
 from faultgouge.studies.sweep.draw import draw_sweep, onsets_figure, reach_of
-from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
+from faultgouge.studies.sweep.run_sweep import merge, read_results, remaining_work, run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS, remaining_work
 from faultgouge.studies.sweep.user_function import user_function
 from faultgouge.studies.sweep.workers import WorkerError, compute_points
 
@@ -36,7 +35,7 @@ TOML += toml(SMALL, "scene.")
 
 def sweep_of(axes, task="onset", **changes):
     scene = {section: values | changes.get(section, {}) for section, values in SMALL.items()}
-    return Sweep.from_mapping({"task": task, "sweep": axes, "scene": scene}, TASKS)
+    return Sweep.from_mapping({"task": task, "sweep": axes, "scene": scene})
 
 
 def table(folder):
@@ -74,30 +73,10 @@ def test_what_settles_alike(axes, changes, shared):
     assert (first.settling_key == second.settling_key) is shared
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ('task = "onest"', "give one of"),
-        ('task = "onset"\nseeds = 3', "seeds is no key of a sweep"),
-        ('task = "onset"\n[sweep]\n"packing.seed" = "5:1"', "is no range"),
-        ('task = "onset"\n[sweep]\n"packing.seed" = []', "give a list of values"),
-        ('task = "onset"\n[sweep]\n"packing.seed" = "0:999999"\n"law.mu" = [1.0, 0.5]', "are more than 1000000"),
-        ('task = "onset"\n[sweep]\n"law.kn, law.mu" = [1.0]', "names 2 keys"),
-        ('task = "onset"\n[sweep]\n"law.mo" = [1.0]\n[scene.law]\nkn = 1.0', "law.mo is no key"),
-        ('task = "onset"\nsweep = 3', "is not a section"),
-        ("task = ", "not valid TOML"),
-    ],
-)
-def test_bad_sweeps_are_refused_in_a_sentence(tmp_path, text, says):
-    (tmp_path / "sweep.toml").write_text(text)
-    with pytest.raises(SceneError, match=says):
-        Sweep.from_toml(tmp_path / "sweep.toml", TASKS)
-
-
 def test_a_stored_packing_is_found_from_another_folder(tmp_path):
     (tmp_path / "packing.json").write_bytes(REFERENCE.read_bytes())
     mapping = {"task": "onset", "sweep": {"law.mu": [1.0]}, "scene": SMALL | {"packing": {"file": "packing.json"}}}
-    sweep = Sweep.from_mapping(mapping, TASKS, tmp_path)
+    sweep = Sweep.from_mapping(mapping, tmp_path)
     assert sweep.points[0].scene.packing.file == tmp_path / "packing.json"
 
 
@@ -118,9 +97,37 @@ def three(scene, settled, more):
 '''
 
 
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('task = "onest"', "give one of"),
+        ('task = "onset"\nseeds = 3', "seeds is no key of a sweep"),
+        ('task = "onset"\n[sweep]\n"packing.seed" = "5:1"', "is no range"),
+        ('task = "onset"\n[sweep]\n"packing.seed" = []', "give a list of values"),
+        ('task = "onset"\n[sweep]\n"packing.seed" = "0:999999"\n"law.mu" = [1.0, 0.5]', "are more than 1000000"),
+        ('task = "onset"\n[sweep]\n"law.kn, law.mu" = [1.0]', "names 2 keys"),
+        ('task = "onset"\n[sweep]\n"law.mo" = [1.0]\n[scene.law]\nkn = 1.0', "law.mo is no key"),
+        ('task = "onset"\nsweep = 3', "is not a section"),
+        ("task = ", "not valid TOML"),
+        ('task = "none.py:contacts"', "there is no file"),
+        ('task = "ask.py:nothing"', "has no function nothing"),
+        ('task = "ask.py:three"', r"takes 3 arguments: a task is three\(scene\)"),
+        ('task = "no.such.module:f"', "cannot be imported"),
+        ('task = "broken.py:f"', "cannot be imported .SyntaxError"),
+        ('task = "ends.py:f"', r"cannot be imported .SystemExit: 0"),
+    ],
+)
+def test_bad_sweeps_are_refused_in_a_sentence_before_work(tmp_path, text, says):
+    for name, code in {"ask.py": FUNCTIONS, "broken.py": "def", "ends.py": "raise SystemExit(0)"}.items():
+        (tmp_path / name).write_text(code)
+    (tmp_path / "sweep.toml").write_text(text)
+    with pytest.raises(SceneError, match=says):
+        Sweep.from_toml(tmp_path / "sweep.toml")
+
+
 def function_sweep(folder, function, axes=None):
     scene = {"task": f"ask.py:{function}", "sweep": axes or {"packing.seed": "1:2"}, "scene": SMALL}
-    return Sweep.from_mapping(scene, TASKS, folder)
+    return Sweep.from_mapping(scene, folder)
 
 
 def test_a_function_of_the_users_is_a_task_and_its_errors_are_rows(tmp_path):
@@ -148,23 +155,6 @@ def test_rows_of_a_function_are_known_by_its_code_and_shards_merge_without_it(tm
     assert not set(before) & {point.key for point in function_sweep(tmp_path, "contacts").points}
     file.unlink()
     assert [row["key"] for row in merge(parts, tmp_path / "whole", id)[1]] == before
-
-
-@pytest.mark.parametrize(
-    ("task", "says"),
-    [
-        ("none.py:contacts", "there is no file"),
-        ("ask.py:nothing", "has no function nothing"),
-        ("ask.py:three", r"takes 3 arguments: a task is three\(scene\)"),
-        ("no.such.module:f", "cannot be imported"),
-        ("broken.py:f", "cannot be imported .SyntaxError"),
-    ],
-)
-def test_a_function_that_cannot_be_called_is_refused_before_work(tmp_path, task, says):
-    (tmp_path / "ask.py").write_text(FUNCTIONS)
-    (tmp_path / "broken.py").write_text("def")
-    with pytest.raises(SceneError, match=says):
-        Sweep.from_mapping({"task": task, "scene": SMALL}, TASKS, tmp_path)
 
 
 def test_known_rows_tell_how_long_a_scene_takes(tmp_path):
@@ -345,7 +335,7 @@ def test_trigger_and_eruptions_as_tasks(tmp_path):
     scene = SMALL | more | {"eruptions": {"load": [0.02], "time": 1.0}}
     found = {}
     for task in ("trigger", "eruptions"):
-        wanted = Sweep.from_mapping({"task": task, "sweep": {"packing.seed": [2]}, "scene": scene}, TASKS)
+        wanted = Sweep.from_mapping({"task": task, "sweep": {"packing.seed": [2]}, "scene": scene})
         (row,) = run_sweep(wanted, tmp_path / task, say=id)
         assert draw_sweep([row], tmp_path / task, print).endswith("results.png")
         found[task] = row["result"]
@@ -397,9 +387,8 @@ WITHOUT_GUARD = """
 from pathlib import Path
 from faultgouge.studies.sweep.run_sweep import run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.tasks import TASKS
 
-run_sweep(Sweep.from_toml("sweep.toml", TASKS), Path("out"), workers=2)
+run_sweep(Sweep.from_toml("sweep.toml"), Path("out"), workers=2)
 """
 
 
@@ -448,7 +437,7 @@ def test_a_distributed_engine_whose_worker_is_killed_loses_nothing(tmp_path):
     """Dask's local cluster, as docs/howto_cluster.md has it."""
     distributed, dask = pytest.importorskip("distributed"), pytest.importorskip("dask")
     (tmp_path / "seeds.toml").write_text(SEEDS)
-    sweep, killed = Sweep.from_toml(tmp_path / "seeds.toml", TASKS), []
+    sweep, killed = Sweep.from_toml(tmp_path / "seeds.toml"), []
     alone = run_sweep(sweep, tmp_path / "alone", say=id, workers=1)
     stored = tmp_path / "cluster" / "results.jsonl"
     # one thread a worker: LAMMPS does not stand several in a process

@@ -2,20 +2,20 @@
 
 import json
 from dataclasses import replace
+from importlib import import_module
 from itertools import takewhile
 
 import numpy as np
 import pytest
 from reference_layer import REFERENCE, SMALL, toml
 
+from faultgouge.analysis.files.atomic_write import FORMAT, FORMAT_KEY
 from faultgouge.figures.pages import render
 from faultgouge.pywrap import Scene, SceneError, perturb, reach, settle
-from faultgouge.studies.eruptions import eruptions
-from faultgouge.studies.eruptions.compute import Start as RunStart
-from faultgouge.studies.eruptions.compute import erupt
-from faultgouge.studies.trigger import trigger_map
-from faultgouge.studies.trigger.compute import Wave, bisect_amplitude, predictions
-from faultgouge.studies.triggering.forecast import JUMP_SHARE, forecast
+from faultgouge.studies.eruptions import StartOfRun as RunStart
+from faultgouge.studies.eruptions import erupt, eruptions
+from faultgouge.studies.trigger import Wave, bisect_amplitude, predictions, trigger
+from faultgouge.studies.triggering import JUMP_SHARE, forecast
 
 BASE = SMALL | {"packing": {"file": str(REFERENCE)}, "ramp": {"step": 1e-3, "until": 0.025}}
 
@@ -30,9 +30,9 @@ def cut_off(folder, lines, name):
 
 @pytest.mark.long
 def test_prediction_is_what_lammps_bisects(tmp_path):
-    trigger = {"distance": [0.1, 1e-3], "omega": [1.0, 14.0], "time": 4.0, "runs": 2}
-    scene = Scene.from_mapping({**BASE, "friction": {"v0": 1e-7, "v_ss": "10 v0"}, "trigger": trigger})
-    result = trigger_map(scene, tmp_path / "out", say=id)
+    asked = {"distance": [0.1, 1e-3], "omega": [1.0, 14.0], "time": 4.0, "runs": 2}
+    scene = Scene.from_mapping({**BASE, "friction": {"v0": 1e-7, "v_ss": "10 v0"}, "trigger": asked})
+    result = trigger(scene, tmp_path / "out", say=id)
     assert result["fx_c"] == pytest.approx(0.021833056408, rel=1e-9)
     assert len(result["map"]) == 4
     runs = [row for row in result["map"] if row["measured"] is not None]
@@ -41,19 +41,19 @@ def test_prediction_is_what_lammps_bisects(tmp_path):
         assert row["below"] < row["measured"] < row["above"] < 1.011 * row["below"]
         assert row["predicted"] == pytest.approx(row["measured"], rel=0.05)
     lines = (tmp_path / "out/trigger.jsonl").read_text()
-    assert trigger_map(scene, tmp_path / "out", say=id) == result
+    assert trigger(scene, tmp_path / "out", say=id) == result
     assert (tmp_path / "out/trigger.jsonl").read_text() == lines  # nothing was computed again
-    assert trigger_map(scene, cut_off(tmp_path, lines, "trigger.jsonl"), say=id) == result
+    assert trigger(scene, cut_off(tmp_path, lines, "trigger.jsonl"), say=id) == result
     assert {"map.png", "thresholds.png", "trigger.md"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 
 @pytest.mark.long
 def test_distances_count_from_the_onset_with_dissipation(tmp_path):
     """Normal dashpots alone lower it, from 0.0218331 to 0.0218328; the wave is damped, in K's answer as in LAMMPS."""
-    trigger = {"distance": [0.1], "omega": [14.0], "time": 1.0, "runs": 1}
-    more = {"damping": {"cn": 1.0}, "friction": {"v0": 1e-7, "v_ss": "10 v0"}, "trigger": trigger}
+    asked = {"distance": [0.1], "omega": [14.0], "time": 1.0, "runs": 1}
+    more = {"damping": {"cn": 1.0}, "friction": {"v0": 1e-7, "v_ss": "10 v0"}, "trigger": asked}
     scene = Scene.from_mapping({**BASE, "ramp": {"step": 5.5e-3, "until": 0.022}, **more})
-    result = trigger_map(scene, tmp_path / "out", say=id)
+    result = trigger(scene, tmp_path / "out", say=id)
     assert result["fx_c"] == pytest.approx(0.0218328368, abs=1e-10)
     assert result["undamped_fx_c"] == pytest.approx(0.021833056408, rel=1e-9)
     (row,) = result["map"]
@@ -72,7 +72,7 @@ def test_distances_count_from_the_onset_with_dissipation(tmp_path):
 def test_trigger_needs_a_threshold(tmp_path, more, says):
     scene = Scene.from_mapping(BASE | more)
     with pytest.raises(SceneError, match=says):
-        trigger_map(scene, tmp_path)
+        trigger(scene, tmp_path)
     assert not list(tmp_path.iterdir())
 
 
@@ -101,7 +101,7 @@ def test_a_stable_packing_is_watched_for_a_time_of_its_own_units(units, monkeypa
         sections["packing"]["settle_friction"] = friction  # with it the packing is unstable
         start = settle(Scene.from_mapping(sections))
         if friction:
-            monkeypatch.setattr("faultgouge.studies.eruptions.compute.growth_rate", lambda packing: 0.0)
+            monkeypatch.setattr(import_module("faultgouge.studies.eruptions"), "growth_rate", lambda packing: 0.0)
         run = erupt(RunStart(start.packing, start.residual, 200.0 * unit))
         found[friction] = run["ends"], run["time"] / unit
     assert [ends for ends, _ in found.values()] == ["stable", "rises"]
@@ -114,7 +114,7 @@ def test_the_page_of_eruptions_says_which_sizes_are_noise():
     words = {}
     for name, more in {"noise": {"msd": 1e-24, "ends": "cut off"}, "grown": {"msd": 1e-10, "ends": "law"}}.items():
         result = {"runs": [run | more], "scene": {"load": {"fy": 3.0}}}
-        page = render("faultgouge.studies.eruptions", "eruptions.md.j2", units=None, **eruptions.page(result))
+        page = render("faultgouge.studies", "eruptions.md.j2", units=None, **eruptions.page(result))
         words[name] = " ".join(page.split())
     assert "1 did not leave this noise in their time, and their sizes are those of the noise" in words["noise"]
     assert "All sizes stand above it" in words["grown"]
@@ -148,7 +148,8 @@ def test_eruptions_grow_out_of_noise_and_are_the_same_on_two_ranks(faultgouge, t
     # rounding alone: 1e-25 after a hundred time units
     assert all(run["noise"] < 1e-25 for run in one["runs"])
     done = faultgouge("eruptions", "scene.toml", "-o", "two", "--json", ranks=2)
-    assert json.loads(done.stdout) == one == json.loads((tmp_path / "two/eruptions.json").read_text())
+    stored = json.loads((tmp_path / "two/eruptions.json").read_text())
+    assert json.loads(done.stdout) == stored == {FORMAT_KEY: FORMAT, **one}
 
 
 @pytest.mark.slow

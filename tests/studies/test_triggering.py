@@ -9,8 +9,7 @@ from faultgouge.analysis.motion.normal_form import NormalForm
 from faultgouge.analysis.motion.power_law import PowerLaw
 from faultgouge.figures.pages import render
 from faultgouge.pywrap.lammps.dynamics import Weakening
-from faultgouge.studies.triggering.compute import Sensitivity, Triggering, judge, summary
-from faultgouge.studies.triggering.forecast import Forecast
+from faultgouge.studies.triggering import Forecast, Sensitivity, Triggering, judge, summary
 
 V0, LENGTH = 1e-11, 400.0
 TIME = np.linspace(0.1, LENGTH, 4000)

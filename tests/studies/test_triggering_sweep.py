@@ -9,10 +9,10 @@ from reference_layer import SMALL, toml
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import NoEquilibriumError, Scene, SceneError, settle
 from faultgouge.pywrap.onset import onset_run
+from faultgouge.studies import triggering
 from faultgouge.studies.reproduce import reproduce
 from faultgouge.studies.statistics import distribution, median_interval, quartiles, share, sign_test
-from faultgouge.studies.sweep import triggering
-from faultgouge.studies.sweep.triggering_summary import in_words, summary
+from faultgouge.studies.triggering import in_words, summary_of_rows
 
 SCENE = SMALL | {
     "packing": SMALL["packing"] | {"seed": 2},
@@ -123,14 +123,14 @@ def test_what_was_found_before_a_failure_is_kept(scene, monkeypatch):
     found = {1.0: end("onset", 0.01), 0.8: end("onset", 0.008, 0.8)}
     monkeypatch.setattr(triggering, "first_onset", lambda scene, mu, start: (found[mu], ()))
     monkeypatch.setattr(triggering, "eruption", fail)
-    result = triggering.triggering(scene, None)
+    result = triggering.triggering.row(scene, None)
     assert [each["reach"] for each in result["ramps"]] == [0.01, 0.008]
     assert result["lowered"] is True
     assert result["says"] == "no eruption today"
 
 
 def test_eruptions_are_counted():
-    result = summary(MEMBERS)
+    result = summary_of_rows(MEMBERS)
     assert {name: (each["count"], each["of"]) for name, each in result["rises"].items()} == {"5": (3, 4), "10": (2, 4)}
     assert [each["count"] for each in result["control_rises"].values()] == [4, 0]
     assert (result["grows"]["count"], result["grows"]["of"]) == (2, 4)
@@ -148,9 +148,9 @@ def test_eruptions_are_counted():
 
 def test_the_summary_keeps_what_was_found_before_a_failure():
     broken = row(8, [end("onset", 0.01)], says="no eruption today")
-    result = summary([broken, row(9, says="did not settle")])
+    result = summary_of_rows([broken, row(9, says="did not settle")])
     assert (result["onsets"][0]["found"]["count"], result["lowered"]["of"], result["lowered_unknown"]) == (1, 0, 0)
-    assert in_words(summary([row(9, says="did not settle")])) == []
+    assert in_words(summary_of_rows([row(9, says="did not settle")])) == []
 
 
 @pytest.mark.slow

@@ -8,8 +8,7 @@ from reference_layer import toml
 from faultgouge.analysis import spectrum
 from faultgouge.pywrap import Scene, ramp, settle
 from faultgouge.studies.statistics import sign_test
-from faultgouge.studies.sweep.triggering import triggering
-from faultgouge.studies.sweep.triggering_summary import in_words, summary
+from faultgouge.studies.triggering import in_words, summary_of_rows, triggering
 
 UNSTABLE = {
     "packing": {"disks": 20, "top": 4, "width": 4.9, "seed": 1, "settle_friction": True},
@@ -76,10 +75,10 @@ def test_perturb_and_trigger(faultgouge_here, refusal, pairs):
 def test_a_sweep_infers_nothing_of_weakening():
     """With mu = 0.4 the sweep finds no equilibrium at the next load, which is no sign of a flow."""
     scene = Scene.from_mapping({name: UNSTABLE[name] for name in ("packing", "law", "load", "ramp")})
-    found = triggering(scene, lambda mu: settle(scene, mu))
+    found = triggering.row(scene, lambda mu: settle(scene, mu))
     assert [(each["ends"], each["reach"]) for each in found["ramps"]] == [("onset", 0.0)] * 2
     assert found["lowered"] is None
-    assert "both packings are unstable" in "\n".join(in_words(summary([{"result": found, "says": None}])))
+    assert "both packings are unstable" in "\n".join(in_words(summary_of_rows([{"result": found, "says": None}])))
 
 
 def test_two_unstable_starts_do_not_tell_whether_the_onset_is_lower():

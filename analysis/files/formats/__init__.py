@@ -1,15 +1,37 @@
 """Packings from and to other codes: LAMMPS, MercuryDPM, YADE, GSD, extended XYZ, CSV, VTK.
 
-`formats` lists the module that reads and writes each kind of file. A reader returns `Disks`, plain columns;
-`packing_of` makes a packing of disks, and `upper_layer` finds the layer that carries the load. `settling.relax` brings
-a packing out of balance to rest.
+`FORMATS` has a line for each format: the module that reads and writes it, imported when a file of the format is used. A
+reader returns `Disks`, plain columns; `packing_of` makes a packing of disks, and `upper_layer` finds the layer that
+carries the load. `settling.relax` brings a packing out of balance to rest. A writer takes `Exported`, the columns of a
+Packing or of a Configuration.
 """
 
-from .disks import Disks, Slips, packing_of
-from .export_quantities import Frame, ModeVectors
-from .frames import choose_frames, frames_of
-from .registry import format_of, is_hdf5, read_disks, write_frames, write_packing
-from .upper_layer import UpperLayerError, upper_layer
+from __future__ import annotations
+
+import re
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ...arrays import Floats
+from ...configuration import Configuration
+from ...counted import counted
+from ...errors import BadInputError, PackingFileError
+from ...packing.packing import Packing
+from ..atomic_write import BEGINNINGS
+from ..plain_file import open_plain, open_text
+from .disks import Disks, Slips, UpperLayerError, packing_of, upper_layer
+from .exported import (
+    Frame,
+    ModeVectors,
+    choose_frames,
+    exported_configuration,
+    exported_packing,
+    frames_of,
+    motion_of_mode,
+)
 
 __all__ = [
     "Disks",
@@ -27,3 +49,261 @@ __all__ = [
     "write_frames",
     "write_packing",
 ]
+
+RESTART_BEGINNING = b"LammpS RestartT"
+"""How restarts of LAMMPS begin."""
+
+WORD_OF_NUMBER = re.compile(r"[-+.\deE]+")
+
+
+class Format(NamedTuple):
+    """A format.
+
+    Attributes
+    ----------
+    words : str
+        What it is.
+    module : str
+        The module of this package.
+    suffixes : tuple of str
+        Of files that are read; a file that is written has the first. Of a format that the first line tells, what that
+        line is.
+    reader : str
+        Function in the module; empty for what is not read. Restarts are read by LAMMPS itself, in pywrap.
+    frames : bool
+        Whether a file that is read may hold several frames.
+    text : bool
+        Whether a file that is read may be compressed by gzip, and its name end in .gz.
+    """
+
+    words: str
+    module: str
+    suffixes: tuple[str, ...]
+    reader: str = ""
+    frames: bool = False
+    text: bool = True
+
+
+DATA = Format("LAMMPS data (atom style sphere)", "lammps_data", (".data",), "read_data")
+DUMP = Format("LAMMPS dump", "lammps_dump", (".dump", ".lammpstrj"), "read_custom_dump", frames=True)
+RESTART = Format("LAMMPS restart", "", (".restart",), "LAMMPS itself", text=False)
+YADE = Format("YADE's text", "tables", ("line 1 is #format x_y_z_r",), "read_yade")
+MERCURY = Format("MercuryDPM's data", "tables", (".data, line 1 is N time bounds",), "read_mercury", frames=True)
+MDANALYSIS = Format("what MDAnalysis reads with radii", "libraries", (), "read_universe", frames=True)
+
+FORMATS = (
+    Format("dumps of the decks", "lammps_dump", (".disks",), "read_deck_dump", frames=True, text=False),
+    Format("extended XYZ", "xyz", (".xyz", ".extxyz"), "read_xyz", frames=True),
+    DATA,
+    DUMP,
+    RESTART,
+    Format("tables", "tables", (".csv", ".txt"), "read_table"),
+    Format("packing.json", "tables", (".json",), "read_json"),
+    Format("GSD", "libraries", (".gsd",), "read_gsd", frames=True, text=False),
+    YADE,
+    MERCURY,
+)
+"""LAMMPS has no suffixes of its own: data.NAME, dump.NAME and restart.NAME are known as well. YADE and MercuryDPM are
+told by the first line, whatever the name is; MercuryDPM's files have the suffix of LAMMPS's."""
+
+READERS = {suffix: each for each in FORMATS for suffix in each.suffixes}
+WRITERS = {".vtp": ("vtp", "write_vtp"), ".xyz": ("xyz", "write_xyz"), ".gsd": ("libraries", "write_gsd")}
+FILMS = {name: WRITERS[name] for name in (".xyz", ".gsd")} | {".pvd": ("vtp", "write_pvd")}
+"""Module and function by suffix: of one packing, with modes; of several frames."""
+HEAD_OF_CONTACTS = "id1,id2,n_x,n_y,n_z,f_n,f_t,"
+"""How a table of contacts begins."""
+WITHOUT_MODES = {".data": "LAMMPS data", ".csv": "a table of contacts"}
+
+
+def list_formats() -> str:
+    """All formats that are read, in words."""
+    listed = [f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS]
+    return ", ".join(
+        [*listed, "each text also as .gz", "run.h5", "LAMMPS decks (.in, in.NAME)", f"and {MDANALYSIS.words}"]
+    )
+
+
+def begins_with(path: Path, *beginnings: bytes) -> bool:
+    """Whether a file begins in one of some ways; OSError if it cannot be read."""
+    with open_plain(path) as stream:
+        return stream.read(64).startswith(beginnings)
+
+
+def is_hdf5(path: Path) -> bool:
+    """Whether a file begins like HDF5 or like a run.h5; OSError if it cannot be read."""
+    return begins_with(path, *BEGINNINGS)
+
+
+def format_of(path: Path) -> Format:
+    """Find the format of a file by its suffix, or by its prefix for LAMMPS files.
+
+    Raises
+    ------
+    PackingFileError
+        If no reader knows the format.
+    OSError
+        If the file cannot be read.
+    """
+    begun = _by_beginning(path)
+    if begun is not None:
+        return begun
+    suffix = Path(path.stem).suffix if path.suffix.lower() == ".gz" else path.suffix
+    found = READERS.get(suffix.lower())
+    if found is not None and (suffix == path.suffix or found.text):
+        return found
+    if begins_with(path, RESTART_BEGINNING):
+        return RESTART
+    begin = path.name.split(".")[0].lower()
+    if begin in ("data", "dump"):
+        return DATA if begin == "data" else DUMP
+    if is_hdf5(path):
+        raise PackingFileError(f"{path} is HDF5 and needs no import: packing.file, draw and spectrum take a run.h5.")
+    from .libraries import has_parser
+
+    own = path.suffix.lower() == ".h5"  # MDAnalysis has a parser of it once `mdanalysis` is imported
+    if path.suffix and not own and has_parser(path):
+        return MDANALYSIS
+    raise PackingFileError(f"{path} is of no format that is read: give {list_formats()}.")
+
+
+def _by_beginning(path: Path) -> Format | None:
+    """YADE and MercuryDPM, which the first line tells."""
+    try:
+        with open_text(path) as stream:
+            words = stream.readline(400).split()
+    except (OSError, UnicodeDecodeError, EOFError, zlib.error):
+        return None
+    if words[:1] == ["#format"]:
+        return YADE
+    numbers = len(words) in (6, 8) and all(WORD_OF_NUMBER.fullmatch(word) for word in words)
+    return MERCURY if numbers and ".data" in path.name.lower() else None
+
+
+def read_disks(path: Path, frame: int | None = None) -> Disks:
+    """Read the disks in a file of another code.
+
+    Parameters
+    ----------
+    path : Path
+        The file; see `list_formats`.
+    frame : int, optional
+        Number of the frame; negative numbers count from the last.
+
+    Raises
+    ------
+    PackingFileError
+        If the file is missing, has no known format, is a restart, or does not contain disks in a plane.
+    """
+    if not path.is_file():
+        raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
+    found = format_of(path)
+    if not found.frames and frame not in (None, 0, -1):
+        raise PackingFileError(f"{path} has one frame; there is no --frame {frame}.")
+    if found is RESTART:
+        raise PackingFileError(f"{path} is a restart: LAMMPS itself reads it, in faultgouge import.")
+    disks: Disks = _function(found.module, found.reader)(path, *([frame] if found.frames else []))
+    return disks
+
+
+def _function(module: str, name: str) -> Any:
+    return getattr(import_module(f".{module}", __package__), name)
+
+
+def check_writer(path: Path, modes: bool = False, frames: bool = False) -> None:
+    """Refuse a name that no writer takes, of several frames or of one packing with or without modes."""
+    if frames:
+        if path.suffix not in FILMS:
+            raise BadInputError(f"-o {path}: several frames go into {', '.join(FILMS)}; give it one of these suffixes.")
+        return
+    if path.suffix == ".pvd":
+        raise BadInputError(f"-o {path}: a .pvd is a list of frames; add --frames all, or export a .vtp.")
+    if path.suffix not in (*WRITERS, *WITHOUT_MODES):
+        names = ", ".join([*WRITERS, *WITHOUT_MODES])
+        raise BadInputError(f"-o {path}: exports are {names}; give it one of these suffixes.")
+    if modes and path.suffix in WITHOUT_MODES:
+        what = WITHOUT_MODES[path.suffix]
+        raise BadInputError(f"-o {path}: {what} has no room for modes; leave --mode out, or export .vtp or .xyz.")
+
+
+def write_packing(
+    path: Path,
+    packing: Packing | Configuration,
+    modes: Sequence[ModeVectors] = (),
+    values: Mapping[str, Floats] | None = None,
+) -> str:
+    """Write a packing for another code.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its suffix is the format.
+    packing : Packing or Configuration
+        The packing.
+    modes : sequence of ModeVectors
+        Modes to write with the packing.
+    values : mapping of ndarray, each of shape (N,), optional
+        Further columns of the particles, by name; for .vtp, .xyz and .gsd.
+
+    Returns
+    -------
+    str
+        Description of the contents, and of what the format cannot store.
+
+    Raises
+    ------
+    BadInputError
+        If the suffix is none of an export, or the format has no modes.
+    OutputError
+        If the file cannot be written.
+    """
+    check_writer(path, bool(modes))
+    alone = isinstance(packing, Packing)
+    if path.suffix == ".data":
+        return str(_function("lammps_data", "write_data" if alone else "write_spheres")(path, packing))
+    if path.suffix == ".csv":
+        return str(_function("tables", "write_contacts")(path, packing, HEAD_OF_CONTACTS))
+    if isinstance(packing, Packing):
+        exported = exported_packing(Frame(packing), modes)
+    else:
+        exported = exported_configuration(packing, modes)
+    exported.particles.update(values or {})
+    write = _function(*WRITERS[path.suffix])
+    words = write(path, exported if path.suffix == ".vtp" else [(0.0, exported)])
+    if alone and path.suffix != ".vtp":
+        return str(words)
+    what = {"disk" if alone else "particle": len(packing), "contact": len(packing.contacts), "mode": len(modes)}
+    return ", ".join(counted(number, noun) for noun, number in what.items())
+
+
+def write_frames(path: Path, frames: Iterable[Frame]) -> None:
+    """Write the frames of a ramp or of an undamped run (`frames_of`) for another code; the suffix is the format.
+
+    Raises
+    ------
+    BadInputError
+        If the suffix is not in `FILMS`.
+    OutputError
+        If the file cannot be written.
+    """
+    check_writer(path, frames=True)
+    _function(*FILMS[path.suffix])(path, ((float(each.time), exported_packing(each)) for each in frames))
+
+
+def write_mode_frames(
+    path: Path, configuration: Configuration, mode: ModeVectors, count: int, periods: int = 1
+) -> None:
+    """Write the motion of a mode, growth left out, as a film of frames.
+
+    Parameters
+    ----------
+    count, periods : int
+        Frames, and whole periods of the mode in them.
+
+    Raises
+    ------
+    BadInputError, OutputError
+        As of `write_frames`.
+    """
+    check_writer(path, frames=True)
+    frames = motion_of_mode(configuration, mode, count, periods)
+    _function(*FILMS[path.suffix])(path, ((float(k), frame) for k, frame in enumerate(frames)))

@@ -3,10 +3,13 @@
 Readers find columns; `of_columns` interprets the columns, whatever their names in the format. If a file lacks masses,
 angles, slips or the period, the mass is 1, angles and slips are 0, and the sides are open. Impossible numbers are
 refused here, once for all formats: disks out of the plane, below the floor, or with a centre inside another disk.
+`upper_layer` selects the layer by a number of disks, a type, IDs, a group, or a region, in one line of text.
 """
 
 from __future__ import annotations
 
+import operator
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -15,14 +18,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Floats, Indices
-from ...errors import PackingFileError
+from ...errors import BadInputError, PackingFileError
 from ...packing.contacts import FLOOR, Contacts
 from ...packing.geometry import nearest_image, neighbour_tree, touching
 from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
+from ..plain_file import read_plain_text
 
 FLATNESS = 1e-6
 """Spread of z up to which disks lie in a plane, in smallest radii: text with seven digits, or float32, leaves less."""
+
+LAYER_WAYS = (
+    "12 (the highest that touch something), type:2, type:NAME, ids:1,4,7-9, ids:@FILE, group:NAME (of a restart), or a "
+    'region such as "y>10"'
+)
+
+LEAST_TOUCHING_SHARE = 0.5
+"""Share of disks that touch something below which a packing is not at rest yet, and contacts tell nothing."""
+
+MOST_NAMES = 10
+"""Disks that are named; more are counted."""
+
+OPERATORS = {"<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": operator.ge}
+REGION = re.compile(r"\s*(x|y|radius)\s*(<=|>=|<|>)\s*([-+.\deE]+)\s*")
+
 
 NAMES = {
     "x": ("x", "xu", "pos_x"),
@@ -345,3 +364,137 @@ def _whole(source: str, name: str, column: Floats) -> Indices:
     if not np.array_equal(column, np.rint(column)) or (name == "id" and np.any(column < 1)):
         raise PackingFileError(f"{source}: the column {name} must hold whole numbers{' from 1' * (name == 'id')}.")
     return column.astype(np.int64)
+
+
+class UpperLayerError(BadInputError):
+    """The upper layer is not given, or its text is not understood, or names what a file does not have."""
+
+
+def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> NDArray[np.bool_]:
+    """Select the disks of the upper layer.
+
+    Parameters
+    ----------
+    disks : Disks
+        From a reader.
+    says : str or int, optional
+        A number of highest disks that touch something, ``type:K`` or ``type:NAME``, ``ids:1,4,7-9``, ``ids:@FILE``
+        (numbers in a file), ``group:NAME``, or conditions on x, y and radius joined by "and". By default the upper
+        layer of the file. Of a packing of which less than half touches something, which is not at rest yet, a number
+        is one of the highest of all disks.
+    key : str
+        What stands before the text where the user gives it, for messages.
+
+    Returns
+    -------
+    ndarray of bool, shape (N,)
+
+    Raises
+    ------
+    UpperLayerError
+        If no upper layer is given, the text is not understood, or it selects no disk.
+    """
+    source, text = disks.source, "" if says is None else str(says).strip()
+    kind, _, value = text.partition(":")
+
+    def refusal(reason: str) -> UpperLayerError:
+        return UpperLayerError(f"{key}{text}: {reason}.")
+
+    if says is None:
+        if disks.top is None:
+            says = f"{source} does not say which disks are the upper layer"
+            raise UpperLayerError(f"{says}: add {key.rstrip(' =')}, {LAYER_WAYS}.")
+        if not disks.top.any():
+            raise UpperLayerError(f"{source}: its own column top holds no disk: {_extent(disks)}.")
+        return disks.top
+    if text.isdecimal():
+        if int(text) > len(disks):
+            raise refusal(f"{source} has {len(disks)} disks alone")
+        order = np.argsort(-disks.position[:, 1], kind="stable")
+        held = ~touching_nothing(disks)[order]
+        if held.sum() >= max(int(text), LEAST_TOUCHING_SHARE * len(disks)):
+            order = order[held]
+        chosen = np.isin(np.arange(len(disks)), order[: int(text)])
+    elif kind == "type" and value in disks.types:
+        chosen = disks.types[value]
+    elif kind == "type" and value.isdecimal() and disks.kind is not None:
+        chosen = disks.kind == int(value)
+    elif kind == "type" and value:
+        if disks.types:
+            raise refusal(f"{source} has no type {value} (its types: {', '.join(disks.types)})")
+        if disks.kind is None:
+            raise refusal(f"{source} has no types; take another of {LAYER_WAYS}")
+        raise refusal(f"the types of {source} have no names: give a number, as in type:2")
+    elif kind == "group" and value:
+        if value not in disks.groups:
+            has = ", ".join(disks.groups) or "none; restarts alone have groups"
+            raise refusal(f"{source} has no group {value} (its groups: {has})")
+        chosen = disks.groups[value]
+    elif kind == "ids" and value:
+        try:
+            listed = read_plain_text(value[1:]) if value.startswith("@") else value
+        except (OSError, UnicodeDecodeError) as error:
+            raise refusal(f"the file cannot be read ({error})") from None
+        wanted: set[int] = set()
+        for part in re.split(r"[\s,]+", listed.strip()):
+            match = re.fullmatch(r"(\d+)(?:-(\d+))?", part)
+            if not match:
+                raise refusal(f"{part} is no ID and no range of IDs, as in ids:1,4,7-9")
+            wanted.update(range(int(match[1]), int(match[2] or match[1]) + 1))
+        if missing := wanted - set(disks.id.tolist()):
+            raise refusal(f"{source} has no disk {min(missing)}")
+        chosen = np.isin(disks.id, list(wanted))
+    else:
+        values = {"x": disks.position[:, 0], "y": disks.position[:, 1], "radius": disks.radius}
+        chosen = np.ones(len(disks), dtype=np.bool_)
+        for part in text.split(" and "):
+            match = REGION.fullmatch(part)
+            try:
+                chosen = chosen & OPERATORS[match[2]](values[match[1]], float(match[3])) if match else chosen & False
+            except ValueError:
+                match = None
+            if match is None:
+                raise refusal(f"it is none of {LAYER_WAYS}")
+    if not chosen.any():
+        raise refusal(f"this layer of {source} holds no disk: {_extent(disks)}")
+    return chosen
+
+
+def touching_nothing(disks: Disks) -> NDArray[np.bool_]:
+    """Disks that touch neither another disk nor the floor, shape (N,)."""
+    try:
+        contacts = touching(disks.position, disks.radius, disks.box_length)
+    except ValueError as error:
+        raise PackingFileError(f"{disks.source} describes no possible packing: {error}") from error
+    alone = np.ones(len(disks), dtype=np.bool_)
+    alone[contacts.i] = alone[contacts.j[~contacts.floor]] = False
+    return alone
+
+
+def layer_remark(disks: Disks, says: str | None, layer: NDArray[np.bool_]) -> str:
+    """A remark on disks that touch nothing, in the layer or above it; empty for none, or too many."""
+    alone = touching_nothing(disks)
+    if alone.mean() > 1 - LEAST_TOUCHING_SHARE:
+        return ""
+    loose = disks.id[layer & alone].tolist()
+    if loose:
+        return f"{len(loose)} of the {layer.sum()} disks of the upper layer touch nothing: {_list_ids(loose)}"
+    if says is None or not says.strip().isdecimal():
+        return ""
+    above = disks.id[alone & (disks.position[:, 1] > disks.position[layer, 1].min())].tolist()
+    return (
+        f"--top {says} leaves out {len(above)} of the highest disks, which touch nothing: {_list_ids(above)}"
+        if above
+        else ""
+    )
+
+
+def _list_ids(ids: list[int]) -> str:
+    return ", ".join(map(str, ids[:MOST_NAMES])) + (", ..." if len(ids) > MOST_NAMES else "")
+
+
+def _extent(disks: Disks) -> str:
+    y = disks.position[:, 1]
+    types = list(disks.types) or ([] if disks.kind is None else np.unique(disks.kind).tolist())
+    kinds = f", and their types are {', '.join(map(str, types))}" if types else ""
+    return f"its disks go from y = {y.min():g} to {y.max():g}{kinds}"

@@ -11,19 +11,18 @@ end of its line, because there may be no density that gives the mass to the last
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
 
+from ...configuration import Configuration
 from ...errors import PackingFileError
 from ...packing.packing import Packing
-from ..atomic_write import write_text
-from . import export_quantities
+from ..atomic_write import FORMAT, FORMAT_KEY, check_format, write_text
 from .disks import Disks, of_columns, sphere_volume
-from .export_quantities import Frame, ModeVectors
-from .text_columns import columns_of, lines_of, numbers_in, strip_comments
+from .exported import contact_rows, pick_numbers, scalars, slips_of
+from .tables import columns_of, lines_of, numbers_in, strip_comments
 
 HEADER_COMMENT = "# faultgouge"
 CONTACT_COMMENT = "# contact"
@@ -48,7 +47,7 @@ def read_data(path: Path) -> Disks:
     if not rows:
         raise PackingFileError(f"{path} has no disks.")
     low, high = header["xlo xhi"]
-    marked = next((line for line in lines[:start] if HEADER_COMMENT in line), None)
+    marked = next((line for line in lines[:start] if f"{HEADER_COMMENT} " in line), None)
     if marked is None:
         return of_columns(str(path), columns, box_length=high - low)
     # a file that faultgouge wrote
@@ -57,12 +56,13 @@ def read_data(path: Path) -> Disks:
     columns |= columns_of(path, comments, names, f"{len(names)} behind the #")
     columns["top"] = columns["type"] - 1
     values = dict(part.split("=") for part in marked.partition(HEADER_COMMENT)[2].split() if "=" in part)
+    check_format(values.get(FORMAT_KEY), path)
     contacts = " ".join(
         line.removeprefix(CONTACT_COMMENT) for line in lines[:start] if line.startswith(CONTACT_COMMENT)
     )
-    slips = export_quantities.slips_of(numbers_in(contacts, path), "x_low" in columns)
+    slips = slips_of(numbers_in(contacts, path), "x_low" in columns)
     period = high - low if values.get("sides") == "p" else None
-    return of_columns(str(path), columns, box_length=period, given=export_quantities.pick_numbers(values), slips=slips)
+    return of_columns(str(path), columns, box_length=period, given=pick_numbers(values), slips=slips)
 
 
 def _header(path: Path, lines: list[str]) -> dict[str, list[float]]:
@@ -82,19 +82,32 @@ def _header(path: Path, lines: list[str]) -> dict[str, list[float]]:
     return found
 
 
-def write_data(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
+def write_spheres(path: Path, configuration: Configuration) -> str:
+    """Write the particles of a Configuration; returned is, in words, which part of it is there."""
+    c = configuration
+    (xx, *_), (xy, yy, _), (xz, yz, zz) = c.box.tolist()
+    low, rest = c.origin.tolist(), np.pad(c.position, ((0, 0), (0, 3 - c.dimension)))
+    box = [f"{a!r} {a + size!r} {axis}lo {axis}hi" for axis, a, size in zip("xyz", low, (xx, yy, zz), strict=True)]
+    tilt = [f"{xy!r} {xz!r} {yz!r} xy xz yz"] if any((xy, xz, yz)) else []
+    lines = [f"# {FORMAT_KEY}={FORMAT}", "", f"{len(c)} atoms", f"{c.kind.max()} atom types", *box, *tilt, ""]
+    columns = [c.ids, c.kind, 2 * c.radius, c.mass / sphere_volume(c.radius), *rest.T]
+    rows = [" ".join(map(repr, row)) for row in zip(*(each.tolist() for each in columns), strict=True)]
+    write_text(path, "\n".join([*lines, "Atoms # sphere", "", *rows]) + "\n")
+    return "places, radii, masses and types; contacts, laws and loads are not in it"
+
+
+def write_data(path: Path, packing: Packing) -> str:
     """Write a data file that `read_data` reads back to the bit; returned is, in words, which part LAMMPS reads."""
-    (packing,) = (frame.packing for frame in frames)
     volume = sphere_volume(packing.radius)
     density = packing.mass / volume  # no other double gives LAMMPS the mass to the bit where this one does not
     sides = "f" if packing.box_length is None else "p"
     lines = [
-        f"{HEADER_COMMENT} sides={sides} "
-        + " ".join(f"{key}={value!r}" for key, value in export_quantities.scalars(packing).items())
+        f"{HEADER_COMMENT} {FORMAT_KEY}={FORMAT} sides={sides} "
+        + " ".join(f"{key}={value!r}" for key, value in scalars(packing).items())
     ]
     lines += ["", f"{len(packing)} atoms", "2 atom types", *box_lines(packing), ""]
     # behind the numbers of the header: readers look for these in the first lines to know the format
-    for first, second, *slips in export_quantities.contact_rows(packing).tolist():
+    for first, second, *slips in contact_rows(packing).tolist():
         lines.append(" ".join([CONTACT_COMMENT, str(int(first)), str(int(second)), *map(repr, slips)]))
     lines += ["", "Atoms # sphere", ""]
     extra = [packing.mass, packing.angle]

@@ -1,4 +1,4 @@
-"""Read and write extended XYZ, the format of OVITO and ASE, in full precision: `import` reads an export back bitwise.
+"""Extended XYZ, the format of OVITO and ASE, in full precision: `import` reads an export of a Packing back bitwise.
 
 The second line has the box (Lattice, pbc), the columns (Properties), law and load by name, and the contacts as one list
 of numbers. One line for each disk follows.
@@ -13,11 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import PackingFileError
-from ..atomic_write import replace_whole
-from . import export_quantities
+from ..atomic_write import FORMAT, FORMAT_KEY, check_format, replace_whole
 from .disks import Disks, of_columns
-from .export_quantities import Frame, ModeVectors
-from .text_columns import block_of_frame, columns_of, lines_of, numbers_in
+from .exported import Exported, pick_numbers, slips_of
+from .tables import block_of_frame, columns_of, lines_of, numbers_in
 
 PAIR = re.compile(r'([\w./-]+)=(?:"([^"]*)"|(\S+))')
 VECTORS = {"pos": ("x", "y", "z"), "position": ("x", "y", "z")}
@@ -34,6 +33,7 @@ def read_xyz(path: Path, frame: int | None = None) -> Disks:
 
     begin, count = block_of_frame(path, lines, 2, count_at, frame, "XYZ")
     values = {key: quoted or plain for key, quoted, plain in PAIR.findall(lines[begin + 1])}
+    check_format(values.get(FORMAT_KEY), path)
     if "Properties" not in values:
         raise PackingFileError(
             f"{path}, line {begin + 2}: it has no Properties=..., so that this is no extended XYZ file."
@@ -46,11 +46,9 @@ def read_xyz(path: Path, frame: int | None = None) -> Disks:
     lattice = numbers_in(values.get("Lattice", ""), path)
     periodic = len(lattice) == 9 and values.get("pbc", "T T T").split()[0] in ("T", "1", "True")
     listed = values.get("contacts")
-    slips = None if listed is None else export_quantities.slips_of(numbers_in(listed, path), "x_low" in columns)
+    slips = None if listed is None else slips_of(numbers_in(listed, path), "x_low" in columns)
     period = lattice[0] if periodic else None
-    return of_columns(
-        str(path), columns, species, box_length=period, given=export_quantities.pick_numbers(values), slips=slips
-    )
+    return of_columns(str(path), columns, species, box_length=period, given=pick_numbers(values), slips=slips)
 
 
 def _columns(properties: str) -> list[str | None]:
@@ -74,67 +72,33 @@ def _species_column(properties: str) -> int | None:
     return None
 
 
-def _write_columns(frame: Frame, modes: list[ModeVectors]) -> list[tuple[str, str, np.ndarray]]:
-    """Name, kind and numbers of each column; a row is a disk."""
-    packing = frame.packing
-    n, force = len(packing), export_quantities.disk_force(packing)
-    columns: list[tuple[str, str, np.ndarray]] = [
-        # first, for readers of plain XYZ
-        ("pos", "R", export_quantities.in_space(packing.position)),
-        ("id", "I", np.arange(1, n + 1)),
-        ("radius", "R", packing.radius),
-        ("mass", "R", packing.mass),
-        ("top", "I", packing.top.astype(int)),
-        ("normal_force", "R", export_quantities.disk_pressure(packing)),
-    ]
-    if frame.whole:
-        columns += [
-            ("angle", "R", packing.angle),
-            ("forces", "R", export_quantities.in_space(force[:, :2])),
-            ("torque_over_radius", "R", force[:, 2]),
-            ("mobilised", "R", export_quantities.disk_mobilised(packing)),
-        ]
-    if frame.displacement is not None:
-        columns.append(("displacement", "R", export_quantities.in_space(frame.displacement)))
-    if packing.position_low is not None:
-        columns += [("x_low", "R", packing.position_low[:, 0]), ("y_low", "R", packing.position_low[:, 1])]
-    columns += [(name, "R", values) for mode in modes for name, values in mode.fields().items()]
-    return columns
-
-
-def write_xyz(path: Path, frames: Iterable[Frame], modes: list[ModeVectors]) -> str:
-    """Write one frame or several as extended XYZ, and return the contents in words."""
+def write_xyz(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
+    """Write one frame or several, and return the contents in words."""
     with replace_whole(path) as new, new.open("w") as stream:
-        stream.writelines(_text(frame, modes) for frame in frames)
+        stream.writelines(_text(frame) for _, frame in frames)
     return "all of the packing is in it, to the bit"
 
 
-def _text(frame: Frame, modes: list[ModeVectors]) -> str:
-    packing, columns = frame.packing, _write_columns(frame, modes)
-    rows = np.column_stack([array if array.ndim == 2 else array[:, None] for *_, array in columns])
-    whole = np.concatenate([[kind == "I"] * (1 if a.ndim == 1 else a.shape[1]) for _, kind, a in columns])
-    species = np.where(packing.top, "T", "B").tolist()
-    lines = [str(len(packing)), _head(frame, columns)]
-    for name, row in zip(species, rows.tolist(), strict=True):
-        words = (str(int(value)) if is_whole else repr(value) for value, is_whole in zip(row, whole, strict=True))
-        lines.append(f"{name} " + " ".join(words))
-    return "\n".join(lines) + "\n"
-
-
-def _head(frame: Frame, columns: list[tuple[str, str, np.ndarray]]) -> str:
-    """The second line."""
-    packing = frame.packing
-    box = packing.box_length
-    width = box if box is not None else 2 * np.ptp(packing.position[:, 0]) + 2 * packing.radius.max()
-    height = (packing.position[:, 1] + packing.radius).max()
-    properties = ":".join(f"{name}:{kind}:{1 if array.ndim == 1 else array.shape[1]}" for name, kind, array in columns)
+def _text(frame: Exported) -> str:
+    # the places first, for readers of plain XYZ; ASE calls the forces so, and takes symbols of elements as species
+    columns = {"pos": frame.position} | {
+        "forces" if name == "net_force" else name: values for name, values in frame.particles.items()
+    }
+    properties, words = ["species:S:1"], [np.where(frame.top, "U", "B").tolist()]
+    for name, values in columns.items():
+        kind, size = "I" if values.dtype.kind == "i" else "R", 1 if values.ndim == 1 else values.shape[1]
+        properties.append(f"{name}:{kind}:{size}")
+        words += [list(map(repr, part)) for part in values.reshape(len(values), size).T.tolist()]
+    lattice = " ".join(map(repr, frame.box.ravel().tolist()))
     says = [
-        f'Lattice="{float(width)!r} 0.0 0.0 0.0 {float(height)!r} 0.0 0.0 0.0 {2 * float(packing.radius.max())!r}"',
-        f'pbc="{"F" if box is None else "T"} F F"',
-        f"Properties=species:S:1:{properties}",
-        *(f"{key}={float(value)!r}" for key, value in (export_quantities.scalars(packing) | frame.number).items()),
+        f'Lattice="{lattice}"',
+        *([] if frame.origin is None else [f'Origin="{" ".join(map(repr, frame.origin.tolist()))}"']),
+        f'pbc="{" ".join("T" if each else "F" for each in frame.periodic)}"',
+        f"Properties={':'.join(properties)}",
+        f"{FORMAT_KEY}={FORMAT}",
+        *(f"{key}={float(value)!r}" for key, value in frame.numbers.items()),
     ]
-    if frame.whole:
-        numbers = " ".join(repr(value) for value in export_quantities.contact_rows(packing).ravel().tolist())
-        says.append(f'contacts="{numbers}"')
-    return " ".join(says)
+    if frame.rows is not None:
+        says.append(f'contacts="{" ".join(map(repr, frame.rows.ravel().tolist()))}"')
+    lines = [str(len(frame.top)), " ".join(says), *map(" ".join, zip(*words, strict=True))]
+    return "\n".join(lines) + "\n"

@@ -1,4 +1,4 @@
-r"""Error of eigenvalues over the time that they take, far from an exceptional point and near one.
+r"""Error of eigenvalues over the time that they take, near an exceptional point.
 
 The dense solver is backward stable: it returns the eigenvalues of :math:`A + E`, :math:`|E| \sim u |A|_F`, and so errs
 by about :math:`u |A|_F \kappa`, with the condition :math:`\kappa = 1/|y^H x|`, which grows without bound towards an
@@ -28,9 +28,6 @@ ARPACK_COUNT = 6
 
 DISTANCE_OF_PAIR = 1e-9
 """Distance below the onset, force, at which the pair is near its exceptional point."""
-
-LOAD_FAR_OFF = 0.011
-"""F_x far from it."""
 
 DENSE, ARPACK, REFINED = "dense (LAPACK)", "shift-invert (ARPACK)", "dense, refined"
 
@@ -111,30 +108,9 @@ class Target:
         return np.array([complex(each.value) for each in found]), sum(each.steps for each in found)
 
 
-def far(settings: Settings) -> Study:
-    """The eigenvalues about the pair that will coalesce, at half the load."""
-    packing = settings.at(LOAD_FAR_OFF).packing
-    _, pair = _near(settings)
-    return _study("far", settings, packing, pair)
-
-
 def near(settings: Settings) -> Study:
-    """The eigenvalues about the same pair just below the onset."""
-    return _study("near", settings, *_near(settings))
-
-
-def _near(settings: Settings) -> tuple[Packing, float]:
-    """The packing just below the onset, and the pair there, 1 / time^2."""
-    start = settings.ramp[0]
-    with Engine(start.packing) as engine:
-        onset, _ = OnsetMethods(engine, start, settings.scene).bisect(1e-3, 30)
-        below = max((each for each in settings.ramp if each.fx < onset - DISTANCE_OF_PAIR), key=lambda each: each.fx)
-        packing = equilibrate(engine, below, onset - DISTANCE_OF_PAIR).packing
-    values, left, right = eig(dynamical_matrix(packing)[0].toarray(), left=True, right=True)
-    return packing, float(values[np.argmin(np.abs(np.sum(left.conj() * right, axis=0)))].real)
-
-
-def _study(name: str, settings: Settings, packing: Packing, pair: float) -> Study:
+    """The eigenvalues about the pair that coalesces, just below the onset."""
+    packing, pair = _near(settings)
     target = Target.of(packing, 1.001 * pair)
     tolerances = np.logspace(-1, -15, 5 if settings.quick else 15).tolist()
     runs: list[Run[Complexes]] = [
@@ -146,8 +122,7 @@ def _study(name: str, settings: Settings, packing: Packing, pair: float) -> Stud
     last = {point.method: point for point in points}  # shift-invert's with the smallest tolerance
     coordinates, mean = target.coordinates
     return study_of(
-        name,
-        "a few eigenvalues",
+        "near",
         points=points,
         numbers={
             "count": ARPACK_COUNT,
@@ -166,3 +141,14 @@ def _study(name: str, settings: Settings, packing: Packing, pair: float) -> Stud
             Theory("one unit in the last place of the coordinates", (coordinates,)),
         ),
     )
+
+
+def _near(settings: Settings) -> tuple[Packing, float]:
+    """The packing just below the onset, and the pair there, 1 / time^2."""
+    start = settings.ramp[0]
+    with Engine(start.packing) as engine:
+        onset, _ = OnsetMethods(engine, start, settings.scene).bisect(1e-3, 30)
+        below = max((each for each in settings.ramp if each.fx < onset - DISTANCE_OF_PAIR), key=lambda each: each.fx)
+        packing = equilibrate(engine, below, onset - DISTANCE_OF_PAIR).packing
+    values, left, right = eig(dynamical_matrix(packing)[0].toarray(), left=True, right=True)
+    return packing, float(values[np.argmin(np.abs(np.sum(left.conj() * right, axis=0)))].real)

@@ -17,7 +17,6 @@ has neither cancellation nor, with a tiny h, truncation.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -30,7 +29,7 @@ from ....pywrap import Engine
 from .work_precision_study import Run, Settings, Study, Theory, best_of, study_of, timed_points
 
 ANALYTIC, PAPER, COMPLEX = "analytic", "analytic, paper's form", "complex step"
-DIFFERENCES, LAMMPS = "central differences", "central differences in LAMMPS"
+LAMMPS = "central differences in LAMMPS"
 
 Numbers = NDArray[Any]
 
@@ -96,14 +95,8 @@ def complex_step(packing: Packing, number: type = np.complex128) -> Floats:
     return -net_force(packing, 1j * tiny * identity).imag / tiny
 
 
-def central_differences(packing: Packing, step: float) -> Floats:
-    """K by central differences of the same forces in doubles, shape (3N, 3N)."""
-    identity: Floats = step * np.eye(3 * len(packing))
-    return -(net_force(packing, identity) - net_force(packing, -identity)) / (2 * step)
-
-
-def in_lammps(engine: Engine, packing: Packing, step: float) -> Floats:
-    """K by central differences of LAMMPS's forces, shape (3N, 3N), a column at a time."""
+def in_lammps(engine: Engine, packing: Packing, step: float) -> tuple[Floats, int]:
+    """K by central differences of LAMMPS's forces, shape (3N, 3N), a column at a time; and how many forces it took."""
     matrix = np.empty((3 * len(packing),) * 2)
     for column, unit in enumerate(np.eye(len(matrix))):
         forces = []
@@ -111,7 +104,7 @@ def in_lammps(engine: Engine, packing: Packing, step: float) -> Floats:
             engine.displace(packing, sign * step * unit)
             forces.append(engine.net_force)
         matrix[:, column] = (forces[1] - forces[0]) / (2 * step)
-    return matrix
+    return matrix, 2 * len(matrix)
 
 
 def jacobian(settings: Settings) -> Study:
@@ -119,9 +112,14 @@ def jacobian(settings: Settings) -> Study:
     packing = settings.at(0.02).packing
     exact = complex_step(packing, np.clongdouble)
     scale = np.abs(exact).max()
-    steps = np.logspace(-11, -5, 5 if settings.quick else 13)
+    steps, size = np.logspace(-11, -5, 4 if settings.quick else 7), 3 * len(packing)
     with Engine(packing) as engine:
-        runs = _runs(engine, packing, steps)
+        runs: list[Run[Floats]] = [
+            (ANALYTIC, None, lambda: (stiffness_matrix(packing).toarray(), 1)),
+            (PAPER, None, lambda: (stiffness_matrix(packing, "paper").toarray(), 1)),
+            (COMPLEX, None, lambda: (complex_step(packing), size)),
+            *((LAMMPS, step, partial(in_lammps, engine, packing, step)) for step in steps.tolist()),
+        ]
         points = timed_points(runs, settings, lambda matrix: float(np.abs(matrix - exact).max() / scale))
     own, analytic = (_rounding(packing, number) / float(scale) for number in (np.longdouble, np.float64))
     fine = np.geomspace(steps[0], steps[-1], 60)
@@ -132,7 +130,7 @@ def jacobian(settings: Settings) -> Study:
         numbers={
             "fx": packing.fx,
             "disks": len(packing),
-            "size": 3 * len(packing),
+            "size": size,
             "milliseconds": best_of(points)[ANALYTIC].seconds * 1e3,
             "overlap": packing.geometry.overlap.min(),
         },
@@ -142,22 +140,6 @@ def jacobian(settings: Settings) -> Study:
             Theory("overlaps as plain differences", (analytic,)),
         ),
     )
-
-
-def _runs(engine: Engine, packing: Packing, steps: Floats) -> list[Run[Floats]]:
-    """The methods that compute K, with the step of their differences."""
-    size = 3 * len(packing)
-    return [
-        (ANALYTIC, None, partial(_count_calls, 1, lambda: stiffness_matrix(packing).toarray())),
-        (PAPER, None, partial(_count_calls, 1, lambda: stiffness_matrix(packing, "paper").toarray())),
-        (COMPLEX, None, partial(_count_calls, size, complex_step, packing)),
-        *((DIFFERENCES, step, partial(_count_calls, 2 * size, central_differences, packing, step)) for step in steps),
-        *((LAMMPS, step, partial(_count_calls, 2 * size, in_lammps, engine, packing, step)) for step in steps[::2]),
-    ]
-
-
-def _count_calls(evaluations: int, compute: Callable[..., Floats], *arguments: Any) -> tuple[Floats, int]:
-    return compute(*arguments), evaluations
 
 
 def _rounding(packing: Packing, number: type) -> float:

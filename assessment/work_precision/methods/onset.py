@@ -2,8 +2,8 @@ r"""Error of the onset F_x^c over the time that it takes to find it.
 
 There are three methods. A *scan* computes the spectrum at each increment of a ramp, and takes the middle between the
 last real and the first complex spectrum. A *bisection* divides the increment in which the onset lies. The third method
-solves for the *root of the discriminant* of the two eigenvalues (:mod:`~faultgouge.analysis.windows`). The paper's scan
-waits for overdamped dynamics at each increment; the other methods use Newton's method.
+solves for the *root of the discriminant* of the two eigenvalues (:mod:`~faultgouge.analysis.windows`). All
+use Newton's method for the equilibria.
 
 A scan errs by half an increment at the most. A bisection ends where a complex pair can no longer be distinguished from
 rounding, see `believable`: the imaginary part and the overlap :math:`|y^H x|` both vanish as
@@ -25,7 +25,7 @@ from ....pywrap.runs.path_error import with_path_error
 from ....pywrap.runs.scene_path import scene_path
 from .work_precision_study import Run, Settings, StatedError, Study, Theory, compensate, study_of, timed_points
 
-OVERDAMPED, SCAN = "scan, overdamped", "scan, Newton"
+SCAN = "scan, Newton"
 BISECTION, ROOT = "bisection", "root of the discriminant"
 
 DISTANCE_BEYOND = 1e-5
@@ -41,14 +41,14 @@ class OnsetMethods:
     def __init__(self, engine: Engine, start: Equilibrium, scene: Scene) -> None:
         self._engine, self._start, self._scene = engine, start, scene
 
-    def scan(self, increment: float, method: str = "newton") -> tuple[float, int]:
+    def scan(self, increment: float) -> tuple[float, int]:
         """The onset in the middle of an increment, and the number of equilibria."""
-        path, last = self._up(increment, method)
+        path, last = self._up(increment)
         return (last - 0.5) * increment, len(path.equilibria) - 1
 
     def bisect(self, increment: float, halvings: int) -> tuple[float, int]:
         """The onset after a bisection of the scan's increment, and the number of equilibria."""
-        path, last = self._up(increment, "newton")
+        path, last = self._up(increment)
         low, high = (last - 1) * increment, last * increment
         for _ in range(halvings):
             middle = 0.5 * (low + high)
@@ -66,7 +66,7 @@ class OnsetMethods:
 
     def solve(self, increment: float, beyond: float) -> tuple[Onset, LoadPath[Equilibrium], int]:
         """The onset as in `root`, with its stated error, and the path."""
-        path, asked = self._path("newton"), list[float]()
+        path, asked = self._path(), list[float]()
 
         def equilibrium(fx: float) -> Packing:
             asked.append(fx)
@@ -82,26 +82,24 @@ class OnsetMethods:
 
     def beyond(self, onset: float) -> tuple[float, float]:
         """The error at which a bisection ends, and |y^H x| at the distance `DISTANCE_BEYOND` above the onset."""
-        path, _ = self._up(1e-3, "newton")
+        path, _ = self._up(1e-3)
         found = spectrum(path(onset + DISTANCE_BEYOND))
         pair = max(found.pairs, key=lambda each: each.overlap * each.eigenvalue.imag)
         return SAFETY * found.rounding * DISTANCE_BEYOND / (pair.overlap * pair.eigenvalue.imag), pair.overlap
 
-    def _up(self, increment: float, method: str) -> tuple[LoadPath[Equilibrium], int]:
+    def _up(self, increment: float) -> tuple[LoadPath[Equilibrium], int]:
         """The ramp up to the first equilibrium with a complex pair, and its number."""
-        path, k = self._path(method), 1
+        path, k = self._path(), 1
         while not spectrum(path(k * increment)).pairs:
             k += 1
         return path, k
 
-    def _path(self, method: str) -> LoadPath[Equilibrium]:
-        assert self._scene.ramp is not None  # it is the scene of a ramp
-        scene = self._scene.model_copy(update={"ramp": self._scene.ramp.model_copy(update={"method": method})})
-        return scene_path(self._engine, self._start, scene)
+    def _path(self) -> LoadPath[Equilibrium]:
+        return scene_path(self._engine, self._start, self._scene)
 
 
 def onset(settings: Settings) -> Study:
-    """The study: four methods for the onset of the ramp."""
+    """The study: three methods for the onset of the ramp."""
     start = settings.ramp[0]
     exact_start = compensate(start)
     with Engine(start.packing) as engine, Engine(exact_start.packing) as exact_engine:
@@ -148,7 +146,6 @@ def _runs(ways: OnsetMethods, quick: bool, exact: float) -> list[Run[float]]:
     fine = (4e-3, 2e-3, 1e-3) if quick else (4e-3, 2e-3, 1e-3, 5e-4, 2e-4)
     halvings = (5, 25) if quick else (2, 5, 10, 20, 30)
     return [
-        *((OVERDAMPED, increment, partial(ways.scan, increment, "overdamped")) for increment in coarse),
         *((SCAN, increment, partial(ways.scan, increment)) for increment in fine),
         *((BISECTION, 1e-3 * 2.0**-n, partial(ways.bisect, 1e-3, n)) for n in halvings),
         *((ROOT, increment, partial(ways.root, increment, exact)) for increment in coarse),

@@ -8,20 +8,21 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from ..analysis.table_display import table_of
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
 from .terminal import (
-    AsJson,
+    Answer,
     Out,
     ScenePath,
     check_output,
-    print_json,
-    print_line,
+    command,
+    hold_lock,
     read_scene,
     say,
+    say_remark,
     status,
     stored_files,
-    table_of,
 )
 
 if TYPE_CHECKING:
@@ -30,9 +31,14 @@ if TYPE_CHECKING:
 
 app = typer.Typer()
 
+SLIP_COLUMNS = (
+    "begins", "ends", "force_before", "force_after", "slip", "kinetic_energy", "frame_before", "frame_after",
+)  # fmt: skip
+"""Columns of the table of slips."""
 
-@app.command(epilog="Example: faultgouge drive drive.toml -o drive.h5")
-def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = False) -> None:
+
+@command(app, "faultgouge drive drive.toml -o drive.h5")
+def drive(scene: ScenePath, output: Out = Path("drive.h5")) -> Answer | None:
     """Draw the upper layer with a spring whose far end moves: the layer sticks and slips.
 
     The packing settles at F_x = 0; then the spring of [drive] draws, with the dashpots
@@ -49,7 +55,8 @@ def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = Fa
     if table == output:
         raise OutputError(f"{output} is the table of the slips: give the run another name, {output.stem}.h5")
     check_output(output, scene, *stored_files(wanted))
-    check_output(table, scene, output)
+    hold_lock(output)
+    check_output(table, scene, output, head=",".join(SLIP_COLUMNS))
     settings = require_section(wanted.drive, "drive")
     others = _others(output, wanted)
     for path, _ in others.values():
@@ -58,21 +65,17 @@ def drive(scene: ScenePath, output: Out = Path("drive.h5"), as_json: AsJson = Fa
     for name, (path, scene_of_other) in others.items():
         _run(path, scene_of_other, f"driving {name}", start)
     if not is_root():
-        return
+        return None
     result = _result(output, wanted) | _advances(output, {name: path for name, (path, _) in others.items()})
     _write_table(table, result["slips"])
-    if as_json:
-        print_json(result)
-        return
-    print_line(_in_words(result, settings.spring == "rigid"))
     if result["strays"]:
         say(
             f"squeezed out of the bed, above the layer, where no force acts: disks "
             f"{', '.join(map(str, result['strays']))}; they were stopped there"
         )
-    if others:
-        print_line(_advance_in_words(result))
-    print_line(f"written to {', '.join(map(str, [output, *(path for path, _ in others.values())]))} and {table}")
+    says = [_in_words(result, settings.spring == "rigid"), *([_advance_in_words(result)] if others else [])]
+    files = ", ".join(map(str, [output, *(path for path, _ in others.values())]))
+    return Answer(says, result, f"written to {files} and {table}")
 
 
 def _run(
@@ -83,10 +86,10 @@ def _run(
     The files of other scenes, which differ in the signal, begin where the signal does.
     """
     from faultgouge.pywrap import Equilibrium
-    from faultgouge.pywrap.runs.drive_recorder import DriveRecord
-    from faultgouge.pywrap.runs.drive_setup import check_drive, settle_for_drive
+    from faultgouge.pywrap.runs.drive import DriveRecord, check_drive, settle_for_drive
 
     with DriveRecord(output, scene, saved=keeps) as record:
+        say_remark(record)
         if record.last is None:
             if start is None:
                 with status("settling") as show:
@@ -111,7 +114,7 @@ def _others(output: Path, scene: Scene) -> dict[str, tuple[Path, Scene]]:
     assert settings is not None
     if settings.signal is None:
         return {}
-    from faultgouge.pywrap.runs.drive_recorder import NOISES
+    from faultgouge.pywrap.runs.drive import NOISES
 
     noises = {f"noise{number}": settings.with_noise(number) for number in range(1, NOISES + 1)}
     changed = {"without": settings.without_signal()} | noises
@@ -124,7 +127,7 @@ def _others(output: Path, scene: Scene) -> dict[str, tuple[Path, Scene]]:
 def _advances(output: Path, others: dict[str, Path]) -> dict[str, Any]:
     """How much earlier the next slip is, with the signal and with noise; nothing without a signal."""
     from faultgouge.analysis import RunFile
-    from faultgouge.pywrap.runs.drive_recorder import SERIES, advance_error, clock_advance
+    from faultgouge.pywrap.runs.drive import SERIES, advance_error, clock_advance
 
     if not others:
         return {}
@@ -158,8 +161,7 @@ def _result(path: Path, scene: Scene) -> dict[str, Any]:
 
     from faultgouge.analysis import RunFile
     from faultgouge.analysis.motion.slips import friction_of
-    from faultgouge.pywrap.runs.drive import strays
-    from faultgouge.pywrap.runs.drive_recorder import SERIES, all_slips_in
+    from faultgouge.pywrap.runs.drive import SERIES, all_slips_in, strays
 
     with RunFile(path) as file:
         (slips, under_way), series, times = all_slips_in(file), file.series(SERIES), file.observable("time")
@@ -186,9 +188,9 @@ def _write_table(path: Path, slips: list[dict[str, Any]]) -> None:
     """The slips as rows of numbers with all digits."""
     from faultgouge.analysis.files.atomic_write import write_text
 
-    columns = ("begins", "ends", "force_before", "force_after", "slip", "kinetic_energy", "frame_before", "frame_after")
-    rows = [",".join(repr(slip[name]) for name in columns) for slip in slips]
-    write_text(path, "\n".join([",".join(columns), *rows]) + "\n")
+    head = ",".join(SLIP_COLUMNS)
+    rows = [",".join(repr(slip[name]) for name in SLIP_COLUMNS) for slip in slips]
+    write_text(path, "\n".join([head, *rows]) + "\n", head)
 
 
 def _in_words(result: dict[str, Any], rigid: bool) -> str:
@@ -198,9 +200,8 @@ def _in_words(result: dict[str, Any], rigid: bool) -> str:
     if not slips:
         why = ", of a rigid drive, which counts no slips" if rigid else under_way or ": no slip"
         return f"t = {result['time']:.4g}{why}; {mean}, at most {friction['largest']:.3g}"
-    columns = ("begins", "ends", "force_before", "force_after", "slip", "kinetic_energy", "frame_before", "frame_after")
     headings = ("begins", "ends", "F before", "F after", "slip", "kinetic energy", "frame before", "frame after")
-    rows = [[f"{slip[name]:.4g}" for name in columns] for slip in slips]
+    rows = [[f"{slip[name]:.4g}" for name in SLIP_COLUMNS] for slip in slips]
     recurrence = ""
     if len(slips) > 1:
         recurrence = f", one in {(slips[-1]['begins'] - slips[0]['begins']) / (len(slips) - 1):.4g} units of time"

@@ -39,52 +39,44 @@ def export(
             help="Frames of the undamped run if the file has its trajectory, else of the ramp; .xyz, .gsd or .pvd.",
         ),
     ] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="The file: .vtp, .pvd, .xyz, .data or .gsd.")] = Path(
+    output: Annotated[Path, typer.Option("-o", "--output", help="A .vtp, .pvd, .xyz, .data, .gsd or .csv.")] = Path(
         "packing.vtp"
     ),
 ) -> None:
-    """Write a stored packing for ParaView (.vtp), OVITO (.xyz), LAMMPS (.data) or HOOMD (.gsd).
+    """Write a stored packing for ParaView (.vtp), OVITO and ASE (.xyz), LAMMPS (.data) or HOOMD (.gsd).
 
     The file contains disks with radii, net forces and mobilised friction; contacts
-    with forces and slips (in .vtp as lines); modes as vectors (not in .data).
+    with forces and slips (in .vtp as lines); modes as vectors (not in .data). A .csv
+    has a row for each contact.
     `faultgouge import` reads .xyz, .data and .gsd back unchanged, to the bit. A .gsd
     needs pip install 'faultgouge[export]'. With --frames the file is a film of
     displacements; a .pvd for ParaView comes with a folder of .vtp.
     """
     from faultgouge.analysis import Configuration
-    from faultgouge.analysis.files.formats import ModeVectors
-    from faultgouge.analysis.files.formats.configuration_export import check_configuration_writer, export_configuration
-    from faultgouge.analysis.files.formats.registry import check_writer, write_packing
+    from faultgouge.analysis.files.formats import HEAD_OF_CONTACTS, ModeVectors, check_writer, write_packing
 
-    lock_output(context, output, file)
+    lock_output(context, output, file, head=HEAD_OF_CONTACTS if output.suffix == ".csv" else "")
     if frames is not None:
         if mode is not None or frame != -1:
             raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")
         _export_frames(file, frames, output)
         return
     packing = stored_packing(file, frame)
-    if isinstance(packing, Configuration):
-        check_configuration_writer(output)
-    else:
-        check_writer(output, mode is not None)
+    check_writer(output, mode is not None)
     if not is_root():
         return
     modes = [] if mode is None else modes_of(packing, mode)[0]
     vectors = [ModeVectors(f"mode_{each.number}", each.eigenvalue, each.displacement) for each in modes]
-    if isinstance(packing, Configuration):
-        words = export_configuration(output, packing, vectors)
-    else:
-        words = f"F_x = {packing.fx:g}: {write_packing(output, packing, vectors)}"
-    print_line(f"{words}; written to {output}")
+    load = "" if isinstance(packing, Configuration) else f"F_x = {packing.fx:g}: "
+    print_line(f"{load}{write_packing(output, packing, vectors)}; written to {output}")
 
 
 def _export_frames(file: Path, says: str, output: Path) -> None:
     """The frames of a ramp or of an undamped run."""
     from faultgouge.analysis import PackingFileError, RunFile
-    from faultgouge.analysis.files.formats.frames import choose_frames, frames_of
-    from faultgouge.analysis.files.formats.registry import check_frames_writer, write_frames
+    from faultgouge.analysis.files.formats import check_writer, choose_frames, frames_of, write_frames
 
-    check_frames_writer(output)
+    check_writer(output, frames=True)
     if file.suffix == ".disks":
         raise PackingFileError(f"{file} is one packing: leave --frames out, or give a run.h5.")
     if not is_root():

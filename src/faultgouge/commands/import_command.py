@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +11,7 @@ import typer
 from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
+from .stability import first_sentence
 from .terminal import lock_output, print_line, say, status
 
 if TYPE_CHECKING:
@@ -23,8 +25,9 @@ SourceFile = Annotated[
     Path,
     typer.Argument(
         metavar="FILE",
-        help="A LAMMPS deck (.in); or LAMMPS data, dump or restart (atom style sphere), NAME.disks, CSV, extended "
-        "XYZ, GSD, packing.json, or a file that MDAnalysis reads with radii.",
+        help="A LAMMPS deck (.in), or a restart that was kept with its deck (NAME.restart beside NAME.restart.in); or "
+        "LAMMPS data, dump or restart (atom style sphere), NAME.disks, CSV, extended XYZ, GSD, packing.json, or a file "
+        "that MDAnalysis reads with radii.",
         show_default=False,
     ),
 ]
@@ -48,7 +51,11 @@ Period = Annotated[
 ]
 
 SlipsFile = Annotated[
-    Path | None, typer.Option(help="SlipsFile: CSV with id1, id2 (0: the floor), slip; or a LAMMPS dump local.")
+    Path | None,
+    typer.Option(
+        help="A table of contacts: slips (CSV with id1, id2, 0 being the floor, slip; or a LAMMPS dump local); with "
+        "--material forces, of YADE, MercuryDPM (.fstat), LIGGGHTS or LAMMPS."
+    ),
 ]
 
 
@@ -78,6 +85,16 @@ def import_(
         int | None, typer.Option(help="Number of the frame; negative numbers count from the last.")
     ] = None,
     relax: Annotated[bool, typer.Option("--relax", help="Bring a packing out of balance to rest.")] = False,
+    material: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KEY=VALUE,...",
+            help="For spheres of a table: young, poisson, density, friction, restitution; or kn, kt and exponent.",
+        ),
+    ] = None,
+    columns: Annotated[
+        str | None, typer.Option(metavar="NAME,...", help="Names of the columns of --contacts, with --material.")
+    ] = None,
     slides: Annotated[
         bool, typer.Option("--slides", help="For a deck: contacts at Coulomb's bound slide; by default they stick.")
     ] = False,
@@ -98,16 +115,26 @@ def import_(
     friction then starts with zero slips. If the file has slips, it relaxes with
     friction. The command prints how far the disks moved.
 
-    A LAMMPS deck (NAME.in, in.NAME) is run in its own folder, and its last state is
-    stored unchanged, with LAMMPS's own granular styles, disks or spheres. With --relax
-    LAMMPS first runs on with drag until the packing rests.
+    A LAMMPS deck (NAME.in, in.NAME) is run in its own folder, as lmp -in does there, and
+    its last state is stored unchanged, with LAMMPS's own granular styles, disks or
+    spheres. With --relax LAMMPS first runs on with drag until the packing rests. A state
+    that cannot be taken is kept in a restart file, with a deck that goes on from it.
     """
+    from faultgouge.analysis import BadInputError, PackingFileError
+
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
     lock_output(context, output)
+    if material is not None:
+        _import_spheres(file, output, material, contacts, columns, -1 if frame is None else frame)
+        return
+    given = [top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame]
+    is_bare = not floor and all(each is None for each in given)
+    kept = file.with_name(f"{file.name}.in")
+    if is_bare and file.suffix == ".restart" and kept.is_file():
+        file = kept
     if file.suffix == ".in" or file.name.startswith("in."):
-        given = [top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame]
-        if floor or any(each is not None for each in given):
+        if not is_bare:
             raise typer.BadParameter(
                 f"{file} is a deck, which says all by itself: leave all options but -o, --relax, --slides and --balance"
             )
@@ -116,14 +143,51 @@ def import_(
     if slides or balance is not None:
         raise typer.BadParameter("--slides and --balance are for a LAMMPS deck (.in): leave them out")
     laws = {"kn": kn, "kt": _number_or_text(kt), "mu": mu, "exponent": exponent}
-    disks = _place_disks(file, frame, floor, width, contacts)
-    packing = _packing(disks, top, scene, laws | {"fy": fy, "fx": fx, "inertia_factor": inertia})
+    try:
+        disks = _place_disks(file, frame, floor, width, contacts)
+        packing = _packing(disks, top, scene, laws | {"fy": fy, "fx": fx, "inertia_factor": inertia})
+    except (PackingFileError, BadInputError) as error:
+        lines = _deck_around(file) if is_bare else ""
+        if not lines:
+            raise
+        raise type(error)(f"{error}\n{lines}") from error
     _import_disks(file, output, disks, top, packing, relax)
+
+
+def _import_spheres(
+    file: Path, output: Path, material: str, contacts: Path | None, columns: str | None, frame: int
+) -> None:
+    """Store spheres of a table with the forces of their contacts, and give the verdict that the digits allow."""
+    from faultgouge.analysis.files.configuration_file import write_configuration
+    from faultgouge.analysis.files.contact_tables import (
+        material_of,
+        read_contacts,
+        read_spheres,
+        verdict_within_digits,
+    )
+    from faultgouge.analysis.progress import show_progress
+
+    law, spheres = material_of(material), read_spheres(file, frame)
+    if contacts is None:
+        found = spheres.of_material(law)
+    else:
+        found = read_contacts(spheres, contacts, law, None if columns is None else columns.split(","), frame)
+    if not is_root():
+        return
+    write_configuration(output, found, {"deck": ""})
+    keeps(f"{output} has been written", output)
+    print_line(f"{repr(found).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
+    if contacts is None:
+        print_line("\n".join(found.remarks))
+    else:
+        with status("stability") as show, show_progress(show):
+            verdict, says = verdict_within_digits(found)
+        print_line(f"{verdict}\n{says}")
 
 
 def _import_disks(file: Path, output: Path, disks: Disks, top: str | None, packing: Packing, relax: bool) -> None:
     """Store a packing in balance, and say what it is."""
-    from faultgouge.analysis.files.formats.upper_layer import layer_remark
+    from faultgouge.analysis.files.formats.disks import layer_remark
 
     for remark in (disks.remark, layer_remark(disks, top, packing.top)):
         if remark:
@@ -149,28 +213,52 @@ def _import_deck(file: Path, output: Path, slides: bool, balance: float | None, 
 
     keeps(f"nothing has been written to {output} yet")
     text = file.read_text(errors="replace") if file.is_file() else ""  # a deck may move its own file
-    with status(f"{file}: LAMMPS runs"):
+    with status(f"{file}: LAMMPS runs") as show:
         allowed = BALANCE if balance is None else balance
-        configuration = run_deck(file, slides=slides, balance=allowed, relaxes=relaxes, keep=output)
+        configuration = run_deck(
+            file, slides=slides, balance=allowed, relaxes=relaxes, keep=output, notice=say, show=show
+        )
+    keeps(f"{output} has been written; whether the packing is stable says `faultgouge stability {output}`", output)
     if is_root():
         write_configuration(output, configuration, {"deck": text})
-    keeps(f"{output} has been written; whether the packing is stable says `faultgouge spectrum {output}`", output)
     print_line(f"{repr(configuration).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
     print_line(_time_steps(configuration))
-    print_line(_verdict(configuration, output))
+    if is_root():
+        print_line(first_sentence(configuration))
 
 
-def _verdict(configuration: Configuration, output: Path) -> str:
-    """The verdict of `spectrum`, if the packing's spectrum takes seconds."""
-    from faultgouge.analysis import stability
-    from faultgouge.analysis.motion.stability import LARGE
-    from faultgouge.analysis.progress import show_progress
+AROUND = """\
+pair_style gran/hertz/history 1e5 NULL 50 NULL 0.5 1   # the contact law: KN KT GAMMA_N GAMMA_T MU
+pair_coeff * *
+fix floor all wall/gran hertz/history 1e5 NULL 50 NULL 0.5 1 zplane 0 NULL contacts
+fix load all gravity 1.0 vector 0 0 -1
+fix move all nve/sphere
+fix drag all viscous 1.0
+timestep 1e-4
+run 100000   # until it rests; 0 for a restart at rest"""
 
-    moves = len(configuration.rattlers) < len(configuration)
-    if not is_root() or (moves and configuration.coordinates > LARGE // 4):
-        return "\n".join([*configuration.remarks, f"whether the packing is stable says `faultgouge spectrum {output}`"])
-    with status("stability") as show, show_progress(show):
-        return str(stability(configuration))
+
+def _deck_around(file: Path) -> str:
+    """Lines of a deck for a restart or data file of LAMMPS, to be filled in; empty for other files."""
+    from faultgouge.analysis.files.formats import RESTART_BEGINNING
+
+    if not file.is_file():
+        return ""
+    with file.open("rb") as stream:
+        first = stream.readline(500)
+    head = first.decode(errors="replace")
+    if first.startswith(RESTART_BEGINNING):
+        reads = f"comm_modify vel yes\nread_restart {file.name}"
+    elif head.startswith("LAMMPS data file"):
+        units = (re.findall(r"units = (\w+)", head) or ["lj"])[0]
+        reads = f"units {units}\natom_style sphere\nboundary f f f\ncomm_modify vel yes\nread_data {file.name}"
+    else:
+        return ""
+    deck = file.with_suffix(".in").name
+    return (
+        f"For spheres, or any other law, write a deck beside it, here {deck} with the laws and walls of the run that "
+        f"made the file, and give `faultgouge import {deck}`:\n\n{reads}\n{AROUND}"
+    )
 
 
 def _time_steps(configuration: Configuration) -> str:
@@ -187,7 +275,7 @@ def _place_disks(file: Path, frame: int | None, floor: float, width: str | None,
     """The disks of the file; options replace numbers of the file."""
     from dataclasses import replace
 
-    from faultgouge.analysis.files.formats.csv_json import read_slips
+    from faultgouge.analysis.files.formats.tables import read_slips
     from faultgouge.pywrap.lammps.restart_file import read_disks
 
     disks = read_disks(file, frame).above(floor)
@@ -235,7 +323,7 @@ def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[st
 def _refuse_gaps(disks: Disks, top: str | None, scene: Path | None, values: dict[str, Any]) -> None:
     """Say in one sentence all that neither file nor options say, with the command that would do."""
     from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.files.formats.upper_layer import LAYER_WAYS
+    from faultgouge.analysis.files.formats.disks import LAYER_WAYS
 
     gaps = {"--top 10": "which disks are the upper layer"} if top is None and disks.top is None else {}
     if scene is None and "kn" not in values:

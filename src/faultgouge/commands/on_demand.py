@@ -2,7 +2,7 @@
 
 import inspect
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import typer
@@ -11,28 +11,49 @@ from typer.models import CommandInfo
 
 
 class CommandsByName(Mapping[str, Any]):
-    """The commands of a family of modules by name, each of which is made of its function when it is asked for."""
+    """Commands by name, each of which is made of its function when it is asked for.
 
-    def __init__(self, described: list[CommandInfo]) -> None:
-        self.described = {info.name or _function(info).__name__: info for info in described}
+    Parameters
+    ----------
+    described : list of CommandInfo
+        Functions with their names.
+    names : callable
+        The names of further commands, in the order of the help after the others.
+    find : callable
+        The description of one of these; None of another name.
+    """
+
+    def __init__(
+        self, described: list[CommandInfo], names: Callable[[], list[str]], find: Callable[[str], CommandInfo | None]
+    ) -> None:
+        self._described = {info.name or _function(info).__name__: info for info in described}
+        self._names, self._find = names, find
         self._made: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:
         if name not in self._made:
             alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-            alone.registered_commands.append(self.described[name])
+            alone.registered_commands.append(self._info(name))
             self._made[name] = typer.main.get_command(alone)
         return self._made[name]
 
+    def _info(self, name: str) -> CommandInfo:
+        info = self._described.get(name) or self._find(name)
+        if info is None:
+            raise KeyError(name)
+        return info
+
     def __iter__(self) -> Iterator[str]:
-        return iter(self.described)
+        yield from self._described
+        yield from self._names()
 
     def __len__(self) -> int:
-        return len(self.described)
+        return sum(1 for _ in self)
 
     def summaries(self) -> list[tuple[str, str]]:
         """Each command that is not hidden, with the first sentence of its docstring."""
-        return [(name, _first_sentence(info)) for name, info in self.described.items() if not info.hidden]
+        described = [(name, self._info(name)) for name in self]
+        return [(name, _first_sentence(info)) for name, info in described if not info.hidden]
 
 
 class CommandGroup(TyperGroup):

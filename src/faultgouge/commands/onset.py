@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..analysis.counted import counted
+from ..analysis.table_display import table_of
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
 from .terminal import (
@@ -24,7 +24,6 @@ from .terminal import (
     say,
     status,
     stored_files,
-    table_of,
 )
 
 if TYPE_CHECKING:
@@ -101,7 +100,9 @@ def onset(
     tell(f'law of friction: {wanted.law.in_words} (history = "{wanted.law.history}")')
     result = _write_result(output, found)
     if is_root() and folder is not None and not slices:
-        shutil.rmtree(folder, ignore_errors=True)  # the result is there: files left over do no harm
+        from faultgouge.analysis.windows.slices.store import remove_passes
+
+        remove_passes(folder)  # the result is there
     if as_json:
         print_json(result)
     if failed is not None:

@@ -250,8 +250,7 @@ def _frames_of_spheres(
 ) -> None:
     """The motion of a mode of spheres, for programs that show spheres."""
     from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.files.formats import ModeVectors
-    from faultgouge.analysis.files.formats.configuration_export import write_mode_frames
+    from faultgouge.analysis.files.formats import ModeVectors, write_mode_frames
 
     if output.suffix not in (".xyz", ".pvd"):
         raise BadInputError(

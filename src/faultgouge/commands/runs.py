@@ -12,18 +12,20 @@ import typer
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
 from .terminal import (
-    AsJson,
+    Answer,
     Out,
     ScenePath,
     check_output,
+    command,
     growth_in,
+    hold_lock,
     lock_output,
-    print_json,
     print_line,
     progress,
     read_scene,
     report_fallback,
     say,
+    say_remark,
     status,
     stored_files,
 )
@@ -66,15 +68,17 @@ def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
 
     wanted = read_scene(scene, "settle", "settle")
     check_output(output, scene, *stored_files(wanted))
+    hold_lock(output)
     with Record(output, wanted, saved=keeps) as record:
+        say_remark(record)
         last = _settle_or_read(wanted, record)
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
             record.finish()
     print_line(f"{last}; written to {output}")
 
 
-@app.command(epilog="Example: mpiexec -n 2 faultgouge ramp paper.toml -o run.h5")
-def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False) -> None:
+@command(app, "mpiexec -n 2 faultgouge ramp paper.toml -o run.h5")
+def ramp(scene: ScenePath, output: Out = Path("run.h5")) -> Answer | None:
     """Raise F_x from equilibrium to equilibrium, and store each equilibrium.
 
     With turning points in ramp.until, F_x goes up, down and below zero. When F_x
@@ -88,8 +92,10 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
 
     wanted = read_scene(scene, "ramp", "ramp")
     check_output(output, scene, *stored_files(wanted))
+    hold_lock(output)
     settings = require_section(wanted.ramp, "ramp")
     with Record(output, wanted, saved=keeps) as record:
+        say_remark(record)
         start = _settle_or_read(wanted, record)
         loads = all_loads(settings)
         total, done = len(loads), count_behind(settings, record.forces)
@@ -100,27 +106,25 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5"), as_json: AsJson = False
         record.finish()
     assert record.last is not None
     if not is_root():
-        return
+        return None
     left = _hysteresis(output, settings)
-    if as_json:
-        print_json({"equilibria": _equilibria(output), "hysteresis": None if left is None else asdict(left)})
-        return
+    result = {"equilibria": _equilibria(output), "hysteresis": None if left is None else asdict(left)}
     if record.last.fx != loads[-1]:
         beyond = f"{output} goes on from F_x = {loads[-1]:g}, where ramp.until ends, to F_x = {record.last.fx:g}"
-        print_line(f"{beyond}: nothing is left to compute")
-        return
-    print_line(f"F_x = {record.last.fx:g} reached; residual force {record.last.residual:.2g}; written to {output}")
+        return Answer([f"{beyond}: nothing is left to compute"], result)
+    says = [f"F_x = {record.last.fx:g} reached; residual force {record.last.residual:.2g}; written to {output}"]
     if left is not None:
-        print_line(
+        says.append(
             f"F_x is back at {left.fx:g}, and so is the upper layer: the path closes, to rounding"
             if left.closes
             else f"F_x is back at {left.fx:g}: since F_x first had this value, the upper layer has moved by "
             f"{left.remaining:.4g}, and the work of the loads is {left.work:.4g}"
         )
+    return Answer(says, result)
 
 
-@app.command(epilog="Example: faultgouge perturb paper.toml -o run.h5")
-def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson = False) -> None:
+@command(app, "faultgouge perturb paper.toml -o run.h5")
+def perturb(scene: ScenePath, output: Out = Path("perturb.h5")) -> Answer | None:
     """Run the dynamics from the equilibrium at perturb.fx, and record D(t).
 
     Without perturb.fx the load is just beyond the onset, which is found first; with
@@ -135,11 +139,13 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
 
     wanted = read_scene(scene, "perturb", "perturb")
     check_output(output, scene, *stored_files(wanted))
+    hold_lock(output)
     require_section(wanted.perturb, "perturb")
     mus = wanted.law.mus
     if len(mus) > 1:
         say(f"the run uses mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene")
     with Record(output, wanted, task="perturb", saved=keeps) as record:
+        say_remark(record)
         if record.last is None:
             record.append(_start(wanted))
         assert record.last is not None
@@ -150,19 +156,16 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5"), as_json: AsJson 
             last, largest = sample, max(largest, sample.msd)
         record.finish()
     if not is_root():
-        return
+        return None
     with RunFile(output) as file:
         series, packing = file.series("undamped"), file.packing()
-    growth = growth_in(output, series)
-    if as_json:
-        columns = {name: column.tolist() for name, column in series.items()}
-        print_json({"mu": mus[0], "fx": packing.fx} | growth.as_dict() | columns)
-    else:
-        print(
-            f"F_x = {packing.fx:g}, mu = {mus[0]:g}: D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}"
-        )
-        print(growth.says, flush=True)  # before what follows on standard error
-    say(f"written to {output}")
+    growth, columns = growth_in(output, series), {name: column.tolist() for name, column in series.items()}
+    reached = f"D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}"
+    return Answer(
+        [f"F_x = {packing.fx:g}, mu = {mus[0]:g}: {reached}", growth.says],
+        {"mu": mus[0], "fx": packing.fx} | growth.as_dict() | columns,
+        f"written to {output}",
+    )
 
 
 def _start(scene: Scene) -> Equilibrium:

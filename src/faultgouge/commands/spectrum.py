@@ -8,6 +8,7 @@ import typer
 
 from ..analysis.counted import counted
 from ..mpi_rank import is_root
+from .stability import Follow, verdict_of
 from .terminal import (
     AsJson,
     Frame,
@@ -28,6 +29,9 @@ app = typer.Typer()
 
 MOST_PAIRS = 20
 """Lines of complex pairs: a packing of a thousand has hundreds."""
+
+SECONDS_COORDINATES = 2000
+"""Coordinates up to which the spectrum takes seconds; of more the verdict comes before it."""
 
 SLOW_COORDINATES = 6000
 """Coordinates from which a spectrum takes minutes, and a gigabyte or more."""
@@ -50,6 +54,7 @@ def spectrum(
     rise: Annotated[
         bool, typer.Option("--rise", help="Also the motion while F_x rises slowly: drift and vibration over its rate.")
     ] = False,
+    follow: Follow = False,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Also conditions of pairs, quality factors, what makes K asymmetric.")
     ] = False,
@@ -62,11 +67,11 @@ def spectrum(
     way back. The eigenvalues are those of K alone, without dissipation.
     """
     from faultgouge.analysis import spectrum as eigenvalues_of
-    from faultgouge.analysis import stability
-    from faultgouge.analysis.progress import show_progress
 
-    if values and (gain or rise or verbose):
-        raise typer.BadParameter("--values computes nothing but eigenvalues: leave --gain, --rise and --verbose out")
+    if values and (gain or rise or verbose or follow):
+        raise typer.BadParameter(
+            "--values computes nothing but eigenvalues: leave --gain, --rise, --follow and --verbose out"
+        )
     number = frame_at(file, frame, time)
     packing = stored_packing(file, number)
     if rise and not packing.configuration.top.any():
@@ -80,9 +85,13 @@ def spectrum(
     if values:
         _values(packing, as_json)
         return
-    result = eigenvalues_of(packing)
-    with status("stability") as show, show_progress(show):
-        verdict = stability(packing, "fx" if rise else None, spectrum_of_stiffness=result)
+    result = eigenvalues_of(packing) if size <= SECONDS_COORDINATES else None
+    verdict = verdict_of(packing, "fx" if rise else None, spectrum_of_stiffness=result, follow=follow)
+    if not as_json:
+        print(verdict, flush=True)
+    if result is None:
+        with status("spectrum"):
+            result = eigenvalues_of(packing)
     gains = _gain_of(packing) if gain else None
     if not as_json:
         _print_spectrum(packing, result, verdict, gains, verbose)
@@ -138,7 +147,6 @@ def _print_spectrum(
     gain: dict[str, Any] | None,
     verbose: bool,
 ) -> None:
-    print(verdict)
     _print_size(packing, result)
     _print_growing_motions(result, verdict.dissipative, verbose)
     if gain is not None:

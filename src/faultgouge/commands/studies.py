@@ -1,23 +1,28 @@
-"""The commands explain, reproduce, report, extremes, trigger and eruptions, which write studies and reports."""
+"""The commands explain, reproduce, report and extremes, and those of the studies that register themselves.
 
-from __future__ import annotations
+A study of `faultgouge.studies` says by its decorator what its command is (:mod:`faultgouge.registered`): a study of one
+scene, or a task that runs for a scene or a sweep.
+"""
 
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
+from typer.models import CommandInfo
 
+from .. import registered
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
+from .sweeps import DryRun, Shard, run_task
 from .terminal import (
-    AsJson,
+    Answer,
     Folder,
     NewFolder,
-    ScenePath,
+    SceneFile,
+    Workers,
+    command,
     lock_folder,
-    print_json,
     print_line,
     progress,
     read_scene,
@@ -27,36 +32,69 @@ from .terminal import (
 
 app = typer.Typer()
 
+REPLACED = "; the same command starts from the beginning and replaces them"
 
-@app.command(epilog="Example: faultgouge explain paper.toml")
-def explain(
-    scene: ScenePath,
-    timed: Annotated[bool, typer.Option("--time", help="Measure what each part costs: some ten seconds.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON, with the costs.")] = False,
-) -> None:
+
+def names_of_commands() -> list[str]:
+    """The names of the studies that are commands."""
+    return [name for name in registered.names() if find_command(name)]
+
+
+def find_command(name: str) -> CommandInfo | None:
+    """The command of a study; None if no study of this name has one."""
+    about = registered.description(name)
+    if about is None or not about.given.get("example"):
+        return None
+    own, example = typer.Typer(), about.given["example"]
+    if about.kind == "study":
+        words = about.given.get("kept", "what was found so far")
+        kept = f"{{output}}/{name}.jsonl has {words}; the same command continues from there"
+
+        def study(scene: SceneFile, output: Folder = Path(name)) -> Answer:
+            run = registered.study_of(name)
+            result = run(scene, output, say, lambda rows, count: progress(rows, run.counts, count))
+            return Answer(result=result, written=f"written: {output}/{name}.{'md' if run.page else 'json'}")
+
+        study.__doc__ = about.says
+        command(own, example, name=name, reads=name, kept=kept)(study)
+    else:
+        metavar, argument = "SCENE|SWEEP", f"A scene, or a sweep of the task {name}."
+        if "of_run" in about.given:
+            metavar, argument = "SCENE|SWEEP|drive.h5", f"A scene, a sweep of the task {name}, or a run of `drive`."
+
+        def task(
+            file: Annotated[Path, typer.Argument(metavar=metavar, help=argument, show_default=False)],
+            output: Folder = Path(name),
+            shard: Shard = "1/1",
+            workers: Workers = None,
+            dry_run: DryRun = False,
+        ) -> None:
+            if file.suffix == ".h5" and (of_run := registered.study_of(name).of_run) is not None:
+                keeps(f"{output} has the states so far; the same command continues from there", output)
+                if is_root():
+                    with lock_folder(output):
+                        for line in of_run(file, output, say, lambda rows, count: progress(rows, "states", count)):
+                            print_line(line)
+                return
+            run_task(name, file, output, shard, workers, dry_run)
+
+        task.__doc__ = about.says
+        command(own, example, name=name, as_json=False)(task)
+    return own.registered_commands[0]
+
+
+@command(app, "faultgouge explain paper.toml", reads="explain", task="settle")
+def explain(scene: SceneFile) -> Answer:
     """Explain what a scene includes, what it leaves out, and why.
 
-    The command switches every part off, or on, in LAMMPS, and compares the two
-    runs to the bit. With --time it also measures the ratios of their times.
+    The command sets the run of the scene up in LAMMPS, takes no step, and compares
+    what LAMMPS has loaded with and without each part.
     """
-    from faultgouge.assessment.explain.explain import explain as explain_scene
+    from faultgouge.assessment.explain import explain as explain_scene
 
-    wanted = read_scene(scene, "explain", "settle")
-    with status("switching features off and on"):
-        explanation = explain_scene(wanted, timed or as_json)
-    if as_json:
-        print_json(explanation.as_dict())
-    elif is_root():
-        from rich.console import Console
-
-        from faultgouge.assessment.explain.explanation_table import explanation_table, in_words, units_in_words
-
-        if explanation.units is not None:
-            print_line(units_in_words(explanation.units))
-        print_line(f"{in_words(explanation)}\n")
-        console = Console(highlight=False)
-        # a file or a pipe has no width, and a table of 80 columns is hard to read
-        Console(highlight=False, width=max(console.width, 150)).print(explanation_table(explanation))
+    with status("setting up the run with and without each part"):
+        explanation = explain_scene(scene)
+    return Answer(explanation.in_words(), explanation.as_dict())
 
 
 @app.command(epilog="Example: faultgouge reproduce -o results")
@@ -84,101 +122,41 @@ def reproduce(
     print_line(f"written: {output}/report.md")
 
 
-@app.command(epilog="Example: faultgouge report --quick -o report")
+@command(
+    app,
+    "faultgouge report --quick -o report",
+    kept="{output} has the studies that were finished" + REPLACED,
+    as_json=False,
+)
 def report(
     output: NewFolder = Path("report"),
     quick: Annotated[bool, typer.Option("--quick", help="Fewer points: a minute instead of ten.")] = False,
-) -> None:
+) -> Answer:
     """Measure error against run time: which method to use when, for six tasks, with figures and numbers."""
     from faultgouge.assessment.work_precision import report as run_studies
 
-    keeps(
-        f"{output} has the studies that were finished; the same command starts from the beginning and replaces them",
-        output,
-    )
-    with lock_folder(output):
-        run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
-    print_line(f"written: {output}/report.md")
+    run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
+    return Answer(written=f"written: {output}/report.md")
 
 
 Quick = Annotated[bool, typer.Option("--quick", help="About half of the cases, in a few seconds.")]
+TRIED = "{output} has the cases that were finished" + REPLACED
 
 
-@app.command(epilog="Example: mpiexec -n 2 faultgouge extremes -o extremes")
-def extremes(output: NewFolder = Path("extremes"), quick: Quick = False, as_json: AsJson = False) -> None:
+@command(app, "mpiexec -n 2 faultgouge extremes -o extremes", kept=TRIED)
+def extremes(output: NewFolder = Path("extremes"), quick: Quick = False) -> Answer:
     """Test stiff and extreme cases: each holds within a stated bound, or is refused in one sentence."""
-    from faultgouge.assessment.extremes import check
-    from faultgouge.assessment.extremes import extremes as try_cases
+    return try_cases(output, quick)
 
-    keeps(
-        f"{output} has the cases that were finished; the same command starts from the beginning and replaces them",
-        output,
-    )
-    with lock_folder(output):
-        result = try_cases(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
-    counts = Counter(case["status"] for case in result.get("cases", ()))
-    (say if as_json else print_line)(
+
+def try_cases(output: Path, quick: bool) -> Answer:
+    """What `extremes` does in a folder."""
+    from faultgouge.assessment.extremes import check, extremes
+
+    result = extremes(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
+    counts = Counter(case["status"] for case in result["cases"])
+    written = (
         f"{counts.total()} cases: {counts['holds']} hold, {counts['refused']} are refused in a sentence, "
         f"{counts['fails']} fail; written: {output}/extremes.md"
     )
-    if as_json:
-        print_json(result)
-    check(result)
-
-
-@app.command(hidden=True)
-def stability(
-    file: Annotated[Path | None, typer.Argument(show_default=False)] = None,
-    output: NewFolder = Path("stability"),
-    quick: Quick = False,
-    as_json: AsJson = False,
-) -> None:
-    """The name of `extremes` until version 1, with the JSON under its old name, too."""
-    if file is not None:
-        raise typer.BadParameter(
-            f"stability takes no file: `faultgouge spectrum {file}` says whether a packing is stable"
-        )
-    say("faultgouge stability is called faultgouge extremes now: stability is what spectrum tells of a packing")
-    try:
-        extremes(output, quick, as_json)
-    finally:
-        if is_root() and (output / "extremes.json").exists():
-            (output / "stability.json").write_bytes((output / "extremes.json").read_bytes())
-
-
-@app.command(epilog="Example: mpiexec -n 3 faultgouge trigger trigger.toml -o trigger")
-def trigger(scene: ScenePath, output: Folder = Path("trigger"), as_json: AsJson = False) -> None:
-    """Compute the critical amplitude of a wave over its frequency and the distance of the layer from the onset.
-
-    The amplitude is predicted from the stiffness, the damping and the masses, and
-    for some pairs measured by bisection in LAMMPS. The scene must give friction.v0,
-    the velocity above which friction weakens. With several ranks, one rank
-    distributes the runs.
-    """
-    from faultgouge.studies.trigger import trigger_map
-
-    _into_folder(trigger_map, scene, output, "trigger", "bisections", "what was found so far", as_json)
-
-
-@app.command(epilog="Example: mpiexec -n 3 faultgouge eruptions eruptions.toml -o eruptions")
-def eruptions(scene: ScenePath, output: Folder = Path("eruptions"), as_json: AsJson = False) -> None:
-    """Measure the size of eruptions: undamped runs from rest at each load of [eruptions], and how the growth ends.
-
-    With several ranks, one rank distributes the loads.
-    """
-    from faultgouge.studies.eruptions import eruptions as run_all
-
-    _into_folder(run_all, scene, output, "eruptions", "runs", "the runs that were over", as_json)
-
-
-def _into_folder(
-    study: Callable[..., dict[str, Any]], scene: Path, output: Path, name: str, what: str, kept: str, as_json: bool
-) -> None:
-    """Run a study of a scene that goes on in its folder; `what` is counted, and `kept` is what an interrupt leaves."""
-    wanted = read_scene(scene, name)
-    keeps(f"{output}/{name}.jsonl has {kept}; the same command continues from there", output)
-    with lock_folder(output):
-        result = study(wanted, output, say, lambda results, count: progress(results, what, count))
-    (say if as_json else print_line)(f"written: {output}/{name}.md")
-    if as_json:
-        print_json(result)
+    return Answer(result=result, written=written, fails=lambda: check(result))

@@ -6,31 +6,34 @@ alone speaks.
 
 from __future__ import annotations
 
+import inspect
 import json
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sized
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence, Sized
+from contextlib import contextmanager, nullcontext
+from functools import wraps
 from math import isfinite
 from pathlib import Path
 from threading import Event, Thread
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, ParamSpec, TypeVar, get_type_hints
 
 import typer
 
 from ..analysis.counted import counted
 from ..mpi_rank import is_root
-from ..signal_guard import holds
+from ..signal_guard import holds, keeps
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
     from faultgouge.analysis.motion.growth_of_run import GrowthOfRun
     from faultgouge.analysis.motion.slips import Slip
-    from faultgouge.pywrap import Equilibrium, Scene
+    from faultgouge.pywrap import Equilibrium, Record, Scene
     from faultgouge.pywrap.scenes.impossible import Task
 
 T = TypeVar("T")
+P = ParamSpec("P")
 
 SECONDS_BETWEEN_LINES = 60.0
 """Seconds between two lines of progress off a terminal."""
@@ -66,12 +69,106 @@ PackingFile = Annotated[
 ]
 Time = Annotated[float | None, typer.Option("--time", metavar="T", help="Of drive.h5: the state nearest to this time.")]
 Frame = Annotated[int, typer.Option(help="Number of the equilibrium; negative numbers count from the last.")]
+if TYPE_CHECKING:
+    SceneFile = Scene
+else:
+    SceneFile = ScenePath
+"""The argument SCENE of a `command` that reads its scene."""
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+
+
+class Answer(NamedTuple):
+    """What a command has to say.
+
+    Attributes
+    ----------
+    says : sequence of str
+        Lines of the result for people, in place of which --json prints `result`.
+    result : dict, optional
+        The result for programs.
+    written : str
+        What was written: a line after the result, with --json on standard error.
+    fails : callable, optional
+        Called in the end; raises the error of a result that is a failure.
+    """
+
+    says: Sequence[str] = ()
+    result: dict[str, Any] | None = None
+    written: str = ""
+    fails: Callable[[], object] | None = None
+
+
+def command(
+    app: typer.Typer,
+    example: str,
+    *,
+    name: str | None = None,
+    reads: str | None = None,
+    task: Task | None = None,
+    kept: str | None = None,
+    as_json: bool = True,
+    hidden: bool = False,
+) -> Callable[[Callable[P, Answer | None]], Callable[P, Answer | None]]:
+    """Make a function a command: its scene is read, its folder is locked, and its answer is printed, on rank 0.
+
+    An error that the function raises is printed in one sentence by :mod:`faultgouge.exit_status`; `say`, `status` and
+    `progress` show how far the work is.
+
+    Parameters
+    ----------
+    app : typer.Typer
+        The commands of the module.
+    example : str
+        Of the help.
+    name : str, optional
+        Of the command; by default that of the function.
+    reads, task : str, optional
+        The argument `scene`, of type `SceneFile`, is read as this command reads it, before anything is written; a task
+        that would never end is refused.
+    kept : str, optional
+        The option `output` is a folder, which is made and kept from other runs; and what an interrupt leaves in it, in
+        words that name it as {output}.
+    as_json : bool
+        Whether the command has the option --json.
+    """
+
+    def register(work: Callable[P, Answer | None]) -> Callable[P, Answer | None]:
+        own = inspect.signature(work)
+
+        @wraps(work)
+        def run(*args: Any, as_json: bool = False, **options: Any) -> None:
+            given = own.bind(*args, **options)
+            given.apply_defaults()
+            if reads is not None:
+                given.arguments["scene"] = read_scene(given.arguments["scene"], reads, task)
+            if kept is not None:
+                keeps(kept.format(**given.arguments), given.arguments["output"])
+            with nullcontext() if kept is None else lock_folder(given.arguments["output"]):
+                answer = work(*given.args, **given.kwargs) or Answer()
+            if as_json and answer.result is not None:
+                print_json(answer.result)
+            for line in () if as_json else answer.says:
+                print_line(line)
+            if answer.written:
+                (say if as_json else print_line)(answer.written)
+            if answer.fails is not None:
+                answer.fails()
+
+        flag = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=AsJson)
+        hints = get_type_hints(work, include_extras=True)
+        parameters = [each.replace(annotation=hints[key]) for key, each in own.parameters.items()]
+        parameters += [flag] if as_json else []
+        vars(run)["__signature__"] = own.replace(parameters=parameters, return_annotation=None)
+        run.__annotations__ = {each.name: each.annotation for each in parameters}
+        app.command(name, epilog=f"Example: {example}", hidden=hidden)(run)
+        return work
+
+    return register
 
 
 def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
     """The part of a scene file that a command reads; a task that would never end is refused."""
-    from faultgouge.analysis.files.formats.registry import READERS
+    from faultgouge.analysis.files.formats import READERS
     from faultgouge.pywrap.scenes.impossible import refuse_endless
     from faultgouge.pywrap.scenes.scene import Scene
 
@@ -88,9 +185,8 @@ def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
 
 
 def stored_files(scene: Scene) -> list[Path]:
-    """The files that a scene names: of its packing, and of the signal that forces it."""
-    signals = [section.signal for section in (scene.perturb, scene.drive) if section is not None]
-    return [Path(each) for each in (getattr(scene.packing, "file", None), *signals) if each is not None]
+    """The files that a scene names."""
+    return [path for paths in scene.files.values() for path in paths]
 
 
 def stored_packing(file: Path, frame: int = -1) -> Packing | Configuration:
@@ -128,7 +224,7 @@ def stored_series(file: Path) -> dict[str, Any] | None:
 def stored_drive(file: Path) -> tuple[dict[str, Any], list[Slip]] | None:
     """The series of a drive.h5 and its slips; None of another file."""
     from faultgouge.analysis import RunFile
-    from faultgouge.pywrap.runs.drive_recorder import SERIES, drive_of, slips_in
+    from faultgouge.pywrap.runs.drive import SERIES, drive_of, slips_in
 
     if file.suffix == ".disks":
         return None
@@ -143,7 +239,7 @@ def frame_at(file: Path, frame: int, time: float | None) -> int:
     if time is None:
         return frame
     from faultgouge.analysis import BadInputError, RunFile
-    from faultgouge.pywrap.runs.drive_recorder import drive_of
+    from faultgouge.pywrap.runs.drive import drive_of
 
     if not isfinite(time):
         raise BadInputError(f"--time {time:g} is no time: give a number")
@@ -166,20 +262,29 @@ def growth_in(file: Path, series: dict[str, Any]) -> GrowthOfRun:
     return growth_of_run(packing, series["time"], series["msd"], series["friction"], dt)
 
 
-def check_output(output: Path, *inputs: Path) -> None:
-    """Refuse a file that cannot be written, or is one of the inputs, before any work."""
+def check_output(output: Path, *inputs: Path, head: str = "") -> None:
+    """Refuse a file that cannot be written, or is one of the inputs, or of others, before any work."""
     from faultgouge.analysis.files.atomic_write import check_output as check
 
-    check(output, *inputs)
+    check(output, *inputs, head=head)
 
 
-def lock_output(context: typer.Context, output: Path, *inputs: Path) -> None:
+def hold_lock(output: Path) -> None:
+    """Have the guard remove the lock of a file that a run writes, if the run cannot do so itself."""
+    from faultgouge.analysis.files.atomic_write import lock_of
+
+    if is_root() and (lock := lock_of(output)):
+        holds(lock)
+
+
+def lock_output(context: typer.Context, output: Path, *inputs: Path, head: str = "") -> None:
     """`check_output`, and keep other runs from the file until the command ends, on rank 0."""
     from faultgouge.analysis.files.atomic_write import lock_output as lock
 
-    check_output(output, *inputs)
-    if is_root() and (taken := context.with_resource(lock(output))):
-        holds(taken)
+    check_output(output, *inputs, head=head)
+    if is_root():
+        hold_lock(output)
+        context.with_resource(lock(output))
 
 
 @contextmanager
@@ -196,9 +301,11 @@ def lock_folder(folder: Path) -> Iterator[None]:
 
 
 def print_json(value: dict[str, Any]) -> None:
-    """The result on standard output."""
+    """The result on standard output, the same as in a file."""
+    from faultgouge.analysis.files.atomic_write import FORMAT, FORMAT_KEY
+
     if is_root():
-        print(json.dumps(value, indent=1))
+        print(json.dumps({FORMAT_KEY: FORMAT, **value}, indent=1))
 
 
 def print_line(result: str) -> None:
@@ -212,6 +319,12 @@ def say(message: str) -> None:
     """A line on standard error."""
     if is_root():
         print(message, file=sys.stderr)
+
+
+def say_remark(record: Record) -> None:
+    """Say what is not known of a file that goes on."""
+    if record.remark:
+        say(record.remark)
 
 
 def report_fallback(equilibrium: Equilibrium) -> None:
@@ -282,10 +395,3 @@ def progress(items: Iterable[T], what: str, total: int | None = None, done: int 
         for item in items:
             bar.advance(task)
             yield item
-
-
-def table_of(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """A table as lines of text; a column is as wide as its widest entry."""
-    lines = [list(headings), *map(list, rows)]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join("   ".join(map(str.ljust, line, widths)).rstrip() for line in lines)

@@ -8,7 +8,7 @@ import pytest
 
 from faultgouge import load
 from faultgouge.analysis import PackingFileError, read_dump
-from faultgouge.analysis.files.dumps import dump_frames
+from faultgouge.analysis.files.formats.lammps_dump import dump_frames
 
 DISK_COLUMNS = "id type x y radius mass d_theta fx fy tqz floor_slip floor_overlap"
 CONTACT_COLUMNS = "id1 id2 f_n f_t slip"
@@ -96,6 +96,7 @@ def test_names_as_lammps_has_them(dump_path, cluster):
         (".contacts", " slip", " other", "no column slip"),
         (".params", "mu 0", "nu 0", "does not name 'mu'"),
         (".params", "fx 0.5", "fx half", "one number a line"),
+        (".params", "fx 0.5", "fx 0.5\nfaultgouge_format 2", "has format 2 of faultgouge's files"),
         (".disks", "ITEM: TIMESTEP", "hello", "not a complete LAMMPS text dump"),
         (".disks", "OF ATOMS\n6", "OF ATOMS\n7", "7 rows are announced"),
         (".contacts", "ITEM: TIMESTEP\n0", "ITEM: TIMESTEP\n5", "no snapshot of step 0"),
@@ -133,24 +134,3 @@ def test_packing_from_json(tmp_path, reference, reference_packing, cluster):
     assert packing.box_length is None
     assert not packing.top.any()
     assert len(packing.contacts) == 1
-
-
-@pytest.mark.parametrize(
-    ("content", "says"),
-    [
-        ("", "not a packing file"),
-        ("[1, 2]", "not a packing file"),
-        ('{"x": [0], "y": [1]}', "lacks the key 'radius'"),
-        ('{"x": [0], "y": [1, 2], "radius": [1]}', "not a packing file"),
-        ('{"x": [0], "y": [1], "radius": [-1]}', "above 0"),
-        ('{"x": ["a"], "y": [1], "radius": [1]}', "not a packing file"),
-        ('{"x": [0], "y": [1], "radius": [1], "top": [1]}', "top"),
-        ('{"x": [0], "y": [1], "radius": [1], "box_length": 1}', "two largest"),
-    ],
-)
-def test_json_that_is_no_packing(tmp_path, cluster, content, says):
-    path = tmp_path / "packing.json"
-    path.write_text(content)
-    with pytest.raises(PackingFileError, match=says) as error:
-        load(path, law=cluster.law, fy=0.0, top=0)
-    assert "packing.json" in str(error.value)

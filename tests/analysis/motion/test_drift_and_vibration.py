@@ -171,10 +171,3 @@ def test_two_vibrations_of_one_packing_are_told_apart():
         rising = RisingMotion(**one, time=4.0, span=3.0, other_start=replace(one, **other))
         assert replace(found, rising=rising).sentences[-1].endswith(says)
     assert set(found.rising.other_start) == set(one)
-
-
-def test_a_rising_load_is_followed_where_pushes_have_not_settled():
-    at_rest = balanced(three_disks())
-    found = stability(at_rest, rise=np.tile([1.0, 0.0], (3, 1)), time=0.05)
-    assert found.stable is None
-    assert found.rising.drift > 0

@@ -3,10 +3,11 @@
 import sys
 
 import numpy as np
+import pytest
 from granular_packings import command, instance, start, state, with_law
 from mpi4py import MPI
 
-from faultgouge.pywrap import from_lammps
+from faultgouge.pywrap import NotTakenError, from_lammps
 
 WORLD, THREADS = MPI.COMM_WORLD, int(sys.argv[1])
 ENDS = {
@@ -41,6 +42,27 @@ for how, lines in ENDS.items():
     assert lmp.extract_global("ntimestep") == step
     command(lmp, "timer timeout unlimited\nrun 10")
     assert lmp.extract_global("ntimestep") == step + 10
+
+# what zero steps would change, of which nothing is given back, is named before
+CHANGES = {
+    "fix shakes all langevin 1e-9 1e-9 1.0 4711 omega yes": "fix shakes langevin",
+    'fix says all print 1000 "step" file says.txt screen no': "fix says print",
+    "fix mean all ave/time 1 1 1 c_thermo_temp file mean.txt": "fix mean ave/time",
+    "variable dice equal random(0,1,4711)": "variable dice",
+}
+for line, name in CHANGES.items():
+    lmp.command(line)
+    before = state(lmp, WORLD)
+    if WORLD.size > 1 or THREADS > 1:
+        with pytest.raises(NotTakenError, match=f"by which {name} may write, count or draw random numbers"):
+            from_lammps(lmp, given, balance=np.inf)
+    else:
+        from_lammps(lmp, given, balance=np.inf)
+    assert np.array_equal(state(lmp, WORLD), before)
+    lmp.command(f"unfix {line.split()[1]}" if line.startswith("fix") else "variable dice delete")
+command(lmp, "fix cold all langevin 0.0 0.0 1.0 4711 omega yes")
+from_lammps(lmp, [*given, "fix cold all langevin 0.0 0.0 1.0 4711 omega yes"], balance=np.inf)
+lmp.command("unfix cold")
 
 # LAMMPS forgets the histories of contacts in write_restart if other lists of neighbours were asked for since the run
 lmp.command("run 0")

@@ -71,9 +71,13 @@ def test_at_the_angle_of_repose_a_block_slides_on_ahead(block):
     assert moved(lmp, PUSH, 5000) == pytest.approx(ahead, rel=1e-6)
     # a push back is turned round, and loses energy: 2 % is what steps of one-sided motion change
     assert 0 < moved(lmp, -PUSH, 5000) == pytest.approx(back, rel=0.02)
-    verdict = stability(here, time=5.0)
+    verdict = stability(here, rise=[[1.0, 0.0, 0.0]], time=5.0)
     assert verdict.stable is None
-    assert "has not settled" in str(verdict)
+    assert "no constant drift is seen" in verdict.not_followed  # however short the time
+    verdict = stability(here)
+    assert verdict.stable is None
+    assert "has not settled: 1 contact at Coulomb's bound slides on after a push" in str(verdict)
+    assert "if all slid on, 1 motion would go on for ever" in str(verdict)
 
 
 @pytest.mark.long
@@ -92,7 +96,8 @@ def test_a_load_that_rises_accelerates_a_block_that_slides_and_pushes_one_back_t
     assert np.sqrt(3) * back.rising["drift"] == pytest.approx(1 / 300, rel=0.02)
     assert back.rising["vibration"] < 1e-6 * back.rising["drift"]
     assert back.rising["steady"]
-    assert back.rising["next_change"] == pytest.approx(2 * here.contacts.friction[0], rel=0.01)  # slides back
+    assert back.rising["next_change"] == pytest.approx(2 * here.contacts.friction[0], rel=0.01)
+    assert back.rising["next_event"] == "slides back"
     rate, time = 1e-7, 2.0
     command(lmp, f"unfix drag\nreset_timestep 0\nvariable rise equal {rate}*step*dt\nfix rise all addforce v_rise 0 0")
     before = float(of_particle(lmp, "x", 1)[0])
@@ -135,9 +140,7 @@ def test_a_push_sideways_turns_the_force_at_the_bound_and_the_block_slides_ahead
     here, times = from_lammps(lmp), np.linspace(0.02, 2.0, 100)
     motion = one_sided_motion(here, [[0.0, 1.0, 0.0]], times=times)
     assert np.all(motion.displacement[..., 0] == 0)
-    allowed = 0.1 * np.abs(motion.displacement[..., 1]).max()
-    assert moved(lmp, motion.scales[1], 2000, axis=1) == pytest.approx(0.9 * allowed, rel=0.1)
-    verdict = stability(here, rise=[[0.0, 1.0, 0.0]], time=0.1)
+    verdict = stability(here, rise=[[0.0, 1.0, 0.0]], time=20.0)
     assert "the load turns the forces of contacts at Coulomb's bound, and nothing holds" in verdict.not_followed
     rate, time = 0.01 * here.contacts.friction[0], 2.0
     command(lmp, f"unfix drag\nreset_timestep 0\nvariable rise equal {rate}*step*dt\nfix rise all addforce 0 v_rise 0")
@@ -252,4 +255,4 @@ def test_a_block_on_top_of_a_sphere_slides_down_from_the_push_on_that_is_said(la
     assert abs(moved(lmp, 0.01 * least, 6000, which=2)) < 1e-3 * expected
     short = stability(here, time=4.0)
     assert f"`time` = {short.one_sided.needed:.2g} may do" in str(short)
-    assert 4.0 < short.one_sided.needed < verdict.one_sided.time
+    assert 4.0 < short.one_sided.needed < 1.1 * verdict.one_sided.time

@@ -4,64 +4,50 @@ import numpy as np
 import pytest
 from granular_packings import HERTZ, MOVES, command
 
+WALL = "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL"
+OPEN = r"The line of fix w wall/gran does not say where the wall is: give all of"
+TABLE = [
+    # more lines of the instance, a change of what is told of it, and the words that name the culprit
+    (f"{WALL} shear x 1 contacts{MOVES}", {}, "without shear"),
+    ("fix r all rigid group 1 all", {}, "together in bodies that may rotate"),
+    ("fix m all move linear 0 0 0", {}, "unfix it, and let the packing come to rest"),
+    (f"fix s all setforce 0 1 NULL{MOVES}", {}, "drives particles"),
+    ("", {}, "Nothing moves"),
+    (f"{MOVES}\nfix again all nve/sphere", {}, "fix move and fix again both move 2 particles"),
+    (f"{MOVES}\nfix again all nve", {}, "fix move and fix again both move 2 particles"),
+    (MOVES, {}, "The packing moves: the residual of particle [12] at .* and 1 more is out of balance"),
+    (MOVES, None, "no log to read its commands from: give the lines pair_style"),
+    (MOVES, {"history 1e5": "history 2e5"}, "normal forces of the contacts of types 1 and 1 are not those"),
+    (MOVES, {"gran/hertz": "gran/hooke"}, "pair_style gran/hooke/history, and the instance has gran/hertz"),
+    (MOVES, {"1e5": "${kn}"}, "has a variable: write its number"),
+    (MOVES, {"pair_style": "# "}, "no pair_style"),
+    (MOVES, {"* *": "A A"}, r"do not stand alone \(LAMMPS stopped: .*\): give the lines"),
+    (WALL + MOVES, {WALL: "fix w all wall/gran"}, OPEN),
+    (WALL + MOVES, {" zplane 0 NULL": ""}, OPEN),
+    (WALL + MOVES, {" 0 NULL": ""}, OPEN),
+]
 
-@pytest.mark.parametrize(
-    ("pair", "coefficients", "more", "says"),
-    [
-        (HERTZ, "* *", "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL shear x 1 contacts" + MOVES,
-         "without shear"),
-        (HERTZ, "* *", "fix r all rigid group 1 all", "together in bodies that may rotate"),
-        (HERTZ, "* *", "fix m all move linear 0 0 0", "unfix it, and let the packing come to rest"),
-        (HERTZ, "* *", "fix s all setforce 0 1 NULL" + MOVES, "drives particles"),
-        (HERTZ, "* *", "", "Nothing moves"),
-        (HERTZ, "* *", MOVES + "\nfix again all nve/sphere", "fix move and fix again both move 2 particles"),
-        (HERTZ, "* *", MOVES + "\nfix again all nve", "fix move and fix again both move 2 particles"),
-        (HERTZ, "* *", MOVES, "The packing moves: the residual of particle [12] at .* and 1 more is out of balance"),
-    ],
-)  # fmt: skip
-def test_what_is_refused(two, pair, coefficients, more, says):
+
+@pytest.mark.parametrize(("more", "changes", "says"), TABLE)
+def test_what_is_refused(two, more, changes, says):
     from faultgouge.pywrap import NotTakenError, from_lammps
 
-    lmp, told = two(pair, coefficients, more.strip())
+    lmp, told = two(HERTZ, "* *", more.strip())
+    text = "\n".join(told)
+    for before, after in (changes or {}).items():
+        text = text.replace(before, after)
     with pytest.raises(NotTakenError, match=says) as refusal:
-        from_lammps(lmp, told)
+        from_lammps(lmp, None if changes is None else text)
     assert "\n" not in str(refusal.value)
 
 
-def test_commands_that_are_not_those_of_the_instance(two):
-    from faultgouge.pywrap import NotTakenError, from_lammps
+def test_one_text_is_as_good_as_many_lines(two):
+    """A comment is none of the command."""
+    from faultgouge.pywrap import from_lammps
 
     lmp, told = two(HERTZ, "* *", MOVES.strip())
-    with pytest.raises(NotTakenError, match=r"no log to read its commands from: give the lines pair_style"):
-        from_lammps(lmp)
-    other = [told[0].replace("1e5", "2e5"), *told[1:]]
-    with pytest.raises(NotTakenError, match=r"normal forces of the contacts of types 1 and 1 are not those"):
-        from_lammps(lmp, other)
-    with pytest.raises(NotTakenError, match=r"pair_style gran/hooke/history, and the instance has gran/hertz"):
-        from_lammps(lmp, ["pair_style gran/hooke/history 1 1 1 1 1 1"])
-    with pytest.raises(NotTakenError, match="has a variable: write its number"):
-        from_lammps(lmp, ["pair_style gran/hertz/history ${kn} 1 1 1 1 1"])
-    with pytest.raises(NotTakenError, match="no pair_style"):
-        from_lammps(lmp, told[2:])
-    with pytest.raises(NotTakenError, match=r"do not stand alone \(LAMMPS stopped: .*\): give the lines") as refusal:
-        from_lammps(lmp, [told[0], "pair_coeff A A", *told[2:]])
-    assert "\n" not in str(refusal.value)
-    # a comment is none of the command, and one text is as good as many lines
     whole = from_lammps(lmp, "\n".join([*told[:-1], f"{told[-1]}  # ${{comment}}"]), balance=np.inf)
     assert whole == from_lammps(lmp, told, balance=np.inf)
-
-
-@pytest.mark.parametrize("given", ["", " hertz/history 1e5 NULL 1 1 0.5 1", " hertz/history 1e5 NULL 1 1 0.5 1 zplane"])
-def test_a_line_of_a_wall_that_is_not_whole(two, given):
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
-    wall = "fix w all wall/gran hertz/history 1e5 NULL 1 1 0.5 1 zplane 0 NULL"
-    lmp, told = two(HERTZ, "* *", wall + MOVES)
-    lines = [f"fix w all wall/gran{given}" if line == wall else line for line in told]
-    with pytest.raises(
-        NotTakenError, match=r"^The line of fix w wall/gran does not say where the wall is: give all of"
-    ):
-        from_lammps(lmp, lines, balance=np.inf)
 
 
 def test_commands_of_a_log_that_a_deck_has_begun(two, tmp_path):
@@ -106,3 +92,16 @@ def test_a_log_that_two_instances_write(two, lammps_with, tmp_path):
     lammps_with()
     with pytest.raises(NotTakenError, match=r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
         from_lammps(lmp, balance=np.inf)
+
+
+def test_what_runs_write_into_a_log_is_no_command(two, tmp_path):
+    """`fix print` may print anything, at the beginning of a run, too."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp, told = two(HERTZ, "* *", MOVES.strip())
+    lmp.command(f'log "{tmp_path}/own.log"')
+    prints = 'fix says all print 1 "unfix move"\nrun 2\nrun 2\nunfix says\nrun 4 every 2 "print done"\nrun 1 post no'
+    command(lmp, "\n".join([*told, prints]))
+    found = from_lammps(lmp, balance=np.inf)
+    assert len(found) == 2
+    assert found.free.all()  # by fix move

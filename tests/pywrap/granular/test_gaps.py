@@ -74,8 +74,9 @@ def test_a_push_that_closes_a_gap_is_too_large(row):
     # close looks take steps of 0.3 of the stable one
     assert most == pytest.approx(GAP / motion.displacement[:, 0, 0].max(), rel=0.1)
     verdict = stability(here)
-    assert verdict.largest_push < 100 * GAP
-    assert "above, contacts open, close or slide" in str(verdict)
+    # dashpots do not count, and the last disk is nearer to the first: two disks share the energy of a gap of GAP / 2
+    assert verdict.largest_energy == pytest.approx(0.25 * 300 * (GAP / 2) ** 2, rel=1e-3)
+    assert "no contact opens, closes or slides" in str(verdict)
     rise = stability(here, rise=velocity).rising
     assert rise["next_event"] == "closes"
     assert rise["next_change"] == pytest.approx(300 * GAP, rel=1e-3)  # of the spring of the floor

@@ -7,7 +7,7 @@ from pushes import in_steps, pushed
 
 from faultgouge.analysis import damping_matrix, stability, stiffness_matrix
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
-from faultgouge.analysis.motion.one_sided_outcome import random_pushes
+from faultgouge.analysis.motion.pushes import random_pushes
 
 CELL = """
 units lj
@@ -81,20 +81,16 @@ def test_a_lid_moves_as_one(cell, tmp_path, lid):
     on_lid = found.kind == 2
     count, leader = int(on_lid.sum()), int(np.flatnonzero(found.kind == 2)[0])
     assert count == 9
-    if "rigid" in lid:
-        assert found.operators == "differences"
-        assert found.operator_error < 1e-5
-    else:
-        assert found.operators == "laws"
-        assert found.proof < 1e-5
-        measured = from_lammps(lmp, differences=True)
-        for matrix, other in (
-            (stiffness_matrix(found), measured.stiffness),
-            (damping_matrix(found), measured.damping),
-            (found.constraint, measured.constraint),
-        ):
-            assert abs(matrix - other).max() < 1e-6 * abs(other).max()  # 6e-9 of K, 9e-12 of C
-        assert found.residual == pytest.approx(measured.residual, rel=1e-3)
+    assert found.operators == "laws"
+    assert found.proof < 1e-5
+    measured = from_lammps(lmp, differences=True)
+    for matrix, other in (
+        (stiffness_matrix(found), measured.stiffness),
+        (damping_matrix(found), measured.damping),
+        (found.constraint, measured.constraint),
+    ):
+        assert abs(matrix - other).max() < 1e-6 * abs(other).max()  # 6e-9 of K, 9e-12 of C
+    assert found.residual == pytest.approx(measured.residual, rel=1e-3)
     free = "xz" if "held" in lid else "xyz"
     n, mass = len(found), found.coordinate_mass
     for k, axis in enumerate("xyzuvw"):
@@ -112,6 +108,88 @@ def test_a_lid_moves_as_one(cell, tmp_path, lid):
     assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
     write_configuration(tmp_path / "cell.h5", found)
     assert read_configuration(tmp_path / "cell.h5") == found
+
+
+TWO_LIDS = """
+units lj
+atom_style sphere
+boundary p p f
+newton off
+comm_modify vel yes
+region box block 0 2 0 2 -1 4 units box
+create_box 1 box
+{spheres}
+group low id 1 2 3 4
+group grain id 5
+group lid id 6 7 8 9
+group bed union low lid
+set group all diameter 1.0 density 1.9
+set group lid density 2.5
+pair_style gran/hertz/history 1e4 NULL 100 NULL 0.5 1
+pair_coeff * *
+{lids}
+fix load lid addforce 0 0 -1.0
+fix move grain nve/sphere
+fix drag grain viscous 1
+thermo_style custom step
+timestep 0.001
+run 40000
+"""
+CORNERS = [(x, y) for x in (0, 1) for y in (0, 1)]
+
+
+def test_a_grain_between_two_bodies_of_one_fix(lammps_with):
+    """fix rigid moves the particles of its bodies alone, whatever its own group is; a body that keeps its place is as
+    frozen particles, but for dashpots, which feel its mass."""
+    from faultgouge.pywrap import compare_motion, from_lammps
+
+    places = [(x, y, 0.0) for x, y in CORNERS] + [(0.5, 0.45, 0.7)] + [(x, y, 1.4) for x, y in CORNERS]
+    spheres = "\n".join(f"create_atoms 1 single {x} {y} {z} units box" for x, y, z in places)
+    rigid = "fix lids {} rigid group 2 low lid force 1 off off off torque * off off off force 2 on off on"
+    found = {}
+    for group in ("all", "bed"):
+        lmp = lammps_with(TWO_LIDS.format(spheres=spheres, lids=rigid.format(group)), log=f"log.{group}")
+        found[group] = from_lammps(lmp)
+    assert found["all"] == found["bed"]
+    here = found["bed"]
+    assert here.operators == "laws"
+    assert here.proof < 1e-5
+    assert list(here.free) == [False] * 4 + [True] * 5
+    c, mass = here.contacts, here.mass
+    felt = np.array([mass[:4].sum()] * 4 + [mass[4]] + [mass[5:].sum()] * 4)
+    reduced = 1 / (1 / felt[c.i] + 1 / felt[c.j])
+    assert c.normal_dashpot == pytest.approx(100 * reduced * np.sqrt(0.25 * c.overlap), rel=1e-9)
+    measured = from_lammps(lmp, differences=True)
+    assert measured.remarks[0].startswith("K and C are differences of LAMMPS's forces: ")
+    for matrix, other in ((stiffness_matrix(here), measured.stiffness), (damping_matrix(here), measured.damping)):
+        assert abs(matrix - other).max() < 1e-6 * abs(other).max()
+    told, run = stability(here), compare_motion(lmp, here, 2.0, 1e-6, timestep=1e-5)
+    assert told.stable is True
+    assert run.difference < 1e-3
+    # D falls as its slowest part or faster
+    later = compare_motion(lmp, here, 30.0, 1e-6, timestep=1e-4).velocity
+    assert np.sum(later**2) < np.sum(run.velocity**2) * np.exp(told.growth_rate * 28.0)
+
+
+@pytest.mark.long
+def test_a_rigid_lid_with_contacts_at_the_bound_rests_as_in_lammps(cell):
+    """D is that of LAMMPS's particles while all but one in a thousand of the motion dies away."""
+    from faultgouge import relax
+    from faultgouge.pywrap import from_lammps
+
+    lid = "fix push lid addforce 0.5 0 -2.0\nfix body lid rigid single torque 1 off off off"
+    lmp = cell(lid, **{"10 0.5 1": "10 0.3 1"})
+    relax(lmp)
+    lmp.command("run 50000 post no")
+    found = from_lammps(lmp)
+    told = stability(found)
+    assert found.contacts.one_sided.any()
+    assert told.stable is True
+    assert told.one_sided is not None
+    push, times = random_pushes(found, 1)[:, :1], np.array([0.5, 2.0, 8.0, 32.0, 64.0, 100.0])
+    expected = in_steps(found, push, times, 2e-3)
+    np.testing.assert_allclose(pushed(lmp, found, push, times, 2e-3, 1e-8)[:, 0], expected, rtol=2e-3)
+    assert expected[-1] < 0.1 * expected[0]
 
 
 @pytest.mark.long
@@ -172,6 +250,17 @@ def test_a_lid_of_two_masses(cell, lid):
     runs = [compare_motion(lmp, found, 0.02, 1e-6, timestep=h) for h in (1e-4, 5e-5)]
     rest = 2 * runs[1].velocity - runs[0].velocity - runs[0].linear_velocity
     assert np.linalg.norm(rest) < 1e-4 * np.linalg.norm(runs[0].linear_velocity)
+
+
+def test_a_lid_out_of_balance_is_named(cell):
+    from faultgouge.pywrap import NotTakenError, from_lammps
+
+    lmp = cell(f"{CONFINED}\nfix body lid rigid single torque 1 off off off")
+    command(lmp, "fix more lid addforce 0 0 -1.0")
+    with pytest.raises(
+        NotTakenError, match="the residual of the lid of 9 particles that move as one, with particle 28"
+    ):
+        from_lammps(lmp)
 
 
 def test_a_spring_in_aveforce_is_refused(cell):

@@ -8,6 +8,7 @@ from granular_packings import command, instance, start, with_law
 
 TRAPS = """
 variable trap atom -0.2*(x-1.5)
+variable later equal (step>100000000)*0.05
 region everywhere block INF INF INF INF INF INF
 """
 HERTZ = "gran/hertz/history 3e3 NULL 40 40 0.5 1"
@@ -66,13 +67,13 @@ FIXES = {
     "smd cvel 2.0 1e-9 tether 1.5 1.5 NULL 0.0": "fix trap smd pulls at particles",
     "rhok 1 0 0 20.0 0.2": "fix trap rhok acts on particles as contacts do not tell",
     "flow/gauss 1 1 0": "fix trap flow/gauss acts on particles as contacts do not tell",
-    "damping/cundall 0.3 0.3": "fix trap damping/cundall damps as the forces",
+    "addtorque 2.0 0.0 2.0": "fix trap addtorque acts on particles as contacts do not tell",
     "momentum 1000 linear 1 1 0": "fix trap momentum changes velocities",
     "temp/rescale 1000 1e-20 1e-20 0.0 1.0": "fix trap temp/rescale changes velocities",
     "temp/berendsen 1e-20 1e-20 1.0": "fix trap temp/berendsen changes velocities",
 }
 
-OFTEN = ("momentum", "temp")
+OFTEN = ("momentum", "temp", "addtorque")
 """Begins of fixes whose refusal takes less than a second."""
 
 
@@ -150,7 +151,14 @@ def test_fixes_that_act_on_what_moves(bed, fix, says):
 
 @pytest.mark.parametrize(
     "fix",
-    ["addforce 0.01 0 0", "indent 1.0 sphere 0 0 100 1", "setforce NULL NULL NULL", "ave/time 1 1 1 c_thermo_temp"],
+    [
+        "addforce 0.01 0 0",
+        "addforce v_later 0 0",
+        "damping/cundall 0.3 0.3",
+        "indent 1.0 sphere 0 0 100 1",
+        "setforce NULL NULL NULL",
+        "ave/time 1 1 1 c_thermo_temp",
+    ],
 )
 def test_fixes_without_effect_on_small_motion(bed, fix):
     """Whatever their names are, the proof takes them."""
@@ -242,32 +250,6 @@ run 60000
     with pytest.raises(NotTakenError, match=r"as K says: .*some are not in the log"):
         from_lammps(lmp)
     lmp.close()
-
-
-def test_log_of_another_instance(tmp_path):
-    """Two instances of one process with one log: the commands of the second are found for the first."""
-    from faultgouge.pywrap import NotTakenError, from_lammps
-
-    made = []
-    for kt in ("NULL", "2e3"):
-        lmp = instance(tmp_path / "log.lammps")
-        start(lmp, 3, 20)
-        command(lmp, f"""
-pair_style gran/hertz/history 3e3 {kt} 40 40 0.5 1
-pair_coeff * *
-fix floor all wall/gran hertz/history 3e3 {kt} 40 40 0.5 1 zplane 0 NULL contacts
-fix load all gravity 1.0 vector 0.1 0 -1
-fix move all nve/sphere
-fix drag all viscous 1.5
-timestep 0.002
-run 60000
-""")  # fmt: skip
-        made.append(lmp)
-    with pytest.raises(NotTakenError, match=r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
-        from_lammps(made[0])
-    assert from_lammps(made[1]).proof < 1e-5
-    for lmp in made:
-        lmp.close()
 
 
 def test_bonds(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from pushes import PUSH, velocities
 
 from faultgouge.analysis import one_sided_motion, stability
-from faultgouge.analysis.motion.one_sided_outcome import random_pushes
+from faultgouge.analysis.motion.pushes import random_pushes
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from granular_packings import instance
 from pushes import pushed
 
 from faultgouge.analysis import stability
-from faultgouge.analysis.motion.one_sided_outcome import PUSHES, random_pushes
+from faultgouge.analysis.motion.pushes import PUSHES, random_pushes
 
 DECK = """
 units lj

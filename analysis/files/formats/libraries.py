@@ -1,0 +1,174 @@
+"""Files that other libraries read: GSD, HOOMD's format, in and out; and what MDAnalysis reads with radii, such as PQR.
+
+GSD keeps positions, diameters, masses and orientations in float32, too coarse for overlaps. An export also has these
+numbers in float64, among the logged quantities (``log/particles/faultgouge/...``), which `import` prefers; other
+readers see float32. The y axis of a GSD box has its middle at zero; an export gives the height of the floor. MDAnalysis
+hands out positions in float32.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import BadInputError, PackingFileError
+from ..atomic_write import FORMAT, FORMAT_KEY, check_format, replace_whole
+from ..plain_file import check_plain
+from .disks import Disks, of_columns
+from .exported import Exported, pick_numbers, slips_of
+from .tables import choose_frame
+
+OWN_COLUMNS = "radius", "mass", "angle", "top", "x_low", "y_low"
+OWN_QUANTITIES = "particles/faultgouge/"
+CONTACTS = "faultgouge/contacts"
+GSD_PRECISION = "GSD keeps positions and radii in float32, about 1e-7 of a coordinate: overlaps are lost below that"
+
+
+def read_gsd(path: Path, frame: int | None = None) -> Disks:
+    """A frame of a GSD file; the last one by default, if all are of as many disks."""
+    hoomd = needed_library("gsd.hoomd", path)
+    try:
+        check_plain(path)
+        with hoomd.open(str(path), "r") as file:
+            counts = [file[k].particles.N for k in (range(len(file)) if frame is None else ())]
+            return _disks(path, file[choose_frame(path, counts or [0] * len(file), frame)])
+    except (OSError, RuntimeError) as error:
+        raise PackingFileError(f"{path} is no readable GSD file: {error}.") from error
+
+
+def _disks(path: Path, frame: Any) -> Disks:
+    log, particles, box = frame.log, frame.particles, frame.configuration.box
+    own = {
+        key.removeprefix(OWN_QUANTITIES): np.asarray(value)
+        for key, value in log.items()
+        if key.startswith(OWN_QUANTITIES)
+    }
+    if "x" in own:
+        columns = {name: array.astype(np.float64) for name, array in own.items()}
+        values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
+        period, number = values.get("box_length"), values.get(FORMAT_KEY)
+        check_format(None if number is None else int(number), path)
+        rows = log.get(CONTACTS)
+        return of_columns(
+            str(path),
+            columns,
+            _type_names(particles),
+            box_length=None if period is None else float(period),
+            given=pick_numbers(values),
+            slips=None if rows is None else slips_of(rows[rows[:, 0] > 0], "x_low" in columns),
+        )
+    if particles.diameter is None or not particles.N:
+        raise PackingFileError(f"{path} has no disks with diameters.")
+    place = np.asarray(particles.position, dtype=np.float64)
+    turn = np.asarray(particles.orientation, dtype=np.float64)
+    columns = dict(zip("xyz", place.T, strict=True)) | {
+        "diameter": np.asarray(particles.diameter, dtype=np.float64),
+        "mass": np.asarray(particles.mass, dtype=np.float64),
+        "type": 1.0 + np.asarray(particles.typeid, dtype=np.float64),
+        "angle": 2 * np.arctan2(turn[:, 3], turn[:, 0]),
+    }
+    return of_columns(str(path), columns, _type_names(particles), box_length=float(box[0]), remark=GSD_PRECISION)
+
+
+def _type_names(particles: Any) -> list[str]:
+    """The name of each particle's type; none where types have no names."""
+    names = list(particles.types or [])
+    known = len(names) > int(np.max(particles.typeid, initial=0))
+    return [names[number] for number in particles.typeid] if known else []
+
+
+def write_gsd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
+    """Write one frame or several, and return the contents in words."""
+    hoomd = needed_library("gsd.hoomd", path)
+    with replace_whole(path) as new, hoomd.open(str(new), "w") as file:
+        for number, (_, exported) in enumerate(frames):
+            frame = _frame(hoomd, exported)
+            frame.configuration.step = number
+            file.append(frame)
+    return f"{GSD_PRECISION}; the logged quantities have all of the packing in float64, and import takes these"
+
+
+def _frame(hoomd: Any, e: Exported) -> Any:
+    frame, radius, mass = hoomd.Frame(), e.particles["radius"], e.particles["mass"]
+    n, zeros = len(radius), np.zeros((len(radius), 2))
+    angle = e.particles.get("angle", zeros[:, 0])
+    flat = "fy" in e.numbers  # a Packing: y = 0 is in the middle, so that the floor stays there
+    box, middle = e.box.copy(), np.zeros(3)
+    if flat:
+        box[1, 1] = 2 * (e.position[:, 1] + radius).max()
+        box[0, 0] = box[0, 0] if e.periodic[0] else 2 * (np.abs(e.position[:, 0]).max() + radius.max())
+    elif e.origin is not None:
+        middle = e.origin + 0.5 * box.sum(axis=0)
+    flats = np.flatnonzero(np.diag(box) == 0)
+    box[flats, flats] = np.ptp(e.position, axis=0)[flats] + 2 * radius.max()
+    shares = (e.position - middle) @ np.linalg.inv(box)
+    place = e.position - middle - (np.floor(shares + 0.5) * e.periodic) @ box
+    lengths = np.diag(box)
+    tilts = [box[1, 0] / lengths[1], box[2, 0] / lengths[2], box[2, 1] / lengths[2]]
+    frame.configuration.box = [*(lengths * (1, 1, 0 if flat else 1)), *tilts]
+    frame.configuration.dimensions = 2 if flat else 3
+    particles = frame.particles
+    particles.N, particles.types, particles.typeid = n, ["bed", "top"], e.top.astype(np.uint32)
+    particles.position, particles.diameter, particles.mass = place, 2 * radius, mass
+    particles.orientation = np.column_stack([np.cos(0.5 * angle), zeros, np.sin(0.5 * angle)])
+    inertia = e.particles.get("inertia", e.numbers.get("inertia_factor", 0.4) * mass * radius**2)
+    particles.moment_inertia = np.column_stack([zeros if flat else np.tile(inertia, (2, 1)).T, inertia])
+    own = {"x": e.position[:, 0], "y": e.position[:, 1], "angle": angle}
+    own |= {name: e.particles[name] for name in OWN_COLUMNS if name in e.particles}
+    logged = {OWN_QUANTITIES + name: values for name, values in own.items()} if flat else {}
+    logged |= {f"particles/{name}": values for name, values in e.particles.items() if name not in (*OWN_COLUMNS, "id")}
+    logged |= {f"faultgouge/{key}": np.array([value]) for key, value in ({FORMAT_KEY: FORMAT} | e.numbers).items()}
+    if e.rows is not None:  # gsd has no empty arrays: a row of zeros stands for no contact
+        logged[CONTACTS] = e.rows if len(e.rows) else np.zeros((1, e.rows.shape[1]))
+    frame.log = {name: np.ascontiguousarray(values, dtype=np.float64) for name, values in logged.items()}
+    return frame
+
+
+def needed_library(module: str, path: Path) -> Any:
+    """A module of a dependency, or of the extra `export`. Raises BadInputError if it is not installed."""
+    try:
+        return import_module(module)
+    except ImportError:
+        library = module.split(".")[0]
+        raise BadInputError(
+            f"{path} needs the library {library}, which is not installed: pip install 'faultgouge[export]'."
+        ) from None
+
+
+MDANALYSIS_PRECISION = (
+    "MDAnalysis hands out positions in float32, about 1e-7 of a coordinate: overlaps are lost below that"
+)
+
+
+def has_parser(path: Path) -> bool:
+    """Whether MDAnalysis has a parser for files of this name."""
+    try:
+        library = needed_library("MDAnalysis", path)
+    except BadInputError:  # not installed: then the formats that are read are named
+        return False
+    return path.suffix[1:].upper() in library._PARSERS
+
+
+def read_universe(path: Path, frame: int | None = None) -> Disks:
+    """Disks of a file of MDAnalysis."""
+    library = needed_library("MDAnalysis", path)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            universe = library.Universe(str(path))
+            universe.trajectory[-1 if frame is None else frame]
+    except Exception as error:  # its parsers raise nearly every exception there is
+        raise PackingFileError(f"{path} is not read by MDAnalysis: {str(error).splitlines()[0]}") from error
+    atoms = universe.atoms
+    if not hasattr(atoms, "radii"):
+        raise PackingFileError(f"{path} has no radii for MDAnalysis: write it with radii, as CSV or extended XYZ.")
+    columns = dict(zip("xyz", np.asarray(atoms.positions, dtype=np.float64).T, strict=True))
+    columns["radius"] = np.asarray(atoms.radii, dtype=np.float64)
+    size = universe.dimensions
+    period = float(size[0]) if size is not None and size[0] > 0 else None
+    return of_columns(str(path), columns, box_length=period, remark=MDANALYSIS_PRECISION)

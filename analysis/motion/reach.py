@@ -1,0 +1,278 @@
+r"""How hard a packing may be pushed, in any way, before one of its contacts changes: a bound for all pushes.
+
+Mass-weighted, small motion obeys :math:`\ddot z = -(S + N) z - G \dot z` with S symmetric and N antisymmetric. Let
+:math:`E = \tfrac12 |\dot z|^2 + \tfrac12 z^T S z`, and let row :math:`Y_c` be by how much a displacement, and
+:math:`Z_c` by how much a velocity changes what contact c lacks to its change, :math:`m_c`. By the inequality of Cauchy
+and Schwarz
+
+.. math:: |Y_c z + Z_c \dot z|^2 \le (Y_c S^{-1} Y_c^T + Z_c Z_c^T)\, 2 E .
+
+With N = 0 the energy does not rise, so that no contact changes after any push, of one particle or of all, whose energy
+is below
+
+.. math:: E_{max} = \min_c \frac{m_c^2}{2\, (Y_c S^{-1} Y_c^T + Z_c Z_c^T)} \Big/ \mathcal G .
+
+:math:`\mathcal G` is the largest gain of E over time: 1 for N = 0. No random number has a part in it, and neither have
+the numbers and axes of the particles.
+
+**What a contact lacks.** An overlap lacks itself until it opens, or of Hertz's law, whose stiffness changes with the
+overlap, a tenth of itself; a gap lacks itself until it closes. Coulomb's bound is a cone:
+the tangential force :math:`(f_t + a, b)` along and across stays below :math:`\mu f_n + h` if for every angle
+:math:`\varphi` of the plane :math:`a \cos\varphi + b \sin\varphi - h < \mu f_n - f_t \cos\varphi`, which are rows
+and distances as above.
+
+**The gain.** In coordinates whose square is 2 E the motion is :math:`e^{Zt}`. Its norm at :math:`2\tau` and
+:math:`3\tau`, times its bound up to :math:`\tau`, bounds it up to :math:`4\tau`, and so on; once the norm is below one,
+for ever. Without dissipation the energies of the modes of :math:`S + N` are constant, and bound E. Of more than
+`DENSE_GAIN` coordinates :math:`\mathcal G = e` up to the time :math:`1 / |S^{-1/2} N|` (the numerical abscissa;
+Trefethen and Embree, *Spectra and Pseudospectra*, 2005, chapter 14).
+
+**Motions that no force opposes** have no energy of their own: :math:`S + \epsilon` with :math:`\epsilon = 1/t^2` stands
+for S, and the bound holds up to the time t.
+
+The same energy of the displacement by the residual forces says from which push on these do not count.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, eig, eigh, expm, solve_triangular
+from scipy.sparse import csc_array, csr_array, eye_array
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from ..arrays import Complexes, Floats
+from ..factors.sparse_lu import Factors, SingularMatrixError, general_lu, symmetric_lu
+from ..operators.contact_changes import ContactChanges
+from ..progress import report_progress
+from .motion import Motion
+from .one_sided import OneSidedSystem
+from .stable_timestep import stable_timestep
+
+DENSE_GAIN = 600
+"""Coordinates up to which the gain is computed: two seconds."""
+
+FREE_TIME = 500.0
+"""Up to which time a bound holds of a packing with motions that no force opposes, in stable time steps: some hundred
+periods of the fastest motion, twenty of a slow one."""
+
+OCTAVES = 22
+"""Doublings of a quarter of the stable time step until the norm is to fall below one."""
+
+LARGEST_GAIN = 1e4
+"""Gain of the energy beyond which no longer time is looked at."""
+
+SYMMETRIC = 1e-12
+"""Share of the largest entry of S below which N is rounding."""
+
+CONTACTS_TOGETHER = 64
+"""Contacts whose columns are solved for together."""
+
+ANGLES, ZOOMS = 32, 4
+"""Angles of the cone that are looked at, and how often more closely about the best."""
+
+PHASES = 64
+"""Phases of a motion that grows."""
+
+OVERLAP_CHANGE = 0.1
+"""Share by which an overlap of Hertz's law may change. The error of D rises in proportion: with a quarter it was up to
+2.6 % after pushes of one particle and of all in twenty disks, of LAMMPS's own motion."""
+
+SAFE = 2.0
+"""By which factor the stiffness of a contact alone may be lower in the packing, as normal forces soften it."""
+
+
+@dataclass(frozen=True)
+class PushBound:
+    """Up to which energy no contact changes.
+
+    Attributes
+    ----------
+    energy : float
+        Of a push, below which no contact changes; infinite if nothing can change.
+    gain : float
+        Bound of the largest gain of energy.
+    time : float
+        Up to which time this holds; infinite if for ever.
+    residual_energy : float
+        Energy of the displacement by the residual forces.
+    unsettled : bool
+        Whether the residual forces alone may take a contact to another state.
+    """
+
+    energy: float
+    gain: float
+    time: float
+    residual_energy: float
+    unsettled: bool
+
+
+def reach_of(motion: Motion, free: int = 0) -> PushBound | None:
+    """The bound for all pushes of a linear motion that does not grow; None if its energy is not positive.
+
+    Parameters
+    ----------
+    motion : Motion
+        With sticking contacts, none of them at Coulomb's bound.
+    free : int
+        Motions that no force opposes.
+    """
+    step = float(stable_timestep(motion.configuration))
+    shift = (1 / (FREE_TIME * step)) ** 2 if free else 0.0
+    symmetric = csc_array(0.5 * (motion.stiffness + motion.stiffness.T) + shift * eye_array(len(motion.active)))
+    try:
+        factors = symmetric_lu(symmetric, symmetric=True)
+    except SingularMatrixError:
+        return None
+    if factors.negative:
+        return None
+    gain, time = _gain(motion, symmetric, factors, step, FREE_TIME * step if free else np.inf)
+    system = OneSidedSystem(motion)
+    force = system.residual_force
+    moved = factors.solve(force)
+    residual = 0.5 * float(np.sum(force * moved))
+    if motion.configuration.stiffness is not None:  # the bounds of contacts are not known
+        return PushBound(np.inf, gain, time, residual, False)
+    changes = ContactChanges.of(motion.configuration)
+    radius, none = _radius(system, changes, factors), np.zeros((0, 1))
+    # a force that begins to act displaces twice as far as one at rest
+    paths = np.abs(system.rescaled[0] @ moved) if len(changes.wears) else none
+    first = system.contact_changes.first(2 * moved, np.zeros_like(moved), none, paths)
+    return PushBound(0.5 * radius**2 / gain, gain, time, residual, bool(first.min() < 1))
+
+
+def _radius(system: OneSidedSystem, changes: ContactChanges, factors: Factors) -> float:
+    """The smallest root of 2 E with which a contact changes.
+
+    Contacts alone bound their share of S^-1, so that only those are solved for that may be the first.
+    """
+    c, count, weight = system.motion.configuration.contacts, len(changes.bound), system.mass_weight
+    rows, viscous = csr_array(changes.rows @ weight), csr_array(changes.viscous @ weight)
+    dashpots = [[viscous[i * count : (i + 1) * count] for i in range(3)]] * 2
+    lost = np.array([[np.asarray(a.multiply(b).sum(axis=1)).ravel() for a in dashpots[0]] for b in dashpots[1]])
+    slope, bound, force = (each[:, 0] for each in (changes.bound_slope, changes.bound, changes.tangential))
+    coupling = np.linalg.norm(0.5 * (c.closing + c.parting), axis=1) + slope
+    sticks, closed = changes.sticks[:, 0], changes.overlap[:, 0].copy()
+    closed[c.normal_stiffness * c.overlap > 1.01 * c.normal_force] *= OVERLAP_CHANGE
+    with np.errstate(divide="ignore", invalid="ignore"):
+        alone = c.tangential_stiffness + np.nan_to_num(coupling**2 / c.normal_stiffness, nan=0.0, posinf=np.inf)
+        least = np.where(sticks, (bound - force) / np.sqrt(SAFE * alone + np.trace(lost)), np.inf)
+        least = np.minimum(least, np.where(closed > 0, closed * np.sqrt(c.normal_stiffness / SAFE), np.inf))
+    least = np.nan_to_num(least, nan=0.0, posinf=np.inf)
+    order, best = np.argsort(least, kind="stable"), np.inf
+    for begin in range(0, len(order), CONTACTS_TOGETHER):
+        here = order[begin : begin + CONTACTS_TOGETHER]
+        if least[here[0]] >= best:
+            break
+        report_progress(f"largest push: {begin} of {len(order)} contacts looked at")
+        wanted = np.stack([rows[i * count + here].toarray().T for i in range(3)])
+        solved = factors.solve(np.hstack(list(wanted))).reshape(wanted.shape[1], 3, len(here)).transpose(1, 0, 2)
+        product = np.einsum("iec,jec->ijc", wanted, solved)
+        with np.errstate(divide="ignore"):
+            opens = np.where(closed[here] > 0, closed[here] / np.sqrt(product[2, 2]), np.inf)
+        turned = np.ones((3, 1, len(here)))
+        turned[2] = slope[here]
+        both = product * turned * turned.transpose(1, 0, 2) + lost[:, :, here]
+        reaches = np.where(sticks[here], _cone_distance(both, force[here], bound[here]), np.inf)
+        best = min(best, float(opens.min(initial=np.inf)), float(reaches.min(initial=np.inf)))
+    for begin in range(3 * count, rows.shape[0], 3 * CONTACTS_TOGETHER):
+        columns = rows[begin : begin + 3 * CONTACTS_TOGETHER].toarray().T
+        size = np.sqrt(np.sum(columns * factors.solve(columns), axis=0))
+        gap = changes.gap[begin - 3 * count : begin - 3 * count + len(size), 0]
+        with np.errstate(divide="ignore"):
+            best = min(best, float((gap / size).min(initial=np.inf)))
+    return best
+
+
+def _cone_distance(product: Floats, force: Floats, bound: Floats) -> Floats:
+    """The smallest (mu f_n - f_t cos phi) / |n| of each contact, shape (C,), with n = (cos phi, sin phi, -1).
+
+    Norms are those of the products, shape (3, 3, C).
+    """
+    middle, half = np.zeros(len(force)), np.pi
+    for _ in range(1 + ZOOMS):
+        angle = middle[:, None] + half * np.linspace(-1, 1, ANGLES + 1)
+        n = np.stack([np.cos(angle), np.sin(angle), -np.ones_like(angle)])
+        size = np.sqrt(np.maximum(np.einsum("ica,ijc,jca->ca", n, product, n), 0.0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            distance = np.nan_to_num((bound[:, None] - force[:, None] * n[0]) / size, nan=np.inf, posinf=np.inf)
+        best = distance.argmin(axis=1)
+        middle, half = np.take_along_axis(angle, best[:, None], axis=1)[:, 0], 2 * half / ANGLES
+    return np.asarray(distance.min(axis=1))
+
+
+def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, end: float) -> tuple[float, float]:
+    """A bound of the gain of energy, and up to which time it holds: up to the end, if it can."""
+    skew = csr_array(motion.stiffness - symmetric)  # N, and the shift of free motions
+    largest = float(np.abs(symmetric.data).max(initial=0.0))
+    if float(np.abs(skew.data).max(initial=0.0)) <= SYMMETRIC * largest:
+        return 1.0, end
+    if symmetric.shape[0] > DENSE_GAIN:
+
+        def twice(x: Floats) -> Floats:
+            return np.asarray(skew.T @ factors.solve(skew @ x))
+
+        size, start = symmetric.shape[0], np.ones(symmetric.shape[0])
+        found = eigsh(LinearOperator((size, size), twice, dtype=float), 1, v0=start, return_eigenvectors=False)
+        return float(np.exp(1.0)), min(end, float(1 / np.sqrt(found[0])))
+    root = cholesky(symmetric.toarray())  # R with R^T R = S: p = R z
+    size = len(root)
+    if not motion.dissipative and np.isinf(end):
+        return _gain_of_modes(motion.stiffness.toarray(), root), end
+    z = np.zeros((2 * size, 2 * size))
+    z[:size, size:] = root
+    z[size:, :size] = -solve_triangular(root, motion.stiffness.toarray().T, trans="T").T
+    z[size:, size:] = -motion.damping.toarray()
+    fastest = float(eigh(0.5 * (z + z.T), eigvals_only=True, subset_by_index=(2 * size - 1, 2 * size - 1))[0])
+    time, one = 0.25 * step, expm(0.25 * step * z)
+    two = one @ one
+    before, after = np.exp(fastest * time), np.exp(2 * fastest * time)  # up to time, and to 2 time
+    for _ in range(OCTAVES):
+        sizes = _norm(two), _norm(one @ two)
+        before, after = after, max(after, max(sizes) * before)
+        if min(sizes) <= 1:
+            return float(after**2), end
+        if after**2 > LARGEST_GAIN or 4 * time >= end:
+            break
+        time, one, two = 2 * time, two, two @ two
+    return float(after**2), min(end, 4 * time)
+
+
+def _gain_of_modes(stiffness: Floats, root: Floats) -> float:
+    """Without dissipation: the energies of the modes of A are constant, each by itself, and their sum is E but for two
+    factors, with weights with which left and right vectors are as long."""
+    values, x = eig(stiffness)
+    inverse = np.linalg.inv(x)
+    weight = np.sqrt(np.linalg.norm(inverse, axis=1) / np.linalg.norm(x, axis=0))
+    outward, inward, omega = x / weight, weight[:, None] * inverse, np.sqrt(np.abs(values))
+    back = solve_triangular(root, inward.T, trans="T").T
+    larger = max(np.linalg.norm(outward, 2), np.linalg.norm(root @ outward / omega, 2))
+    smaller = max(np.linalg.norm(inward, 2), np.linalg.norm(omega[:, None] * back, 2))
+    return float((larger * smaller) ** 2)
+
+
+def _norm(matrix: Floats) -> float:
+    """The largest singular value: a Ritz value errs by the square of the tolerance."""
+    square = LinearOperator(matrix.shape, lambda x: matrix.T @ (matrix @ x), dtype=float)
+    return float(np.sqrt(eigsh(square, 1, v0=np.ones(len(matrix)), tol=1e-6, return_eigenvectors=False)[0]))
+
+
+def change_of_growing(motion: Motion, s: complex) -> float | None:
+    """D at which the linear motion with the eigenvalue s takes the first contact to another state; None if none is
+    known that changes."""
+    if motion.configuration.stiffness is not None:
+        return None
+    system, identity = OneSidedSystem(motion), eye_array(len(motion.active))
+    near = s * (1 + 1e-7)  # the vector of the nearest eigenvalue comes out in two steps
+    factors = general_lu(csc_array(near**2 * identity + near * motion.damping + motion.stiffness.astype(complex)))
+    shape: Complexes = np.random.default_rng(0).standard_normal(len(motion.active)).astype(complex)
+    for _ in range(3):
+        shape = factors.solve(shape)
+        shape /= np.linalg.norm(shape)
+    turns = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
+    z = np.real(shape[:, None] * turns)
+    v = np.real(s * shape[:, None] * turns)
+    paths = np.zeros((system.rescaled[0].shape[0], PHASES))
+    first = system.contact_changes.first(z, v, np.zeros((system.sliders[1].shape[0], PHASES)), paths)
+    at = int(first.argmin())
+    found = float(first[at] ** 2 * system.mean_square_displacement(z)[at])
+    return found if np.isfinite(found) else None

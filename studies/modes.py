@@ -1,0 +1,482 @@
+r"""Complex pairs along a ramp: their number, their growth rates, and the loss that stops them.
+
+Beyond the first window the operator :math:`K = S + A` of a packing, S symmetric and A antisymmetric, has ever more
+complex pairs. With :math:`\omega = \sqrt\lambda`, the mean square displacement of a pair grows at the rate
+:math:`2 |\mathrm{Im}\,\omega|`, and
+
+.. math:: Q = \frac{|\mathrm{Re}\,\omega|}{2\,|\mathrm{Im}\,\omega|}
+
+is the quality factor below which a dissipation that gives each mode the loss :math:`\omega/Q` stops the growth. The
+least Q over the pairs of a load is the Q that stops all of them. The *share* of complex modes is twice the number of
+pairs over the number of eigenvalues; rattlers have none.
+
+**Which pairs count.** For eigenvalues that nearly merge, rounding makes spurious pairs with imaginary parts of up to
+:math:`(u |A|_F\, c)^{1/2}` for couplings c (:mod:`~faultgouge.analysis.motion.spectrum`). No coupling is larger than
+the largest eigenvalue, so that a pair beyond that bound is physical, and its vectors are not needed. For the other
+pairs the vectors are computed, and decide.
+
+**Where the branch ends.** A real negative eigenvalue is the classical instability: Newton's method has passed a turning
+point, and no packing reaches such an equilibrium by itself. The loads of a packing end before this point ("turning
+point").
+
+**A bound.** The imaginary part of an eigenvalue is at most the norm of the antisymmetric part, :math:`|\mathrm{Im}\,
+\lambda| \le |(A - A^T)/2|_2` with A the mass-weighted operator (Bendixson, Acta Math. 25, 359 (1902)): the key bound. A
+contact couples only two disks, so that the norm does not grow with the number of disks unless contacts become stiffer
+or more loaded: growth rates cannot grow without limit with the number of disks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import Field
+from scipy.sparse import csr_array
+from scipy.sparse.linalg import eigsh
+
+from ..analysis import (
+    NoEquilibriumError,
+    Packing,
+    dynamical_matrix,
+    eigenvalues,
+    growth_rate,
+    nearest_modes,
+    negative_eigenvalues,
+    spectrum,
+)
+from ..analysis.arrays import Floats
+from ..analysis.files.atomic_write import write_json
+from ..analysis.motion.eigenvalues import SAFETY, Complexes, exceeds_rounding, unit_rounding
+from ..analysis.motion.spectrum import SLICED
+from ..analysis.table_display import table_of
+from ..pywrap import Equilibrium, Scene
+from ..pywrap.load_path import LoadPath
+from ..pywrap.scenes.command_sections import PATH
+from ..pywrap.scenes.study_sections import section_of
+from ..pywrap.scenes.validation import Positive, Section, require_section
+from .cycle import cycle
+from .executors import Say
+from .packing_tools import Start, path_from
+from .result_rows import Row, write_csv
+from .statistics import median
+from .study import draw_all, task
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from .sweep.sweep_plan import Sweep
+
+SHIFT_OFFSET = 1e-9
+"""Distance of a shift from the eigenvalue whose vectors are wanted, in units of the eigenvalue."""
+
+NORM_ERROR = 1e-6
+"""Relative error of the norm squared: it is a bound that is several times larger than what it bounds."""
+
+FREQUENCY_DIGITS = 7
+"""Digits of the frequencies that are stored."""
+
+QUANTITIES = ("share", "growth_rate", "least_q")
+
+ROCK = (50, 300)
+"""Quality factors of rock."""
+
+TICKS = (0.003, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4)
+"""F_x/F_y that stand below an axis, where they were looked at."""
+
+LABELS = {
+    "share": "share of complex modes",
+    "growth_rate": r"largest $2\,|\mathrm{Im}\,\omega|$",
+    "least_q": "least Q",
+    "critical_restitution": "critical restitution",
+}
+
+COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q")
+"""Of modes.csv."""
+
+PANELS = 4
+"""Loads whose frequencies are drawn side by side."""
+
+FRAMES_A_SECOND = 2.0
+"""Frames of the film a second."""
+
+MediansOverLoad = Mapping[str, Any]
+"""loads, and for each quantity a list of [median, low, high]."""
+
+
+class ModesSection(Section):
+    """[modes] the complex pairs along the ramp.
+
+    Attributes
+    ----------
+    fx_over_fy : tuple of float
+        Loads at which all eigenvalues are taken, in units of F_y. Those beyond the last equilibrium are left out.
+    """
+
+    fx_over_fy: Annotated[tuple[Positive, ...], Field(min_length=1, strict=False)] = (
+        *(0.003, 0.01, 0.02, 0.03, 0.05, 0.1, 0.14, 0.2, 0.25, 0.3, 0.35, 0.4),
+    )
+
+
+@dataclass(frozen=True)
+class PairCounts:
+    """The complex pairs of one packing.
+
+    Attributes
+    ----------
+    omega : ndarray of complex, shape (P,)
+        Of each pair the frequency with positive real and imaginary part, fastest growing first, 1 / time.
+    modes : int
+        Number of eigenvalues.
+    negative : tuple of float
+        The real negative eigenvalues, the most negative first, 1 / time^2.
+    """
+
+    omega: Complexes
+    modes: int
+    negative: tuple[float, ...] = ()
+
+    @classmethod
+    def of(cls, values: Complexes) -> PairCounts:
+        """Pairs of some eigenvalues: all with a positive imaginary part count."""
+        omega = np.sqrt(values[values.imag > 0])
+        return cls(omega[np.argsort(-omega.imag)], len(values))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers: pairs, negative, share, growth_rate, omega (of the fastest pair), least_q."""
+        fastest = self.omega[0] if len(self.omega) else None
+        rates = [growth_rate(value) for value in self.negative[:1]] + [2 * w.imag for w in self.omega[:1]]
+        return {
+            "pairs": len(self.omega),
+            "share": 2 * len(self.omega) / self.modes if self.modes else 0.0,
+            "negative": len(self.negative),
+            "growth_rate": float(max(rates, default=0.0)),
+            "omega": None if fastest is None else float(fastest.real),
+            "least_q": float(np.min(self.omega.real / (2 * self.omega.imag))) if len(self.omega) else None,
+        }
+
+
+def count_pairs(packing: Packing) -> PairCounts:
+    """The complex pairs of a packing that exceed their rounding uncertainty.
+
+    Parameters
+    ----------
+    packing : Packing
+        In equilibrium.
+    """
+    if packing.coordinates > SLICED:
+        found = spectrum(packing)
+        omega = np.sqrt([pair.eigenvalue for pair in found.pairs]).astype(np.complex128)
+        return PairCounts(omega, len(found.eigenvalues), tuple(found.negative.tolist()))
+    values = eigenvalues(packing)
+    rounding = unit_rounding(dynamical_matrix(packing)[0].data)
+    surely = np.sqrt(SAFETY * rounding * np.abs(values).max(initial=0.0))
+    doubtful = np.flatnonzero((values.imag > 0) & (values.imag <= surely))
+    noise = [k for k in doubtful if not _is_real(packing, values[k], rounding)]
+    values = values.copy()
+    values[noise] = values[noise].real
+    return replace(PairCounts.of(values), negative=tuple(negative_eigenvalues(packing).tolist()))
+
+
+def _is_real(packing: Packing, value: complex, rounding: float) -> bool:
+    found = nearest_modes(packing, value * (1 + SHIFT_OFFSET), 2)
+    nearest = int(np.argmin(np.abs(found.values - value)))
+    return exceeds_rounding(value, float(found.overlap[nearest]), rounding)
+
+
+def antisymmetric_norm(packing: Packing) -> float:
+    """|(A - A^T)/2|_2 of the mass-weighted operator, which no |Im lambda| exceeds, 1 / time^2."""
+    matrix, _ = dynamical_matrix(packing)
+    skew = csr_array(0.5 * (matrix - matrix.T))
+    if skew.shape[0] < 3 or abs(skew).max() == 0:
+        return 0.0
+    start = np.random.default_rng(0).standard_normal(skew.shape[0])
+    largest = eigsh(csr_array(skew.T @ skew), 1, which="LA", v0=start, tol=NORM_ERROR, return_eigenvectors=False)
+    return float(np.sqrt(largest[0]))
+
+
+def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[str, Any]]) -> dict[str, Any]:
+    """The row of the packing at each load of [modes] that it bears.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a section [ramp].
+    rest : Equilibrium
+        The settled packing.
+    look : callable
+        Packing -> the numbers of one load.
+    """
+    settings = section_of(scene, ModesSection) or ModesSection()
+    step, wanted = require_section(scene.ramp, "ramp").step, settings.fx_over_fy
+    row: dict[str, Any] = {"ends": "until", "loads": []}
+    with path_from(rest, scene) as path:
+        for share in sorted(wanted):
+            try:
+                packing = _climb_to(path, share * scene.load.fy, step)
+            except NoEquilibriumError:
+                row["ends"] = "no equilibrium"
+                break
+            if len(negative_eigenvalues(packing)):
+                row["ends"] = "turning point"
+                break
+            row["loads"].append({"fx_over_fy": share, "fx": packing.fx} | look(packing))
+    return row | {"reach": path.equilibria[-1].fx, "contacts": len(rest.packing.contacts)}
+
+
+def _climb_to(path: LoadPath[Equilibrium], fx: float, step: float) -> Packing:
+    """The packing at fx, by multiples of the step up to there."""
+    for k in range(round(path.equilibria[-1].fx / step), int(fx / step) + 1):
+        if path.equilibria[-1].fx < k * step < fx:
+            path(k * step)
+            del path.equilibria[:-2]  # thousands of equilibria of a large packing would fill the memory
+    return path(fx)
+
+
+def load_row(packing: Packing) -> dict[str, Any]:
+    """The numbers of one load of the task "modes"."""
+    found = count_pairs(packing)
+    row = found.as_dict() | {
+        "modes": found.modes,
+        "contacts": len(packing.contacts),
+        "sliding": int(np.count_nonzero(packing.sliding)),
+        "rattlers": len(packing.rattlers),
+        "bound": antisymmetric_norm(packing),
+    }
+    if len(found.omega):
+        value = found.omega[0] ** 2
+        pair = nearest_modes(packing, value * (1 + SHIFT_OFFSET), 1)
+        row |= {"participation": float(pair.participation[0]), "rotation": float(pair.rotation[0])}
+    digits = [
+        [float(f"{w.real:.{FREQUENCY_DIGITS}g}"), float(f"{w.imag:.{FREQUENCY_DIGITS}g}")] for w in found.omega.tolist()
+    ]
+    return row | {"frequencies": digits}
+
+
+@dataclass(frozen=True)
+class Table:
+    """One set of packings.
+
+    Attributes
+    ----------
+    name : str
+        Of the set, such as "force 100".
+    rows : tuple of dict
+        A packing each, by seed.
+    """
+
+    name: str
+    rows: tuple[dict[str, Any], ...]
+
+    @property
+    def disks(self) -> int:
+        """Disks of each packing."""
+        words = self.name.split()
+        return int(words[-1]) if words[-1].isdecimal() else 100
+
+    @property
+    def loads(self) -> list[float]:
+        """F_x/F_y that some packing has borne."""
+        return sorted({load["fx_over_fy"] for row in self.rows for load in row.get("loads", ())})
+
+    def borne(self, fx_over_fy: float) -> list[dict[str, Any]]:
+        """The rows of a load, for every packing that has borne it."""
+        return [load for row in self.rows for load in row.get("loads", ()) if load["fx_over_fy"] == fx_over_fy]
+
+    def at(self, fx_over_fy: float, key: str) -> Floats:
+        """A number of every packing that has borne a load, shape (n,): least Q is inf where there is no pair."""
+        return np.array([np.inf if load[key] is None else load[key] for load in self.borne(fx_over_fy)], dtype=float)
+
+
+def medians_over_load(table: Table, names: Sequence[str] = QUANTITIES) -> dict[str, Any]:
+    """Medians with intervals at each load, and how many packings bear it."""
+    found: dict[str, Any] = {"packings": len(table.rows), "loads": table.loads}
+    found["count"] = [len(table.at(load, names[0])) for load in table.loads]
+    return found | {name: [median(table.at(load, name)) for load in table.loads] for name in names}
+
+
+def over_load(courses: Mapping[str, MediansOverLoad], names: Sequence[str] = QUANTITIES) -> Figure:
+    """Medians with their intervals over F_x/F_y, a panel for each quantity.
+
+    Parameters
+    ----------
+    courses : mapping
+        What is written beside a line -> its numbers.
+    names : sequence of str
+        The quantities.
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
+
+    from ..figures.style import INK
+
+    figure = Figure((3.6 * len(names), 3.4), layout="constrained")
+    for axes, name in zip(np.atleast_1d(figure.subplots(1, len(names))), names, strict=True):
+        for number, (label, course) in enumerate(courses.items()):
+            draw_band(axes, course["loads"], np.array(course[name], dtype=float), f"C{number}", label)
+        axes.set(xscale="log", xlabel=r"$F_x/F_y$", ylabel=LABELS[name])
+        seen = {load for course in courses.values() for load in course["loads"]}
+        axes.set_xticks([load for load in TICKS if load in seen], [f"{load:g}" for load in TICKS if load in seen])
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        found = np.concatenate([np.ravel(np.array(course[name], dtype=float)) for course in courses.values()])
+        if not np.any(np.isfinite(found) & (found > 0)):
+            axes.text(0.5, 0.5, "no motion grows", transform=axes.transAxes, ha="center", color=INK)
+            axes.set_xlim(0.5 * min(seen), 2 * max(seen))
+        elif name in ("growth_rate", "least_q"):
+            axes.set_yscale("log")
+        if name == "least_q":
+            axes.axhspan(*ROCK, color="0.9", zorder=0)
+            axes.text(0.02, ROCK[0] * 1.1, "rock", transform=axes.get_yaxis_transform(), color=INK, fontsize="small")
+        axes.grid(alpha=0.3)
+    if len(courses) > 1:
+        figure.axes[0].legend(title="disks")
+    return figure
+
+
+def draw_band(axes: Axes, loads: Sequence[float], values: Any, colour: str, label: str) -> None:
+    """A line of medians with the band of their intervals; what is not positive is not drawn."""
+    shown = np.where(np.isfinite(values) & (values > 0), values, np.nan)
+    axes.plot(loads, shown[:, 0], "o-", color=colour, label=label, markersize=3)
+    axes.fill_between(loads, shown[:, 1], shown[:, 2], color=colour, alpha=0.2, linewidth=0)
+
+
+def _plane(loads: Sequence[Mapping[str, Any]]) -> Figure:
+    """Frequencies of the complex pairs in the plane of Re omega and Im omega, a panel for each of a few loads."""
+    from matplotlib.figure import Figure
+
+    figure = Figure((3.2 * len(loads), 3.2), layout="constrained")
+    for axes, load in zip(np.atleast_1d(figure.subplots(1, len(loads), sharex=True, sharey=True)), loads, strict=True):
+        points = np.reshape(load["frequencies"], (-1, 2))
+        axes.plot(points[:, 0], points[:, 1], ".", color="C3", markersize=4)
+        axes.set(xlabel=r"$\mathrm{Re}\,\omega$", yscale="log", title=_title(load))
+        axes.grid(alpha=0.3)
+    figure.axes[0].set_ylabel(r"$\mathrm{Im}\,\omega$")
+    return figure
+
+
+def _write_plane_film(loads: Sequence[Mapping[str, Any]], path: Path) -> None:
+    """The plane of frequencies along a ramp as a film, a frame for each load."""
+    from matplotlib.figure import Figure
+
+    from ..figures.film import Film
+    from ..figures.style import styled
+    from ..figures.writers import write_film
+
+    figure = Figure((5, 4), layout="constrained")
+    axes = figure.add_subplot()
+    points = [np.reshape(load["frequencies"], (-1, 2)) for load in loads]
+    every = np.concatenate(points)
+    (line,) = axes.plot([], [], ".", color="C3", markersize=4)
+    words = axes.text(0.5, 1.02, _title(loads[-1]), transform=axes.transAxes, ha="center")
+    axes.set(xlabel=r"$\mathrm{Re}\,\omega$", ylabel=r"$\mathrm{Im}\,\omega$", yscale="log")
+    axes.set(xlim=(0, 1.05 * every[:, 0].max()), ylim=(0.5 * every[:, 1].min(), 2 * every[:, 1].max()))
+
+    class PlaneFilm(Film):
+        """The film of these loads."""
+
+        def show(self, number: int) -> None:
+            """The frequencies of one load."""
+            line.set_data(points[number][:, 0], points[number][:, 1])
+            words.set_text(_title(loads[number]))
+
+    write_film(styled(PlaneFilm)(figure, [line, words], len(loads)), path, FRAMES_A_SECOND)
+
+
+def _title(load: Mapping[str, Any]) -> str:
+    return f"$F_x/F_y$ = {load['fx_over_fy']:g}: {100 * load['share']:.0f} % complex"
+
+
+def _gather(sweep: Sweep, rows: Sequence[Row], output: Path, say: Say) -> list[str]:
+    """modes.json, modes.csv, pictures and a film in the folder of a sweep; the loads of the first packing in words."""
+    scenes = {point.key: point.scene for point in sweep.points}
+    good = [row for row in rows if row["says"] is None]
+    lines: list[Row] = []
+    for row in good:
+        scene = scenes[row["key"]]
+        packing = {} if scene is None else scene.packing.model_dump()
+        known = {"disks": packing.get("disks"), "seed": packing.get("seed")}
+        loads = row["result"]["loads"]
+        lines += [known | {key: each for key, each in load.items() if key != "frequencies"} for load in loads]
+    keys = ("ends", "reach", "contacts")
+    packings = [
+        {"values": row["values"], "says": row["says"]} | {key: row["result"].get(key) for key in keys} for row in rows
+    ]
+    write_json(output / "modes.json", {"asked": sweep.as_dict(), "rows": lines, "packings": packings})
+    write_csv(output / "modes.csv", COLUMNS, lines)
+    _draw(good, lines, output, say)
+    return _in_words(lines, packings, output)
+
+
+def _draw(good: Sequence[Row], lines: Sequence[Row], output: Path, say: Say) -> None:
+    """Pictures of all packings over the load, and of the first packing in the plane of frequencies."""
+    if not lines:
+        say("no packing bears any of the loads: there is nothing to draw")
+        return
+    from ..figures.style import report_failure, styled
+
+    sizes = sorted({line["disks"] for line in lines if line["disks"] is not None})
+    groups = {"all": list(good)}
+    if len(sizes) > 1:
+        groups = {str(n): [row for row in good if row["values"].get("packing.disks") == n] for n in sizes}
+    courses = {
+        name: medians_over_load(Table(name, tuple(row["result"] for row in group))) for name, group in groups.items()
+    }
+    draw_all({"modes": lambda: over_load(courses)}, output, say)
+    shown = [load for load in good[0]["result"]["loads"] if load["pairs"]]
+    if not shown:
+        say("the first packing has no complex pair at these loads: its plane of frequencies is not drawn")
+        return
+    draw_all({"plane": lambda: _plane(shown[:: -max(1, -(-len(shown) // PANELS))][::-1])}, output, say)
+    with report_failure("plane.gif", say):
+        styled(_write_plane_film)(shown, output / "plane.gif")
+
+
+def _in_words(lines: Sequence[Row], packings: Sequence[Row], output: Path) -> list[str]:
+    """The loads of a packing, or the first of many, as a table, and how many packings failed or ended early."""
+    says, table = [], []
+    for row in lines:
+        if (row["disks"], row["seed"]) == (lines[0]["disks"], lines[0]["seed"]):
+            numbers = ("" if row[key] is None else f"{row[key]:.4g}" for key in ("growth_rate", "least_q"))
+            table.append((f"{row['fx_over_fy']:g}", str(row["pairs"]), f"{row['share']:.3f}", *numbers))
+    if table:
+        says.append(table_of(("F_x/F_y", "complex pairs", "share", "growth rate of D", "least Q"), table))
+    failed = [each["says"] for each in packings if each["says"] is not None]
+    says.append(f"packings: {len(packings)}, failed: {len(failed)}; written: {output}/modes.json")
+    says += [f"the first that failed: {sentence}" for sentence in failed[:1]]
+    short = [each for each in packings if each["says"] is None and each["ends"] != "until"]
+    for each in short[:1]:
+        why = "an eigenvalue is negative" if each["ends"] == "turning point" else "there is no equilibrium"
+        says.append(
+            f"packings whose branch ends before the last load, so that loads are left out: {len(short)}; the first "
+            f"of them goes to F_x = {each['reach']:g}, and {why} at the next load"
+        )
+    return says
+
+
+@task(
+    reads=PATH,
+    needs=("ramp",),
+    section=ModesSection,
+    gather=_gather,
+    writes={"modes.json": "", "modes.csv": ",".join(COLUMNS)},
+    of_run=cycle,
+    example="faultgouge modes modes.toml -o modes",
+)
+def modes(scene: Scene, start: Start) -> Row:
+    """Compute the complex modes along the ramp: their number, growth rates, and the loss that would stop them.
+
+    At each load of the section [modes] the command computes all eigenvalues: the
+    share of complex modes, the largest growth rate, and the least Q, the quality
+    factor below which dissipation stops all growth. It writes modes.json, modes.csv,
+    pictures over the load and of the plane of frequencies, and a film of this plane.
+    For a sweep, the pictures show medians over packings.
+
+    Of a drive.h5 the command computes the eigenvalues of each stored state, with the
+    stiffness of the spring: complex pairs, growth with and without dissipation, and
+    the lowest eigenvalue, with the contacts at Coulomb's bound all sticking, and all
+    sliding. It writes cycle.json, cycle.csv and a picture.
+    """
+    return along_ramp(scene, start(scene.law.mus[0]), load_row)

@@ -1,0 +1,132 @@
+"""faultgouge import DECK.in leaves the deck's folder as `lmp -in` does, byte for byte, and takes LAMMPS's last state.
+
+Of logs, the lines with times that the run took differ from run to run, and are left out.
+"""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pile_decks import DECK, ROUND
+from reference_layer import BIN
+
+HEAD = DECK.format(**ROUND, word="contacts").rpartition("run 6000")[0]
+
+STATE = """
+thermo 50
+dump state all custom 5 state.dump id x y z
+dump_modify state sort id format float %.17g
+"""
+
+PARTS = {
+    "@START\n": HEAD + STATE,
+    "@HEAD\n": HEAD,
+    "@LAW\n": HEAD[HEAD.index("variable kn") :],
+    "@STATE\n": STATE,
+    "@SECOND\n": HEAD.replace("boundary f f f", "boundary p p f").replace("0.45", "0.5"),
+    "@OTHER\n": STATE.replace(" state ", " other "),
+    "@END\n": "",
+}
+"""What stands for these lines in decks_of_users.txt: @END ends a file in the middle of a line."""
+
+
+def _decks():
+    """Files by the names of decks, the deck first, which is deck.in."""
+    found = {}
+    for whole in (Path(__file__).parent / "decks_of_users.txt").read_text().split("==== ")[1:]:
+        name, _, text = whole.partition("\n")
+        for part, fill in PARTS.items():
+            text = text.replace(part, fill)
+        deck, *more = text.split("---- ")
+        found[name] = {"deck.in": deck} | {each.partition("\n")[0]: each.partition("\n")[2] for each in more}
+    return found
+
+
+DECKS = _decks()
+
+TIMES = re.compile(
+    rb"^(Printed on |Loop time of|Performance:|[\d.]+% CPU use|Total wall time|.* CPU = "
+    rb"|(Pair|Neigh|Comm|Output|Modify|Other) +\|)"
+)
+
+RUN_THEM = """
+import json, math, os, sys
+from pathlib import Path
+import mpi4py
+mpi4py.rc(initialize=False)  # each copy begins MPI itself
+from mpi4py import MPI
+from faultgouge.analysis import FaultgougeError
+from faultgouge.pywrap.granular.run_deck import run_deck
+for deck in sys.argv[1:]:  # each in a process where no LAMMPS was before
+    child = os.fork()
+    if child == 0:
+        MPI.Init()
+        try:
+            found = run_deck(Path(deck), balance=math.inf)
+            says = found.position.tolist()
+        except FaultgougeError as error:
+            says = str(error)
+        print(json.dumps([deck, says]), flush=True)
+        os._exit(0)
+    os.waitpid(child, 0)
+"""
+
+
+def _files(folder):
+    """All files of a folder; logs without times."""
+    found = {}
+    for path in sorted(each for each in folder.rglob("*") if each.is_file()):
+        fill = path.read_bytes()
+        if path.suffix in (".log", ".lammps") or path.name == "info.txt":
+            fill = [line for line in fill.splitlines() if not TIMES.match(line)]
+        found[str(path.relative_to(folder))] = fill
+    return found
+
+
+def _last_frame(text, count):
+    return np.array([[float(word) for word in line.split()[1:]] for line in text.decode().splitlines()[-count:]])
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """For each deck, the folders that `lmp -in` and this program leave, and what this program has found."""
+    base = tmp_path_factory.mktemp("decks")
+    here = {}
+    for name, files in DECKS.items():
+        for who in ("lmp", "here"):
+            folder = base / name.replace(" ", "_") / who
+            for file, fill in files.items():
+                (folder / file).parent.mkdir(parents=True, exist_ok=True)
+                (folder / file).write_text(fill)
+            if who == "lmp":
+                subprocess.run(
+                    [BIN / "lmp", "-in", "deck.in"], cwd=folder, capture_output=True, check=False, timeout=60
+                )
+        here[name] = folder
+    decks = [str(folder / "deck.in") for folder in here.values()]
+    done = subprocess.run(
+        [sys.executable, "-c", RUN_THEM, *decks], capture_output=True, text=True, check=True, timeout=300
+    )
+    found = dict(json.loads(line) for line in done.stdout.splitlines() if line.startswith('["'))
+    return {name: (folder.parent / "lmp", folder, found.get(str(folder / "deck.in"))) for name, folder in here.items()}
+
+
+@pytest.mark.parametrize("name", DECKS)
+def test_folder_and_last_state(folders, name):
+    theirs, ours, state = folders[name]
+    assert state is not None
+    expected, found = _files(theirs), _files(ours)
+    assert found.keys() == expected.keys()
+    for file, fill in expected.items():
+        assert found[file] == fill, file
+    stops = any(
+        line.startswith(b"ERROR") for log in ("log.lammps", "deep/log.lammps") for line in expected.get(log, ())
+    )
+    assert isinstance(state, str) == stops, state
+    dumps = [file for file in expected if file.endswith("state.dump") and expected[file]]
+    if not isinstance(state, str) and dumps and name not in ("two systems", "particles go", "minimize"):
+        assert np.array_equal(state, _last_frame(expected[dumps[0]], 3))

@@ -1,0 +1,149 @@
+"""Up to which push the linear motion holds, whatever the push: the same however a packing is written, and in LAMMPS."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pushes import in_steps, pushed
+from scipy.sparse import csr_array
+
+from faultgouge.analysis import Motion, stability
+from faultgouge.analysis.arrays import derive_frozen
+from faultgouge.analysis.contacts import PER_CONTACT, LinearisedContacts
+from faultgouge.analysis.motion.reach import OVERLAP_CHANGE, reach_of
+
+BEDS = [("mindlin/force", 2), ("gran/hertz/history", 3)]
+
+
+@pytest.fixture(scope="module")
+def bed(beds):
+    """LAMMPS with particles at rest, none of whose contacts is at the bound, and their configuration."""
+    from faultgouge.pywrap import from_lammps
+
+    def make(law, d):
+        lmp = beds(law, d)
+        return lmp, from_lammps(lmp)
+
+    return make
+
+
+def renumbered(here, random):
+    """The packing with its particles and contacts in another order, and the partners of pairs exchanged."""
+    order = random.permutation(len(here))
+    place = np.argsort(order)
+    c = here.contacts.chosen(random.permutation(len(here.contacts)))
+    values = {name: np.array(getattr(c, name)) for name in PER_CONTACT}
+    values["i"], values["j"] = place[c.i], np.where(c.wall, -1, place[c.j])
+    swap = ~c.wall & (random.random(len(c)) < 0.5)
+    values["i"][swap], values["j"][swap] = values["j"][swap], values["i"][swap]
+    for name in ("normal", "tangential_force", "closing", "parting"):
+        values[name][swap] *= -1
+    for name in ("slip_arm", "lever_arm"):
+        values[name][swap] = values[name][swap][:, ::-1]
+    given = {
+        name: getattr(here, name)[order] for name in ("position", "radius", "mass", "inertia", "load", "free", "kind")
+    }
+    return derive_frozen(here, contacts=LinearisedContacts(**values), **given)
+
+
+def turned(here, matrix):
+    """The packing rotated or mirrored: vectors turn, and torques as pseudovectors."""
+    c, d = here.contacts, here.dimension
+    values = {name: getattr(c, name) for name in PER_CONTACT}
+    values |= {name: values[name] @ matrix.T for name in ("normal", "tangential_force", "closing", "parting")}
+    load = here.load @ matrix.T
+    load[:, 1] *= np.linalg.det(matrix)
+    return derive_frozen(
+        here, contacts=LinearisedContacts(**values), load=load, box=here.box @ matrix.T,
+        position=here.position @ matrix[:d, :d].T,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("law", "d"), BEDS)
+def test_the_range_does_not_depend_on_how_the_packing_is_written(bed, law, d):
+    _, here = bed(law, d)
+    expected, random = reach_of(Motion.of(here)), np.random.default_rng(2)
+    told = stability(here)
+    assert told.largest_energy == pytest.approx(expected.energy, rel=1e-9)
+    others = [renumbered(here, random) for _ in range(20)]
+    angle = 0.7
+    rotation = np.eye(3)
+    rotation[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    others += [turned(here, rotation), turned(here, np.diag([-1.0, 1.0, 1.0]))]
+    for other in others:
+        found = reach_of(Motion.of(other))
+        for name in ("energy", "gain", "residual_energy"):
+            assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-6)
+
+
+@pytest.mark.parametrize(("law", "d"), BEDS)
+def test_every_push_within_the_range_moves_lammps_as_the_linear_packing(bed, law, d):
+    """Of one particle, and of all in random directions: D is the same within 2 %."""
+    lmp, here = bed(law, d)
+    told, random = stability(here), np.random.default_rng(3)
+    times, dt = np.array([0.2, 0.5, 1.0, 2.0, 4.0]), 1e-3
+    moving = d * len(here)
+    pushes = np.zeros((here.coordinates, 6))
+    for k in range(3):
+        direction = random.standard_normal(d)
+        particle = random.integers(len(here))
+        pushes[particle : moving : len(here), k] = told.largest_push * direction / np.linalg.norm(direction)
+        pushes[:moving, 3 + k] = random.standard_normal(moving)
+        energy = 0.5 * np.sum(here.coordinate_mass * pushes[:, 3 + k] ** 2)
+        pushes[:, 3 + k] *= np.sqrt(told.largest_energy / energy)
+    assert 0.5 * here.mass.max() * told.largest_push**2 == pytest.approx(told.largest_energy, rel=1e-9)
+    assert 10 * told.residual_push < told.largest_push
+    found = pushed(lmp, here, pushes, times, dt, 0.99)
+    for k in range(pushes.shape[1]):
+        np.testing.assert_allclose(found[:, k], in_steps(here, pushes[:, k : k + 1], times, dt), rtol=0.02)
+
+
+@pytest.mark.parametrize(("law", "d"), BEDS)
+def test_the_push_that_the_bound_is_made_for_takes_a_contact_there(bed, law, d):
+    """The bound is no looser than its gain: the state that Cauchy and Schwarz name changes the contact at once."""
+    from faultgouge.analysis.motion.one_sided import OneSidedSystem
+
+    _, here = bed(law, d)
+    motion = Motion.of(here)
+    reach, system = reach_of(motion), OneSidedSystem(motion)
+    symmetric = 0.5 * (motion.stiffness + motion.stiffness.T).toarray()
+    changes, best = system.contact_changes, np.inf
+    count = len(changes.bound)
+    rows, viscous = (csr_array(each).toarray() for each in (changes.rows, changes.viscous))
+    none = np.zeros((0, 1))
+    for k in range(count):
+        opens, slope = rows[2 * count + k], changes.bound_slope[k]
+        for s in (1.0, -1.0):
+            row, dashpots = s * rows[k] - slope * opens, s * viscous[k] - viscous[2 * count + k]
+            z = np.linalg.solve(symmetric, row)
+            first = changes.first(z[:, None], dashpots[:, None], none, none)[0]
+            best = min(best, 0.5 * (z @ symmetric @ z + dashpots @ dashpots) * first**2)
+        best = min(
+            best, 0.5 * (OVERLAP_CHANGE * changes.overlap[k, 0]) ** 2 / (opens @ np.linalg.solve(symmetric, opens))
+        )
+    assert 0.7 * best < reach.energy * reach.gain < best * (1 + 1e-9)  # a contact may be nearest the bound sideways
+
+
+def test_free_motions_limit_the_time(bed):
+    """Without friction disks turn freely; the range then holds up to a time that is told."""
+    _, here = bed("mindlin/force", 2)
+    c = here.contacts
+    smooth = derive_frozen(
+        here,
+        contacts=derive_frozen(
+            c,
+            tangential_stiffness=np.where(c.wall, 0.0, c.tangential_stiffness),
+            tangential_force=0 * c.tangential_force,
+        ),
+    )
+    found = reach_of(Motion.of(smooth), free=1)
+    assert found is not None
+    assert 0 < found.time < np.inf
+
+
+def test_a_verdict_is_true_false_or_an_error(bed):
+    told = stability(bed("mindlin/force", 2)[1])
+    assert bool(told) is told.stable is True
+    assert not replace(told, stable=False)
+    with pytest.raises(ValueError, match=r"not known whether the packing is stable: no reason: ask for \.stable"):
+        bool(replace(told, stable=None, reasons=("no reason",)))
