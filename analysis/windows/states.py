@@ -26,7 +26,7 @@ from scipy.sparse import csc_array, csr_array, eye_array
 
 from ..arrays import Complexes, Floats
 from ..factors.sparse_lu import SingularMatrixError, general_lu
-from ..motion.eigenvalues import SAFETY, unit_rounding
+from ..motion.eigenvalues import SAFETY
 from .system import System
 
 DENSE = 200
