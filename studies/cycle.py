@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import eigvals, lu_factor, lu_solve
+from scipy.linalg import lu_factor, lu_solve
 
 from ..analysis import Configuration, Packing, RunFile
 from ..analysis.arrays import Complexes, Floats, derive_frozen
@@ -37,10 +37,10 @@ from ..analysis.files.atomic_write import FORMAT_KEY, check_format, check_own, m
 from ..analysis.files.plain_file import read_plain, read_plain_text
 from ..analysis.has_configuration import HasConfiguration
 from ..analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, unit_rounding, zero_uncertainties
+from ..analysis.motion.linear import all_rates, linear_verdict
 from ..analysis.motion.modes import Modes, participation_ratio
 from ..analysis.motion.motion import Motion
-from ..analysis.motion.rates import DENSE_DAMPED, FREE_SHARE, rates_of
-from ..analysis.motion.slips import Slip
+from ..analysis.responses.slips import Slip
 from ..analysis.table_display import table_of
 from ..pywrap import SceneError
 from ..pywrap.runs.drive import SERIES, drive_of, slips_in
@@ -56,8 +56,8 @@ LONE_PARTICIPATION = 1.5
 """Disks that take part in a motion, below which the motion is that of one disk."""
 
 ALL_RATES = 1500
-"""Coordinates up to which LAPACK computes all eigenvalues with dissipation, ten seconds: the fastest growing motions
-alone, which `rates_of` has of so many coordinates, may all be those of one disk each."""
+"""Coordinates up to which LAPACK computes all eigenvalues with dissipation, ten seconds: the fastest growing motion
+alone, which is known of more coordinates, may be that of one disk."""
 
 INVERSE_STEPS = 3
 """Steps of inverse iteration with an eigenvalue that is known to nine digits: two leave 1e-12 of the others."""
@@ -159,11 +159,9 @@ def _damped_rate(motion: Motion) -> float | None:
 
 def _rates(motion: Motion) -> Sequence[complex] | Complexes:
     """Eigenvalues s with dissipation, the fastest growing first: all of them, unless the packing is large."""
-    if not DENSE_DAMPED < len(motion.active) <= ALL_RATES:
-        return rates_of(motion).values
-    values = eigvals(motion.first_order, check_finite=False)
-    moves = (values.imag >= 0) & (np.abs(values) > FREE_SHARE * np.abs(values).max())
-    return sorted(values[moves], key=lambda s: -s.real)
+    if len(motion.active) > ALL_RATES:
+        return [linear_verdict(motion, decides=False).s]
+    return all_rates(motion)[0]
 
 
 def null_vector(singular: Complexes) -> Complexes:

@@ -50,7 +50,7 @@ from ..analysis import (
 from ..analysis.arrays import Floats
 from ..analysis.files.atomic_write import write_json
 from ..analysis.motion.eigenvalues import SAFETY, Complexes, exceeds_rounding, unit_rounding
-from ..analysis.motion.rates import SLICED
+from ..analysis.motion.spectrum import SLICED
 from ..analysis.table_display import table_of
 from ..pywrap import Equilibrium, Scene
 from ..pywrap.load_path import LoadPath

@@ -41,6 +41,9 @@ class Material(NamedTuple):
         1.5 or 1.
     density, friction, restitution : float
         Mass / volume; coefficient of friction; restitution.
+    gamma, gamma_t : float
+        In place of restitution: dashpots gamma m* sqrt(R* delta) of Hertz's law, gamma m* of springs, as LAMMPS's
+        gran/* styles have them; gamma_t = gamma/2 by default.
     rescales : float
         1 if the tangential force of a given slip grows with the overlap (gran/hertz/history, LIGGGHTS), 0 if each
         increment of force stays as it is (mindlin/force, YADE, MercuryDPM), the default.
@@ -55,6 +58,8 @@ class Material(NamedTuple):
     friction: float = 0.5
     restitution: float = 1.0
     rescales: float = 0.0
+    gamma: float | None = None
+    gamma_t: float | None = None
 
     def checked(self) -> "Material":
         """The same with kn and kt.
@@ -68,7 +73,8 @@ class Material(NamedTuple):
             raise BadInputError("The material needs young, or kn in its place, and not both.")
         allowed = {
             "young": (0, np.inf), "kn": (0, np.inf), "density": (0, np.inf), "poisson": (-1, 0.5),
-            "restitution": (0, 1), "kt": (-TINY, np.inf), "friction": (-TINY, np.inf), "exponent": (0, 1.5),
+            "restitution": (0, 1), "exponent": (0, 1.5),
+            **dict.fromkeys(("gamma", "gamma_t", "kt", "friction"), (-TINY, np.inf)),
         }  # fmt: skip
         for name, (low, high) in allowed.items():
             value = getattr(self, name)
@@ -181,6 +187,10 @@ def spheres_of_material(
     normal_force = stiff * overlap / material.exponent if normal_force is None else np.asarray(normal_force, float)
     log = -np.log(material.restitution)
     viscous = 2 * np.sqrt(5 / 6 if hertz else 1.0) * log / np.hypot(log, np.pi) * np.sqrt(heavy)
+    dashpots = [viscous * np.sqrt(stiff), viscous * np.sqrt(shear)]
+    if material.gamma is not None:
+        across = material.gamma / 2 if material.gamma_t is None else material.gamma_t
+        dashpots = [each * heavy * area for each in (material.gamma, across * (material.friction > 0))]
     known = "tangential_force" in forces or not material.friction or not len(i)
     none = np.zeros((len(i), 3))
     tangential = np.asarray(forces.pop("tangential_force", none), float)
@@ -194,7 +204,7 @@ def spheres_of_material(
         "slip_arm": arms, "lever_arm": arms, "lever_slope": np.zeros(len(i)), "normal_force": normal_force,
         "tangential_force": tangential, "normal_stiffness": stiff, "tangential_stiffness": shear, "closing": coupling,
         "parting": coupling, "friction": material.friction * np.maximum(normal_force, 0.0),
-        "normal_dashpot": viscous * np.sqrt(stiff), "tangential_dashpot": viscous * np.sqrt(shear),
+        "normal_dashpot": dashpots[0], "tangential_dashpot": dashpots[1],
     }  # fmt: skip
     made = LinearisedContacts(**given | forces)
     whole = {

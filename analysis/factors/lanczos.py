@@ -198,11 +198,15 @@ class SlicedSpectrum:
         most, before, high = self.sizes.slice_size, None, np.inf
         while first < stop:
             solve, below = self.factorise(self.matrix, shift)
-            if below <= first:
-                low, shift = shift, 0.5 * (shift + high) if np.isfinite(high) else shift + 2 * (shift - low)
+            ahead = below - first
+            # factors take a small part of the time of a slice: a shift that is far off is moved
+            if ahead > most and shift - low > 1e-9 * abs(shift):
+                high, shift = shift, low + (shift - low) * max(0.5 * most / ahead, 0.1)
                 continue
-            if below - first > most and shift - low > 1e-9 * abs(shift):
-                high, shift = shift, low + (shift - low) * max(0.4 * most / (below - first), 0.1)
+            if ahead <= 0 or (ahead < most // 4 and below + ahead < stop and np.isinf(high)):
+                step = shift - low
+                low, shift = (shift, shift) if ahead <= 0 else (low, shift)
+                shift = 0.5 * (shift + high) if np.isfinite(high) else shift + step * min(most / max(ahead, 1), 2.0)
                 continue
             part = self.slice_about(shift, (first, min(stop, 2 * below - first)), margin, (solve, below))
             if before is not None:

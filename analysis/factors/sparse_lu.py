@@ -112,7 +112,7 @@ def general_lu(matrix: csc_array, *, ordered: bool = False) -> Factors:
     Otherwise, and for complex matrices, the pivot is the diagonal entry unless another one of its column is larger than
     a hundred of it, so that the order of elimination remains. Raises SingularMatrixError if a pivot is zero.
     """
-    order = None if ordered else np.argsort(elimination_places(csc_array(abs(matrix) + abs(matrix.T))))
+    order = None if ordered else np.argsort(elimination_places(matrix))
     inside = matrix if order is None else csc_array(matrix[order][:, order])
     if np.isrealobj(matrix.data):
         right = np.random.default_rng(2).standard_normal(matrix.shape[0])
@@ -128,7 +128,7 @@ def general_lu(matrix: csc_array, *, ordered: bool = False) -> Factors:
 
 
 def elimination_places(matrix: csc_array) -> Indices:
-    """Places of the rows of a matrix with a symmetric pattern in an order of elimination, shape (n,).
+    """Places of the rows of a matrix in an order of elimination of the pattern of A + A^T, shape (n,).
 
     >>> from scipy.sparse import csc_array
     >>> line = csc_array([[2.0, 1.0, 0.0], [1.0, 2.0, 1.0], [0.0, 1.0, 2.0]])
@@ -136,7 +136,9 @@ def elimination_places(matrix: csc_array) -> Indices:
     [0, 1, 2]
     """
     size = matrix.shape[0]
-    pattern = csr_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
+    pattern = csc_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
+    pattern = csr_array(pattern + pattern.T)  # METIS may not come to an end where it is not symmetric
+    pattern.data[:] = 1.0
     # rows of one pattern have the same sum of random numbers
     _, group = np.unique(pattern @ np.random.default_rng(0).random(size), return_inverse=True)
     member = csr_array((np.ones(size), group, np.arange(size + 1)), shape=(size, int(group.max(initial=-1)) + 1))

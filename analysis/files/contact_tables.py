@@ -66,7 +66,12 @@ DATA = {
     8: ["x", "y", "vx", "vy", "radius", "q", "w", "info"],
 }
 NAMES = {"r": "radius", "rad": "radius", "c_radius": "radius", "xu": "x", "yu": "y", "zu": "z", "force": "fn",
-         "p1": "ftx", "p2": "fty", "p3": "ftz", "i": "id1", "j": "id2", "patom1": "id1", "patom2": "id2"}  # fmt: skip
+         "p1": "ftx", "p2": "fty", "p3": "ftz", "i": "id1", "j": "id2", "patom1": "id1", "patom2": "id2",
+         "f_n": "fn", "f_t_x": "ftx", "f_t_y": "fty", "f_t_z": "ftz"}  # fmt: skip
+
+
+FORCES = ["fn", "fx", "fy", "fz", *(f"{name}{axis}" for name in ("ft", "fn", "fs") for axis in "xyz")]
+"""Names of columns with forces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +118,13 @@ def _table(path: Path, columns: Sequence[str] | None, frame: int = -1) -> tuple[
     if lines[0].startswith("ITEM:"):
         shown = list(dump_frames(path))[frame]
         names, rows = list(shown.columns), shown.rows
-        low, high = shown.bounds[:, :2].T
-        if shown.bounds.shape[1] > 2 and np.any(shown.bounds[:, 2]):
-            raise PackingFileError(f"{path} has a tilted box: give one with right angles.")
-        about = {"box": np.diag(high - low), "origin": low, "periodic": np.array([b == "pp" for b in shown.boundary])}
+        low, high = shown.bounds[:, :2].T.copy()
+        xy, xz, yz = shown.bounds[:, 2] if shown.bounds.shape[1] > 2 else (0.0, 0.0, 0.0)
+        low -= [min(0.0, xy, xz, xy + xz), min(0.0, yz), 0.0]  # the bounds are those of a box around the tilted one
+        high -= [max(0.0, xy, xz, xy + xz), max(0.0, yz), 0.0]
+        box = np.diag(high - low)
+        box[1, 0], box[2, :2] = xy, (xz, yz)
+        about = {"box": box, "origin": low, "periodic": np.array([each == "pp" for each in shown.boundary])}
         if len(about["periodic"]) != 3:
             about["periodic"] = None
     else:
@@ -232,6 +240,9 @@ def read_contacts(
             raise PackingFileError(
                 f"{path} has no column {name} (its columns: {', '.join(table)}); --columns names those of a dump local."
             )
+    # neighbours that do not touch have rows of zeros in pair/local
+    bears = np.any([table[name] != 0 for name in FORCES if name in table] or [np.ones(len(table["id1"]), bool)], axis=0)
+    table = {name: column[bears] for name, column in table.items()}
     where = {int(each): k for k, each in enumerate(spheres.id)}
     i = np.array([where.get(int(each), -2) for each in table["id1"]], dtype=np.int64)
     walls = (table["id2"] < 0) | ((table["id2"] == 0) & (0 not in where))
@@ -244,12 +255,12 @@ def read_contacts(
     branch, periodic = _branches(spheres, path, table, i, j)
     n = branch / np.linalg.norm(branch, axis=1)[:, None]
     fn, ft = _forces(path, table, n)
-    # each contact once, and only those that bear something: neighbours of pair/local have no force
+    # each contact once, though .fstat may have it from both sides
     low, high = np.minimum(i, j), np.maximum(i, j)
     place = np.round(branch * np.where(i < j, 1, -1)[:, None] / spheres.radius.mean(), 3)
     _, once = np.unique(np.column_stack([low, high, place]), axis=0, return_index=True)
-    kept = np.sort(once[(np.abs(fn) > 0)[once]])
-    i, j, branch, n, fn, ft = (each[kept] for each in (i, j, branch, n, fn, ft))
+    kept = np.sort(once)
+    i, j, branch, fn, ft = i[kept], j[kept], branch[kept], fn[kept], ft[kept]
 
     def packing(normal: Floats, tangential: Floats) -> Configuration:
         size, bound = np.linalg.norm(tangential, axis=1), material.friction * np.maximum(normal, 0.0)
@@ -275,7 +286,7 @@ def read_contacts(
     if lacks > AT_REST:
         raise PackingFileError(
             f"{path}: forces are out of balance by {lacks:.2g} of the mean contact force, whatever gravity is: this is "
-            "no packing at rest, or a contact or a wall is missing; measured forces have counts alone, --measured."
+            "no packing at rest, or a contact or a wall is missing."
         )
     remarks.append(f"forces balance to {lacks:.1g} of their mean but for gravity; a load takes what is left")
     return derive_frozen(found, remarks=tuple(remarks))

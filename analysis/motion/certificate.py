@@ -62,20 +62,23 @@ SHARES = (0.1, 0.2, 0.4)
 """beta over the ratio of the traces of G and S that are tried: 0.2 is best in beds of spheres, by a fifth at the
 most."""
 
-LOWEST, LEAST = 1e-3, 40
+LOWEST_SHARE, LEAST = 1e-3, 40
 """w is not sought below this share of the largest frequency, and is taken larger until so many motions are slow: the
 slowest decay is one of theirs."""
 
-WIDTH, WIDER, TRIES = 0.02, 1.04, 5
+WIDTH, WIDER, W_TRIES = 0.02, 1.04, 5
 """Relative width to which w is found in the part, its factor from one try of all coordinates to the next, and tries."""
 
 FREE_MARGIN = 0.02
 """Decay that fast motions are to have from the first, as a share of that at w: it costs a few slow motions more."""
 
+DECAYS = (1.0, 0.98, 0.9, 0.5)
+"""Shares of the slowest decay that are tried as that of all fast motions: less than all leaves an error."""
+
 MARGIN = 40
 """Neighbours of a slice on either side."""
 
-WORST, CHANGES = 24, 12
+WORST, CHANGES = 16, 16
 """Motions whose error is made smaller at a time, and how often."""
 
 SURE = 1e-3
@@ -91,7 +94,7 @@ FORM_BYTES = 26
 MEMORY_SHARE = 0.7
 """Share of the memory of the machine that factors of F may take."""
 
-WORK, RATE = 4e12, 3e9
+MOST_WORK, RATE = 4e12, 3e9
 """Multiplications for slow motions that are taken on, twenty minutes, and multiplications in a second."""
 
 
@@ -145,7 +148,7 @@ class Pencil:
     @classmethod
     def of(cls, stiffness: csr_array, damping: csr_array) -> "Pencil":
         """Of A and G + H."""
-        order = np.argsort(elimination_places(csc_array(abs(stiffness) + abs(stiffness.T) + abs(damping))))
+        order = np.argsort(elimination_places(csc_array(abs(stiffness) + abs(damping))))
         parts = (each[order][:, order] for each in (stiffness, damping))
         return cls(tuple(csr_array(0.5 * (each + sign * each.T)) for each in parts for sign in (1, -1)))
 
@@ -207,7 +210,7 @@ def prove(stiffness: csr_array, damping: csr_array, zero: float) -> Proof:
             break
         w *= 1.5
     work = count / 120 * (300 * entries + 4e5 * pencil.size)
-    if work > WORK:
+    if work > MOST_WORK:
         raise NoProofError(
             f"dashpots hold growth above a frequency of {w:.3g} alone, of {top:.3g}, below which there are {count} "
             f"motions: that takes {work / RATE / 60:.0f} minutes"
@@ -219,7 +222,7 @@ def prove(stiffness: csr_array, damping: csr_array, zero: float) -> Proof:
         f"{work / RATE / 60:.2g} min and {bytes_needed / 1e9:.2g} GB"
     )
     decay = FREE_MARGIN * _typical_decay(pencil, w)
-    for _ in range(TRIES):
+    for _ in range(W_TRIES):
         if pencil.is_positive(w, beta, decay, factors=factors):
             break
         w *= WIDER
@@ -230,8 +233,10 @@ def prove(stiffness: csr_array, damping: csr_array, zero: float) -> Proof:
         pencil, SlicedSpectrum(csc_array(pencil.matrices[0])), w, top, zero
     )
     slowest = -float(values.real.max(initial=-np.inf)) if len(values) else decay
-    if slowest > decay and np.isfinite(slowest) and pencil.is_positive(w, beta, slowest, factors=factors):
-        decay = slowest
+    for share in DECAYS if slowest > decay and np.isfinite(slowest) else ():
+        if share * slowest > decay and pencil.is_positive(w, beta, share * slowest, factors=factors):
+            decay = share * slowest
+            break
     return Proof(values, errors, w, count, free, decay, not factors, all_slow, top)
 
 
@@ -257,7 +262,7 @@ def _frequency(
         )
     best = top, 0.0
     for share in SHARES:
-        low, high = LOWEST * top, best[0]
+        low, high = LOWEST_SHARE * top, best[0]
 
         def holds(w: float, share: float = share) -> float:
             beta = min(share * ratio, 1 / (twisting / w + strongest))

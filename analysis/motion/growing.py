@@ -35,6 +35,7 @@ from ..errors import BadInputError
 from ..factors.lanczos import BlockKrylov
 from ..progress import report_progress
 from .eigenvalues import Linear
+from .random_state import CHANCE
 
 FIRST_VECTORS, MOST_VECTORS, MORE = 12, 30, 3
 """Vectors of the space before its eigenvalues are looked at, at the most, and between two looks."""
@@ -45,9 +46,8 @@ TRIPLE = 3.0
 EIGENVALUE_MARGIN = 1.03
 """By how much the largest eigenvalue is taken larger, of which Arnoldi's iteration misses a hundredth."""
 
-CHANCE, APPEARS = 1e-3, 1e-2
-"""Probability that a motion is overlooked, as its share in the start is smaller, and the error with which it
-appears."""
+APPEARS = 1e-2
+"""Error with which a motion appears in a space."""
 
 CONVERGED, SURELY = 1e-5, 10.0
 """Relative residual of s with which the search ends, and growth over what a larger residual may change that is one."""

@@ -39,7 +39,7 @@ CHANCE = 1e-3
 REFERENCE = 0.1
 """omega_0 as a share of the largest frequency: about the slowest motions that are left in the end."""
 
-WORK, OVERHEAD = 2e11, 2e4
+STATE_WORK, OVERHEAD = 2e11, 2e4
 """Multiplications with entries of A and G, three minutes, and those that could be done in the time that a step
 takes."""
 
@@ -67,7 +67,12 @@ FREE_FORCE = 1e-12
 
 
 def follow_decay(
-    motion: Motion, kept: csr_array, why: str, time: float | None = None, searched: float = np.inf, work: float = WORK
+    motion: Motion,
+    kept: csr_array,
+    why: str,
+    time: float | None = None,
+    searched: float = np.inf,
+    work: float = STATE_WORK,
 ) -> Linear:
     """Follow the motion from a random state until it has decayed, or grows.
 
@@ -123,8 +128,7 @@ def follow_decay(
             coarse = _slope(list(after), span)
             count = int(np.ceil(FOLDS / max(coarse, 1 / now) / span * FINER)) + 1
             fine = _slope([look(dt / FINER) for _ in range(2 * count)], span / FINER)
-            error = abs(fine - coarse) / (FINER**2 - 1)
-            rate = fine + (fine - coarse) / (FINER**2 - 1)
+            rate, error = fine + (fine - coarse) / (FINER**2 - 1), abs(fine - coarse)
             if rate > error and rate * now > ALGEBRAIC:
                 return Linear(False, rate, error, free, said="motion from a random state grows")
             break

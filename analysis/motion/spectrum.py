@@ -52,13 +52,14 @@ from ..packing.disk_operators import Form
 from ..packing.packing import Floats, Indices
 from ..progress import report_progress
 from ..table_display import TableDisplay
-from .all_eigenvalues import all_eigenvalues
-from .block_arnoldi import SpectrumError
+from .all_eigenvalues import SpectrumError, all_eigenvalues
 from .eigenvalues import (
     SAFETY,
     Complexes,
+    Linear,
     active_coordinates,
     exceeds_rounding,
+    exponential,
     is_negative,
     is_zero,
     mass_weighted,
@@ -66,16 +67,18 @@ from .eigenvalues import (
     zero_uncertainties,
     zero_uncertainty,
 )
-from .growth_in_words import exponential
 from .modes import Mode, Modes, growth_rate
 from .motion import Motion
 from .no_verdict import no_verdict
-from .rates import SLICED, Rates, rates_of
+
+SLICED = 2000
+"""Coordinates beyond which `spectrum` takes the eigenvalues of K in slices. Of 870 coordinates of disks LAPACK takes
+0.8 of the time of slices, of 900 of spheres 0.4, and of 2,910 of disks 3.4 times as long."""
 
 DENSE_LARGEST = 900
 """Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
 
-LAPACK_UP_TO = 20_000
+LAPACK_INSTEAD = 20_000
 """Coordinates up to which LAPACK takes over where slices are incomplete: two hours, and 13 GB."""
 
 LIMIT = 1e-4
@@ -146,7 +149,9 @@ class Spectrum(TableDisplay):
         if self._doubts:
             return f"not known whether the packing is stable: {'; '.join(self._doubts)}; {alone}"
         if contacts.one_sided.any():
-            rates = (rates_of(Motion.of(self.packing, sliding=on)) for on in (False, True))
+            from .linear import linear_verdict
+
+            rates = (linear_verdict(Motion.of(self.packing, sliding=on), decides=not on) for on in (False, True))
             stick, slide = (exponential(each.growth_rate, 4, each.at_least) for each in rates)
             count = int(contacts.one_sided.sum())
             slides = "slides on ahead and sticks" if count == 1 else "slide on ahead and stick"
@@ -158,6 +163,8 @@ class Spectrum(TableDisplay):
         damped = self._damped
         if damped is None:
             return "no motion grows" if self.is_stable else f"unstable, D as exp({self.growth_rate():.6g} t): {counts}"
+        if damped.stable is None:
+            return f"not known whether the packing is stable: {'; '.join(damped.reasons)}; {alone}"
         verdict = "every motion decays" if self.is_stable else "unstable"
         if self.is_stable and damped.growth_rate == 0:
             return f"no motion grows with the packing's dissipation; {alone}"
@@ -190,7 +197,7 @@ class Spectrum(TableDisplay):
         if self._doubts or self.packing.configuration.contacts.one_sided.any():
             return None
         if self._damped is not None:
-            return not self._damped.grows.any()
+            return self._damped.stable
         return not self.pairs and not len(self.negative)
 
     @cached_property
@@ -203,8 +210,10 @@ class Spectrum(TableDisplay):
         return None if self._damped is None else self._damped.growth_rate
 
     @cached_property
-    def _damped(self) -> Rates | None:
-        return rates_of(Motion.of(self.packing)) if self.packing.configuration.damped else None
+    def _damped(self) -> Linear | None:
+        from .linear import linear_verdict
+
+        return linear_verdict(Motion.of(self.packing)) if self.packing.configuration.damped else None
 
     @property
     def least_q(self) -> float:
@@ -291,7 +300,7 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
 
     LAPACK's dense solver serves up to `SLICED` coordinates. Beyond, :mod:`~faultgouge.analysis.motion.all_eigenvalues`
     takes one slice of the spectrum after the other. If these are found to be incomplete, LAPACK serves up to
-    `LAPACK_UP_TO` coordinates, and the result says so in its `remark`.
+    `LAPACK_INSTEAD` coordinates, and the result says so in its `remark`.
 
     Parameters
     ----------
@@ -359,7 +368,7 @@ def _values_and_vectors(matrix: csr_array, rounding: float, alike: float) -> tup
         try:
             found = all_eigenvalues(matrix)
         except SpectrumError as error:
-            if matrix.shape[0] > LAPACK_UP_TO:
+            if matrix.shape[0] > LAPACK_INSTEAD:
                 raise
             remark = f"by LAPACK, as slices were incomplete: {str(error).rstrip('.')}"
             report_progress(f"{error} LAPACK takes over, which needs {32e-9 * matrix.shape[0] ** 2:.2g} GB")

@@ -65,6 +65,7 @@ def run_deck(
     keep: Path | None = None,
     notice: Notice | None = None,
     show: Notice | None = None,
+    use: Callable[[Any, Configuration], None] | None = None,
 ) -> Configuration:
     """Run a deck in its own folder, as `lmp -in` there, and take its last state as `from_lammps` does.
 
@@ -82,6 +83,8 @@ def run_deck(
         Gets a sentence before the first run if what is set up cannot be taken as it stands; the deck may change that.
     show : callable, optional
         Gets how far `relaxes` has come.
+    use : callable, optional
+        Gets the instance and its packing before the instance is closed.
 
     Raises
     ------
@@ -95,7 +98,10 @@ def run_deck(
         raise BadInputError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
     deck = carry_out_deck(path, notice)
     try:
-        return _take(deck, path, slides=slides, balance=balance, relaxes=relaxes, show=show)
+        found = _take(deck, path, slides=slides, balance=balance, relaxes=relaxes, show=show)
+        if use is not None:
+            use(deck.lmp, found)
+        return found
     except (NotTakenError, NoEquilibriumError) as error:
         kept = keep_state(deck.lmp, deck.carried_out, keep, path) if keep else ""
         raise NotTakenError(f"{_of_deck(str(error)).rstrip('.')}. {kept}".rstrip()) from error

@@ -61,6 +61,15 @@ def test_order_of_particles_is_that_of_their_coordinates():
     assert entries[0] < 1.05 * entries[1]  # of larger matrices nested dissection leaves fewer
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_order_of_a_matrix_whose_pattern_is_not_symmetric(seed):
+    """METIS loops for ever on such a graph."""
+    matrix = csc_array(lattice(30) + 40 * eye_array(2700))
+    matrix.data[np.random.default_rng(seed).random(matrix.nnz) < 0.1] = 0.0
+    matrix.eliminate_zeros()
+    assert np.array_equal(np.sort(elimination_places(matrix)), np.arange(2700))
+
+
 def test_general_factors_of_a_matrix_without_a_diagonal():
     """Pivots are then others of their columns."""
     matrix = csc_array(lattice(12).tolil())

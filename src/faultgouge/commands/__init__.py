@@ -17,8 +17,8 @@ from .on_demand import CommandGroup, CommandsByName
 from .studies import find_command, names_of_commands
 
 FAMILIES = (
-    "runs", "drive", "spectrum", "onset", "pictures", "vibrations", "import_command", "export_command", "studies",
-    "sweeps", "examples",
+    "runs", "drive", "stability", "spectrum", "onset", "pictures", "vibrations", "import_command", "export_command",
+    "studies", "sweeps", "examples",
 )  # fmt: skip
 """Modules with commands."""
 

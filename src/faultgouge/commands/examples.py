@@ -12,7 +12,9 @@ app = typer.Typer()
 
 @app.command(epilog="Example: faultgouge examples pour")
 def examples(
-    name: Annotated[str | None, typer.Argument(help="Which one is copied into this folder.", show_default=False)] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="Which one is copied into this folder.", show_default=False)
+    ] = None,
 ) -> None:
     """List ten examples that run in seconds each, or copy one into this folder."""
     from importlib.resources import files

@@ -11,6 +11,7 @@ import typer
 from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
+from .stability import first_sentence
 from .terminal import lock_output, print_line, say, status
 
 if TYPE_CHECKING:
@@ -176,9 +177,9 @@ def _import_spheres(
     write_configuration(output, found, {"deck": ""})
     keeps(f"{output} has been written", output)
     print_line(f"{repr(found).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
-    for remark in found.remarks:
-        print_line(remark)
-    if contacts is not None:
+    if contacts is None:
+        print_line("\n".join(found.remarks))
+    else:
         with status("stability") as show, show_progress(show):
             verdict, says = verdict_within_digits(found)
         print_line(f"{verdict}\n{says}")
@@ -217,12 +218,13 @@ def _import_deck(file: Path, output: Path, slides: bool, balance: float | None, 
         configuration = run_deck(
             file, slides=slides, balance=allowed, relaxes=relaxes, keep=output, notice=say, show=show
         )
-    keeps(f"{output} has been written; whether the packing is stable says `faultgouge spectrum {output}`", output)
+    keeps(f"{output} has been written; whether the packing is stable says `faultgouge stability {output}`", output)
     if is_root():
         write_configuration(output, configuration, {"deck": text})
     print_line(f"{repr(configuration).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
     print_line(_time_steps(configuration))
-    print_line(_verdict(configuration, output))
+    if is_root():
+        print_line(first_sentence(configuration))
 
 
 AROUND = """\
@@ -257,19 +259,6 @@ def _deck_around(file: Path) -> str:
         f"For spheres, or any other law, write a deck beside it, here {deck} with the laws and walls of the run that "
         f"made the file, and give `faultgouge import {deck}`:\n\n{reads}\n{AROUND}"
     )
-
-
-def _verdict(configuration: Configuration, output: Path) -> str:
-    """The verdict of `spectrum`, if the packing's spectrum takes seconds."""
-    from faultgouge.analysis import stability
-    from faultgouge.analysis.motion.stability import LARGE
-    from faultgouge.analysis.progress import show_progress
-
-    moves = len(configuration.rattlers) < len(configuration)
-    if not is_root() or (moves and configuration.coordinates > LARGE // 4):
-        return "\n".join([*configuration.remarks, f"whether the packing is stable says `faultgouge spectrum {output}`"])
-    with status("stability") as show, show_progress(show):
-        return str(stability(configuration))
 
 
 def _time_steps(configuration: Configuration) -> str:

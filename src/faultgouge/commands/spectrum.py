@@ -8,6 +8,7 @@ import typer
 
 from ..analysis.counted import counted
 from ..mpi_rank import is_root
+from .stability import Follow, verdict_of
 from .terminal import (
     AsJson,
     Frame,
@@ -29,8 +30,8 @@ app = typer.Typer()
 MOST_PAIRS = 20
 """Lines of complex pairs: a packing of a thousand has hundreds."""
 
-SLOW_COORDINATES = 6000
-"""Coordinates from which a spectrum takes minutes, and a gigabyte or more."""
+VERDICT_FIRST = 2000
+"""Coordinates beyond which the eigenvalues take longer than the verdict, which does not need them."""
 
 
 @app.command(epilog="Example: faultgouge spectrum run.h5 --json")
@@ -50,6 +51,7 @@ def spectrum(
     rise: Annotated[
         bool, typer.Option("--rise", help="Also the motion while F_x rises slowly: drift and vibration over its rate.")
     ] = False,
+    follow: Follow = False,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Also conditions of pairs, quality factors, what makes K asymmetric.")
     ] = False,
@@ -62,11 +64,12 @@ def spectrum(
     way back. The eigenvalues are those of K alone, without dissipation.
     """
     from faultgouge.analysis import spectrum as eigenvalues_of
-    from faultgouge.analysis import stability
     from faultgouge.analysis.progress import show_progress
 
-    if values and (gain or rise or verbose):
-        raise typer.BadParameter("--values computes nothing but eigenvalues: leave --gain, --rise and --verbose out")
+    if values and (gain or rise or verbose or follow):
+        raise typer.BadParameter(
+            "--values computes nothing but eigenvalues: leave --gain, --rise, --follow and --verbose out"
+        )
     number = frame_at(file, frame, time)
     packing = stored_packing(file, number)
     if rise and not packing.configuration.top.any():
@@ -74,15 +77,19 @@ def spectrum(
     if not is_root():
         return
     size = packing.configuration.coordinates
-    if size > SLOW_COORDINATES:
-        # four matrices of doubles; 18000 coordinates took 10.2 GB
-        say(f"{size} coordinates: their spectrum needs {32e-9 * size**2:.2g} GB, and a time that grows as their cube")
+    large = size > VERDICT_FIRST
     if values:
+        if large:  # four matrices of doubles; 18000 coordinates took 10.2 GB
+            say(f"{size} coordinates: LAPACK needs {32e-9 * size**2:.2g} GB, and a time that grows as their cube")
         _values(packing, as_json)
         return
-    result = eigenvalues_of(packing)
-    with status("stability") as show, show_progress(show):
-        verdict = stability(packing, "fx" if rise else None, spectrum_of_stiffness=result)
+    result = None if large else eigenvalues_of(packing)
+    verdict = verdict_of(packing, "fx" if rise else None, spectrum_of_stiffness=result, follow=follow)
+    if not as_json:
+        print(verdict, flush=True)
+    if result is None:
+        with status("eigenvalues of K") as show, show_progress(show):
+            result = eigenvalues_of(packing)
     gains = _gain_of(packing) if gain else None
     if not as_json:
         _print_spectrum(packing, result, verdict, gains, verbose)
@@ -138,7 +145,6 @@ def _print_spectrum(
     gain: dict[str, Any] | None,
     verbose: bool,
 ) -> None:
-    print(verdict)
     _print_size(packing, result)
     _print_growing_motions(result, verdict.dissipative, verbose)
     if gain is not None:
@@ -197,7 +203,7 @@ def _print_growing_motions(result: Spectrum, dissipative: bool, verbose: bool) -
 
 def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None, with the reason, if unstable, too large, or where it fails."""
-    from faultgouge.analysis.motion.transient import GAIN_DISKS, NoGainError, transient_gains
+    from faultgouge.analysis.responses.transient import GAIN_DISKS, NoGainError, transient_gains
 
     most, size = 3 * GAIN_DISKS, packing.configuration.coordinates
     if size > most:

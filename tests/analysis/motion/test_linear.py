@@ -2,14 +2,26 @@
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_array
+from known_spectra import complex_block
+from known_spectra import turned as turned_blocks
+from linearised import dissipative
+from scipy.sparse import csr_array, diags_array
 from scipy.spatial import cKDTree
 
+from faultgouge.analysis import Configuration, LinearisedContacts, Motion, fastest_growing
+from faultgouge.analysis.arrays import derive_frozen
+from faultgouge.analysis.contacts import PER_CONTACT
+from faultgouge.analysis.errors import BadInputError
+from faultgouge.analysis.motion import linear as module
 from faultgouge.analysis.motion.certificate import NoProofError, prove
+from faultgouge.analysis.motion.eigenvalues import exponential
+from faultgouge.analysis.motion.linear import linear_verdict, opposed
+from faultgouge.analysis.motion.random_state import follow_decay
 
 
 def random_packing(seed):
-    """A and G of disks with random contacts: springs, dashpots of some strength, forces that follow the overlap or turn.
+    """A and G of disks with random contacts: springs, dashpots of some strength, forces that follow the overlap or
+    turn.
 
     Some have drag, no tangential dashpots, springs that push apart, or lever arms that differ; some nothing that holds
     them, so that they drift."""
@@ -80,3 +92,223 @@ def test_certificate_against_lapack_on_random_packings(first):
         for value in proof.values[:10]:
             assert np.abs(s - value).min() <= max(proof.errors[list(proof.values).index(value)], 1e-6 * top)
     assert proofs >= 5
+
+
+@pytest.fixture
+def beyond_lapack(monkeypatch):
+    """As if LAPACK served no packing."""
+    monkeypatch.setattr(module, "LAPACK_FIRST", 0)
+    monkeypatch.setattr(module, "LAPACK_UP_TO", 0)
+
+
+def row_of_spheres(count, pressed=2.0, dashpot=40.0):
+    """Equal spheres side by side on a plane, between two walls that press them together; apart if `pressed` is 0."""
+    first, others = np.arange(count), np.arange(count - 1)
+    i = np.concatenate([others + 1, first, [0, count - 1]])
+    j = np.concatenate([others, np.full(count + 2, -1)])
+    pair, size = j >= 0, len(i)
+    normal = np.zeros((size, 3))
+    normal[pair, 0] = 1.0
+    normal[count - 1 : -2, 2] = 1.0
+    normal[-2, 0], normal[-1, 0] = 1.0, -1.0
+    force = np.where(np.abs(normal[:, 0]) > 0, pressed, 1.0)
+    load = np.zeros((count, 2, 3))
+    load[:, 0, 2] = -1.0
+    none, ones = np.zeros((size, 3)), np.ones((size, 2))
+    contacts = LinearisedContacts(
+        i=i, j=j, normal=normal, distance=np.where(pair, 1.0, np.inf), overlap=np.full(size, 1e-3),
+        slip_arm=0.5 * ones, lever_arm=0.5 * ones, lever_slope=np.zeros(size),
+        normal_force=force, tangential_force=none,
+        normal_stiffness=np.full(size, 3e3), tangential_stiffness=np.full(size, 2e3), closing=none, parting=none,
+        normal_dashpot=np.full(size, dashpot), tangential_dashpot=np.full(size, 0.5 * dashpot),
+        friction=0.5 * force,
+    )  # fmt: skip
+    place = np.column_stack([first, 0 * first, 0.5 + 0 * first])
+    each = np.ones(count)
+    contacts = contacts.chosen(force > 0)
+    return Configuration(
+        dimension=3, position=place, radius=0.5 * each, mass=each, inertia=0.1 * each, contacts=contacts,
+        box=np.diag([count, 1.0, 1.0]), origin=np.array([-0.5, -0.5, 0.0]), periodic=np.zeros(3, bool), load=load,
+    )  # fmt: skip
+
+
+def turned_row(row):
+    """The row, and its load, in another direction, so that no number that should be zero is zero to the bit."""
+    q, _ = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))
+    contacts = derive_frozen(row.contacts, normal=row.contacts.normal @ q)
+    return derive_frozen(row, contacts=contacts, load=row.load @ q)
+
+
+def with_a_pair_out_of_balance(row, force):
+    """A row on a plane, and two spheres beside it that push each other apart a little, and turn round each other."""
+    c, count = row.contacts, len(row)
+    given = {name: getattr(c, name) for name in PER_CONTACT}
+    more = {name: values[:1] for name, values in given.items()}
+    more |= {"i": [count + 1], "j": [count], "normal_force": [force], "friction": [0.5 * force]}
+    more |= {"normal": [[1.0, 0.0, 0.0]], "distance": [1.0]}
+    contacts = LinearisedContacts(**{name: np.concatenate([given[name], more[name]]) for name in given})
+    each = {name: np.append(getattr(row, name), getattr(row, name)[:2]) for name in ("radius", "mass", "inertia")}
+    return Configuration(
+        dimension=3, position=np.vstack([row.position, np.add(row.position[:2], [0.0, 5.0, 0.0])]), contacts=contacts,
+        box=row.box, origin=row.origin, periodic=row.periodic,
+        load=np.concatenate([row.load, np.zeros((2, 2, 3))]), **each,
+    )  # fmt: skip
+
+
+STRONG, WEAK, WITH_DRAG = (2.0, 1.0, None), (0.2, 0.1, None), (0.02, 0.01, 30.0)
+
+
+@pytest.mark.parametrize("dashpots", [STRONG, WEAK, WITH_DRAG])
+def test_rate_of_a_packing_beyond_lapack_is_that_of_lapack(reference_packing, request, dashpots):
+    motion = Motion.of(dissipative(reference_packing(1.0), *dashpots))
+    expected = linear_verdict(motion)
+    request.getfixturevalue("beyond_lapack")
+    found = linear_verdict(motion)
+    assert found.stable is expected.stable is True
+    assert found.said.startswith("no motion faster than")
+    assert found.growth_rate == pytest.approx(expected.growth_rate, abs=found.error + expected.error)
+    assert found.error < (0.51 if dashpots is WITH_DRAG else 1e-2) * abs(found.growth_rate)
+    assert found.free == expected.free
+
+
+@pytest.mark.parametrize(
+    ("row", "stable", "free"),
+    [
+        (row_of_spheres(20, 0.0), True, 40),  # they roll along two axes, each by itself
+        (turned_row(row_of_spheres(12, 0.0)), True, 36),  # with rounding, and about the third axis
+        (row_of_spheres(4, 2.0, 4.0), False, 1),  # pressed together they buckle
+        (row_of_spheres(40, 1e-2), False, 1),
+    ],
+)
+def test_motions_that_no_force_opposes_are_counted_and_no_growth(row, stable, free, request):
+    motion = Motion.of(row)
+    expected = linear_verdict(motion)
+    assert (expected.stable, expected.free) == (stable, free)
+    request.getfixturevalue("beyond_lapack")
+    found = linear_verdict(motion)
+    assert found.stable is stable
+    assert found.growth_rate == pytest.approx(expected.growth_rate, rel=1e-6)
+    if stable:
+        assert found.free == free
+    kept = opposed(motion)
+    np.testing.assert_allclose((kept.T @ kept).toarray(), np.eye(kept.shape[1]), atol=1e-14)
+
+
+def test_motion_that_no_force_opposes_does_not_grow_by_a_force_out_of_balance():
+    """1e-9 of the forces leaves it an eigenvalue of A below zero, and s next to the root of that."""
+    row = with_a_pair_out_of_balance(row_of_spheres(3, 0.0), 1e-9)
+    balanced = with_a_pair_out_of_balance(row_of_spheres(3, 0.0), 1e-16)
+    expected, found = linear_verdict(Motion.of(balanced)), linear_verdict(Motion.of(row))
+    assert row.residual == pytest.approx(1e-9)
+    assert 1e-6 < np.linalg.eigvals(Motion.of(row).first_order).real.max() < 1e-4
+    assert found.stable
+    assert found.free == expected.free > 6
+    assert found.growth_rate == pytest.approx(expected.growth_rate, rel=1e-6)
+
+
+def test_a_symmetric_stiffness_is_decided_by_its_energy_alone(beyond_lapack):
+    found = linear_verdict(Motion.of(row_of_spheres(20, 0.0), dissipation=False))
+    assert found.stable
+    assert found.said == "the stiffness is symmetric, and its energy positive (proved)"
+    assert found.free == 40
+
+
+def test_where_dashpots_do_not_hold_the_law_a_random_state_is_followed(beyond_lapack, reference_packing):
+    """Dashpots along the normals alone leave motions undamped: there is no certificate, and a reason within a
+    second."""
+    motion = Motion.of(dissipative(reference_packing(1.0), 2.0, 0.0, None))
+    found = linear_verdict(motion, time=5.0)
+    assert found.stable is None
+    assert "as motion from a random state shows within t = 4.9" in found.reasons[0]
+    assert 0 < found.searched < 20
+
+
+def made_up(growing):
+    """The motion of a known matrix, with a loss in proportion to it, and its largest 2 Re s."""
+    rng = np.random.default_rng(4)
+    values = [np.array([[value]]) for value in rng.uniform(0.5, 100, 150)]
+    matrix = turned_blocks([*values, complex_block(40.0, growing)], rng)
+    size = matrix.shape[0]
+    damping = csr_array(2e-2 * (matrix + matrix.T))
+    z = np.block([[np.zeros((size, size)), np.eye(size)], [-matrix.toarray(), -damping.toarray()]])
+    row = row_of_spheres(40)
+    motion = Motion(row, np.arange(size), np.ones(size), csr_array(matrix), damping)
+    return motion, 2 * np.linalg.eigvals(z).real.max()
+
+
+@pytest.mark.parametrize("growing", [0.1, 30.0])
+def test_a_random_state_falls_or_grows_as_the_slowest_motion(growing):
+    """The row of spheres, whose time step the state is followed with, is stiffer than the matrix."""
+    motion, expected = made_up(growing)
+    found = follow_decay(motion, csr_array(np.eye(len(motion.active))), "", work=2e10)
+    assert found.stable is bool(growing < 1)
+    assert found.growth_rate == pytest.approx(expected, rel=0.1, abs=0)
+    assert found.growth_rate == pytest.approx(expected, abs=found.error)
+
+
+def operator(seed, growing):
+    """150 real eigenvalues and some that grow, sparse."""
+    rng = np.random.default_rng(seed)
+    blocks = [np.array([[value]]) for value in rng.uniform(0.5, 100, 150)]
+    return turned_blocks([*blocks, *growing], rng)
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+@pytest.mark.parametrize("damped", [True, False])
+def test_fastest_growing_motion(seed, damped):
+    """Dashpots stop one of the motions, and slow others down; LAPACK's eigenvalues of the first-order system."""
+    growing = [complex_block(30.0, 3.0), complex_block(70.0, 2.5), complex_block(2.0, 0.05)]
+    matrix = operator(seed, growing)
+    loss = 4e-4 * (matrix + matrix.T) + diags_array(np.random.default_rng(seed).uniform(0, 0.06, matrix.shape[0]))
+    loss = csr_array(loss * damped)
+    size = matrix.shape[0]
+    z = np.block([[np.zeros((size, size)), np.eye(size)], [-matrix.toarray(), -loss.toarray()]])
+    values = np.linalg.eigvals(z)
+    found = fastest_growing(matrix, loss if damped else None)
+    assert found.stable is False
+    assert found.growth_rate == pytest.approx(2 * values.real.max(), rel=1e-6)
+    assert np.abs(found.s - values).min() < 1e-6
+
+
+@pytest.mark.parametrize("strong", [0.5, 40.0])
+def test_strong_dissipation(strong):
+    """A loss of many times the largest frequency: the sum does not lose its digits, and a negative eigenvalue grows."""
+    matrix = operator(4, [np.array([[-25.0]])])
+    found = fastest_growing(matrix, csr_array(strong * diags_array(np.ones(matrix.shape[0]))), periods=(3, 10))
+    # s^2 + c s - 25 = 0
+    assert found.growth_rate == pytest.approx(-strong + np.sqrt(strong**2 + 100), rel=1e-6)
+
+
+@pytest.mark.parametrize("damped", [False, True])
+def test_nothing_grows(damped):
+    """Then a rate of about 3 over the longest time is the limit."""
+    matrix = operator(5, [complex_block(50.0, 1e-4)])
+    damping = csr_array(0.01 * diags_array(np.ones(matrix.shape[0]))) if damped else None
+    found = fastest_growing(matrix, damping, periods=(10.0, 30.0))
+    longest = 30 * 2 * np.pi / 10
+    assert found.stable is None
+    assert 1 / longest < found.searched < 4 / longest
+
+
+def test_many_that_grow_alike_are_seen_to_grow():
+    """Their space does not converge; still the growth of one is certain, at a rate that is told as the least."""
+    growing = [complex_block(30.0 + 0.003 * k, 5.0) for k in range(80)]
+    found = fastest_growing(operator(7, growing), periods=(10.0, 10.0))
+    assert found.stable is False
+    rate = 2 * abs(np.sqrt(30.0 + 5j).imag)
+    # the fastest of the eighty, which are not orthogonal, grows at 1.001 times this rate
+    assert 0.95 * rate < found.growth_rate < 1.001 * rate
+
+
+@pytest.mark.parametrize(
+    ("size", "periods", "says"), [(40, (100.0, 10.0), "100 to 10 periods"), (4, (1.0, 2.0), "4 coordinates")]
+)
+def test_refusals(size, periods, says):
+    with pytest.raises(BadInputError, match=says):
+        fastest_growing(csr_array(np.eye(size)), periods=periods)
+
+
+def test_growth_that_is_not_known_closely_is_told_by_a_bound():
+    assert exponential(0.21962, 6) == "D as exp(0.21962 t)"
+    assert exponential(0.21962, 6, at_least=True) == "D at least as exp(0.21 t), not known closer"
+    assert exponential(39.99, 4, at_least=True) == "D at least as exp(39 t), not known closer"

@@ -294,24 +294,23 @@ run 0 post no
 @pytest.mark.long
 def test_the_slowest_motion_of_a_thousand_spheres_decays_as_in_lammps(tmp_path):
     """Kinetic energy after a push, without what rolls on for ever; a push of 1e-7 opens no contact."""
+    from faultgouge.analysis.motion.linear import linear_verdict, opposed
     from faultgouge.analysis.motion.motion import Motion
-    from faultgouge.analysis.motion.rates import rates_of
-    from faultgouge.analysis.motion.slow_motions import motions_of_one
     from faultgouge.pywrap import from_lammps
     from faultgouge.pywrap.granular.lammps_arrays import owned_array, rows_of, set_velocity
 
     lmp = bed_at_rest(tmp_path / "log.lammps")
     here = from_lammps(lmp)
     motion = Motion.of(here)
-    told = rates_of(motion).decay
-    assert told.grows is False
-    assert f"the slowest decays with D as exp({told.slowest:.6g} t)" in str(told)
-    alone, rows = motions_of_one(motion.stiffness, motion.damping, motion.particle), rows_of(lmp, here)
+    told = linear_verdict(motion)
+    assert told.stable
+    assert f"the slowest decays with D as exp({told.growth_rate:.6g} t)" in told.said
+    kept, rows = opposed(motion), rows_of(lmp, here)
 
     def energy():
         velocity = owned_array(lmp, "v")[rows], owned_array(lmp, "omega")[rows] * here.radius[:, None]
         z = here.join_vectors(*velocity)[motion.active] * motion.root_mass
-        return np.sum((z - alone @ (alone.T @ z)) ** 2)
+        return np.sum((kept.T @ z) ** 2)
 
     set_velocity(lmp, here, PUSH * random_pushes(here, 1)[:, 0])
     means = []
@@ -324,7 +323,7 @@ def test_the_slowest_motion_of_a_thousand_spheres_decays_as_in_lammps(tmp_path):
     lmp.close()
     # 0.5 % was measured; two motions are left that differ by a tenth
     rate = np.polyfit(np.arange(50, 100), np.log(means[50:]), 1)[0]
-    assert rate == pytest.approx(told.slowest, rel=0.05)
+    assert rate == pytest.approx(told.growth_rate, rel=0.05)
 
 
 def spheres_under_a_rising_load(lmp, here, slope, rate, chunk, count):

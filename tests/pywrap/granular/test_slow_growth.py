@@ -5,7 +5,7 @@ import pytest
 from granular_packings import command, head, of_particle
 
 from faultgouge.analysis import spectrum, stability
-from faultgouge.analysis.motion import rates
+from faultgouge.analysis.motion import linear
 
 SPRING, HALF_SPAN = 1e3, 0.95
 MASS = np.pi / 6
@@ -75,7 +75,7 @@ def test_strong_dashpots_hold_slow_motion_up_and_do_not_hide_it(lammps_with, mon
     from faultgouge.pywrap import from_lammps
 
     if large:  # as if not all eigenvalues were known
-        monkeypatch.setattr(rates, "DENSE_DAMPED", 0)
+        monkeypatch.setattr(linear, "LAPACK_FIRST", 0)
     verdict = stability(from_lammps(lmp))
     assert verdict.stable is bool(expected < 0)
     assert verdict.growth_rate == pytest.approx(2 * expected, rel=1e-6)

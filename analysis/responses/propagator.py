@@ -9,12 +9,12 @@ from scipy.sparse.linalg import svds
 
 from ..errors import FaultgougeError
 from ..has_configuration import HasConfiguration
+from ..motion.eigenvalues import Complexes
+from ..motion.linear import all_rates
+from ..motion.motion import Motion
 from ..packing.packing import Floats, Indices
-from .eigenvalues import Complexes
 from .matrix_functions import LONE_COSINE, BlockDiagonal, Function, second_order
-from .motion import Motion
 from .oscillator import Oscillator, released_motion
-from .rates import rates_of
 from .response import LinearMotion
 
 Norm = Literal["displacement", "energy"]
@@ -62,7 +62,7 @@ class NoGainError(FaultgougeError):
 
 def stable_motion(packing: HasConfiguration) -> LinearMotion:
     """The motion of a packing; NoGainError if the packing is unstable."""
-    if rates_of(Motion.of(packing)).grows.any():
+    if all_rates(Motion.of(packing))[1].any():
         raise NoGainError("the packing is unstable: some motion grows for ever, and no gain is the largest")
     return LinearMotion.of(packing)
 

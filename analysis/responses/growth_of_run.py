@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..counted import counted
+from ..motion.eigenvalues import Complexes
+from ..motion.linear import all_rates
+from ..motion.motion import Motion
+from ..motion.spectrum import spectrum
 from ..packing.packing import Floats, Packing
-from .eigenvalues import Complexes
 from .growth import NOISE_FACTOR, Growth, fit_growth, growing_range
-from .motion import Motion
-from .rates import rates_of
-from .spectrum import spectrum
 
 NOISE_SHARE = 0.1
 """Share of the fastest motion in the noise, in units of the share of a mean mode. A pair near its coalescence is
@@ -232,8 +232,8 @@ def _bounds(packing: Packing, time: Floats, msd: Floats, rate: float | None, jum
 
 def unstable_rates(packing: Packing) -> Complexes:
     """The eigenvalues s with Re s > 0 beyond rounding of a packing with dissipation; 1 / time."""
-    rates = rates_of(Motion.of(packing))
-    return rates.values[rates.grows]
+    values, grows, *_ = all_rates(Motion.of(packing))
+    return values[grows]
 
 
 def _damped_growth(packing: Packing) -> tuple[float, int, int]:
