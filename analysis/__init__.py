@@ -10,6 +10,7 @@ code with their contacts to first order. The physics is in the docstrings of the
 - `factors`: factors of sparse and banded matrices;
 - `motion`: eigenvalues, the verdict on stability, responses, growth in a run, time step;
 - `windows`: the loads between which a motion grows;
+- `elasticity`: stress, elastic moduli, vibrations, spheres of a material;
 - `files`: run.h5, dumps, and the formats of other codes.
 
 The names of this package are imported when they are used.
@@ -23,6 +24,10 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .arrays import Complexes, Floats, Indices
     from .configuration import Configuration, Snapshot
     from .contacts import LinearisedContacts
+    from .elasticity.dissipation import LostEnergy, lost_by_modes, lost_energy
+    from .elasticity.material_spheres import Material, spheres_of_material, timestep_rules
+    from .elasticity.moduli import ElasticModuli, elastic_moduli, stress
+    from .elasticity.vibrations import PlaneWave, Vibrations, dispersion, softness, vibrations
     from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
     from .files.formats.lammps_dump import read_dump
     from .files.runfile import RunFile
@@ -61,18 +66,18 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .windows.pair_over_load import pair_eigenvalues
 
 __all__ = [
-    "FLOOR", "BadInputError", "Complexes", "Configuration", "ContactGeometry", "Contacts",
-    "FaultgougeError", "Floats", "Growth", "Indices", "Linear", "LinearisedContacts", "MindlinLaw", "Mode", "Modes",
-    "Motion",
-    "NoEquilibriumError", "NoGainError", "OneSidedMotion", "OneSidedOutcome", "Onset", "OnsetError", "OutputError",
-    "Packing", "PackingFileError", "PowerLaw", "RisingMotion", "RunFile", "Signal", "Slip", "Snapshot", "Spectrum",
-    "Stability", "TransientGain", "Window", "closest_to_meeting", "complex_windows", "damping_matrix",
-    "discrete_frequency", "dynamical_matrix", "eigenvalues", "fastest_growing", "find_onset", "fit_growth",
-    "fit_power_law", "growth_of_run", "growth_rate", "largest_damping_rate", "largest_frequency", "layer_force",
-    "linear_response", "mass_weighted", "mean_square_displacement", "nearest_image", "nearest_modes",
-    "negative_eigenvalues", "normal_modes", "one_sided_motion", "pair_eigenvalues", "rayleigh_timestep",
-    "read_dump", "solid_fraction", "spectrum", "stability", "stable_timestep", "stiffness_matrix",
-    "touching", "transient_gain",
+    "FLOOR", "BadInputError", "Complexes", "Configuration", "ContactGeometry", "Contacts", "ElasticModuli",
+    "FaultgougeError", "Floats", "Growth", "Indices", "Linear", "LinearisedContacts", "LostEnergy", "Material",
+    "MindlinLaw", "Mode", "Modes", "Motion", "NoEquilibriumError", "NoGainError", "OneSidedMotion", "OneSidedOutcome",
+    "Onset", "OnsetError", "OutputError", "Packing", "PackingFileError", "PlaneWave", "PowerLaw", "RisingMotion",
+    "RunFile", "Signal", "Slip", "Snapshot", "Spectrum", "Stability", "TransientGain", "Vibrations", "Window",
+    "closest_to_meeting", "complex_windows", "damping_matrix", "discrete_frequency", "dispersion", "dynamical_matrix",
+    "eigenvalues", "elastic_moduli", "fastest_growing", "find_onset", "fit_growth", "fit_power_law", "growth_of_run",
+    "growth_rate", "largest_damping_rate", "largest_frequency", "layer_force", "linear_response", "lost_by_modes",
+    "lost_energy", "mass_weighted", "mean_square_displacement", "nearest_image", "nearest_modes",
+    "negative_eigenvalues", "normal_modes", "one_sided_motion", "pair_eigenvalues", "rayleigh_timestep", "read_dump",
+    "softness", "solid_fraction", "spectrum", "spheres_of_material", "stability", "stable_timestep",
+    "stiffness_matrix", "stress", "timestep_rules", "touching", "transient_gain", "vibrations",
 ]  # fmt: skip
 
 if not TYPE_CHECKING:

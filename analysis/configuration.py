@@ -256,14 +256,14 @@ class Configuration(Particles):
         -------
         dict of ndarray, each of shape (C,)
             id1 and id2, IDs of both partners, 0 for a wall; n_x, n_y, n_z, the normal, which points to the first; f_n,
-            the normal force; t_x, t_y, t_z, the tangential force on the first; f_t, its size; overlap, length;
+            the normal force; f_t_x, f_t_y, f_t_z, the tangential force on the first; f_t, its size; overlap, length;
             mobilised, |f_t|/(mu f_n).
         """
         c, axes = self.contacts, "xyz"
         columns = {"id1": self.ids[c.i], "id2": np.where(c.wall, 0, self.ids[np.maximum(c.j, 0)])}
         columns |= {f"n_{axis}": c.normal[:, k] for k, axis in enumerate(axes)}
         columns |= {"f_n": c.normal_force, "f_t": np.linalg.norm(c.tangential_force, axis=1)}
-        columns |= {f"t_{axis}": c.tangential_force[:, k] for k, axis in enumerate(axes)}
+        columns |= {f"f_t_{axis}": c.tangential_force[:, k] for k, axis in enumerate(axes)}
         return columns | {"overlap": c.overlap, "mobilised": self.mobilised}
 
     def to_pandas(self) -> "DataFrame":

@@ -10,6 +10,8 @@ from typing import Any
 def names_on_use(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """The functions `__getattr__` and `__dir__` of a package; its names are those under its `if TYPE_CHECKING:`.
 
+    `dir` lists what the package offers, `__all__`, and not what its file imports.
+
     A type checker reads these imports as they stand, and Python makes each of them when its name is used.
     """
     [block] = [
@@ -25,4 +27,4 @@ def names_on_use(package: str, file: str) -> tuple[Callable[[str], Any], Callabl
             return getattr(import_module(module_of[name], package), name)
         raise AttributeError(f"module {package!r} has no attribute {name!r}")
 
-    return get, lambda: sorted({*vars(import_module(package)), *module_of})
+    return get, lambda: sorted(import_module(package).__all__)

@@ -5,8 +5,8 @@ contacts at Coulomb's bound; 200 to 299 are others, of all laws, in two and thre
 dashpots, with lids that move as one, and of up to 200 particles. LAMMPS is followed after the pushes of the verdict,
 for 60 units of time or more. The table `tables/verdict_numbers.csv` has a row a packing. `time` is how long one-sided
 motion was followed, 0 where linear motion decides, and D is over the square of the push. `lammps` is the largest D in
-the last fifth of LAMMPS's motion over that in its first half. The last column says which verdicts are others with one
-of the numbers halved or doubled: "STILL x 2: unknown" for instance.
+the last fifth of LAMMPS's motion over that in its first half. The last column says which verdicts of the first packings
+are others with one of the numbers halved or doubled: "STILL_SHARE x 2: unknown" for instance.
 
     nice python benchmarks/verdict_numbers.py [--packings 100:180 200:300] [--keep FOLDER]
 """
@@ -39,7 +39,7 @@ LAWS = (
     "granular hertz, mindlin/force", "gran/hertz/history", "granular hertz, mindlin_rescale/force",
     "granular hooke, linear_history", "granular hertz, mindlin",
 )  # fmt: skip
-NUMBERS = "STILL", "GROWN_ENERGY", "CHUNK", "CHUNKS"
+NUMBERS = "STILL_SHARE", "GROWN_ENERGY", "CHUNK"
 NAMES = {False: "grows", True: "rests", None: "unknown"}
 COLUMNS = (
     "packing", "law", "dimension", "particles", "at_bound", "verdict", "time", "amplification", "amplification_lammps",
@@ -144,7 +144,7 @@ def row_of(number: int, kept: dict[str, Any]) -> dict[str, Any] | None:
     if number < 200 and not here.contacts.one_sided.any():
         return None
     found = stability(here)
-    if found.one_sided is not None:
+    if number < 200:
         for name in NUMBERS:
             usual = getattr(module, name)
             for factor in (0.5, 2):

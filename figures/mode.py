@@ -8,6 +8,7 @@ largest displacement.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -29,7 +30,7 @@ from .disk_view import View
 from .packing import PACKING_WIDTH
 from .packing_artist import PackingArtist
 from .spheres import add_scale_of_turns, draw_turns, new_figure
-from .style import EDGE, INK, styled
+from .style import EDGE, INK, STYLE, figure_of, require_axes, styled
 
 TYPICAL_ARROW, LONGEST_ARROW = 1.2, 4.0
 """Length that three quarters of the arrows do not exceed, and length of the longest arrow at most, in units of the mean
@@ -242,7 +243,7 @@ def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list
     return [ModeShape.of(packing, modes, number)], f"mode {number} of {len(modes.values)}"
 
 
-def draw_mode(packing: HasConfiguration, number: int | None = None) -> Figure:
+def draw_mode(packing: HasConfiguration, number: int | None = None, axes: Axes | None = None) -> Figure:
     """Draw a mode: arrows for displacements, colours for rotations.
 
     Parameters
@@ -252,6 +253,8 @@ def draw_mode(packing: HasConfiguration, number: int | None = None) -> Figure:
     number : int, optional
         Which mode, counted by the real part of the eigenvalue from 0. By default the fastest growing complex pair, at
         two moments a quarter of a period apart; without one, the two real modes that are closest to meeting.
+    axes : Axes, optional
+        Where to draw the first of them at its first moment; a figure of its own, with a scale, by default.
 
     Returns
     -------
@@ -263,7 +266,17 @@ def draw_mode(packing: HasConfiguration, number: int | None = None) -> Figure:
     BadInputError
         If the packing has no such mode.
     """
-    return draw_modes(packing, *modes_of(packing, number))
+    require_axes(axes)
+    modes, words = modes_of(packing, number)
+    if axes is None:
+        return draw_modes(packing, modes, words)
+    with matplotlib.rc_context(fname=STYLE):
+        if packing.dimension == 3:
+            _draw_spheres_of(axes, packing.configuration, modes[0])
+        else:
+            ModeArtist(axes, packing, modes[0]).show(0.0)
+            axes.set_title(modes[0].words, fontsize=7)
+    return figure_of(axes)
 
 
 @styled
@@ -301,14 +314,19 @@ def _draw_modes_of_spheres(packing: Configuration, modes: Sequence[ModeShape], w
     figure = new_figure(packing, len(modes))
     axes = figure.subplots(1, len(modes), squeeze=False)[0]
     for one, mode in zip(axes, modes, strict=True):
-        moved = mode.at(0.0)
-        turns = np.linalg.norm(moved[3:], axis=0).max() or 1.0
-        moved = np.concatenate([moved[:3], moved[3:] / turns])
-        draw_turns(one, packing, moved, _arrow_scale(packing, mode))
-        one.set_title(mode.words, fontsize=7)
+        _draw_spheres_of(one, packing, mode)
     figure.suptitle(f"{words}, at the largest displacement", fontsize=8)
     add_scale_of_turns(figure, axes)
     return figure
+
+
+def _draw_spheres_of(axes: Axes, packing: Configuration, mode: ModeShape) -> None:
+    """A mode of spheres at its largest displacement, on axes."""
+    moved = mode.at(0.0)
+    turns = np.linalg.norm(moved[3:], axis=0).max() or 1.0
+    moved = np.concatenate([moved[:3], moved[3:] / turns])
+    draw_turns(axes, packing, moved, _arrow_scale(packing, mode))
+    axes.set_title(mode.words, fontsize=7)
 
 
 def side_by_side(packing: HasConfiguration, count: int) -> tuple[Figure, list[Axes], float]:

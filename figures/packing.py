@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from faultgouge.analysis import BadInputError, Configuration, Packing
+from faultgouge.analysis import Configuration, Packing
 from faultgouge.analysis.counted import counted
 from faultgouge.analysis.has_configuration import HasConfiguration
 
@@ -25,7 +25,7 @@ from .disk_view import View
 from .load_arrows import draw_load
 from .packing_artist import PackingArtist
 from .spheres import SpheresArtist, new_figure
-from .style import EDGE, FLOOR, INK, UPPER, figure_of, styled
+from .style import EDGE, FLOOR, INK, UPPER, figure_of, require_axes, styled
 
 PACKING_WIDTH = 3.4
 """Width of a figure that holds one packing, inch."""
@@ -64,10 +64,7 @@ def draw_packing(
     ValueError
         If no such colour is known.
     """
-    if axes is not None and not isinstance(axes, Axes):
-        raise BadInputError(
-            f"draw takes matplotlib's Axes, and no {type(axes).__name__}: draw(packing).savefig(path) writes a file."
-        )
+    require_axes(axes)
     if color != "none" and color not in COLOURS:
         raise ValueError(f"color = {color!r} is none of {', '.join(COLOURS)}, none.")
     if packing.dimension == 3:

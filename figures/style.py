@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
+from faultgouge.analysis import BadInputError
 from faultgouge.analysis.files.atomic_write import replace_whole
 
 STYLE = str(files(__package__) / "faultgouge.mplstyle")
@@ -31,6 +32,14 @@ def figure_of(axes: Axes) -> Figure:
     figure = axes.get_figure(root=True)
     assert figure is not None
     return figure
+
+
+def require_axes(axes: object) -> None:
+    """Refuse what is no matplotlib axes in a sentence, with what may have been meant."""
+    if axes is not None and not isinstance(axes, Axes):
+        raise BadInputError(
+            f"draw takes matplotlib's Axes, and no {type(axes).__name__}: draw(packing).savefig(path) writes a file."
+        )
 
 
 @contextmanager

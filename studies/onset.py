@@ -48,6 +48,11 @@ about the root of this distance, so that both are accurate."""
 
 @task(reads=PATH, needs=("ramp",))
 def onset(scene: Scene, start: Start) -> Row:
+    """The first onset of a scene with one friction coefficient: `onset_row`."""
+    return onset_row(scene, start)
+
+
+def onset_row(scene: Scene, start: Start) -> Row:
     """The first onset of a scene with one friction coefficient, as a row of a table.
 
     Raises

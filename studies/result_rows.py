@@ -121,8 +121,12 @@ def flat(result: Mapping[str, Any], above: str = "") -> dict[str, Any]:
 
 
 def check_table(names: list[str], folder: Path) -> None:
-    """Refuse a results.csv and a results.parquet of others, before work begins."""
-    check_own(folder / "results.csv", ",".join(names) + ",")
+    """Refuse a results.csv and a results.parquet of others, before work begins.
+
+    A table begins with the swept keys; that of a scene, which has none, is known by the rows beside it.
+    """
+    if names or not (folder / "results.jsonl").exists():
+        check_own(folder / "results.csv", ",".join(names) + ",")
     check_own(folder / "results.parquet")
 
 
@@ -131,7 +135,9 @@ def write_tables(rows: list[Row], names: list[str], folder: Path) -> None:
     found = dict.fromkeys([*names, *(name for row in rows for name in flat(row["result"]))])
     columns = [*(name for name in found if name != "says"), "says"]
     table = [row["values"] | flat(row["result"]) | {"says": row["says"]} for row in rows]
-    write_csv(folder / "results.csv", columns, table, len(names))
+    file = folder / "results.csv"
+    stored = file.read_text().splitlines()[:1] if file.exists() and not names else []
+    write_csv(file, columns, table, "".join(stored) or ",".join(names))
     if find_spec("pandas") and find_spec("pyarrow"):
         import pandas as pd
 
@@ -141,16 +147,13 @@ def write_tables(rows: list[Row], names: list[str], folder: Path) -> None:
             frame.to_parquet(new)
 
 
-def write_csv(path: Path, columns: Sequence[str], table: Iterable[Row], known_by: int | None = None) -> None:
-    """Write some columns of rows; the file is replaced as a whole, if its first columns are the same, `known_by` many.
-
-    All columns by default.
-    """
+def write_csv(path: Path, columns: Sequence[str], table: Iterable[Row], head: str | None = None) -> None:
+    """Write some columns of rows; the file is replaced as a whole, if it begins with `head`: by default all columns."""
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows([_cell(row.get(column)) for column in columns] for row in table)
-    write_text(path, text.getvalue(), head=",".join(columns[:known_by]))
+    write_text(path, text.getvalue(), head=",".join(columns) if head is None else head)
 
 
 def _cell(value: Any) -> Any:

@@ -14,11 +14,10 @@ functions: a scene with the section of a study imports the study's file.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mpi4py import MPI
@@ -66,22 +65,67 @@ def draw_all(figures: Figures, folder: Path, say: Say) -> None:
             save(styled(figure)(), folder / name)
 
 
-@dataclass(frozen=True)
-class SceneStudy:
-    """A study of one scene, which is called with the scene and a folder; attributes as of `study`."""
+@dataclass(frozen=True, kw_only=True)
+class RegisteredStudy:
+    """A study, which is called with a scene and a folder; or, of a task, its `row` with a scene and its packing.
+
+    The decorators take all attributes but the first three.
+
+    Attributes
+    ----------
+    name : str
+        The name of the function and of its file; its docstring is the help of the command.
+    compute : callable, optional
+        Scene, `Work` -> the contents of NAME.json but the scene and its units.
+    row : callable, optional
+        The task of a sweep: scene, function mu -> settled packing -> a row. A study may have it, too.
+    reads, needs : tuple of str
+        Sections of a scene that are read besides its own, and those that it cannot do without.
+    section : type of Section, optional
+        Its own section, [NAME].
+    check : callable
+        Raises SceneError for a scene without what is needed.
+    figures : callable
+        Contents of NAME.json, rows -> the functions that draw the pictures, by file name.
+    page : callable, optional
+        For a page NAME.md: contents of NAME.json -> the names of the template NAME.md.j2, beside the file, but
+        `result`, which is these contents, and `units`.
+    beside : str
+        A section of the scene that may change while the stored rows remain valid.
+    counts, kept : str
+        What the progress counts, and what an interrupt leaves.
+    example : str, optional
+        The example of the help. A task with one is a command, too, which takes a scene or a sweep of this task.
+    gather : callable, optional
+        What a task makes of all rows of a sweep.
+    writes : mapping
+        The files that `gather` writes besides pictures, and the heads of those that are tables: files of others of
+        these names are refused before work begins.
+    of_run : callable, optional
+        What the command of a task does with a stored run, FILE.h5, in place of a scene.
+    """
 
     name: str
-    compute: Callable[[Scene, Work], Result]
+    compute: Callable[[Scene, Work], Result] | None = None
+    row: TaskRow | None = None
     reads: tuple[str, ...]
-    needs: tuple[str, ...]
-    section: type[Section] | None
-    check: Callable[[Scene], object]
-    figures: Callable[[Result, Rows], Figures]
-    page: Callable[[Result], Result] | None
-    beside: str
-    row: TaskRow | None
-    counts: str
-    kept: str
+    needs: tuple[str, ...] = ()
+    section: type[Section] | None = None
+    check: Callable[[Scene], object] = lambda scene: None
+    figures: Callable[[Result, Rows], Figures] = lambda result, rows: {}
+    page: Callable[[Result], Result] | None = None
+    beside: str = "output"
+    counts: str = "rows"
+    kept: str = "what was found so far"
+    example: str | None = None
+    gather: Gather | None = None
+    writes: Mapping[str, str] = field(default_factory=dict)
+    of_run: Callable[[Path, Path, Say, Progress], Sequence[str]] | None = None
+
+    @property
+    def sections(self) -> tuple[str, ...]:
+        """All sections of a scene that are read."""
+        return (*self.reads, self.name) if self.section else self.reads
 
     def __call__(
         self, scene: Scene, output: Path, say: Say = print, progress: Progress = lambda results, _: results
@@ -104,6 +148,7 @@ class SceneStudy:
         """
         from ..figures.pages import render
 
+        assert self.compute is not None
         self.check(scene)
         pool: Any
         with open_executor(workers=1) as pool:
@@ -123,102 +168,11 @@ class SceneStudy:
         return result
 
 
-@dataclass(frozen=True)
-class SweepTask:
-    """A task of a sweep, which is called with a scene and a function mu -> settled packing; attributes as of `task`."""
-
-    name: str
-    row: TaskRow
-    reads: tuple[str, ...]
-    needs: tuple[str, ...]
-    section: type[Section] | None
-    gather: Gather | None
-    writes: Mapping[str, str]
-    of_run: Callable[[Path, Path, Say, Progress], Sequence[str]] | None
-
-    def __call__(self, scene: Scene, start: Start) -> Row:
-        """The row of a scene."""
-        return self.row(scene, start)
+def study(**given: Any) -> Callable[[Callable[[Scene, Work], Result]], RegisteredStudy]:
+    """Register the function of a study of one scene; keywords are the attributes of `RegisteredStudy`."""
+    return lambda compute: RegisteredStudy(name=compute.__name__, compute=compute, **given)
 
 
-def study(
-    *,
-    reads: Iterable[str],
-    needs: Iterable[str] = (),
-    section: type[Section] | None = None,
-    check: Callable[[Scene], object] = lambda scene: None,
-    figures: Callable[[Result, Rows], Figures] = lambda result, rows: {},
-    page: Callable[[Result], Result] | None = None,
-    beside: str = "output",
-    row: TaskRow | None = None,
-    counts: str = "rows",
-    kept: str = "what was found so far",
-    example: str | None = None,
-) -> Callable[[Callable[[Scene, Work], Result]], SceneStudy]:
-    """Register a study of one scene; its name is that of the function and of the file, and its help the docstring.
-
-    Parameters
-    ----------
-    reads, needs : iterable of str
-        Sections of a scene that the study reads besides its own, and those that it cannot do without.
-    section : type of Section, optional
-        Its own section, [NAME].
-    check : callable
-        Raises SceneError for a scene without what is needed.
-    figures : callable
-        Contents of NAME.json, rows -> the functions that draw the pictures, by file name.
-    page : callable, optional
-        For a page NAME.md: contents of NAME.json -> the names of the template NAME.md.j2, beside the file, but
-        `result`, which is these contents, and `units`.
-    beside : str
-        A section of the scene that may change while the stored rows remain valid.
-    row : callable, optional
-        The study as a task of a sweep.
-    counts, kept : str
-        What the progress counts, and what an interrupt leaves.
-    example : str, optional
-        The example of the help.
-    """
-
-    def register(compute: Callable[[Scene, Work], Result]) -> SceneStudy:
-        name = compute.__name__
-        own = () if section is None else (name,)
-        every = (*reads, *own)
-        return SceneStudy(name, compute, every, tuple(needs), section, check, figures, page, beside, row, counts, kept)
-
-    return register
-
-
-def task(
-    *,
-    reads: Iterable[str],
-    needs: Iterable[str] = (),
-    section: type[Section] | None = None,
-    gather: Gather | None = None,
-    writes: Mapping[str, str] = MappingProxyType({}),
-    of_run: Callable[[Path, Path, Say, Progress], Sequence[str]] | None = None,
-    example: str | None = None,
-) -> Callable[[TaskRow], SweepTask]:
-    """Register a task of a sweep; its name is that of the function and of the file.
-
-    Parameters
-    ----------
-    reads, needs, section
-        As of `study`.
-    gather : callable, optional
-        What is made of all rows.
-    writes : mapping
-        The files that `gather` writes besides pictures, and the heads of those that are tables: files of others of
-        these names are refused before work begins.
-    of_run : callable, optional
-        What the command does with a stored run, FILE.h5, in place of a scene.
-    example : str, optional
-        The example of the help: with it the task is a command, too, which takes a scene or a sweep of this task.
-    """
-
-    def register(row: TaskRow) -> SweepTask:
-        name = row.__name__
-        own = () if section is None else (name,)
-        return SweepTask(name, row, (*reads, *own), tuple(needs), section, gather, writes, of_run)
-
-    return register
+def task(**given: Any) -> Callable[[TaskRow], RegisteredStudy]:
+    """Register the function of a task of a sweep; keywords are the attributes of `RegisteredStudy`."""
+    return lambda row: RegisteredStudy(name=row.__name__, row=row, **given)

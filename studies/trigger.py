@@ -42,7 +42,7 @@ from ..pywrap.scenes.units import real_units
 from ..pywrap.scenes.validation import Positive, Section, require_section
 from ..pywrap.settling.settle import settle
 from .eruptions import growth_rate
-from .onset import onset
+from .onset import onset_row
 from .packing_tools import Start, path_from
 from .result_rows import Row, Rows, row_columns
 from .study import Figures, Result, Work, study
@@ -257,7 +257,7 @@ def _row(scene: Scene, start: Start) -> Row:
     Raises SceneError if the scene has no section [ramp], or no v_0.
     """
     threshold(scene)
-    wave, first = settings(scene), onset.row(scene, start)
+    wave, first = settings(scene), onset_row(scene, start)
     if first["ends"] != "onset":
         return {"ends": first["ends"], "fx_c": None, "map": [], "measured": []}
     packings = equilibria(scene, [first["fx_c"] * (1 - each) for each in wave.distance])

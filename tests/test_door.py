@@ -207,3 +207,35 @@ def test_the_stages_of_a_scene_are_calls(faultgouge_here, tmp_path):
     without = scene.model_copy(update={"perturb": scene.perturb.model_copy(update={"fx": None})})
     with pytest.raises(faultgouge.pywrap.SceneError, match=r"perturb.fx is missing"):
         faultgouge.perturb(without)
+
+
+def test_a_packing_and_its_modes_are_drawn_into_axes_of_ones_own(cluster_file):
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    left, right = figure.subplots(1, 2)
+    assert faultgouge.draw(cluster_file, ax=left) is figure
+    assert faultgouge.draw(cluster_file, right, mode=0) is figure
+    assert "mode 0" in right.get_title()
+    assert len(left.collections) > 0
+    with pytest.raises(BadInputError, match=r"or 'pair', and not mode = 1\.5"):
+        faultgouge.draw(cluster_file, mode=1.5)
+    with pytest.raises(BadInputError, match="counted from 0"):
+        faultgouge.draw(cluster_file, mode=10**6)
+
+
+def test_a_page_shows_itself_in_a_notebook(cluster_file, tmp_path):
+    page = faultgouge.view(cluster_file, tmp_path / "page.html")
+    assert isinstance(page, Path)
+    shown = page._repr_html_()
+    assert shown.startswith('<iframe srcdoc="&lt;!doctype html&gt;')
+    assert shown.count('"') == 8
+
+
+def test_the_frames_of_a_file_are_a_sequence(cluster_file):
+    found = faultgouge.frames(cluster_file)
+    assert len(found) == len([*found]) >= 1
+    assert found[-1] == found[len(found) - 1] == faultgouge.load(cluster_file)
+    assert found[:1] == [faultgouge.load(cluster_file, 0)]
+    with pytest.raises(IndexError):
+        _ = found[len(found)]

@@ -43,7 +43,7 @@ FLOORS = {
         ("operators",),
         ("factors",),
         ("motion",),
-        ("responses",),
+        ("elasticity", "responses"),
         ("files",),
         ("windows",),
     ),
@@ -67,6 +67,8 @@ def modules() -> dict[str, Path]:
     """Every module with its file; the folders of the package are links, which `glob` follows."""
     found = {}
     for path in glob("**/*.py", root_dir=ROOT, recursive=True):
+        if path.startswith("scenes/"):  # examples that are copied for a user
+            continue
         names = ["faultgouge", *Path(path).with_suffix("").parts]
         found[".".join(names[:-1] if names[-1] == "__init__" else names)] = ROOT / path
     return found

@@ -7,8 +7,8 @@ odd (:mod:`~faultgouge.analysis.motion.one_sided`). Six numbers decide:
 - a motion *grows* if its kinetic energy, a mean over a tenth of a chunk, has grown to `GROWN_ENERGY` times that of the
   first tenth. No motion that no force opposes does: the energy of a particle that sliders have let go grows as the
   square of the time;
-- a motion *rests* if sticking contacts do not grow, and the sliders have come to rest: with the slips of two halves of
-  the second half of the time, and the ratio by which these fall, a share below `STILL` of all slip is left to come;
+- a motion *rests* if sticking contacts do not grow, and the sliders have come to rest: with the slips of the last three
+  quarters of the time, and the ratio by which these fall, a share below `STILL_SHARE` of all slip is left to come;
 - it *has not settled* otherwise, after `CHUNKS` chunks, or `WORK_OF_MOTION` multiplications.
 
 Growth rate, amplification, the smallest push and the creep of laws with two derivatives are read from the same steps.
@@ -65,7 +65,7 @@ GROWN_ENERGY = 1e10
 """Growth of the kinetic energy that no packing at rest was seen to reach without growing for ever: transients of
 packings at Coulomb's bound went up to 6e5."""
 
-STILL = 1e-2
+STILL_SHARE = 1e-2
 """Slip that may be left, as a share of all slip: D then changes by 2 %."""
 
 PUSH_OVER_RESIDUAL = 10.0
@@ -262,7 +262,9 @@ def follow_pushes(
         if not np.all(gained <= GROWN_ENERGY):
             grows = True
         elif (
-            may_rest and each.time > 1.99 * usual and (now := _slip_left([look.slid[:, :-2] for look in seen])) <= STILL
+            may_rest
+            and each.time > 1.99 * usual
+            and (now := _slip_left([look.slid[:, :-2] for look in seen])) <= STILL_SHARE
         ):
             grows, left = False, now
         if grows or (time is None and grows is False) or len(seen) >= most * LOOKS_PER_CHUNK:
@@ -301,7 +303,7 @@ def _outcome(
         wanted = (
             now + (np.log(GROWN_ENERGY) - gained) / rate
             if rate > 0
-            else 2 * np.log(STILL) / sticking
+            else 2 * np.log(STILL_SHARE) / sticking
             if sticking
             else 0
         )

@@ -23,8 +23,9 @@ and distances as above.
 
 **The gain.** In coordinates whose square is 2 E the motion is :math:`e^{Zt}`. Its norm at :math:`2\tau` and
 :math:`3\tau`, times its bound up to :math:`\tau`, bounds it up to :math:`4\tau`, and so on; once the norm is below one,
-for ever. Of more than `DENSE_GAIN` coordinates :math:`\mathcal G = e` up to the time :math:`1 / |S^{-1/2} N|`
-(the numerical abscissa; Trefethen and Embree, *Spectra and Pseudospectra*, 2005, chapter 14).
+for ever. Without dissipation the energies of the modes of :math:`S + N` are constant, and bound E. Of more than
+`DENSE_GAIN` coordinates :math:`\mathcal G = e` up to the time :math:`1 / |S^{-1/2} N|` (the numerical abscissa;
+Trefethen and Embree, *Spectra and Pseudospectra*, 2005, chapter 14).
 
 **Motions that no force opposes** have no energy of their own: :math:`S + \epsilon` with :math:`\epsilon = 1/t^2` stands
 for S, and the bound holds up to the time t.
@@ -35,7 +36,7 @@ The same energy of the displacement by the residual forces says from which push 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky, eigh, expm, solve_triangular
+from scipy.linalg import cholesky, eig, eigh, expm, solve_triangular
 from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
@@ -215,6 +216,8 @@ def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, e
         return float(np.exp(1.0)), min(end, float(1 / np.sqrt(found[0])))
     root = cholesky(symmetric.toarray())  # R with R^T R = S: p = R z
     size = len(root)
+    if not motion.dissipative and np.isinf(end):
+        return _gain_of_modes(motion.stiffness.toarray(), root), end
     z = np.zeros((2 * size, 2 * size))
     z[:size, size:] = root
     z[size:, :size] = -solve_triangular(root, motion.stiffness.toarray().T, trans="T").T
@@ -232,6 +235,19 @@ def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, e
             break
         time, one, two = 2 * time, two, two @ two
     return float(after**2), min(end, 4 * time)
+
+
+def _gain_of_modes(stiffness: Floats, root: Floats) -> float:
+    """Without dissipation: the energies of the modes of A are constant, each by itself, and their sum is E but for two
+    factors, with weights with which left and right vectors are as long."""
+    values, x = eig(stiffness)
+    inverse = np.linalg.inv(x)
+    weight = np.sqrt(np.linalg.norm(inverse, axis=1) / np.linalg.norm(x, axis=0))
+    outward, inward, omega = x / weight, weight[:, None] * inverse, np.sqrt(np.abs(values))
+    back = solve_triangular(root, inward.T, trans="T").T
+    larger = max(np.linalg.norm(outward, 2), np.linalg.norm(root @ outward / omega, 2))
+    smaller = max(np.linalg.norm(inward, 2), np.linalg.norm(omega[:, None] * back, 2))
+    return float((larger * smaller) ** 2)
 
 
 def _norm(matrix: Floats) -> float:

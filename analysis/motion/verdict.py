@@ -245,12 +245,12 @@ class Stability:
                 f"{most:.1g} a contact may open, close or slide"
             )
         elif self.stable:
-            below = f"; below {least:.1g} residual forces count" if least else ""
+            below = f"; below a velocity of {least:.1g} residual forces count" if least else ""
             worn = ", but for what vibration wears down" if self.creep else ""
-            within = f" up to t = {self.push_time:.3g}" if self.push_time else ""
+            within = f", until t = {self.push_time:.3g}" if self.push_time else ""
             yield (
-                f"holds for every push up to the energy {self.largest_energy:.2g}, of one particle up to the velocity "
-                f"{most:.2g}{within}: no contact opens, closes or slides{worn}{below}"
+                f"holds for every push of an energy up to {self.largest_energy:.2g}, as of one particle at {most:.2g}"
+                f"{within}: no contact opens, closes or slides{worn}{below}"
             )
             if self.creep and np.isfinite(self.creep.first_change[1]):
                 yield (

@@ -16,18 +16,24 @@ from ..motion.buckling import negative_eigenvalues, surely_positive
 from ..motion.spectrum import Spectrum, spectrum
 from ..packing.packing import Packing
 from ..progress import Watch, report_progress, show_progress
-from .edges import Edge, SystemOfLoad, Window
+from .edges import Edge, Increments, Window
 from .find_windows import WindowsSoFar, check_increasing, find_windows, windows_up_to
-from .limits import LIMITS, Limits
-from .onset import RAISE_LOAD, Increments, NoGrowthError, Onset, OnsetError
-from .search import Look
+from .onset import RAISE_LOAD, NoGrowthError, Onset, OnsetError
+from .search import Look, SystemOfLoad
 from .slices.ranks import ALONE, Ranks
 from .system import System, force_bearing, full_operator
 
+ALL_WINDOWS = 300
+"""Disks up to which all windows are sought, from all eigenvalues: half a second for a decomposition, which grows with
+the cube of the number. Beyond, the first window is sought in slices of the spectrum."""
 
-def takes_all_modes(packing: HasConfiguration, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
+LAPACK_COORDINATES = 5000
+"""Coordinates up to which all eigenvalues at the first load are asked for: half a minute, and as their cube."""
+
+
+def takes_all_modes(packing: HasConfiguration, modes: tuple[int, int] | None = None) -> bool:
     """Whether a packing is small enough for all of its modes to be searched, and for all windows to be found."""
-    return modes is None and packing.coordinates <= 3 * limits.all_windows
+    return modes is None and packing.coordinates <= 3 * ALL_WINDOWS
 
 
 def find_onset(
@@ -41,7 +47,6 @@ def find_onset(
     watch: Watch | None = None,
     ranks: Ranks = ALONE,
     folder: Path | None = None,
-    limits: Limits = LIMITS,
 ) -> Onset:
     """Find the windows of growing motion between the smallest and the largest load.
 
@@ -102,7 +107,7 @@ def find_onset(
     start = equilibrium(float(loads[0]))
     if dissipation and not start.damped:
         raise ValueError("The packing has no dissipation: call find_onset without dissipation=True.")
-    search = _OnsetSearch(equilibrium, start, loads, modes, first, ranks, folder, limits)
+    search = _OnsetSearch(equilibrium, start, loads, modes, first, ranks, folder)
     with show_progress(watch):
         if not dissipation:
             return search.undamped_onset()
@@ -120,21 +125,20 @@ class _OnsetSearch:
     first: bool
     ranks: Ranks
     folder: Path | None
-    limits: Limits
 
     @property
     def takes_all(self) -> bool:
         """Whether all modes are searched, and all windows can be found."""
-        return takes_all_modes(self.start, self.modes, self.limits)
+        return takes_all_modes(self.start, self.modes)
 
     def undamped(self, fx: float) -> System:
         """The system at a load, without dissipation."""
-        return System.of(self.equilibrium(fx), limits=self.limits)
+        return System.of(self.equilibrium(fx))
 
     def damped(self, fx: float) -> System:
         """The system at a load, with dissipation."""
         packing = self.start if fx == self.loads[0] else self.equilibrium(fx)
-        return System.of(packing, True, self.limits)
+        return System.of(packing, True)
 
     def windows_of(
         self, system: SystemOfLoad, look: Look = lambda below, above: (), known: WindowsSoFar = lambda windows, fx: None
@@ -147,12 +151,11 @@ class _OnsetSearch:
                 look=look,
                 first=self.first,
                 known=known,
-                limits=self.limits,
             )
             return found[:1] if self.first else found, ()
         from .slices.first_window import first_window  # with libraries that nothing else needs
 
-        one, doubtful = first_window(system, self.loads, self.modes, self.ranks, self.folder, self.limits)
+        one, doubtful = first_window(system, self.loads, self.modes, self.ranks, self.folder)
         return (one,) if one else (), doubtful
 
     def undamped_onset(self) -> Onset:
@@ -176,7 +179,7 @@ class _OnsetSearch:
         """The onset with dissipation among all modes: growth is looked for inside of the undamped windows, too."""
         report_progress(f"pairs that become complex without dissipation, up to F_x = {self.loads[-1]:.6g}")
         undamped = self.undamped_onset_or_none()
-        inside = _Inside(self.undamped, self.loads, undamped, self.limits)
+        inside = _Inside(self.undamped, self.loads, undamped)
 
         def known_windows(windows: tuple[Window, ...], fx: float) -> None:
             if windows and not self.first:
@@ -205,20 +208,20 @@ class _OnsetSearch:
     def _undamped_windows(self) -> tuple[tuple[Window, ...], Increments, Spectrum | None, float | None]:
         """Windows without dissipation, increments in doubt, the spectrum at the smallest load if that is known, and the
         load before which the branch of equilibria ends."""
-        start, limits = self.start, self.limits
-        negative = negative_eigenvalues(force_bearing(start, limits))
+        start = self.start
+        negative = negative_eigenvalues(force_bearing(start))
         if len(negative):
             return (_at_start(start, float(negative[0]), 1.0),), (), None, start.fx
-        branch = _Branch(self.equilibrium, start, self.loads, limits)
+        branch = _Branch(self.equilibrium, start, self.loads)
         # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
         if self.modes is None and (not self.takes_all or (self.first and not isinstance(start, Packing))):
-            found = _complex_at_start(start, limits)
+            found = _complex_at_start(start)
             if found is not None:
                 return (_fastest(start, found),), (), found, None
         try:
             return *self.windows_of(branch), None, branch.ends
         except NoEquilibriumError:  # beyond the first increment, which the search asks for in any case
-            found = _complex_at_start(start, limits) if self.takes_all else None
+            found = _complex_at_start(start) if self.takes_all else None
             if found is None:
                 raise
             return (_fastest(start, found),), (), found, branch.ends
@@ -230,7 +233,7 @@ class _Inside:
     Where the first window alone is known, the others are sought as far as the ramp is walked.
     """
 
-    def __init__(self, undamped: SystemOfLoad, loads: Floats, known: Onset | None, limits: Limits) -> None:
+    def __init__(self, undamped: SystemOfLoad, loads: Floats, known: Onset | None) -> None:
         self._windows: tuple[Window, ...] = () if known is None else known.windows
         self._reached = np.inf
         self._along: Iterator[tuple[float, tuple[Window, ...]]] = iter(())
@@ -238,7 +241,7 @@ class _Inside:
             begin = max(0, int(np.searchsorted(loads, known.fx_c, side="right")) - 1)
             if begin < len(loads) - 1:
                 self._reached = float(loads[begin])
-                self._along = windows_up_to(undamped, loads[begin:], limits=limits)
+                self._along = windows_up_to(undamped, loads[begin:])
 
     def look(self, below: float, above: float) -> list[float]:
         """Loads between two loads at which to look: the onsets, and the middles of the windows that end in between."""
@@ -258,15 +261,15 @@ class _Branch:
     """The systems of a branch of stable equilibria; it ends where one at a given load has a negative eigenvalue."""
 
     def __init__(
-        self, equilibrium: Callable[[float], HasConfiguration], start: HasConfiguration, loads: Floats, limits: Limits
+        self, equilibrium: Callable[[float], HasConfiguration], start: HasConfiguration, loads: Floats
     ) -> None:
-        self._equilibrium, self._start, self._limits = equilibrium, start, limits
+        self._equilibrium, self._start = equilibrium, start
         self._first, self._given = float(loads[0]), set(loads[1:].tolist())
         self.ends: float | None = None
 
     def __call__(self, fx: float) -> System:
         packing = self._start if fx == self._first else self._equilibrium(fx)
-        system = System.of(packing, limits=self._limits)
+        system = System.of(packing)
         if fx in self._given and self._buckles(packing, system):
             self.ends = fx if self.ends is None else min(self.ends, fx)
             raise TurningPointError(
@@ -277,20 +280,18 @@ class _Branch:
 
     def _buckles(self, packing: HasConfiguration, system: System) -> bool:
         """Whether an eigenvalue is negative."""
-        return not surely_positive(system.stiffness) and bool(
-            len(negative_eigenvalues(force_bearing(packing, self._limits)))
-        )
+        return not surely_positive(system.stiffness) and bool(len(negative_eigenvalues(force_bearing(packing))))
 
 
-def _complex_at_start(start: HasConfiguration, limits: Limits) -> Spectrum | None:
+def _complex_at_start(start: HasConfiguration) -> Spectrum | None:
     """The spectrum of a packing at the smallest load, if it has a complex pair.
 
     None if it has none, or if the packing is too large for all eigenvalues to be asked for. Of a symmetric operator,
     as without tangential forces, nothing is computed.
     """
-    if start.coordinates > limits.lapack_coordinates or _symmetric(full_operator(start, limits)):
+    if start.coordinates > LAPACK_COORDINATES or _symmetric(full_operator(start)):
         return None
-    found = spectrum(force_bearing(start, limits))
+    found = spectrum(force_bearing(start))
     return found if found.pairs else None
 
 

@@ -9,12 +9,14 @@ from scipy.sparse import csr_array
 from ..arrays import Matrix
 from ..counted import counted
 from ..progress import report_progress
-from .edges import SystemOfLoad, Window
-from .limits import LIMITS, Limits
-from .screens.growth import GrowthScreen
-from .screens.pairs import PairScreen
-from .search import Look, windows_along
-from .system import System, unit_of
+from .edges import Window
+from .quiet import Quiet
+from .search import Look, Search, SystemOfLoad
+from .states import State
+from .system import System
+
+FEW_COORDINATES = 60
+"""Coordinates up to which all motions take as long as to know which may grow."""
 
 WindowsSoFar = Callable[[tuple[Window, ...], float], None]
 """Takes the windows so far, and the load up to which these are complete."""
@@ -28,7 +30,6 @@ def find_windows(
     look: Look = lambda below, above: (),
     first: bool = False,
     known: WindowsSoFar = lambda windows, fx: None,
-    limits: Limits = LIMITS,
 ) -> tuple[Window, ...]:
     """Find all windows of a one-parameter family of systems.
 
@@ -39,7 +40,7 @@ def find_windows(
     forces : array_like, shape (S,)
         The increasing loads.
     narrowest : float, optional
-        Windows narrower than this are not looked for, force; by default as in `Limits`.
+        Windows narrower than this are not looked for, force; by default 1e-7 of the largest load.
     look : callable, optional
         Two neighbouring loads -> further loads between them at which to look; these may have no equilibrium.
     first : bool
@@ -58,7 +59,7 @@ def find_windows(
         If the loads are not at least two increasing numbers.
     """
     windows: tuple[Window, ...] = ()
-    for fx, windows in windows_up_to(system, forces, narrowest=narrowest, look=look, first=first, limits=limits):
+    for fx, windows in windows_up_to(system, forces, narrowest=narrowest, look=look, first=first):
         known(windows, fx)
     return windows
 
@@ -70,20 +71,16 @@ def windows_up_to(
     narrowest: float | None = None,
     look: Look = lambda below, above: (),
     first: bool = False,
-    limits: Limits = LIMITS,
+    decompose: Callable[[System], State] = State.of,
 ) -> Iterator[tuple[float, tuple[Window, ...]]]:
     """Yield each load but the smallest, with all windows up to this load; the windows are those of `find_windows`."""
     loads = check_increasing(forces)
+    last = float(loads[-1])
+    # the pair of a narrower window would grow more slowly than any run can show
+    narrowest = 1e-7 * float(np.abs(loads).max()) if narrowest is None else narrowest
     start = system(float(loads[0]))
-    unit, last = unit_of(start), float(loads[-1])
-    narrowest = limits.narrowest * float(np.abs(loads).max()) if narrowest is None else narrowest
-    screen = GrowthScreen(limits) if start.dissipative else PairScreen(limits)
-
-    def in_units(fx: float) -> System:
-        return (start if fx == start.fx else system(fx)).in_units_of(unit)
-
-    for fx, found in windows_along(in_units, loads, narrowest, screen, look=look, first=first, limits=limits):
-        windows = tuple(window.in_units_of(unit) for window in found)
+    few = Quiet(decompose) if start.dissipative and len(start.active) > FEW_COORDINATES else None
+    for fx, windows in Search(system, narrowest, few, first, decompose).along(loads, look):
         so_far = (
             f"; {counted(len(windows), 'window')} so far, the first from {windows[0].fx_onset:.8g}" if windows else ""
         )
@@ -96,7 +93,6 @@ def complex_windows(
     forces: ArrayLike,
     *,
     narrowest: float | None = None,
-    limits: Limits = LIMITS,
 ) -> tuple[Window, ...]:
     """Find all windows of complex eigenvalues of a one-parameter family of matrices.
 
@@ -107,9 +103,7 @@ def complex_windows(
     forces : array_like, shape (S,)
         The increasing loads.
     narrowest : float, optional
-        Windows narrower than this are not looked for, force; by default as in `limits`.
-    limits : Limits
-        Sizes and tolerances of the search.
+        Windows narrower than this are not looked for, force; by default 1e-7 of the largest load.
 
     Returns
     -------
@@ -121,7 +115,7 @@ def complex_windows(
     ValueError
         If the loads are not at least two increasing numbers.
     """
-    return find_windows(lambda fx: System(fx, csr_array(operator(fx))), forces, narrowest=narrowest, limits=limits)
+    return find_windows(lambda fx: System(fx, csr_array(operator(fx))), forces, narrowest=narrowest)
 
 
 def check_increasing(forces: ArrayLike) -> NDArray[np.float64]:

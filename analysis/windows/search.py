@@ -1,60 +1,80 @@
-r"""The walk along a ramp: all windows of a family of systems, with dissipation or without.
+r"""Windows of loads on which motion grows: one search, without dissipation and with it, from eigenvalues alone.
 
-**From load to load.** A motion that grows at the upper load of an increment is followed back to the lower load. If the
-motion grows there, too, its window stays open. Otherwise its window begins in between, at an edge that is solved for
-(:mod:`~faultgouge.analysis.windows.edges`). A motion that grows at the lower load alone is followed ahead to the end of
-its window. Modes that grow at neither load may grow in between, and modes that grow at both may rest in between. Where
-the bounds of :mod:`~faultgouge.analysis.windows.between` allow for this, the modes are computed at a load in between.
-An increment with another number of growing motions there, or in doubt for another reason, is divided and walked in
-parts, until no part in doubt is wider than `Search.narrowest`.
+Without dissipation two real eigenvalues of A meet, and go on as a complex pair. Their mean and the *discriminant*
 
-**Few motions.** On most increments nothing happens, and to know that takes no decomposition. A screen
-(:mod:`~faultgouge.analysis.windows.screens`) names the few motions that may change, or the few modes that may meet.
-Where too many are named, or the increment stays in doubt when it is short, all modes of both loads are computed.
+.. math:: D = (\lambda_1 - \lambda_2)^2
 
-**Modes of both loads.** Pairs of real modes without dissipation might meet a third mode on the way, and levels bend
-where contacts open or close: such increments are divided as well (`LoadStep.apart`, `LoadStep.hiding`).
+are smooth functions of the matrix where the two meet (Kato, *Perturbation Theory for Linear Operators*, 1966, II.1),
+so that a backward stable solver returns D with an error of rounding times |A|, although each eigenvalue errs by the root
+of that. D < 0 is a complex pair. With dissipation :math:`\mathrm{Re}\, s` of one eigenvalue goes through zero. So a
+motion *grows* where -D, or Re s, is positive, and a window begins and ends where this number changes its sign.
+
+**Between two loads a and b** all motions are known at both ends, with slopes. The shapes of motions that grow tell
+which of these are the same at both ends. If one motion more grows at one end, its edge lies in between, and is solved
+for (:mod:`~faultgouge.analysis.windows.edges`). Two or more changes are in doubt. What grows at neither end, or at
+both, may do otherwise in between: a function g that is positive at both ends, whose slopes are known, too, has a cubic
+through all four numbers. Where the cubic, less `BEND` of the smaller g, is negative, a window may hide (`lowest`).
+Without dissipation g is D of neighbouring real levels, and -D of a complex pair. Two levels that pass each other touch
+D = 0, and have to be looked at there. With dissipation the cubics of the mean m and of D of two eigenvalues tell the
+real parts of :math:`m \pm \tfrac12\sqrt D`, which neither coalescence nor crossing disturbs (`excursion`).
+
+**An increment in doubt is divided** where the doubt is largest, down to increments of `narrowest`. What changes on
+these is a jump of the equilibrium. Where contacts change the levels bend, so that the search first takes a short step
+about each such change.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
-from typing import Protocol
+from typing import Any, NamedTuple
 
-from ..arrays import Floats
+import numpy as np
+
+from ..arrays import Complexes, Floats, Indices
 from ..errors import NoEquilibriumError, TurningPointError
-from .between import Few, LoadStep, ModeAtEnds, ModesAtEnds, ModesOfLoads, stretch
-from .edges import DoubtError, Edge, LostPairError, LostTrackError, SystemOfLoad, Window, locate_edge
-from .limits import LIMITS, Limits
-from .space import Space
+from .edges import Edge, Window, sign_change
+from .states import State
 from .system import System
-from .system_modes import SystemModes
+from .tracks import Doubt, Point, Track, nearest_pair
+
+SystemOfLoad = Callable[[float], System]
+"""Load -> the system there."""
 
 Look = Callable[[float, float], Iterable[float]]
 """Two neighbouring loads of a ramp -> further loads between them that are to be looked at."""
 
-Open = list[tuple[Space, Edge]]
-"""Motions that grow at a load, and where each has begun to."""
+Few = Callable[[System, System], tuple[State, State] | None]
+"""The motions that may change between two loads, at both; None if all motions have to be looked at."""
 
-Changes = Sequence[tuple[Space, Space]]
-"""Motions that begin or end to grow on an increment, at its lower and at its upper load."""
+BEND = 0.05
+"""Curvature that two values and slopes do not show, as a share of the smaller value: more than enough for loads
+between which motions are recognised at all."""
 
-Sure = Callable[[Changes], bool]
-"""Whether no motion begins or ceases to grow beside these, and each of them does so once."""
+ALIKE = 0.2
+"""Product of the overlaps of left and of right vectors from which on two motions are the same."""
+
+BEND_LENGTH = 2.0**-4
+"""Length in increments of the step about a load at which contacts change, in which a window may still hide."""
+
+LOOKS = 12
+"""Looks at a pair before it is in doubt whether it meets in between: levels that pass each other take one or two."""
+
+PLACES = np.linspace(0, 1, 41)[1:-1]
+"""Where in an increment the cubics are looked at."""
 
 
-class Screen(Protocol):
-    """Who names the few motions that may change between two loads."""
+class Changes(NamedTuple):
+    """What happens between two loads: motions that go on growing, those that begin to grow, and those that cease to.
 
-    def __call__(self, here: System, there: System, growing: Sequence[Space], depth: int) -> Few | ModesOfLoads | None:
-        """The few motions or modes that may change; None if they are too many.
+    Motions are numbers in the states at the lower and at the upper load.
+    """
 
-        `growing` grow at the lower load, and the increment has been divided `depth` times. A DoubtError says where
-        another motion grows in between.
-        """
+    same: list[tuple[int, int]]
+    begun: list[tuple[int, Edge]]
+    ended: list[tuple[int, Edge]]
 
 
 class Search:
-    """The windows of a family of systems.
+    """The windows of a family of systems, from load to load.
 
     Parameters
     ----------
@@ -62,37 +82,39 @@ class Search:
         Load -> System.
     narrowest : float
         Windows narrower than this are not looked for, force.
-    screen : Screen, optional
-        Without one all modes of all loads are computed.
+    few : callable, optional
+        Names the few motions that may change.
     first : bool
         Whether the walk ends with the first window.
+    decompose : callable
+        System -> all of its motions.
     """
 
     def __init__(
         self,
         system: SystemOfLoad,
         narrowest: float,
-        screen: Screen | None = None,
+        few: Few | None = None,
         first: bool = False,
-        limits: Limits = LIMITS,
+        decompose: Callable[[System], State] = State.of,
     ) -> None:
-        self.at, self.narrowest, self.screen, self.limits = system, narrowest, screen, limits
-        self._first = first
-        self.open: Open | None = None  # at the load reached so far
+        self.at, self.narrowest, self.few, self.first = system, narrowest, few, first
+        self._decompose = decompose
+        self.growing: list[tuple[complex, Edge]] | None = None  # eigenvalues at the load reached so far
         self.closed: list[Window] = []
-        self._modes: dict[float, SystemModes] = {}
+        self._known: dict[float, State] = {}
         self._before: System | None = None
-
-    @property
-    def finished(self) -> bool:
-        """Whether the first window has been found, and is all that is sought."""
-        return self._first and bool(self.open or self.closed)
 
     @property
     def windows(self) -> tuple[Window, ...]:
         """All windows up to the load reached so far, by increasing onset."""
-        still = [Window(onset, None) for _, onset in self.open or []]
+        still = [Window(onset, None) for _, onset in self.growing or []]
         return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
+
+    @property
+    def finished(self) -> bool:
+        """Whether the first window has been found, and is all that is sought."""
+        return self.first and bool(self.growing or self.closed)
 
     def along(self, loads: Floats, look: Look = lambda below, above: ()) -> Iterator[tuple[float, tuple[Window, ...]]]:
         """Yield each load but the smallest, with all windows up to this load.
@@ -114,7 +136,7 @@ class Search:
                         raise
                     continue
                 for step in self._steps(here, there):
-                    self._advance(here, step, 0)
+                    self._advance(here, step)
                     here = step
                     if self.finished:
                         break
@@ -124,265 +146,324 @@ class Search:
 
     def _steps(self, here: System, there: System) -> list[System]:
         """The steps that lead to a load; where contacts change on the way, a short step about each change."""
-        shortest = self.limits.bend_length * (there.fx - here.fx)
+        shortest = BEND_LENGTH * (there.fx - here.fx)
 
         def divide(below: System, above: System) -> list[System]:
             if above.fx - below.fx <= shortest or below.states == above.states:
                 return [above]
-            middle = look_between(self.at, below.fx, 0.5 * (below.fx + above.fx), above.fx)
-            return [*divide(below, middle[0]), *divide(middle[0], above)] if middle else [above]
+            middle = self._between(below.fx, 0.5 * (below.fx + above.fx), above.fx)
+            return [*divide(below, middle), *divide(middle, above)] if middle else [above]
 
         places = [here, *divide(here, there)]
         same = [one.states == other.states for one, other in pairwise(places)]
         smooth = [before and after for before, after in pairwise(same)]
         return [place for place, inside in zip(places[1:], [*smooth, False], strict=True) if not inside]
 
-    def _advance(self, here: System, there: System, depth: int) -> None:
-        """Carry the windows over an increment, divided while it is in doubt."""
-        try:
-            self.open, ended = self._carry(here, there, depth)
-            self.closed += ended
-            self._before = here
-            self._modes = {fx: each for fx, each in self._modes.items() if fx >= there.fx}
-            return
-        except DoubtError as doubt:
-            share = self.limits.division_share
-            fx = (1 - share) * here.fx + share * there.fx if doubt.fx is None else doubt.fx
-        middle = []
-        if there.fx - here.fx > self.narrowest:
-            middle = look_between(self.at, here.fx, fx, there.fx)
-        if middle and here.fx < middle[0].fx < there.fx:
-            self._advance(here, middle[0], depth + 1)
-            if not self.finished:
-                self._advance(middle[0], there, depth + 1)
-        else:
-            self.open, ended = self._carry_undivided(here, there)
-            self.closed += ended
-
-    def _carry(self, here: System, there: System, depth: int) -> tuple[Open, list[Window]]:
-        """The motions that grow at the upper load, and the windows that end before; DoubtError if that is not sure."""
-        if self.screen is None or depth > self.limits.screen_divisions:
-            return self._by_all_modes(here, there, depth)
-        growing = [space for space, _ in self.open or []]
-        try:
-            few = self.screen(here, there, growing, depth)
-            if isinstance(few, Few):
-                if self.open is None:
-                    self.open = _begin([] if few.named == 0 else self.modes(here).growing)
-                return self._settle(here, there, few.courses, [], lambda changes: True)
-            if few is not None and (self.open is None or len(few[0].grows) == len(growing)):
-                return self._by_modes(few, depth)
-        except DoubtError:
-            if depth < self.limits.screen_divisions:
-                raise
-        return self._by_all_modes(here, there, depth)
-
-    def _by_all_modes(self, here: System, there: System, depth: int) -> tuple[Open, list[Window]]:
-        """As `_carry`, by all modes of both loads."""
-        lower, upper = self.modes(here), self.modes(there)
-        if self.screen and self.open is not None and len(lower.grows) != len(self.open):
-            raise LostTrackError
-        return self._by_modes((lower, upper), depth)
-
-    def _by_modes(self, modes: ModesOfLoads, depth: int) -> tuple[Open, list[Window]]:
-        """As `_carry`, by the modes that may change."""
-        here, there = (each.system for each in modes)
-        if self.open is None:
-            self.open = _begin(modes[0].growing)
-        before = self._before if self._before is not None and self._before.fx < here.fx else None
-        step = LoadStep(*modes, before, self.limits)
-        hiding = step.hiding(self.narrowest)
-        if hiding is None:
-            raise DoubtError
-
-        def sure(changes: Changes) -> bool:
-            if here.dissipative:
-                return True
-            parts = self.limits.bend_divisions if step.bent else self.limits.change_divisions
-            return not ((changes or hiding) and depth < parts) and step.apart(changes, self.narrowest)
-
-        return self._settle(here, there, step.courses, hiding, sure)
-
-    def _settle(
-        self, here: System, there: System, courses: Sequence[ModeAtEnds], hiding: Sequence[ModesAtEnds], sure: Sure
-    ) -> tuple[Open, list[Window]]:
-        """The motions that grow at the upper load, and the windows that end before.
-
-        Motions that begin or end to grow are handed to `sure`, then edges are solved for and modes `hiding` looked at.
-        """
-        left, now, watched = list(self.open or []), [], list(hiding)
-        begun: list[tuple[Space, Space]] = []
-        ending: list[tuple[Space, Space, Edge]] = []
-        for below, above in courses:
-            below = (
-                _require(above.follow(here, self.limits)) if below is None and above is not None else _require(below)
-            )
-            above = _require(below.follow(there, self.limits)) if above is None else above
-            earlier = next((each for each in left if each[0].equals(below)), None)
-            if earlier is not None:
-                left.remove(earlier)
-            if (earlier is None) == below.grows:
-                raise DoubtError
-            if earlier is None and above.grows:
-                begun.append((below, above))
-            elif earlier is not None and not above.grows:
-                ending.append((below, above, earlier[1]))
-            elif earlier is not None:
-                now.append((above, earlier[1]))
-            if below.grows == above.grows:
-                watched.append(([below], [above]))
-        for space, onset in left:
-            ahead = _require(space.follow(there, self.limits))
-            if ahead.grows:
-                raise DoubtError
-            ending.append((space, ahead, onset))
-        if not sure([*begun, *(each[:2] for each in ending)]):
-            raise DoubtError
-        for modes in watched:
-            inside = other_growth(self.at, modes, self.narrowest, dipping=True, limits=self.limits)
-            if inside is not None:
-                raise DoubtError(inside[0].fx)
-        ended = [Window(onset, self._edge(below, above)) for below, above, onset in ending]
-        now += [(above, self._edge(below, above)) for below, above in begun]
-        return now, ended
-
-    def _edge(self, below: Space, above: Space) -> Edge:
-        """Edge between two loads, at one of which a motion grows; in doubt unless growth begins or ends once."""
-        try:
-            edge, left, right = locate_edge(self.at, below, above, self.limits)
-        except (LostPairError, NoEquilibriumError):
-            raise DoubtError from None
-        if not below.system.dissipative and below.fx < left.fx < right.fx < above.fx:
-            for ends in ((below, left), (right, above)):
-                if ends[0].growth * ends[1].growth <= 0 or stretch(ends[:1], ends[1:], self.limits)[0] > self.narrowest:
-                    raise DoubtError
-        return edge
-
-    def _carry_undivided(self, here: System, there: System) -> tuple[Open, list[Window]]:
-        """Carry the windows over an increment that is not divided; an unsolved edge is uncertain by half of it."""
-        left, now = list(self.open or []), []
-        for space in self.modes(there).growing:
-            origin = space.follow(here, self.limits)
-            earlier = None if origin is None else next((each for each in left if each[0].equals(origin)), None)
-            if earlier is None and len(left) >= len(self.modes(there).grows):
-                earlier = min(left, key=lambda each: abs(each[0].mean - space.mean))
-            if earlier is not None:
-                left.remove(earlier)
-                now.append((space, earlier[1]))
-            else:
-                now.append((space, self._edge_or_half(origin, space, here, there)))
-        return now, [
-            Window(onset, self._edge_or_half(space, space.follow(there, self.limits), here, there))
-            for space, onset in left
-        ]
-
-    def _edge_or_half(self, below: Space | None, above: Space | None, here: System, there: System) -> Edge:
-        last = above or below
-        assert last is not None
-        if below is not None and above is not None and below.growth * above.growth < 0:
+    def _between(self, below: float, middle: float, above: float) -> System | None:
+        """The system at the middle load, or at a load beside it; None if none of these has an equilibrium."""
+        for fx in (middle, 0.5 * (below + middle), 0.5 * (middle + above)):
             try:
-                return locate_edge(self.at, below, above, self.limits)[0]
-            except (LostPairError, NoEquilibriumError):
-                pass
-        return Edge.between(here.fx, there.fx, last)
+                return self.at(fx) if below < fx < above else None
+            except NoEquilibriumError:
+                continue
+        return None
 
-    def modes_at(self, fx: float) -> SystemModes:
-        """All modes at a load."""
-        return self._modes[fx] if fx in self._modes else self.modes(self.at(fx))
-
-    def modes(self, system: System) -> SystemModes:
-        """All modes of a system, kept as long as its load is not passed."""
-        found = self._modes.get(system.fx)
-        if found is None or found.system is not system:
-            found = self._modes[system.fx] = SystemModes.of(system)
+    def state(self, system: System) -> State:
+        """All motions of a system, kept as long as its load is not passed."""
+        found = self._known.get(system.fx)
+        if found is None:
+            found = self._known[system.fx] = self._decompose(system)
         return found
 
-
-def _begin(growing: Sequence[Space]) -> Open:
-    """The motions that grow at the smallest load."""
-    return [(each, Edge.start(each)) for each in growing]
-
-
-def _require(space: Space | None) -> Space:
-    if space is None:
-        raise DoubtError
-    return space
-
-
-def _growing_of(modes: Sequence[Space]) -> list[bool]:
-    """Whether each mode grows, those that do not first."""
-    return sorted(mode.grows for mode in modes)
-
-
-def other_growth(
-    at: SystemOfLoad,
-    seen: Sequence[list[Space]],
-    narrowest: float,
-    *,
-    dipping: bool = False,
-    limits: Limits = LIMITS,
-) -> list[Space] | None:
-    """Modes that nearly meet, at a load where another number of them grows than at each load of `seen`.
-
-    None if there surely is no such load, but on stretches narrower than `narrowest`. A DoubtError is raised if that is
-    open after `Limits.dips` looks, or if the modes cannot be followed. For a pair that has to be `dipping` it is also
-    raised if the discriminant does not dip where its slopes say so: the loads are then too far apart.
-    """
-    places, ends = sorted(seen, key=lambda each: each[0].fx), [_growing_of(each) for each in seen]
-    for _ in range(limits.dips):
-        dips = ((*stretch(*both, limits), both) for both in pairwise(places))
-        width, fx, (lower, upper) = max(dips, key=lambda dip: dip[0])
-        if width <= narrowest:
-            return None
-        found = look_between(at, lower[0].fx, fx, upper[0].fx)
-        if not found or not lower[0].fx < found[0].fx < upper[0].fx:
-            break
-        (place,) = found
-        nearer = lower if place.fx - lower[0].fx < upper[0].fx - place.fx else upper
-        modes = [mode for mode in (each.follow(place, limits) for each in nearer) if mode is not None]
-        if len(modes) < len(nearer) or (len(modes) == 2 and modes[0].equals(modes[1])):
-            raise DoubtError(place.fx)
-        if _growing_of(modes) not in ends:
-            return modes
-        least = min(abs(each[0].growth) for each in (lower, upper))
-        if dipping and not place.dissipative and abs(modes[0].growth) > least:
-            raise DoubtError(place.fx)
-        places = sorted([*places, modes], key=lambda each: each[0].fx)
-    raise DoubtError
-
-
-def windows_along(
-    system: SystemOfLoad,
-    loads: Floats,
-    narrowest: float,
-    screen: Screen | None = None,
-    *,
-    look: Look = lambda below, above: (),
-    first: bool = False,
-    limits: Limits = LIMITS,
-) -> Iterator[tuple[float, tuple[Window, ...]]]:
-    """Yield each load but the smallest, with all windows up to this load, see `Search.along`.
-
-    A screen is of finite order: if all modes contradict the screen, the ramp is walked again without a screen.
-    """
-    reached = float(loads[0])
-    for way in [screen, None] if screen else [None]:
+    def _advance(self, here: System, there: System) -> None:
+        """Carry the windows over an increment, divided while it is in doubt."""
+        middle = None
         try:
-            for load, windows in Search(system, narrowest, way, first, limits).along(loads, look):
-                if load > reached or (first and windows):  # the second walk may find what the first one missed
-                    reached = max(reached, load)
-                    yield load, windows
-            return
-        except LostTrackError:
-            if way is None:
-                raise
+            few = self.few(here, there) if self.few else None
+            below, above = few or (self.state(here), self.state(there))
+            if self.growing is None:
+                self.growing = [(below.values[k], Edge.start(below, k)) for k in np.flatnonzero(below.grows)]
+            if few and len(self.growing) != below.grows.sum():
+                few, below, above = None, self.state(here), self.state(there)
+            changes = self._changes(below, above)
+        except Doubt as doubt:
+            if there.fx - here.fx > self.narrowest:
+                fx = doubt.fx if doubt.fx is not None else here.fx + 0.47 * (there.fx - here.fx)
+                margin = 0.02 * (there.fx - here.fx)
+                middle = self._between(here.fx, float(np.clip(fx, here.fx + margin, there.fx - margin)), there.fx)
+            if middle is not None:
+                self._advance(here, middle)
+                if not self.finished:
+                    self._advance(middle, there)
+                return
+            below, above = self.state(here), self.state(there)
+            changes = self._undivided(below, above)
+        left = list(self.growing or [])
+
+        def onset_of(k: int) -> Edge:
+            nearest = min(range(len(left)), key=lambda j: abs(left[j][0] - below.values[k]))
+            return left.pop(nearest)[1]
+
+        ended = [Window(onset_of(k), edge) for k, edge in changes.ended]
+        self.growing = [(above.values[j], onset_of(i)) for i, j in changes.same]
+        self.growing += [(above.values[j], edge) for j, edge in changes.begun]
+        self.closed += ended
+        self._before = here
+        self._known = {fx: each for fx, each in self._known.items() if fx >= there.fx}
+
+    def _undivided(self, below: State, above: State) -> Changes:
+        """What changes on an increment that is not divided: an unsolved edge is uncertain by half of it."""
+        rows, columns = np.flatnonzero(below.grows), np.flatnonzero(above.grows)
+        same = [(int(rows[i]), int(columns[j])) for i, j in assign(below.alike(above, rows, columns) + 1e-300)]
+        begun = [int(j) for j in columns if j not in {j for _, j in same}]
+        ended = [int(i) for i in rows if i not in {i for i, _ in same}]
+        loads = below.fx, above.fx
+        return Changes(
+            same,
+            [(k, Edge.between(loads, above.system, above.values[k], above.overlap[k])) for k in begun],
+            [(k, Edge.between(loads, below.system, below.values[k], below.overlap[k])) for k in ended],
+        )
+
+    def _changes(self, below: State, above: State) -> Changes:
+        """What happens between two loads; a Doubt if that is not sure."""
+        kind = self._changes_of_motions if below.system.dissipative else self._changes_of_pairs
+        return kind(below, above, below.slopes(above.system), above.slopes(below.system))
+
+    def _changes_of_pairs(self, below: State, above: State, drift_a: Complexes, drift_b: Complexes) -> Changes:
+        """As `_changes`, without dissipation: what changes is real at one load and a complex pair at the other."""
+        rows, columns = np.flatnonzero(below.grows), np.flatnonzero(above.grows)
+        alike = below.alike(above, rows, columns)
+        same = [(int(rows[i]), int(columns[j])) for i, j in assign(alike) if alike[i, j] > ALIKE]
+        begun = [int(j) for j in columns if j not in {j for _, j in same}]
+        ended = [int(i) for i in rows if i not in {i for i, _ in same}]
+        if len(begun) + len(ended) > 1:
+            raise Doubt
+        levels_a, levels_b = np.flatnonzero(~below.grows), np.flatnonzero(~above.grows)
+        begins, ends = [], []
+        for k in begun:
+            inside = Point.pair(above, drift_b, k)
+            outside, levels_a = _levels_of(inside, below, drift_a, levels_a)
+            begins.append((k, self._edge(Track(self.at, outside, inside), inside.fx, outside.fx)))
+        for k in ended:
+            inside = Point.pair(below, drift_a, k)
+            outside, levels_b = _levels_of(inside, above, drift_b, levels_b)
+            ends.append((k, self._edge(Track(self.at, inside, outside), inside.fx, outside.fx)))
+        if len(levels_a) != len(levels_b):
+            raise Doubt
+        self._check_levels(below, above, drift_a, drift_b, levels_a, levels_b)
+        for i, j in same:
+            pair = Point.pair(below, drift_a, i), Point.pair(above, drift_b, j)
+            span = above.fx - below.fx
+            ends_of_pair = ((each.numbers[1].real, span * each.slopes[1].real) for each in pair)
+            width, place = lowest(*(np.array([-number]) for end in ends_of_pair for number in end))
+            if width[0] * span > self.narrowest:
+                self._look_inside(Track(self.at, *pair), float(place[0]))
+        return Changes(same, begins, ends)
+
+    def _check_levels(
+        self, below: State, above: State, drift_a: Complexes, drift_b: Complexes, levels_a: Indices, levels_b: Indices
+    ) -> None:
+        """A Doubt if two real levels meet between two loads at which they are neighbours."""
+        before = self._before
+        arrival = drift_a if before is None or before.fx >= below.fx else below.slopes(before)
+        span = above.fx - below.fx
+        (g0, v0), (g1, v1), (_, v2) = (
+            (np.diff(state.values[levels].real), span * np.diff(drift[levels].real))
+            for state, levels, drift in (
+                (below, levels_a, drift_a),
+                (above, levels_b, drift_b),
+                (below, levels_a, arrival),
+            )
+        )
+        width, place = lowest(g0**2, 2 * g0 * v0, g1**2, 2 * g1 * v1)
+        near = width * span > self.narrowest
+        bent = lowest(g0**2, 2 * g0 * v2, g1**2, 2 * g1 * v1)[0] * span > self.narrowest
+        if np.any(bent & ~near):
+            raise Doubt  # they would meet if they went on as on the way to the lower load
+        for k in np.flatnonzero(near):
+            ends = Point.pair(below, drift_a, *levels_a[k : k + 2]), Point.pair(above, drift_b, *levels_b[k : k + 2])
+            self._look_inside(Track(self.at, *ends), float(place[k]))
+
+    def _look_inside(self, track: Track, place: float) -> None:
+        """Look where the growth of a pair may have the other sign than at both ends: a Doubt if it has.
+
+        Parabolas through the lowest value and its neighbours lead to the place where growth is nearest to a change of
+        its sign.
+        """
+        (below, above), sign = track.ends, np.sign(track.growth(track.ends[0]))
+        span = above - below
+        fx = below + float(np.clip(place, 0.01, 0.99)) * span
+        for _ in range(LOOKS):
+            track.growth(fx)
+            loads = sorted(track.known)
+            values = [sign * track.growth(load) for load in loads]
+            lowest_of = int(np.argmin(values))
+            begin = min(max(lowest_of - 1, 0), len(loads) - 3)
+            low, three = loads[lowest_of], slice(begin, begin + 3)
+            curve, slope, least = np.polyfit((np.array(loads[three]) - low) / span, values[three], 2)
+            if values[lowest_of] < 0 and not 2 * np.sqrt(-values[lowest_of] / max(curve, 0.0)) * span < self.narrowest:
+                raise Doubt(low)
+            fx, least = low - 0.5 * float(slope / curve) * span, least - 0.25 * slope**2 / curve
+            if not below < fx < above or least > BEND * max(values[three]):
+                return
+            if min(abs(fx - load) for load in loads) < 0.5 * self.narrowest:
+                return
+        raise Doubt(fx)
+
+    def _edge(self, track: Track, inside: float, outside: float) -> Edge:
+        """The edge of a motion that grows at one of two loads; in doubt unless its growth begins or ends once."""
+        change = sign_change(track.growth, *sorted((inside, outside)))
+        ends = sorted((inside, outside))
+        if change.smooth:
+            if not track.pairs or not ends[0] < change.loads[0] < change.loads[-1] < ends[1]:
+                return track.edge(change)
+            width = self._width_beside(track, change.loads)
+            if width > self.narrowest:
+                raise Doubt
+            return track.edge(change)
+        left, right = (track.at(fx) for fx in (change.loads[0], change.loads[-1]))
+        jump = float(np.abs(left.stiffness - right.stiffness).max())
+        largest, usual = (max(abs(track.growth(fx)) for fx in loads) for loads in (change.loads, ends))
+        if jump < 1e-7 * left.frequency**2 and largest > 1e-3 * usual:
+            raise Doubt(change.fx)  # the equilibrium does not jump: the motion has become another one on the way
+        return track.edge(change)
+
+    def _width_beside(self, track: Track, loads: list[float]) -> float:
+        """The widest stretch on either side of an edge on which the growth may change its sign again."""
+        left, right = loads[0], loads[-1]
+        slope = (track.growth(right) - track.growth(left)) / (right - left)
+        widths = []
+        for end, near, drift in ((track.points[0], left, slope), (track.points[1], right, slope)):
+            sign, step = np.sign(track.growth(end.fx)), near - end.fx
+            at_end = sign * track.growth(end.fx), sign * track.growth_slope(end) * step
+            numbers = (*at_end, sign * track.growth(near), sign * drift * step)
+            widths.append(abs(step) * float(lowest(*(np.array([number]) for number in numbers))[0][0]))
+        return max(widths)
+
+    def _changes_of_motions(self, below: State, above: State, drift_a: Complexes, drift_b: Complexes) -> Changes:
+        """As `_changes`, with dissipation."""
+        alike = below.alike(above)
+        if not (below.whole and above.whole):  # some have no partner, as another one is nearer to the point there
+            alike[alike < ALIKE] = 0.0
+        image = dict(assign(alike))
+        origin = {j: i for i, j in image.items()}
+        rows, columns = (np.flatnonzero(each.grows).tolist() for each in (below, above))
+        if any(i not in image for i in rows) or any(j not in origin for j in columns):
+            raise Doubt
+        for i in {*rows, *(origin[j] for j in columns)}:
+            if alike[i, image[i]] < max(ALIKE, 0.8 * alike[i].max(), 0.8 * alike[:, image[i]].max()):
+                raise Doubt
+        known = np.array(sorted(image.items()), dtype=int).reshape(-1, 2).T
+        span = above.fx - below.fx
+        a, b, slope_a, slope_b = below.values[known[0]], above.values[known[1]], drift_a[known[0]], drift_b[known[1]]
+        p, q = neighbours(a, span * slope_a, b, span * slope_b)
+        width, place = excursion(*((each[p], each[q]) for each in (a, span * slope_a, b, span * slope_b)))
+        if width.max(initial=0.0) * span > self.narrowest:
+            raise Doubt(below.fx + float(place[np.argmax(width)]) * span)
+
+        def edge(i: int, j: int, begins: bool) -> Edge:
+            track = Track(self.at, Point.motion(below, drift_a, i), Point.motion(above, drift_b, j))
+            return self._edge(track, *(track.ends[::-1] if begins else track.ends))
+
+        same = [(i, image[i]) for i in rows if above.grows[image[i]]]
+        begun = [(j, edge(origin[j], j, True)) for j in columns if not below.grows[origin[j]]]
+        ended = [(i, edge(i, image[i], False)) for i in rows if not above.grows[image[i]]]
+        return Changes(same, begun, ended)
 
 
-def look_between(look: SystemOfLoad, below: float, middle: float, above: float) -> list[System]:
-    """The system at the middle load, or at a load beside it; empty if none of these has an equilibrium."""
-    for fx in (middle, 0.5 * (below + middle), 0.5 * (middle + above)):
-        try:
-            return [look(fx)]
-        except NoEquilibriumError:
-            continue
-    return []
+def _levels_of(inside: Point, state: State, drift: Complexes, levels: Indices) -> tuple[Point, Indices]:
+    """The two real levels that are a complex pair at another load, and all others; a Doubt if that is not sure."""
+    step = state.fx - inside.fx
+    i, j = nearest_pair(state.values[levels], inside.numbers + step * inside.slopes)
+    return Point.pair(state, drift, int(levels[i]), int(levels[j])), np.delete(levels, [i, j])
+
+
+def assign(weight: Floats) -> list[tuple[int, int]]:
+    """Rows and columns that are each other's largest weight, in turn among those that are left."""
+    weight, found = weight.copy(), []
+    while weight.size and weight.max() > 0:
+        columns, rows = weight.argmax(axis=1), weight.argmax(axis=0)
+        own = [i for i in range(len(weight)) if weight[i, columns[i]] > 0 and rows[columns[i]] == i]
+        found += [(i, int(columns[i])) for i in own]
+        weight[own], weight[:, columns[own]] = 0.0, 0.0
+    return found
+
+
+def neighbours(a: Complexes, slope_a: Complexes, b: Complexes, slope_b: Complexes) -> tuple[Indices, Indices]:
+    """Pairs of motions that may nearly meet, from s and its slopes at both ends.
+
+    They are at most two places apart in the order of Im s, before or after, or in another order after. But where two
+    motions coalesce close by, so that each is the other's nearest by far and they part by more than their distance,
+    only their own mean and D are smooth: neither is paired with a third.
+    """
+    p, q = np.triu_indices(len(a), 1)
+    ranks = [np.argsort(np.argsort(each.imag, kind="stable")) for each in (a, b)]
+    near = [np.abs(rank[p] - rank[q]) <= 2 for rank in ranks]
+    kept = near[0] | near[1] | ((ranks[0][p] < ranks[0][q]) != (ranks[1][p] < ranks[1][q]))
+    for values, slopes in ((a, slope_a), (b, slope_b)):
+        apart = np.abs(values[:, None] - values)
+        np.fill_diagonal(apart, np.inf)
+        nearest = apart.argmin(axis=1) if len(values) else np.zeros(0, int)
+        own = np.arange(len(values))
+        close = (nearest[nearest] == own) & (np.abs(slopes - slopes[nearest]) > np.abs(values - values[nearest]))
+        for one, other in ((p, q), (q, p)):
+            far = np.abs(values[one] - values[other]) > 10 * np.abs(values[one] - values[nearest[one]])
+            kept &= ~(close[one] & far)
+    return p[kept], q[kept]
+
+
+def cubic(a: Any, slope_a: Any, b: Any, slope_b: Any) -> Any:
+    """Cubics through values and slopes at both ends of 0 < t < 1, at `PLACES`; shape (..., P)."""
+    t = PLACES
+    parts = ((a, (1 + 2 * t) * (1 - t) ** 2), (slope_a, t * (1 - t) ** 2), (b, t**2 * (3 - 2 * t)))
+    return sum(np.multiply.outer(each, shape) for each, shape in parts) - np.multiply.outer(slope_b, t**2 * (1 - t))
+
+
+def lowest(d0: Floats, s0: Floats, d1: Floats, s1: Floats) -> tuple[Floats, Floats]:
+    """The widest stretch of 0 < t < 1 on which functions, positive at both ends, may be negative.
+
+    d0, s0 and d1, s1, each of shape (P,), are values and slopes at t = 0 and at t = 1. Returned are the largest
+    possible width in t, zero where a function surely stays positive, and where it is lowest.
+
+    The lowest point is that of the cubic or of the parabolas through both values and one slope, less the disagreement
+    of the three curves and `BEND` of the smaller value.
+    """
+    # Parabolas d0 + s0 t + f t^2 and d1 - s1 r + g r^2, r = 1 - t; cubic d0 + s0 t + h t^2 + k t^3.
+    f, g = d1 - d0 - s0, d0 - d1 + s1
+    h, k = 3 * (d1 - d0) - 2 * s0 - s1, 2 * (d0 - d1) + s0 + s1
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(np.maximum(h * h - 3 * k * s0, 0.0))
+        t = np.array([-s0 / (2 * f), 1 - s1 / (2 * g), (root - h) / (3 * k)])
+        t = np.clip(np.nan_to_num(t, nan=0.5), 0.0, 1.0)
+        r = 1 - t
+        curve = d0 + t * (s0 + t * (h + t * k))
+        spread = np.maximum(np.abs(d0 + t * (s0 + t * f) - curve), np.abs(d1 - r * (s1 - r * g) - curve))
+        low = curve - spread - BEND * np.minimum(d0, d1) * (4 * t * r)
+        deepest = np.argmin(low, axis=0), np.arange(len(d0))
+        depth = np.maximum(-low[deepest], 0.0)
+        width = np.where(depth > 0, 2 * np.sqrt(depth / np.maximum(np.abs(f), np.abs(g))), 0.0)
+    return np.minimum(width, 1.0), t[deepest]
+
+
+def excursion(a: Any, slope_a: Any, b: Any, slope_b: Any) -> tuple[Floats, Floats]:
+    """Where pairs of motions have another sign of Re s in 0 < t < 1 than at both ends.
+
+    Parameters
+    ----------
+    a, slope_a, b, slope_b : two ndarrays of complex, shape (P,)
+        s of the two motions at t = 0, their slopes, and those at t = 1.
+
+    Returns
+    -------
+    width, place : ndarray, shape (P,)
+        Share of the increment, zero where there is no such place, and where Re s is farthest on the other side.
+    """
+    mean = cubic(*(0.5 * (each[0] + each[1]) for each in (a, slope_a, b, slope_b)))
+    gap_a, gap_b = a[0] - a[1], b[0] - b[1]
+    drift_a, drift_b = 2 * gap_a * (slope_a[0] - slope_a[1]), 2 * gap_b * (slope_b[0] - slope_b[1])
+    root = 0.5 * np.sqrt(cubic(gap_a**2, drift_a, gap_b**2, drift_b).astype(complex)).real
+    inside = np.array([mean.real + root, mean.real - root])
+    before, after = (np.sort(np.array(each).real, axis=0)[::-1, ..., None] for each in (a, b))
+    other = ((inside > 0) != (before > 0)) & ((before > 0) == (after > 0))
+    depth = np.where(other, np.abs(inside), 0.0).max(axis=0)
+    return other.any(axis=0).sum(axis=-1) / (len(PLACES) + 1), PLACES[np.argmax(depth, axis=-1)]

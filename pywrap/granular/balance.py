@@ -194,7 +194,7 @@ def moving_region(lmp: Any, commands: Commands) -> str:
     A region may have `move` and `rotate` with variables. Whether these change in time, or have come to a constant, is
     seen in a few steps of a copy.
     """
-    found = {}
+    found: dict[str, tuple[str, str]] = {}
     for name, line in commands.fixes.items():
         regions = [line.split()[line.split().index("region") + 1]] if " wall/gran/region" in line else []
         for region in regions:

@@ -15,7 +15,7 @@ from .granular_commands import BODIES, OWN, Commands, NotTakenError, without_suf
 from .instance_queries import open_files
 from .lammps_arrays import Arrays
 from .look_in_a_copy import in_a_copy
-from .looks import box_of, look_at_forces, particles_of
+from .looks import box_of, look, members_of, particles_of
 from .mobility import mobility
 
 NORMAL_PART = 1e-6
@@ -60,8 +60,7 @@ def still_particles(lmp: Any, given: Commands | None) -> Still:
     columns = ["dx dy dz force p1 p2 p3", "dx dy dz force", "dx dy dz"]
     while True:  # not every pair style hands all of these out
         try:
-            look = partial(look_at_forces, lmp, given, files, columns[0])
-            commands, fixes, found, members = in_a_copy(look)
+            commands, fixes, found = in_a_copy(partial(look, lmp, given, files, columns[0]))
             break
         except NotTakenError:
             columns.pop(0)
@@ -70,6 +69,7 @@ def still_particles(lmp: Any, given: Commands | None) -> Still:
     count, dimension = len(found["id"]), lmp.extract_setting("dimension")
     if count == 0:
         raise NotTakenError("This LAMMPS has no particles.")
+    members = members_of(found)
     lines = {name: line for name, line in commands.fixes.items() if name in members}
     moved = mobility(lines, members, found["rmass"], dimension)
     empty = csr_array(moved.constraint.shape)

@@ -39,7 +39,7 @@ from .balance import known_cause
 from .contact_law_measurement import MeasuredLaw, State, measure_law, remark_on
 from .granular_commands import GIVE_LINES, OWN, Commands, NotLinearisedError, NotTakenError, without_suffix
 from .lammps_arrays import Arrays
-from .looks import box_of, particles_of
+from .looks import box_of, members_of, particles_of
 from .mobility import mobility
 
 FORCE_AGREEMENT = 1e-6
@@ -74,8 +74,8 @@ def configuration_by_laws(lmp: Any, commands: Commands, found: Arrays, laws: Kno
     """The configuration of the arrays of a look; laws that are known are not measured, and new ones are added."""
     if not len(found["id"]):
         raise NotTakenError("This LAMMPS has no particles.")
-    lines = {name: line for name, line in commands.fixes.items() if f"group {name}" in found}
-    members = {name.removeprefix("group "): each for name, each in found.items() if name.startswith("group ")}
+    members = members_of(found)
+    lines = {name: line for name, line in commands.fixes.items() if name in members}
     moved = mobility(lines, members, found["rmass"], lmp.extract_setting("dimension"))
     free, frozen = moved.free, np.zeros(len(found["id"]), bool)
     for name, line in lines.items():

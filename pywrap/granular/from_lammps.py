@@ -20,7 +20,7 @@ from .configuration_by_laws import KnownLaws, check_friction, configuration_by_l
 from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError, read_commands, with_one_rank
 from .instance_queries import open_files, require_instance
 from .look_in_a_copy import can_copy, in_a_copy
-from .looks import look_at_contacts
+from .looks import look
 from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError, OtherStiffnessError, push_remark
 from .motion_proof import prove as prove_motion
 
@@ -36,8 +36,9 @@ def from_lammps(
 ) -> Configuration:
     """The packing of a LAMMPS instance with its linearised contacts, as it stands.
 
-    The instance does not change: its next run is the same to the bit as without the look, on any number of ranks, and
-    with the threads of `package omp`.
+    The instance does not change: its next run is the same to the bit as without the look. On several ranks, or with the
+    threads of `package omp`, LAMMPS itself runs zero steps: fixes and variables that these would change are refused by
+    their names before.
 
     Parameters
     ----------
@@ -63,13 +64,14 @@ def from_lammps(
     -------
     Configuration
         With its contacts' laws, as they are measured; or, where these do not apply (`operators` says which), with K and
-        C by differences of forces, on one rank. Its `remarks` name the drag and the velocities that are left out.
+        C by differences of forces, on one rank. Its `remarks` name the drag and the velocities that are left out, and
+        say why differences are taken.
 
     Raises
     ------
     NotTakenError
         If the packing cannot be taken: it moves, or has moving walls or bodies that rotate; or the commands are not
-        those of the instance; or LAMMPS's forces do not change as K says.
+        those of the instance; or LAMMPS's forces do not change as K says; or the look would change the next run.
     """
     return take_configuration(lmp, commands, {}, slides=slides, balance=balance, prove=prove, differences=differences)
 
@@ -102,7 +104,7 @@ def take_configuration(
 def _instead_of_laws(
     lmp: Any, given: Commands | None, reason: NotLinearisedError, *, slides: bool, balance: float, prove: bool
 ) -> Configuration:
-    """A Configuration by differences, with the reason among its remarks; or that by laws, where it is as close."""
+    """A Configuration by differences, with the reason among its remarks; or the reason, where it is not proved."""
     why = str(reason).rstrip(".")
     if not can_copy(lmp):
         raise NotLinearisedError(with_one_rank(reason)) from reason
@@ -132,8 +134,8 @@ def _instead_of_laws(
 
 def _by_laws(lmp: Any, given: Commands | None, laws: KnownLaws, *, balance: float, prove: bool) -> Configuration:
     """A Configuration whose contacts have the laws that LAMMPS shows; a NotLinearisedError if something else acts."""
-    look = partial(look_at_contacts, lmp, given, open_files())
-    deck, fixes, found = in_a_copy(look) if can_copy(lmp) else look()
+    work = partial(look, lmp, given, open_files())
+    deck, fixes, found = in_a_copy(work) if can_copy(lmp) else work()
     try:
         configuration = configuration_by_laws(lmp, deck, found, laws)
     except ValueError as error:  # numbers that no contact at rest has

@@ -53,7 +53,7 @@ PRINT = re.compile(
 )
 """The command `print` in a log. LAMMPS writes the text into the lines that follow."""
 
-RUN = re.compile(r"(?ms)^[ \t]*(run|minimize|rerun)[ \t](?![^\n]*\bevery\b)[^\n]*\n.*?^Loop time of [^\n]*$")
+RUN = re.compile(r"(?ms)^[ \t]*(?:(run|minimize|rerun)[ \t][^\n]*\n|Per MPI rank memory ).*?^Loop time of [^\n]*$")
 """A run in a log, with all that is written meanwhile, by `fix print` among others."""
 
 
@@ -103,7 +103,7 @@ def read_commands(lines: "Iterable[str] | Commands", *, log: bool = False) -> Co
         return lines
     whole = lines if isinstance(lines, str) else "\n".join(lines)
     found = []
-    for line in re.sub(r"&[ \t]*\n", " ", RUN.sub("run", _without_prints(whole)) if log else whole).splitlines():
+    for line in re.sub(r"&[ \t]*\n", " ", RUN.sub(r"\1", _without_prints(whole)) if log else whole).splitlines():
         text = line.split("#")[0]
         if "$" in text and text.split()[0] in ("pair_style", "pair_coeff", "fix", "region"):
             if log:

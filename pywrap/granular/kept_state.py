@@ -43,7 +43,6 @@ def keep_state(lmp: Any, carried_out: Iterable[list[str]], keep: Path, deck: Pat
     with shared_folder(world) as folder:
         try:
             lmp.command("restart 0")
-            lmp.command("thermo_modify lost error")
             lmp.command(f"restart 1 {folder}/state.*")
             lmp.command("run 1 post no")
             lmp.command("restart 0")

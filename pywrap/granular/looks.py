@@ -45,30 +45,45 @@ SETTING = ("setforce", "aveforce", "lineforce", "planeforce")
 """Fixes that set forces, of which the force of a wall is then no difference."""
 
 
-def look_at_contacts(
-    lmp: Any, given: Commands | None, files: dict[int, OpenFile]
+def look(
+    lmp: Any, given: Commands | None, files: dict[int, OpenFile], columns: str = ""
 ) -> tuple[Commands, dict[str, str], Arrays]:
     """The commands, the styles of fixes, and the arrays of all ranks in the order of the particles' IDs; in a copy if
-    there can be one."""
+    there can be one.
+
+    With `columns` of compute pair/local, whatever exerts forces is taken: contacts with walls are not looked at one by
+    one, and "at walls" has the sizes of the forces of all walls on each particle, shape (N,).
+    """
     world, copied = communicator(lmp), can_copy(lmp)
     if given is None:
         lines = log_of(lmp, files) if copied else world.bcast(only_log() if world.rank == 0 else None, root=0)
-        given = _logged_commands(lines)
+        if lines is None:
+            raise NotTakenError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
+        given = read_commands(lines, log=True)
     elif copied:
         lmp.command("log none")
     styles = styles_of(lmp)
-    check_instance(lmp, styles, given)
+    with suppress(NotLinearisedError) if columns else nullcontext():
+        check_instance(lmp, styles, given)
     plain = {name: without_suffix(style) for name, style in styles.fixes.items()}
-    groups = _groups(lmp, {name: given.fixes[name] for name in plain if plain[name] in MOBILE})
-    walls = [name for name in plain if plain[name] in WALLS]
-    columns = "dx dy dz force p3" if given.style == OWN else "dx dy dz force p1 p2 p3"
+    if columns:
+        _check_motion(lmp, plain, given)
+    mobile = {name: given.fixes[name] for name, style in plain.items() if style in MOBILE}
+    groups = {name: line.split()[2] for name, line in mobile.items()}
+    for name in [name for name in mobile if plain[name] in BODIES]:
+        bodies = translating_bodies(mobile[name], lmp.extract_setting("dimension"))
+        groups |= {f"{name} {body.group}": body.group for body in bodies}
     if copied:
         quieten(lmp, drag=True)
     else:
         _refuse_changes(lmp, styles, given)
-    silent = _silent_walls(styles, given)
+    silent = _silent_walls(styles, given) if not columns else []
+    walls = [name for name in plain if plain[name] in WALLS and name not in silent and not columns]
+    usual = "dx dy dz force p3" if given.style == OWN else "dx dy dz force p1 p2 p3"
     with nullcontext() if copied else given_back(lmp):
-        mine = arrays_at_rest(lmp, groups, [name for name in walls if name not in silent], columns)
+        mine = arrays_at_rest(lmp, groups, walls, columns or usual)
+    if columns:
+        mine["at walls"] = _forces_of_walls(lmp, styles, given, mine)
     forces = mine["f"]
     setting = [name for name in plain if silent and plain[name] in SETTING]
     for name in setting:
@@ -79,9 +94,32 @@ def look_at_contacts(
     for name in silent:
         mine[f"wall {name}"], forces = contacts_of_plane(lmp, name, given.fixes[name], mine, forces)
     every = world.allgather(mine)
-    found = {name: _join_ranks([each[name] for each in every]) for name in mine}
+    found = {}
+    for name in mine:  # the array of a rank without rows may have another number of columns
+        parts = [each[name] for each in every]
+        found[name] = np.concatenate([part for part in parts if len(part)] or parts[:1])
     order = np.argsort(found["id"], kind="stable")
     return given, styles.fixes, {name: rows if name in BY_CONTACT else rows[order] for name, rows in found.items()}
+
+
+def _check_motion(lmp: Any, plain: dict[str, str], given: Commands) -> None:
+    """Refuse fixes that move or hold particles in a way that is not known, and walls that move."""
+    for name, style in plain.items():
+        if not style.startswith((*MOVES, *HOLDS)):
+            continue
+        if style not in MOBILE:
+            raise NotTakenError(
+                f"fix {name} {style} moves or holds particles in a way that is not known here: unfix it."
+            )
+        if name not in given.fixes or without_suffix(given.fixes[name].split()[3]) != style:
+            raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINE}.")
+    if moves := moving_region(lmp, given):
+        raise NotTakenError(moves)
+
+
+def members_of(found: Arrays) -> dict[str, NDArray[np.bool_]]:
+    """Who is in the group of each fix that moves or holds particles, and in the bodies of a fix rigid."""
+    return {name.removeprefix("group "): each for name, each in found.items() if name.startswith("group ")}
 
 
 def _refuse_changes(lmp: Any, styles: Styles, commands: Commands) -> None:
@@ -99,60 +137,6 @@ def _refuse_changes(lmp: Any, styles: Styles, commands: Commands) -> None:
             f"{' and '.join(changes)} may write, count or draw random numbers, so that the next run would be another "
             "one: take one rank and one thread, where the look is in a copy, or unfix or delete what is named."
         )
-
-
-def _groups(lmp: Any, lines: dict[str, str]) -> dict[str, str]:
-    """The groups of fixes by their IDs; and those of the bodies of a fix rigid, by the ID and the group."""
-    groups = {name: line.split()[2] for name, line in lines.items()}
-    for name, line in lines.items():
-        if without_suffix(line.split()[3]) in BODIES:
-            bodies = translating_bodies(line, lmp.extract_setting("dimension"))
-            groups |= {f"{name} {body.group}": body.group for body in bodies}
-    return groups
-
-
-def _logged_commands(lines: list[str] | None) -> Commands:
-    """The commands of a log, which an instance may not have."""
-    if lines is None:
-        raise NotTakenError(f"This LAMMPS has no log to read its commands from: {GIVE_LINES}.")
-    return read_commands(lines, log=True)
-
-
-def _join_ranks(parts: list[Floats]) -> Floats:
-    """Rows of all ranks; the array of a rank without rows may have another number of columns."""
-    return np.concatenate([part for part in parts if len(part)] or parts[:1])
-
-
-def look_at_forces(
-    lmp: Any, given: Commands | None, files: dict[int, OpenFile], columns: str
-) -> tuple[Commands, dict[str, str], Arrays, dict[str, NDArray[np.bool_]]]:
-    """The commands, the styles of fixes, the particles, and who is in the groups of the fixes that move or hold them;
-    in a copy."""
-    if given is None:
-        given = _logged_commands(log_of(lmp, files))
-    lmp.command("log none")
-    styles = styles_of(lmp)
-    with suppress(NotLinearisedError):
-        check_instance(lmp, styles, given)
-    moving = {name for name, style in styles.fixes.items() if style.startswith((*MOVES, *HOLDS))}
-    for name in moving:
-        style = styles.fixes[name]
-        if without_suffix(style) not in MOBILE:
-            raise NotTakenError(
-                f"fix {name} {style} moves or holds particles in a way that is not known here: unfix it."
-            )
-        if name not in given.fixes or without_suffix(given.fixes[name].split()[3]) != without_suffix(style):
-            raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINE}.")
-    if moves := moving_region(lmp, given):
-        raise NotTakenError(moves)
-    groups = _groups(lmp, {name: line for name, line in given.fixes.items() if name in moving})
-    quieten(lmp, drag=True)
-    found = arrays_at_rest(lmp, groups, [], columns)
-    found["at walls"] = _forces_of_walls(lmp, styles, given, found)
-    order = np.argsort(found["id"], kind="stable")
-    members = {name: found.pop(f"group {name}")[order] for name in groups}
-    found = {name: rows if name in BY_CONTACT else rows[order] for name, rows in found.items()}
-    return given, styles.fixes, found, members
 
 
 def _forces_of_walls(lmp: Any, styles: Styles, commands: Commands, found: Arrays) -> Floats:

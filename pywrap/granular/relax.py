@@ -192,8 +192,9 @@ def bring_to_rest(
     finally:
         drag.remove()
     raise NoEquilibriumError(
-        f"The packing does not come to rest{where} in {steps} steps: {residual:.3g} is out of balance, and its "
-        f"particles have moved by {way / diameter:.2g} diameters; give more steps, or the packing creeps or flows."
+        f"The packing does not come to rest{where} in {steps} steps: {residual / (force or 1.0):.2g} of the mean "
+        f"contact force is out of balance, and its particles have moved by {way / diameter:.2g} diameters; give more "
+        "steps, or the packing creeps or flows."
     )
 
 

@@ -65,6 +65,7 @@ def run_deck(
     keep: Path | None = None,
     notice: Notice | None = None,
     show: Notice | None = None,
+    use: Callable[[Any, Configuration], None] | None = None,
 ) -> Configuration:
     """Run a deck in its own folder, as `lmp -in` there, and take its last state as `from_lammps` does.
 
@@ -82,6 +83,8 @@ def run_deck(
         Gets a sentence before the first run if what is set up cannot be taken as it stands; the deck may change that.
     show : callable, optional
         Gets how far `relaxes` has come.
+    use : callable, optional
+        Gets the instance and its packing before the instance is closed.
 
     Raises
     ------
@@ -95,7 +98,10 @@ def run_deck(
         raise BadInputError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
     deck = carry_out_deck(path, notice)
     try:
-        return _take(deck, path, slides=slides, balance=balance, relaxes=relaxes, show=show)
+        found = _take(deck, path, slides=slides, balance=balance, relaxes=relaxes, show=show)
+        if use is not None:
+            use(deck.lmp, found)
+        return found
     except (NotTakenError, NoEquilibriumError) as error:
         kept = keep_state(deck.lmp, deck.carried_out, keep, path) if keep else ""
         raise NotTakenError(f"{_of_deck(str(error)).rstrip('.')}. {kept}".rstrip()) from error
@@ -144,13 +150,17 @@ def carry_out_deck(path: Path, notice: Notice | None = None) -> EndedDeck:
             plugin.faultgouge_end_watch(lmp.lmp, int(complete))
     finally:
         os.chdir(here)
+    carried_out = communicator(lmp).bcast(carried_out, root=0)
     if lmp.extract_setting("box_exist"):
-        _close_files(lmp)
-    return EndedDeck(lmp, communicator(lmp).bcast(carried_out, root=0), stopped)
+        _close_files(lmp, carried_out)
+    return EndedDeck(lmp, carried_out, stopped)
 
 
-def _close_files(lmp: Any) -> None:
-    """Close the files that a deck has open, and have no run of this program end early."""
+def _close_files(lmp: Any, carried_out: list[list[str]]) -> None:
+    """Close the files that a deck has open; and have no run of this program end early, or need what is taken away."""
+    lost = [words[words.index("lost") + 1] for words in carried_out if "lost" in words and words[0] == "thermo_modify"]
+    lmp.command("thermo_style custom step")
+    lmp.command(f"thermo_modify lost {lost[-1] if lost else 'error'}")
     for name in lmp.available_ids("dump"):
         lmp.command(f"undump {name}")
     for name, style in styles_of(lmp).fixes.items():

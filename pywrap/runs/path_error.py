@@ -42,13 +42,11 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, eigvals
-from scipy.sparse.linalg import ArpackError
+from scipy.linalg import LinAlgError
 
-from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing, dynamical_matrix, nearest_modes
+from ...analysis import NoEquilibriumError, Onset, OnsetError, Packing
 from ...analysis.arrays import Floats
-from ...analysis.windows import Space, System, Window, force_bearing
-from ...analysis.windows.nearby import nearest_mode
+from ...analysis.windows import System, Window, eigenvalues_near
 from ..equilibria.quasistatic import Equilibrium
 from ..load_path import LoadPath
 from .nearby_root import nearby_root
@@ -61,7 +59,7 @@ FEWEST_INCREMENTS = 4
 LEAST_BEARING_FORCE = 1e-9
 """Normal force, in units of F_y, from which on a contact counts; that of a disk that carries nothing is noise."""
 
-PATH_FAILURES = NoEquilibriumError, OnsetError, ArpackError, LinAlgError
+PATH_FAILURES = NoEquilibriumError, OnsetError, LinAlgError
 """Errors of another path, which cost the error of the path alone and not the onset."""
 
 LOAD_SHIFTS = 1 / 3, 2 / 3
@@ -69,9 +67,6 @@ LOAD_SHIFTS = 1 / 3, 2 / 3
 
 LONGEST_RUN = 2
 """Loads that may be left out one after the other."""
-
-DISKS_OF_ALL_MODES = 30
-"""Disks up to which all eigenvalues take no longer than some."""
 
 UNCERTAINTY_OF_CORRECTION = 2.0
 """Uncertainty of an extrapolated onset, in units of the correction. As a rule a correction is good to a tenth.
@@ -290,13 +285,7 @@ def squared_gap(eigenvalue: float) -> Vanishes:
     """(lambda_1 - lambda_2)^2 of the two eigenvalues nearest to one, 1 / time^4, as a function of the packing."""
 
     def discriminant(packing: Packing) -> float:
-        near = eigenvalue * (1 + 1e-7)  # no eigenvalue to the last digit
-        bare = force_bearing(packing)
-        values = (
-            eigvals(dynamical_matrix(bare)[0].toarray())
-            if len(bare) < DISKS_OF_ALL_MODES
-            else nearest_modes(bare, near, 4).values
-        )
+        values = eigenvalues_near(System.of(packing), eigenvalue)
         one, other = values[np.argsort(np.abs(values - eigenvalue))[:2]]
         return float(((one - other) ** 2).real)
 
@@ -305,14 +294,12 @@ def squared_gap(eigenvalue: float) -> Vanishes:
 
 def growth_near(frequency: float, with_dashpots: Callable[[Packing], Packing]) -> Vanishes:
     """Re s of the motion nearest to a frequency, 1 / time, as a function of the packing without its dissipation."""
-    known: list[Space] = []
+    last = 1j * frequency
 
     def growth(packing: Packing) -> float:
-        system = System.of(with_dashpots(packing), dissipation=True)
-        followed = (known[0].at(system) if known else None) or nearest_mode(system, frequency)
-        if followed is None:
-            return np.nan
-        known[:] = [followed]
-        return followed.growth
+        nonlocal last
+        values = eigenvalues_near(System.of(with_dashpots(packing), dissipation=True), last)
+        last = complex(values[np.argmin(np.abs(values - last))])
+        return last.real
 
     return growth

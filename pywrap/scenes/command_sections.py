@@ -58,4 +58,4 @@ COMMANDS: Mapping[str, Command] = {
 def command_of(name: str | None) -> Command | None:
     """What a command, a study or the task of a sweep reads; None of one that reads every section."""
     study = None if name is None or name in COMMANDS else registered.study_of(name)
-    return COMMANDS.get(name or "") if study is None else Command(study.reads, study.needs)
+    return COMMANDS.get(name or "") if study is None else Command(study.sections, study.needs)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .pywrap import Scene, from_lammps, perturb, ramp, relax, settle
     from .pywrap.onset import onset
     from .pywrap.runs.drive import drive
-    from .stored_files import load, spectrum, stability
+    from .stored_files import elastic_moduli, frames, load, spectrum, stability, stress, vibrations
     from .studies.sweep.run_sweep import sweep
 
     __version__: str
@@ -29,8 +29,8 @@ if "IPython" in sys.modules:
     show_pictures()
 
 __all__ = [
-    "Scene", "__version__", "draw", "drive", "from_lammps", "load", "onset", "pair", "perturb", "ramp", "relax",
-    "settle", "spectrum", "stability", "sweep", "view",
+    "Scene", "__version__", "draw", "drive", "elastic_moduli", "frames", "from_lammps", "load", "onset", "pair",
+    "perturb", "ramp", "relax", "settle", "spectrum", "stability", "stress", "sweep", "vibrations", "view",
 ]  # fmt: skip
 
 _get, __dir__ = names_on_use(__name__, __file__)

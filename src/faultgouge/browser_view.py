@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,20 @@ from .stored_files import load, packing_in, path_of
 Progress = Callable[[Sequence[HasConfiguration]], Iterable[HasConfiguration]]
 
 
+class ViewedPage(type(Path())):  # type: ignore[misc]  # the class of paths of this system
+    """The path of a page, which a notebook shows."""
+
+    def _repr_html_(self) -> str:
+        return f'<iframe srcdoc="{escape(self.read_text())}" width="100%" height="640" style="border: 0"></iframe>'
+
+
 def view(
     file: str | Path,
     output: str | Path = "page.html",
     loads: int | None = None,
     say: Callable[[str], Any] = print,
     progress: Progress = iter,
-) -> Path:
+) -> ViewedPage:
     """Write a page of a stored packing, ramp, undamped run or driven run.
 
     Parameters
@@ -38,8 +46,8 @@ def view(
 
     Returns
     -------
-    Path
-        The page.
+    ViewedPage
+        The path of the page; in a notebook the page itself is seen.
 
     Raises
     ------
@@ -65,7 +73,7 @@ def view(
     if seconds(packings) > 5:
         say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
     write_view(packings, output, title, series, progress, axis)
-    return output
+    return ViewedPage(output)
 
 
 def _of_run(run: RunFile, most: int) -> tuple[list[Any], Axis | None, str]:

@@ -38,15 +38,17 @@ def description(name: str) -> Description | None:
     """The description of a study; None if there is no study of this name."""
     path = FOLDER / f"{name}.py"
     text = path.read_text(encoding="utf-8") if name.isidentifier() and path.is_file() else ""
-    if "\n@study(" not in text and "\n@task(" not in text:
+    begin = max(text.find("\n@study("), text.find("\n@task("))
+    if begin < 0:
         return None
-    functions = [node for node in ast.parse(text).body if isinstance(node, ast.FunctionDef) and node.name == name]
-    for node in functions:
-        for each in node.decorator_list:
-            if isinstance(each, ast.Call) and isinstance(each.func, ast.Name) and each.func.id in ("study", "task"):
-                given = {str(key.arg): getattr(key.value, "value", None) for key in each.keywords}
-                return Description(each.func.id, given, ast.get_docstring(node) or "")
-    return None
+    # the decorated function alone: to parse whole files takes a fifth of the time of `faultgouge --help`
+    (node,) = ast.parse(text[begin:].split("\n\n\n")[0]).body
+    if not isinstance(node, ast.FunctionDef) or node.name != name:
+        return None
+    (decorator,) = node.decorator_list
+    assert isinstance(decorator, ast.Call)
+    given = {str(key.arg): getattr(key.value, "value", None) for key in decorator.keywords}
+    return Description(getattr(decorator.func, "id", ""), given, ast.get_docstring(node) or "")
 
 
 def names() -> list[str]:

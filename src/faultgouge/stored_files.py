@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .analysis import BadInputError, Configuration, MindlinLaw, Packing, RunFile, read_dump
+from .analysis import BadInputError, Configuration, MindlinLaw, Packing, RunFile, Stability, read_dump
+from .analysis import elastic_moduli as moduli_of_packing
 from .analysis import spectrum as spectrum_of_packing
 from .analysis import stability as stability_of_packing
+from .analysis import stress as stress_of_packing
+from .analysis import vibrations as vibrations_of_packing
 from .analysis.files.configuration_file import holds_configuration, read_configuration
 from .analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
+from .analysis.files.formats.lammps_dump import dump_frames
 from .analysis.files.runfile import law_of_parameters
 from .analysis.has_configuration import HasConfiguration
 
@@ -93,6 +98,41 @@ def load(
     return packing_of(disks, law, layer, drag_time=drag_time, **load)
 
 
+class frames(Sequence["Packing | Configuration"]):  # noqa: N801  # a function to its users, as `range` is
+    """The packings of a file, each read when it is asked for.
+
+    Parameters
+    ----------
+    file : str or Path
+        As for `load`.
+
+    Examples
+    --------
+    ``len(frames("run.h5"))``, ``frames("run.h5")[-1]``, ``[packing.fx for packing in frames("run.h5")]``.
+    """
+
+    def __init__(self, file: str | Path) -> None:
+        self.path = path_of(file, "frames")
+        if self.path.suffix == ".disks":
+            self._count = sum(1 for _ in dump_frames(self.path))
+        elif self.path.suffix == ".h5" and not holds_configuration(self.path):
+            with RunFile(self.path) as run:
+                self._count = len(run)
+        else:
+            load(self.path)
+            self._count = 1
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, number: Any) -> Any:
+        chosen = range(self._count)[number]
+        return [load(self.path, each) for each in chosen] if isinstance(number, slice) else load(self.path, chosen)
+
+    def __repr__(self) -> str:
+        return f"<frames of {self.path}: {self._count}>"
+
+
 def path_of(file: object, caller: str) -> Path:
     """The path that a function is given; a BadInputError if it is none."""
     if isinstance(file, (str, Path)):
@@ -125,8 +165,39 @@ def takes_file(
     return opens
 
 
-stability = takes_file(stability_of_packing)
+@takes_file
+def stability(
+    packing: HasConfiguration,
+    rise: str | ArrayLike | None = None,
+    time: float | None = None,
+    *,
+    follow: Any = None,
+    **known: Any,
+) -> Stability:
+    """Whether a packing moves; see :func:`faultgouge.analysis.stability`.
+
+    Parameters
+    ----------
+    packing : Packing, Configuration, str or Path
+        The equilibrium, or a file with it.
+    rise, time, **known
+        As there.
+    follow : bool or lammps.lammps, optional
+        Whether LAMMPS goes on where motion grows, until it vibrates, creeps or flows (`Stability.follow`): True of a
+        Packing, which the plugin moves, or the instance of which a Configuration was taken.
+    """
+    if follow is None or follow is False:
+        return stability_of_packing(packing, rise, time, **known)
+    from .pywrap.granular.growth_followed import follow_by
+
+    followed = follow_by(packing, None if follow is True else follow)
+    return stability_of_packing(packing, rise, time, follow=followed, **known)
+
+
 spectrum = takes_file(spectrum_of_packing)
+stress = takes_file(stress_of_packing)
+elastic_moduli = takes_file(moduli_of_packing)
+vibrations = takes_file(vibrations_of_packing)
 
 
 def packing_in(run: RunFile, frame: int = -1) -> Packing:

@@ -162,7 +162,7 @@ def test_dumps_that_are_asked_for_hold_the_equilibria(faultgouge_here, beyond):
         (("view", "scene.toml"), "scene.toml is a scene, and this command reads a stored packing"),
         (("onset", "run.h5"), "run.h5 is a stored run, and onset reads a scene: give its .toml file"),
         (("onset", "disks.csv"), "convert it by `faultgouge import disks.csv -o packing.h5`"),
-        (("stability", "run.h5"), "`faultgouge spectrum run.h5` says whether a packing is stable"),
+        (("stability", "scene.toml"), "scene.toml is a scene, and this command reads a stored packing"),
     ],
 )
 def test_a_file_of_the_wrong_kind_is_refused_with_what_to_do(refusal, words, says):
@@ -208,7 +208,7 @@ def test_the_overview_has_the_whole_first_sentence_of_each_command(faultgouge_he
     assert "merge Join the shards of a sweep; the table is that of an undivided sweep. eruptions" in text
     commands = program().commands
     hidden = {name for name in commands if commands[name].hidden}
-    assert hidden == {"stability"}  # the name that `extremes` once had
+    assert hidden == set()
     assert set(re.findall(r"^  (\w+)  ", table, re.MULTILINE)) == set(commands) - hidden
     assert "Did you mean 'onset'?" in refusal("onst")
 

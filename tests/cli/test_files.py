@@ -183,7 +183,7 @@ OTHERS = {
     "movie run.h5 --mode 0 -o data.gif": "data.gif",
     "movie run.h5 --mode 0 -o data.mp4": "data.mp4",
     "view run.h5 -o data.html": "data.html",
-    **{f"export run.h5 -o data.{suffix}": f"data.{suffix}" for suffix in ("vtp", "xyz", "data", "gsd")},
+    **{f"export run.h5 -o data.{suffix}": f"data.{suffix}" for suffix in ("vtp", "xyz", "data", "gsd", "csv")},
     "export run.h5 --frames all -o data.pvd": "data/00000.vtp",
     "sweep sweep.toml -o out": "out/results.csv",
     "sweep sweep.toml --workers 1 -o out": "out/sweep.json",

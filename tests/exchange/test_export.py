@@ -371,7 +371,10 @@ def test_pandas_reads_a_table_of_contacts(tmp_path, sheared, configuration):
         held = packing.configuration
         pandas.testing.assert_frame_equal(table[list(held.to_pandas())], held.to_pandas(), check_exact=True)
         total = held.load[:, 0].copy()
-        force = table[["n_x", "n_y", "n_z"]].mul(table.f_n, axis=0).to_numpy() + table[["t_x", "t_y", "t_z"]].to_numpy()
+        force = (
+            table[["n_x", "n_y", "n_z"]].mul(table.f_n, axis=0).to_numpy()
+            + table[["f_t_x", "f_t_y", "f_t_z"]].to_numpy()
+        )
         np.add.at(total, table.id1 - 1, force)
         pair = table.id2 > 0
         np.subtract.at(total, table.id2[pair] - 1, force[pair])

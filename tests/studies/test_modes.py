@@ -65,7 +65,7 @@ def test_a_packing_that_buckles_ends_its_branch_and_counts():
     assert found["growth_rate"] == pytest.approx(spectrum(column).growth_rate(), rel=1e-9)
     # the ramp has come to the first load of the scene, 0.02 F_y
     there = Equilibrium(replace(column, fx=0.02 * 3.0), 0.0, 1e-11, 1)
-    row = modes(Scene.from_mapping(SCENE), lambda mu: there)
+    row = modes.row(Scene.from_mapping(SCENE), lambda mu: there)
     assert (row["ends"], row["loads"]) == ("turning point", [])
 
 
@@ -77,7 +77,7 @@ def test_the_command_leaves_rows_pictures_and_a_film(faultgouge, tmp_path):
     assert [row["fx_over_fy"] for row in rows] == [0.02, 0.1, 0.2]
     assert all(row["disks"] == 60 and row["seed"] == 77 for row in rows)
     scene = Scene.from_mapping(SCENE)
-    here = modes(scene, lambda mu: settle(scene, mu))
+    here = modes.row(scene, lambda mu: settle(scene, mu))
     assert [row["pairs"] for row in rows] == [load["pairs"] for load in here["loads"]]
     with (tmp_path / "out/modes.csv").open() as file:
         assert [int(row["pairs"]) for row in csv.DictReader(file)] == [row["pairs"] for row in rows]
@@ -99,7 +99,7 @@ def test_the_command_says_where_a_branch_ends_and_draws_a_packing_that_stays_sta
 @pytest.mark.slow
 def test_loads_beyond_the_last_equilibrium_are_left_out():
     scene = Scene.from_mapping(SCENE | {"modes": {"fx_over_fy": [0.2, 5.0]}, "ramp": {"step": 0.03, "until": 20.0}})
-    found = modes(scene, lambda mu: settle(scene, mu))
+    found = modes.row(scene, lambda mu: settle(scene, mu))
     assert found["ends"] == "no equilibrium"
     assert [load["fx_over_fy"] for load in found["loads"]] == [0.2]
     assert 0.6 <= found["reach"] < 15
@@ -110,7 +110,7 @@ def test_loads_beyond_the_last_equilibrium_are_left_out():
 def test_displacements_that_lammps_would_refuse_end_no_ramp(name, seed):
     """On the way Newton's method tries displacements with which the centre of a disk lies in another disk."""
     (point,) = (point for point in sets()[name].points if point.values["packing.seed"] == seed)
-    found = modes(point.scene, lambda mu: settle(point.scene, mu))
+    found = modes.row(point.scene, lambda mu: settle(point.scene, mu))
     assert len(found["loads"]) >= 8
 
 

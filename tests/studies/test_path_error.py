@@ -103,7 +103,7 @@ def test_rows_of_a_sweep_state_the_error_that_onset_states_and_it_covers():
     ramp = {"step": 2e-3, "until": 0.006}
     sections = {"packing": {"disks": 100, "seed": 28}, "law": {"kn": 2e5, "mu": 0.15}, "load": {"fy": 3.0}}
     scene, fine = (Scene.from_mapping(sections | {"ramp": ramp | more}) for more in ({}, {"step": 1e-4}))
-    row = onset(scene, partial(settle, scene))
+    row = onset.row(scene, partial(settle, scene))
     known, limit = (onset_run(each, 0.15, first=True) for each in (scene, fine))
     window = known.windows[0]
     assert (row["fx_c"], row["error"], row["error_of_path"]) == (window.fx_onset, window.error, window.path_error)

@@ -162,12 +162,6 @@ def test_the_end_of_python_in_a_task_is_a_row(folder):
     assert [row["says"] for row in rows[1:]] == [None, None]
 
 
-def test_a_module_that_ends_python_when_it_is_imported_is_refused(folder):
-    (folder / "ask.py").write_text("raise SystemExit(0)")
-    with pytest.raises(SceneError, match=r"cannot be imported .SystemExit: 0"):
-        sweep_of(folder, "ends")
-
-
 def test_merge_keeps_the_rows_of_its_target(folder):
     """A target that has more than the parts, as a row that was computed since, loses none; another sweep is refused."""
     one, two = shards(folder, "ends")

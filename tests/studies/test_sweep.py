@@ -73,26 +73,6 @@ def test_what_settles_alike(axes, changes, shared):
     assert (first.settling_key == second.settling_key) is shared
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ('task = "onest"', "give one of"),
-        ('task = "onset"\nseeds = 3', "seeds is no key of a sweep"),
-        ('task = "onset"\n[sweep]\n"packing.seed" = "5:1"', "is no range"),
-        ('task = "onset"\n[sweep]\n"packing.seed" = []', "give a list of values"),
-        ('task = "onset"\n[sweep]\n"packing.seed" = "0:999999"\n"law.mu" = [1.0, 0.5]', "are more than 1000000"),
-        ('task = "onset"\n[sweep]\n"law.kn, law.mu" = [1.0]', "names 2 keys"),
-        ('task = "onset"\n[sweep]\n"law.mo" = [1.0]\n[scene.law]\nkn = 1.0', "law.mo is no key"),
-        ('task = "onset"\nsweep = 3', "is not a section"),
-        ("task = ", "not valid TOML"),
-    ],
-)
-def test_bad_sweeps_are_refused_in_a_sentence(tmp_path, text, says):
-    (tmp_path / "sweep.toml").write_text(text)
-    with pytest.raises(SceneError, match=says):
-        Sweep.from_toml(tmp_path / "sweep.toml")
-
-
 def test_a_stored_packing_is_found_from_another_folder(tmp_path):
     (tmp_path / "packing.json").write_bytes(REFERENCE.read_bytes())
     mapping = {"task": "onset", "sweep": {"law.mu": [1.0]}, "scene": SMALL | {"packing": {"file": "packing.json"}}}
@@ -115,6 +95,34 @@ def seed_of(scene):
 def three(scene, settled, more):
     return {}
 '''
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('task = "onest"', "give one of"),
+        ('task = "onset"\nseeds = 3', "seeds is no key of a sweep"),
+        ('task = "onset"\n[sweep]\n"packing.seed" = "5:1"', "is no range"),
+        ('task = "onset"\n[sweep]\n"packing.seed" = []', "give a list of values"),
+        ('task = "onset"\n[sweep]\n"packing.seed" = "0:999999"\n"law.mu" = [1.0, 0.5]', "are more than 1000000"),
+        ('task = "onset"\n[sweep]\n"law.kn, law.mu" = [1.0]', "names 2 keys"),
+        ('task = "onset"\n[sweep]\n"law.mo" = [1.0]\n[scene.law]\nkn = 1.0', "law.mo is no key"),
+        ('task = "onset"\nsweep = 3', "is not a section"),
+        ("task = ", "not valid TOML"),
+        ('task = "none.py:contacts"', "there is no file"),
+        ('task = "ask.py:nothing"', "has no function nothing"),
+        ('task = "ask.py:three"', r"takes 3 arguments: a task is three\(scene\)"),
+        ('task = "no.such.module:f"', "cannot be imported"),
+        ('task = "broken.py:f"', "cannot be imported .SyntaxError"),
+        ('task = "ends.py:f"', r"cannot be imported .SystemExit: 0"),
+    ],
+)
+def test_bad_sweeps_are_refused_in_a_sentence_before_work(tmp_path, text, says):
+    for name, code in {"ask.py": FUNCTIONS, "broken.py": "def", "ends.py": "raise SystemExit(0)"}.items():
+        (tmp_path / name).write_text(code)
+    (tmp_path / "sweep.toml").write_text(text)
+    with pytest.raises(SceneError, match=says):
+        Sweep.from_toml(tmp_path / "sweep.toml")
 
 
 def function_sweep(folder, function, axes=None):
@@ -147,23 +155,6 @@ def test_rows_of_a_function_are_known_by_its_code_and_shards_merge_without_it(tm
     assert not set(before) & {point.key for point in function_sweep(tmp_path, "contacts").points}
     file.unlink()
     assert [row["key"] for row in merge(parts, tmp_path / "whole", id)[1]] == before
-
-
-@pytest.mark.parametrize(
-    ("task", "says"),
-    [
-        ("none.py:contacts", "there is no file"),
-        ("ask.py:nothing", "has no function nothing"),
-        ("ask.py:three", r"takes 3 arguments: a task is three\(scene\)"),
-        ("no.such.module:f", "cannot be imported"),
-        ("broken.py:f", "cannot be imported .SyntaxError"),
-    ],
-)
-def test_a_function_that_cannot_be_called_is_refused_before_work(tmp_path, task, says):
-    (tmp_path / "ask.py").write_text(FUNCTIONS)
-    (tmp_path / "broken.py").write_text("def")
-    with pytest.raises(SceneError, match=says):
-        Sweep.from_mapping({"task": task, "scene": SMALL}, tmp_path)
 
 
 def test_known_rows_tell_how_long_a_scene_takes(tmp_path):

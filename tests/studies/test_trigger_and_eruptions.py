@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from reference_layer import REFERENCE, SMALL, toml
 
+from faultgouge.analysis.files.atomic_write import FORMAT, FORMAT_KEY
 from faultgouge.figures.pages import render
 from faultgouge.pywrap import Scene, SceneError, perturb, reach, settle
 from faultgouge.studies.eruptions import StartOfRun as RunStart
@@ -147,7 +148,8 @@ def test_eruptions_grow_out_of_noise_and_are_the_same_on_two_ranks(faultgouge, t
     # rounding alone: 1e-25 after a hundred time units
     assert all(run["noise"] < 1e-25 for run in one["runs"])
     done = faultgouge("eruptions", "scene.toml", "-o", "two", "--json", ranks=2)
-    assert json.loads(done.stdout) == one == json.loads((tmp_path / "two/eruptions.json").read_text())
+    stored = json.loads((tmp_path / "two/eruptions.json").read_text())
+    assert json.loads(done.stdout) == stored == {FORMAT_KEY: FORMAT, **one}
 
 
 @pytest.mark.slow

@@ -123,7 +123,7 @@ def test_what_was_found_before_a_failure_is_kept(scene, monkeypatch):
     found = {1.0: end("onset", 0.01), 0.8: end("onset", 0.008, 0.8)}
     monkeypatch.setattr(triggering, "first_onset", lambda scene, mu, start: (found[mu], ()))
     monkeypatch.setattr(triggering, "eruption", fail)
-    result = triggering.triggering(scene, None)
+    result = triggering.triggering.row(scene, None)
     assert [each["reach"] for each in result["ramps"]] == [0.01, 0.008]
     assert result["lowered"] is True
     assert result["says"] == "no eruption today"

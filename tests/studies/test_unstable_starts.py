@@ -75,7 +75,7 @@ def test_perturb_and_trigger(faultgouge_here, refusal, pairs):
 def test_a_sweep_infers_nothing_of_weakening():
     """With mu = 0.4 the sweep finds no equilibrium at the next load, which is no sign of a flow."""
     scene = Scene.from_mapping({name: UNSTABLE[name] for name in ("packing", "law", "load", "ramp")})
-    found = triggering(scene, lambda mu: settle(scene, mu))
+    found = triggering.row(scene, lambda mu: settle(scene, mu))
     assert [(each["ends"], each["reach"]) for each in found["ramps"]] == [("onset", 0.0)] * 2
     assert found["lowered"] is None
     assert "both packings are unstable" in "\n".join(in_words(summary_of_rows([{"result": found, "says": None}])))

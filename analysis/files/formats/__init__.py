@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ...arrays import Floats
 from ...configuration import Configuration
 from ...counted import counted
 from ...errors import BadInputError, PackingFileError
@@ -109,6 +110,8 @@ READERS = {suffix: each for each in FORMATS for suffix in each.suffixes}
 WRITERS = {".vtp": ("vtp", "write_vtp"), ".xyz": ("xyz", "write_xyz"), ".gsd": ("libraries", "write_gsd")}
 FILMS = {name: WRITERS[name] for name in (".xyz", ".gsd")} | {".pvd": ("vtp", "write_pvd")}
 """Module and function by suffix: of one packing, with modes; of several frames."""
+HEAD_OF_CONTACTS = "id1,id2,n_x,n_y,n_z,f_n,f_t,"
+"""How a table of contacts begins."""
 WITHOUT_MODES = {".data": "LAMMPS data", ".csv": "a table of contacts"}
 
 
@@ -222,7 +225,12 @@ def check_writer(path: Path, modes: bool = False, frames: bool = False) -> None:
         raise BadInputError(f"-o {path}: {what} has no room for modes; leave --mode out, or export .vtp or .xyz.")
 
 
-def write_packing(path: Path, packing: Packing | Configuration, modes: Sequence[ModeVectors] = ()) -> str:
+def write_packing(
+    path: Path,
+    packing: Packing | Configuration,
+    modes: Sequence[ModeVectors] = (),
+    values: Mapping[str, Floats] | None = None,
+) -> str:
     """Write a packing for another code.
 
     Parameters
@@ -233,6 +241,8 @@ def write_packing(path: Path, packing: Packing | Configuration, modes: Sequence[
         The packing.
     modes : sequence of ModeVectors
         Modes to write with the packing.
+    values : mapping of ndarray, each of shape (N,), optional
+        Further columns of the particles, by name; for .vtp, .xyz and .gsd.
 
     Returns
     -------
@@ -251,11 +261,12 @@ def write_packing(path: Path, packing: Packing | Configuration, modes: Sequence[
     if path.suffix == ".data":
         return str(_function("lammps_data", "write_data" if alone else "write_spheres")(path, packing))
     if path.suffix == ".csv":
-        return str(_function("tables", "write_contacts")(path, packing))
+        return str(_function("tables", "write_contacts")(path, packing, HEAD_OF_CONTACTS))
     if isinstance(packing, Packing):
         exported = exported_packing(Frame(packing), modes)
     else:
         exported = exported_configuration(packing, modes)
+    exported.particles.update(values or {})
     write = _function(*WRITERS[path.suffix])
     words = write(path, exported if path.suffix == ".vtp" else [(0.0, exported)])
     if alone and path.suffix != ".vtp":

@@ -292,10 +292,10 @@ def read_slips(path: Path, length: str = "") -> Slips:
     return Slips(first.astype(np.int64), second.astype(np.int64), slip, found["low"])
 
 
-def write_contacts(path: Path, packing: Packing | Configuration) -> str:
-    """Write a row for each contact, with all digits, and return the contents in words."""
+def write_contacts(path: Path, packing: Packing | Configuration, known_by: str) -> str:
+    """Write a row for each contact, with all digits, and return the contents in words; a table that begins as
+    `known_by` is replaced."""
     columns = packing.configuration.contact_columns()
-    known_by = ",".join(columns)
     if isinstance(packing, Packing):
         columns |= {"slip": packing.contacts.slip}
     rows = zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True)

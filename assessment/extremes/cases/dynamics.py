@@ -19,13 +19,13 @@ import numpy as np
 from mpi4py import MPI
 from scipy.linalg import eigh
 
-from ....analysis import Packing, spectrum, stable_timestep, stiffness_matrix, touching
+from ....analysis import Packing, spectrum, stable_timestep, stiffness_matrix
 from ....pywrap import Engine, SceneError
 from ....pywrap.equilibria.rattlers import place_disks
 from ....pywrap.runs.undamped import time_step
 from .alone import refused_by_lammps
 from .case import Case, Outcome, measured_outcome, refused_outcome
-from .packings import crystal, law, shear_packing, with_slips
+from .packings import crystal, law, shear_packing
 
 GROUP = "time stepping"
 
@@ -138,31 +138,11 @@ def _drift(steps: int) -> Outcome:
     )
 
 
-def _momentum() -> Outcome:
-    """Three disks that overlap and have slipped fly apart: nobody else feels their forces."""
-    position = np.array([[3.0, 5.0], [3.999, 5.0], [3.5, 5.864]])
-    radius = np.full(3, 0.5)
-    bare = Packing(position=position, radius=radius, contacts=touching(position, radius, None), law=law())
-    packing = with_slips(bare, (0.5, -0.9, 1.0))
-    worst = 0.0
-    with Engine(packing) as engine, engine.undamped(1e-5) as dynamics:
-        for _ in range(100):
-            velocity = dynamics.advance(1000).velocity
-            worst = max(worst, float((np.abs(velocity.sum(axis=0)) / np.abs(velocity).sum(axis=0)).max()))
-    return measured_outcome(
-        worst,
-        1e-13,
-        "momentum of three disks with friction that fly apart, in units of their own, 100,000 steps; forces on "
-        "partners are opposite to the bit, and some 1000 roundings of velocities are left",
-    )
-
-
 CASES = [
     Case(GROUP, "step of 0.5 of the limit", partial(_below_the_limit, 0.5, 10_000), True),
     Case(GROUP, "step of 0.99 of the limit", partial(_below_the_limit, 0.99, 10_000), True),
     Case(GROUP, "step of 1.01 of the limit", _over_the_limit, True),
     Case(GROUP, "step of 1.01 of the limit, LAMMPS alone", _limit_is_sharp, True),
-    Case(GROUP, "momentum with friction", _momentum, True),
     Case(GROUP, "energy, 1e5 steps", partial(_drift, 100_000), True),
     Case(GROUP, "energy, 1e7 steps", partial(_drift, 10_000_000)),
     Case(

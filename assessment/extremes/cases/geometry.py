@@ -59,13 +59,6 @@ def _two_disks() -> Outcome:
     )
 
 
-def _three_disks() -> Outcome:
-    """Two that touch, and one on top."""
-    height = 0.499 + np.sqrt(0.998**2 - 0.499**2)
-    position = [(3.0, 0.499), (3.998, 0.499), (3.499, height)]
-    return balance(shear_packing(_disks(position, top=np.array([False, False, True]), fy=3.0)))
-
-
 def _no_contact() -> Outcome:
     """A rattler stays where it is, and has no eigenvalues."""
     settled = bed()
@@ -107,19 +100,6 @@ def _at_the_bound() -> Outcome:
     return measured_outcome(
         excess + stiffness, 0.0, "|f_t| - mu f_n in LAMMPS, and df_t/ds of the analysis, at the bound"
     )
-
-
-def _opens_and_closes() -> Outcome:
-    """A disk leaves one neighbour and reaches the next within one step."""
-    packing = _disks([(3.0, 3.0), (3.999, 3.0), (5.0, 3.0)], _contact(1e-4))
-    there = np.array([0.0, 2e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    with Engine(packing) as engine:
-        over = engine.displace(packing, there)
-        back = engine.displace(over, -there)
-    wrong = over.contacts.i.tolist() != [1] or over.contacts.j.tolist() != [2]
-    wrong |= back.contacts.i.tolist() != [0] or back.contacts.j.tolist() != [1]
-    slips = np.abs(np.concatenate([over.contacts.slip, back.contacts.slip])).max(initial=0.0)
-    return measured_outcome(wrong + slips, 0.0, "wrong contacts, and slips that should have been forgotten")
 
 
 def _grazing() -> Outcome:
@@ -168,11 +148,9 @@ INVALID_GEOMETRY: dict[str, Callable[[], Outcome]] = {
 VALID_GEOMETRY: dict[str, Callable[[], Outcome]] = {
     "one disk": _one_disk,
     "two disks": _two_disks,
-    "three disks": _three_disks,
     "a disk without contact": _no_contact,
     "zero overlap": _zero_overlap,
     "at Coulomb's bound": _at_the_bound,
-    "opens and closes in one step": _opens_and_closes,
     "grazing": _grazing,
 }
 

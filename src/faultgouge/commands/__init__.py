@@ -16,7 +16,10 @@ import typer
 from .on_demand import CommandGroup, CommandsByName
 from .studies import find_command, names_of_commands
 
-FAMILIES = ("runs", "drive", "spectrum", "onset", "pictures", "import_command", "export_command", "studies", "sweeps")
+FAMILIES = (
+    "runs", "drive", "stability", "spectrum", "onset", "pictures", "vibrations", "import_command", "export_command",
+    "studies", "sweeps", "examples",
+)  # fmt: skip
 """Modules with commands."""
 
 
@@ -27,8 +30,8 @@ def program() -> Callable[..., object]:
         invoke_without_command=True,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # Rich would double the time of --help
-        help="Does a packing of frictional grains move, and what happens when it does? Stability, and runs in LAMMPS.",
-        epilog="Example: faultgouge reproduce -o results",
+        help=QUESTION,
+        epilog="Examples: faultgouge stability deck.in; faultgouge init -o scene.toml && faultgouge onset scene.toml",
     )
     app.callback()(_options)
     group = typer.main.get_command(app)
@@ -39,14 +42,17 @@ def program() -> Callable[..., object]:
     return group
 
 
-TO_TRY = """\
-faultgouge: how a stressed, linearly stable layer of frictional disks erupts. Three things to try:
+QUESTION = "Does a packing of frictional grains move, and what happens when it does?"
 
-  faultgouge init -o scene.toml          a scene of 100 disks, with every key commented
-  faultgouge onset scene.toml            the shear forces at which the layer becomes unstable: seconds
-  faultgouge reproduce -o results        the paper's protocol, with figures and a report: minutes
+TO_TRY = f"""\
+{QUESTION} Two things to try:
 
-All commands: faultgouge --help. Each has an example: faultgouge onset --help.
+  faultgouge stability deck.in      runs a LAMMPS deck: does its packing rest, or which motion grows, and how fast?
+  faultgouge init -o scene.toml && faultgouge onset scene.toml
+                                    the shear force at which a layer of 100 disks becomes unstable
+
+A deck and a scene to try: faultgouge examples. All commands: faultgouge --help. Each has an example: faultgouge
+stability --help.
 """
 
 

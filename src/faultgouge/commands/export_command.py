@@ -53,9 +53,9 @@ def export(
     displacements; a .pvd for ParaView comes with a folder of .vtp.
     """
     from faultgouge.analysis import Configuration
-    from faultgouge.analysis.files.formats import ModeVectors, check_writer, write_packing
+    from faultgouge.analysis.files.formats import HEAD_OF_CONTACTS, ModeVectors, check_writer, write_packing
 
-    lock_output(context, output, file)
+    lock_output(context, output, file, head=HEAD_OF_CONTACTS if output.suffix == ".csv" else "")
     if frames is not None:
         if mode is not None or frame != -1:
             raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")

@@ -11,6 +11,7 @@ import typer
 from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
+from .stability import first_sentence
 from .terminal import lock_output, print_line, say, status
 
 if TYPE_CHECKING:
@@ -50,7 +51,11 @@ Period = Annotated[
 ]
 
 SlipsFile = Annotated[
-    Path | None, typer.Option(help="SlipsFile: CSV with id1, id2 (0: the floor), slip; or a LAMMPS dump local.")
+    Path | None,
+    typer.Option(
+        help="A table of contacts: slips (CSV with id1, id2, 0 being the floor, slip; or a LAMMPS dump local); with "
+        "--material forces, of YADE, MercuryDPM (.fstat), LIGGGHTS or LAMMPS."
+    ),
 ]
 
 
@@ -80,6 +85,16 @@ def import_(
         int | None, typer.Option(help="Number of the frame; negative numbers count from the last.")
     ] = None,
     relax: Annotated[bool, typer.Option("--relax", help="Bring a packing out of balance to rest.")] = False,
+    material: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KEY=VALUE,...",
+            help="For spheres of a table: young, poisson, density, friction, restitution; or kn, kt and exponent.",
+        ),
+    ] = None,
+    columns: Annotated[
+        str | None, typer.Option(metavar="NAME,...", help="Names of the columns of --contacts, with --material.")
+    ] = None,
     slides: Annotated[
         bool, typer.Option("--slides", help="For a deck: contacts at Coulomb's bound slide; by default they stick.")
     ] = False,
@@ -110,6 +125,9 @@ def import_(
     if output.exists():
         raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
     lock_output(context, output)
+    if material is not None:
+        _import_spheres(file, output, material, contacts, columns, -1 if frame is None else frame)
+        return
     given = [top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame]
     is_bare = not floor and all(each is None for each in given)
     kept = file.with_name(f"{file.name}.in")
@@ -134,6 +152,37 @@ def import_(
             raise
         raise type(error)(f"{error}\n{lines}") from error
     _import_disks(file, output, disks, top, packing, relax)
+
+
+def _import_spheres(
+    file: Path, output: Path, material: str, contacts: Path | None, columns: str | None, frame: int
+) -> None:
+    """Store spheres of a table with the forces of their contacts, and give the verdict that the digits allow."""
+    from faultgouge.analysis.files.configuration_file import write_configuration
+    from faultgouge.analysis.files.contact_tables import (
+        material_of,
+        read_contacts,
+        read_spheres,
+        verdict_within_digits,
+    )
+    from faultgouge.analysis.progress import show_progress
+
+    law, spheres = material_of(material), read_spheres(file, frame)
+    if contacts is None:
+        found = spheres.of_material(law)
+    else:
+        found = read_contacts(spheres, contacts, law, None if columns is None else columns.split(","), frame)
+    if not is_root():
+        return
+    write_configuration(output, found, {"deck": ""})
+    keeps(f"{output} has been written", output)
+    print_line(f"{repr(found).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
+    if contacts is None:
+        print_line("\n".join(found.remarks))
+    else:
+        with status("stability") as show, show_progress(show):
+            verdict, says = verdict_within_digits(found)
+        print_line(f"{verdict}\n{says}")
 
 
 def _import_disks(file: Path, output: Path, disks: Disks, top: str | None, packing: Packing, relax: bool) -> None:
@@ -169,12 +218,13 @@ def _import_deck(file: Path, output: Path, slides: bool, balance: float | None, 
         configuration = run_deck(
             file, slides=slides, balance=allowed, relaxes=relaxes, keep=output, notice=say, show=show
         )
-    keeps(f"{output} has been written; whether the packing is stable says `faultgouge spectrum {output}`", output)
+    keeps(f"{output} has been written; whether the packing is stable says `faultgouge stability {output}`", output)
     if is_root():
         write_configuration(output, configuration, {"deck": text})
     print_line(f"{repr(configuration).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}")
     print_line(_time_steps(configuration))
-    print_line(_verdict(configuration, output))
+    if is_root():
+        print_line(first_sentence(configuration))
 
 
 AROUND = """\
@@ -190,13 +240,14 @@ run 100000   # until it rests; 0 for a restart at rest"""
 
 def _deck_around(file: Path) -> str:
     """Lines of a deck for a restart or data file of LAMMPS, to be filled in; empty for other files."""
-    from faultgouge.analysis.files.formats import registry
+    from faultgouge.analysis.files.formats import RESTART_BEGINNING
 
     if not file.is_file():
         return ""
     with file.open("rb") as stream:
-        head = stream.readline(500).decode(errors="replace")
-    if registry.is_restart(file):
+        first = stream.readline(500)
+    head = first.decode(errors="replace")
+    if first.startswith(RESTART_BEGINNING):
         reads = f"comm_modify vel yes\nread_restart {file.name}"
     elif head.startswith("LAMMPS data file"):
         units = (re.findall(r"units = (\w+)", head) or ["lj"])[0]
@@ -208,19 +259,6 @@ def _deck_around(file: Path) -> str:
         f"For spheres, or any other law, write a deck beside it, here {deck} with the laws and walls of the run that "
         f"made the file, and give `faultgouge import {deck}`:\n\n{reads}\n{AROUND}"
     )
-
-
-def _verdict(configuration: Configuration, output: Path) -> str:
-    """The verdict of `spectrum`, if the packing's spectrum takes seconds."""
-    from faultgouge.analysis import stability
-    from faultgouge.analysis.motion.stability import LARGE
-    from faultgouge.analysis.progress import show_progress
-
-    moves = len(configuration.rattlers) < len(configuration)
-    if not is_root() or (moves and configuration.coordinates > LARGE // 4):
-        return "\n".join([*configuration.remarks, f"whether the packing is stable says `faultgouge spectrum {output}`"])
-    with status("stability") as show, show_progress(show):
-        return str(stability(configuration))
 
 
 def _time_steps(configuration: Configuration) -> str:

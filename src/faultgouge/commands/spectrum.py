@@ -8,6 +8,7 @@ import typer
 
 from ..analysis.counted import counted
 from ..mpi_rank import is_root
+from .stability import Follow, verdict_of
 from .terminal import (
     AsJson,
     Frame,
@@ -50,6 +51,7 @@ def spectrum(
     rise: Annotated[
         bool, typer.Option("--rise", help="Also the motion while F_x rises slowly: drift and vibration over its rate.")
     ] = False,
+    follow: Follow = False,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Also conditions of pairs, quality factors, what makes K asymmetric.")
     ] = False,
@@ -62,11 +64,12 @@ def spectrum(
     way back. The eigenvalues are those of K alone, without dissipation.
     """
     from faultgouge.analysis import spectrum as eigenvalues_of
-    from faultgouge.analysis import stability
     from faultgouge.analysis.progress import show_progress
 
-    if values and (gain or rise or verbose):
-        raise typer.BadParameter("--values computes nothing but eigenvalues: leave --gain, --rise and --verbose out")
+    if values and (gain or rise or verbose or follow):
+        raise typer.BadParameter(
+            "--values computes nothing but eigenvalues: leave --gain, --rise, --follow and --verbose out"
+        )
     number = frame_at(file, frame, time)
     packing = stored_packing(file, number)
     if rise and not packing.configuration.top.any():
@@ -81,8 +84,7 @@ def spectrum(
         _values(packing, as_json)
         return
     result = None if large else eigenvalues_of(packing)
-    with status("stability") as show, show_progress(show):
-        verdict = stability(packing, "fx" if rise else None, spectrum_of_stiffness=result)
+    verdict = verdict_of(packing, "fx" if rise else None, spectrum_of_stiffness=result, follow=follow)
     if not as_json:
         print(verdict, flush=True)
     if result is None:

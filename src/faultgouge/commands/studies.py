@@ -146,31 +146,11 @@ TRIED = "{output} has the cases that were finished" + REPLACED
 @command(app, "mpiexec -n 2 faultgouge extremes -o extremes", kept=TRIED)
 def extremes(output: NewFolder = Path("extremes"), quick: Quick = False) -> Answer:
     """Test stiff and extreme cases: each holds within a stated bound, or is refused in one sentence."""
-    return _try_cases(output, quick)
+    return try_cases(output, quick)
 
 
-@command(app, "faultgouge extremes", kept=TRIED, hidden=True)
-def stability(
-    file: Annotated[Path | None, typer.Argument(show_default=False)] = None,
-    output: NewFolder = Path("stability"),
-    quick: Quick = False,
-) -> Answer:
-    """The name of `extremes` until version 1, with the JSON under its old name, too."""
-    if file is not None:
-        raise typer.BadParameter(
-            f"stability takes no file: `faultgouge spectrum {file}` says whether a packing is stable"
-        )
-    say("faultgouge stability is called faultgouge extremes now: stability is what spectrum tells of a packing")
-    try:
-        return _try_cases(output, quick)
-    finally:
-        if is_root() and (output / "extremes.json").exists():
-            from faultgouge.analysis.files.atomic_write import write_whole
-
-            write_whole(output / "stability.json", (output / "extremes.json").read_bytes())
-
-
-def _try_cases(output: Path, quick: bool) -> Answer:
+def try_cases(output: Path, quick: bool) -> Answer:
+    """What `extremes` does in a folder."""
     from faultgouge.assessment.extremes import check, extremes
 
     result = extremes(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))

@@ -277,11 +277,11 @@ def hold_lock(output: Path) -> None:
         holds(lock)
 
 
-def lock_output(context: typer.Context, output: Path, *inputs: Path) -> None:
+def lock_output(context: typer.Context, output: Path, *inputs: Path, head: str = "") -> None:
     """`check_output`, and keep other runs from the file until the command ends, on rank 0."""
     from faultgouge.analysis.files.atomic_write import lock_output as lock
 
-    check_output(output, *inputs)
+    check_output(output, *inputs, head=head)
     if is_root():
         hold_lock(output)
         context.with_resource(lock(output))

@@ -92,3 +92,16 @@ def test_a_log_that_two_instances_write(two, lammps_with, tmp_path):
     lammps_with()
     with pytest.raises(NotTakenError, match=r"log of another LAMMPS, too: give each LAMMPS a log of its own"):
         from_lammps(lmp, balance=np.inf)
+
+
+def test_what_runs_write_into_a_log_is_no_command(two, tmp_path):
+    """`fix print` may print anything, at the beginning of a run, too."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp, told = two(HERTZ, "* *", MOVES.strip())
+    lmp.command(f'log "{tmp_path}/own.log"')
+    prints = 'fix says all print 1 "unfix move"\nrun 2\nrun 2\nunfix says\nrun 4 every 2 "print done"\nrun 1 post no'
+    command(lmp, "\n".join([*told, prints]))
+    found = from_lammps(lmp, balance=np.inf)
+    assert len(found) == 2
+    assert found.free.all()  # by fix move

@@ -8,6 +8,7 @@ from granular_packings import command, instance, start, with_law
 
 TRAPS = """
 variable trap atom -0.2*(x-1.5)
+variable later equal (step>100000000)*0.05
 region everywhere block INF INF INF INF INF INF
 """
 HERTZ = "gran/hertz/history 3e3 NULL 40 40 0.5 1"
@@ -152,6 +153,7 @@ def test_fixes_that_act_on_what_moves(bed, fix, says):
     "fix",
     [
         "addforce 0.01 0 0",
+        "addforce v_later 0 0",
         "damping/cundall 0.3 0.3",
         "indent 1.0 sphere 0 0 100 1",
         "setforce NULL NULL NULL",

@@ -1,0 +1,160 @@
+"""Where a motion that grows ends: LAMMPS's own motion, once contacts have changed.
+
+LAMMPS starts from the stored or live state with a small random push, and without drag of its own. Its motion is looked
+at in windows in which linear motion grows by `FOLDS_OF_WINDOW` e-folds:
+
+- it *flows* if the root of D passes `FLOWS_FROM` of the mean diameter: particles leave their neighbours;
+- it *vibrates* if D has stayed the same in `SAME_WINDOWS` windows; a packing that has come to rest counts as this;
+- it *creeps* if D rises on, window by window, in a vibration that carries the packing along.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...analysis import Configuration, Packing, Stability, stable_timestep
+from ...analysis.arrays import Floats
+from ...analysis.motion.pushes import random_pushes
+from ...analysis.progress import report_progress
+from .lammps_arrays import owned_array, rows_of, set_velocity
+from .look_in_a_copy import can_copy, in_a_copy, quieten
+
+STEP_SHARE = 0.1
+"""Time step, as a share of the largest stable one."""
+
+PUSH_OVER_CHANGE = 0.1
+"""Displacement by the push, as a share of that at which the first contact changes."""
+
+FOLDS_OF_WINDOW = 6.0
+"""Growth of D in a window, in e-folds, as long as the motion is linear."""
+
+LOOKS_OF_WINDOW = 60
+"""Displacements that a window has."""
+
+LEAST_WINDOW = 300.0
+"""Length of a window in stable time steps, at the least: ten periods of a slow mode."""
+
+MOST_STEPS_OF_END = 4_000_000
+"""Time steps that are followed: some minutes for fifty particles."""
+
+SAME_WINDOWS, SAME_SHARE = 4, 0.15
+"""Windows whose largest D differ by less than this share, of a motion that goes on as it is."""
+
+FLOWS_FROM = 0.1
+"""Root of D over the mean diameter."""
+
+NO_LAMMPS = (
+    "what LAMMPS does then is not followed: this packing has no LAMMPS behind it; give a run.h5, or a deck "
+    "(`faultgouge stability DECK.in --follow`), or the instance (`stability(packing, follow=lmp)`)"
+)
+"""Where a file holds particles and contacts alone."""
+
+Advance = Callable[[int], Floats]
+
+
+def follow_by(packing: Packing | Configuration, lmp: Any = None) -> Callable[[Stability], Stability]:
+    """What adds to a verdict where the motion that grows ends: `Stability.follow`.
+
+    Parameters
+    ----------
+    packing : Packing or Configuration
+        A Packing is moved by the plugin.
+    lmp : lammps.lammps, optional
+        The instance of which a Configuration was taken; it moves in a copy of the process, and stays as it is.
+    """
+
+    def follow(told: Stability) -> Stability:
+        configuration = packing.configuration
+        if lmp is not None:
+            if not can_copy(lmp):
+                why = "LAMMPS goes on in a copy of the process, which takes one rank and one thread"
+                return replace(told, remarks=(*told.remarks, why))
+            ends = in_a_copy(lambda: _ends(told, configuration, *_live(lmp, configuration)))
+        elif isinstance(packing, Packing):
+            with _plugin(packing) as moving:
+                ends = _ends(told, configuration, *moving)
+        else:
+            return replace(told, remarks=(*told.remarks, NO_LAMMPS))
+        return replace(told, follow=ends)
+
+    return follow
+
+
+def _live(lmp: Any, c: Configuration) -> tuple[Any, Advance, float]:
+    """The instance in a copy, what makes it go on and says the displacements, shape (N, d), and its time step."""
+    lmp.command("log none")
+    quieten(lmp, drag=True)
+    step = STEP_SHARE * float(stable_timestep(c))
+    lmp.command(f"timestep {step:.17g}")
+    low, high, *_ = lmp.extract_box()
+    width = np.where(c.periodic, np.subtract(high, low), np.inf)[: c.dimension]
+    last = owned_array(lmp, "x")[rows_of(lmp, c), : c.dimension].copy()
+    moved = np.zeros_like(last)
+
+    def advance(count: int) -> Floats:
+        nonlocal last
+        lmp.command(f"run {count} post no")
+        now = owned_array(lmp, "x")[rows_of(lmp, c), : c.dimension].copy()
+        change = now - last
+        change -= np.where(np.isfinite(width), width, 0.0) * np.round(change / width)
+        moved[:] += change
+        last = now
+        return moved
+
+    return lmp, advance, step
+
+
+@contextmanager
+def _plugin(packing: Packing) -> Iterator[tuple[Any, Advance, float]]:
+    """The same of a packing that the plugin moves."""
+    from mpi4py import MPI
+
+    from ...analysis import nearest_image
+    from ..lammps.engine import Engine
+
+    step, last = STEP_SHARE * float(stable_timestep(packing)), packing.position
+    moved = np.zeros_like(last)
+    with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(step) as dynamics:
+
+        def advance(count: int) -> Floats:
+            nonlocal last
+            now = dynamics.advance(count).position.copy()
+            moved[:] += nearest_image(now - last, packing.box_length)
+            last = now
+            return moved
+
+        yield engine.lammps, advance, step
+
+
+def _ends(told: Stability, c: Configuration, lmp: Any, advance: Advance, step: float) -> dict[str, Any]:
+    """Where the motion ends, and how."""
+    diameter, rate = 2 * float(c.radius.mean()), told.growth_rate
+    changes = told.first_change or (1e-3 * float(c.contacts.overlap.max(initial=diameter))) ** 2
+    push = random_pushes(c, 1)[:, 0].reshape(c.axes, len(c))
+    push[:, c.rattlers] = 0.0
+    # a push v displaces by v over a frequency, a tenth of the largest
+    set_velocity(lmp, c, (PUSH_OVER_CHANGE * np.sqrt(changes) * 0.1 * 2 * STEP_SHARE / step * push).ravel())
+    window = max(FOLDS_OF_WINDOW / rate, LEAST_WINDOW * step / STEP_SHARE)
+    count, largest, moves = (
+        max(round(window / step / LOOKS_OF_WINDOW), 1),
+        list[float](),
+        ~np.isin(np.arange(len(c)), c.rattlers),
+    )
+    for _ in range(max(MOST_STEPS_OF_END // (count * LOOKS_OF_WINDOW), 3 * SAME_WINDOWS)):
+        seen = []
+        for _ in range(LOOKS_OF_WINDOW):
+            moved = advance(count)
+            seen.append(float(np.sum(moved[moves] ** 2) / len(c)))
+            if not seen[-1] < (FLOWS_FROM * diameter) ** 2:
+                return {"displacement": float(np.sqrt(seen[-1])), "ends": "flows"}
+        largest.append(max(seen))
+        report_progress(f"LAMMPS goes on: displacement {np.sqrt(largest[-1]):.3g}")
+        late = largest[-SAME_WINDOWS:]
+        same = len(largest) > SAME_WINDOWS and max(late) - min(late) < SAME_SHARE * max(late)
+        if same and late[-1] > PUSH_OVER_CHANGE * changes:
+            return {"displacement": float(np.sqrt(max(late))), "ends": "vibrates"}
+    rises = largest[-1] > (1 + SAME_SHARE) * largest[-SAME_WINDOWS]
+    return {"displacement": float(np.sqrt(largest[-1])), "ends": "creeps" if rises else "vibrates"}

@@ -1,0 +1,44 @@
+"""`examples`: a shelf of decks, scenes and a script, each of which runs in seconds."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .terminal import print_line
+
+app = typer.Typer()
+
+
+@app.command(epilog="Example: faultgouge examples pour")
+def examples(
+    name: Annotated[
+        str | None, typer.Argument(help="Which one is copied into this folder.", show_default=False)
+    ] = None,
+) -> None:
+    """List ten examples that run in seconds each, or copy one into this folder."""
+    from importlib.resources import files
+
+    shelf = {
+        Path(each.name).stem: each for each in (files("faultgouge") / "scenes" / "examples").iterdir() if each.is_file()
+    }
+    if name is None:
+        for each in sorted(shelf):
+            what, command = _head(shelf[each].read_text())
+            print_line(f"{each:9} {what}\n{'':9} {command}")
+        print_line("\nfaultgouge examples NAME copies one into this folder.")
+        return
+    if (chosen := shelf.get(name.rsplit(".", 1)[0])) is None:
+        raise typer.BadParameter(f"there is no example {name}: take one of {', '.join(sorted(shelf))}")
+    copy = Path(chosen.name)
+    if copy.exists():
+        raise typer.BadParameter(f"{copy} exists in this folder: move it away, or use another folder")
+    copy.write_bytes(chosen.read_bytes())
+    what, command = _head(chosen.read_text())
+    print_line(f"{copy}: {what}\nnext: {command}")
+
+
+def _head(text: str) -> tuple[str, str]:
+    """What an example shows, and the command that runs the example: its first two lines."""
+    what, command, *_ = text.splitlines()
+    return what.strip('# "'), command.strip('# "')

@@ -1,0 +1,287 @@
+"""Stress, moduli, vibrations and lost energy against closed forms, dense matrices and a slow integration."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from faultgouge.analysis import (
+    BadInputError,
+    Configuration,
+    LinearisedContacts,
+    Material,
+    damping_matrix,
+    dispersion,
+    elastic_moduli,
+    lost_by_modes,
+    lost_energy,
+    softness,
+    spheres_of_material,
+    stable_timestep,
+    stiffness_matrix,
+    stress,
+    timestep_rules,
+    vibrations,
+)
+from faultgouge.analysis.elasticity import vibrations as how
+
+FACES = np.array([[0, 0, 0], [1, 1, 0], [1, 0, 1], [0, 1, 1]]) / 2
+
+
+def crystal(poisson=0.2, overlap=1e-6, cells=(2, 2, 2), **more):
+    """A face-centred cubic crystal of spheres of radius 1/2; the overlap is in radii."""
+    edge = np.sqrt(2) * 0.5 * (2 - overlap)
+    place = edge * np.concatenate([FACES + np.array(cell) for cell in product(*map(range, cells))])
+    box = edge * np.diag(np.array(cells, float))
+    material = Material(1.0, poisson, density=1.0, **more)
+    return spheres_of_material(place, np.full(len(place), 0.5), material, box=box, periodic=[True] * 3)
+
+
+def disordered(cells=(3, 3, 3), seed=0, **more):
+    """Spheres of two sizes near the places of a crystal, which touch: no packing at rest, but every K has modes."""
+    rng = np.random.default_rng(seed)
+    edge = 1.38
+    place = edge * np.concatenate([FACES + np.array(cell) for cell in product(*map(range, cells))])
+    place += rng.uniform(-0.01, 0.01, place.shape)
+    radius = rng.uniform(0.5, 0.52, len(place))
+    material = Material(1000.0, 0.25, density=1.0, **more)
+    box = edge * np.diag(np.array(cells, float))
+    return spheres_of_material(place, radius, material, box=box, periodic=[True] * 3)
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.2, 0.45])
+@pytest.mark.parametrize("overlap", [1e-5, 1e-7])
+def test_moduli_of_a_crystal_are_those_of_duffy_and_mindlin(poisson, overlap):
+    """Their formulas leave the present stress p out; in C11 its parts cancel but for a tenth of delta/R."""
+    packing = crystal(poisson, overlap)
+    found, p = elastic_moduli(packing), np.trace(stress(packing)) / 3
+    mu = 1 / (2 * (1 + poisson))
+    scale = (3 * mu**2 * p / (2 * (1 - poisson) ** 2)) ** (1 / 3) / (2 - poisson)
+    c = found.tensor
+    assert c[0, 0, 0, 0] == pytest.approx((4 - 3 * poisson) * scale, rel=0.1 * overlap + 1e-13)
+    assert c[1, 2, 1, 2] == pytest.approx((4 - 3 * poisson) * scale / 2, abs=2 * p)
+    assert c[0, 0, 1, 1] == pytest.approx(poisson * scale / 2, abs=2 * p)
+    assert np.abs(found.antisymmetric).max() < 1e-14 * c[0, 0, 0, 0]
+    assert np.abs(c - found.affine).max() < 1e-12 * c[0, 0, 0, 0]  # each sphere is a centre of inversion
+
+
+def test_isotropic_numbers_are_those_of_an_isotropic_tensor():
+    found = elastic_moduli(crystal())
+    one = np.eye(3)
+    for dimension, plane in ((3, one), (2, np.diag([1.0, 1.0, 0.0]))):
+        pairs = np.einsum("ik,jl->ijkl", plane, plane)
+        tensor = 3.0 * np.einsum("ij,kl->ijkl", plane, plane) + 2.0 * (pairs + pairs.transpose(0, 1, 3, 2))
+        names = {each: getattr(found, each) for each in found.__dataclass_fields__}
+        made = type(found)(**(names | {"tensor": tensor, "dimension": dimension}))
+        assert made.shear == pytest.approx(2.0, rel=1e-14)
+        assert made.bulk == pytest.approx(3 + 4 / dimension, rel=1e-14)
+        # strain along x with free sides: E and nu from the compliance
+        axes = slice(0, dimension)
+        strain = np.linalg.solve(np.einsum("iijj->ij", tensor)[axes, axes], np.eye(dimension)[0])
+        assert made.young == pytest.approx(1 / strain[0], rel=1e-13)
+        assert made.poisson == pytest.approx(-strain[1] / strain[0], rel=1e-13)
+        assert made.anisotropy < 1e-15
+
+
+def test_waves_of_a_crystal_are_those_of_its_moduli_and_of_its_springs():
+    """Long waves have the speeds of the moduli; a shorter one, whose spheres move along x alone, k_n and k_t."""
+    packing = crystal(0.2, 1e-4, (12, 2, 2))
+    waves, speeds = dispersion(packing, 0, 2), elastic_moduli(packing).wave_speeds[0]
+    c, edge = packing.contacts, packing.box[0, 0] / 12
+    for wave in waves:
+        speed = speeds[0] if wave.polarisation == 0 else speeds[1]
+        assert wave.frequency / wave.wave_number == pytest.approx(speed, rel=0.03 * (wave.wave_number * edge) ** 2)
+        # a little of a transverse wave goes into rotation, which beats
+        assert abs(wave.attenuation) < 1e-4 * wave.frequency
+    # planes of spheres along x are 4 bonds apart on each side: n.x = 1/sqrt 2
+    half = (c.normal_stiffness[0] + c.tangential_stiffness[0] - c.normal_force[0] / c.distance[0]) / 2
+    for wave in waves[::3]:
+        told = np.sqrt(8 * half * (1 - np.cos(wave.wave_number * edge / 2)) / packing.mass[0])
+        assert wave.frequency == pytest.approx(told, rel=1e-6)
+
+
+def test_density_of_states_is_that_of_all_eigenvalues(monkeypatch):
+    """By random vectors and by LAPACK, within the stated errors, and of integral one."""
+    packing = disordered(restitution=0.7)
+    exact = vibrations(packing, moments=96)
+    monkeypatch.setattr(how, "ALL_MODES", 0)
+    found = vibrations(packing, moments=96, vectors=12)
+    told = np.interp(found.frequency, exact.frequency, exact.density)
+    off = np.abs(found.density - told) / np.maximum(found.density_error, 0.02 * told.max())
+    assert np.mean(off < 2) > 0.9
+    assert off.max() < 5
+    for each in (exact, found):
+        width = np.gradient(each.frequency)
+        assert np.sum(each.density * width) == pytest.approx(1, abs=2e-3)
+        assert (each.counted, each.negative) == (packing.coordinates - 3, 0)
+    middle = told > 0.3 * told.max()
+    rotation = np.interp(found.frequency, exact.frequency, exact.rotation)
+    assert np.abs(found.rotation - rotation)[middle].max() < 0.1
+    damping = np.interp(found.frequency, exact.frequency, exact.damping)
+    assert np.abs(found.damping / damping - 1)[middle].max() < 0.1
+
+
+def test_modes_are_those_of_lapack():
+    packing = disordered((2, 2, 2), restitution=0.7)
+    found, root = vibrations(packing), np.sqrt(packing.coordinate_mass)
+    values, vectors = eigh((stiffness_matrix(packing) / np.outer(root, root)).toarray())
+    c = (damping_matrix(packing) / np.outer(root, root)).toarray()
+    assert found.modes["frequency"] == pytest.approx(np.sqrt(values[3:]), rel=1e-9)
+    assert found.modes["damping"] == pytest.approx(np.einsum("ik,ij,jk->k", vectors, c, vectors)[3:], rel=1e-6)
+    energy = (vectors**2).reshape(6, len(packing), -1)[:, :, 3:]
+    of_sphere = energy.sum(axis=0)
+    assert found.modes["participation"] == pytest.approx(1 / (len(packing) * np.sum(of_sphere**2, axis=0)), rel=1e-6)
+    assert found.modes["rotation"] == pytest.approx(energy[3:].sum(axis=(0, 1)), rel=1e-6)
+
+
+def test_softness_is_that_of_the_inverse(monkeypatch):
+    packing = disordered((2, 2, 2))
+    n = len(packing)
+    inverse = np.linalg.pinv(stiffness_matrix(packing).toarray(), rcond=1e-10)
+    told = np.diag(inverse)[: 3 * n].reshape(3, n).mean(axis=0)
+    found, error = softness(packing)
+    assert found == pytest.approx(told, rel=1e-6)
+    assert not error.any()
+    monkeypatch.setattr(how, "EXACT_SOFTNESS", 0)
+    guess, error = softness(packing)
+    assert np.mean(np.abs(guess - told) < 2 * error) > 0.85
+
+
+def with_free_sphere(packing):
+    """The packing with a sphere that touches nothing, in place of its last one."""
+    c = packing.contacts
+    last = len(packing) - 1
+    kept = (c.i != last) & (c.j != last)
+    contacts = LinearisedContacts(**{name: getattr(c, name)[kept] for name in c.__dataclass_fields__})
+    names = ("dimension", "position", "radius", "mass", "inertia", "box", "origin", "periodic", "load")
+    return Configuration(**{name: getattr(packing, name) for name in names}, contacts=contacts)
+
+
+def test_a_free_sphere_counts_nowhere():
+    packing = with_free_sphere(crystal())
+    assert np.isinf(softness(packing)[0]).nonzero()[0].tolist() == [len(packing) - 1]
+    assert vibrations(packing).counted == 6 * (len(packing) - 1) - 3
+    assert elastic_moduli(packing).density == pytest.approx(elastic_moduli(crystal()).density * 31 / 32)
+
+
+@pytest.mark.parametrize("frequency", [0.3, 3.0])
+def test_moduli_over_frequency_are_those_of_a_motion(frequency):
+    """A crystal with one heavy sphere is strained as sin(omega t), and followed until only that motion is left."""
+    packing = disordered((2, 2, 2), restitution=0.05)
+    omega = frequency * float(np.sqrt(eigh(
+        (stiffness_matrix(packing) / np.outer(*2 * [np.sqrt(packing.coordinate_mass)])).toarray(), eigvals_only=True
+    )[3]))  # fmt: skip
+    found = elastic_moduli(packing, omega)
+    k, c, m = stiffness_matrix(packing), damping_matrix(packing), packing.coordinate_mass
+    right = (k - omega**2 * np.diag(m) + 1j * omega * c) @ found.displacement.reshape(len(m), 9)
+    dt = 0.1 * float(stable_timestep(packing))
+    q, v, kept = np.zeros_like(right[:, 1].real), np.zeros_like(right[:, 1].real), []
+    force = right[:, 1]  # of the gradient xy, as sin(omega t) with its phase
+    steps = int(200 / omega / dt * 2)
+    for step in range(steps):
+        t = step * dt
+        v += dt / m * ((force * np.exp(1j * omega * t)).imag - k @ q - c @ v)
+        q += dt * v
+        kept.append(q[:3].copy())
+    t = dt * np.arange(1, steps + 1)[-int(20 / omega / dt) :]
+    basis = np.column_stack([np.sin(omega * t), np.cos(omega * t)])
+    fit = np.linalg.lstsq(basis, np.array(kept)[-len(t) :], rcond=None)[0]
+    told = found.displacement[:3, 0, 1]
+    assert fit[0] + 1j * fit[1] == pytest.approx(told, rel=2e-2, abs=2e-2 * np.abs(told).max())
+    assert abs(found.shear.imag) > 1e-3 * abs(found.shear)
+
+
+def test_lost_energy_is_what_the_motion_has_no_more():
+    """Followed by small steps with dashpots and drag, without sliding: 1/2 v M v + 1/2 q K q falls by it."""
+    packing = disordered((2, 2, 2), restitution=0.5)
+    k, c, m = stiffness_matrix(packing), damping_matrix(packing), packing.coordinate_mass
+    dt = 0.01 * float(stable_timestep(packing))
+    rng = np.random.default_rng(3)
+    q, v = np.zeros(len(m)), 1e-6 * rng.standard_normal(len(m))
+    places, speeds = [q.copy()], [v.copy()]
+    for _ in range(600):
+        half = v - 0.5 * dt / m * (k @ q + c @ v)
+        q = q + dt * half
+        v = (half - 0.5 * dt / m * (k @ q)) / (1 + 0.0)
+        v = v - 0.5 * dt / m * (c @ v)
+        places.append(q.copy())
+        speeds.append(v.copy())
+    lost = lost_energy(packing, dt * np.arange(601), places, speeds)
+    energy = [0.5 * v @ (m * v) + 0.5 * q @ (k @ q) for q, v in zip(places, speeds, strict=True)]
+    assert energy[-1] < 0.5 * energy[0]
+    assert lost.total[-1] == pytest.approx(energy[0] - energy[-1], rel=1e-2)
+    assert lost.slider.sum() == 0
+    of_modes = lost_by_modes(packing, speeds[0])[1]
+    assert of_modes.sum() == pytest.approx(speeds[0] @ (c @ speeds[0]), rel=1e-9)
+    assert (of_modes > -1e-3 * of_modes.sum()).all()
+
+
+def test_a_slider_takes_force_times_slip():
+    """Two spheres pressed together and drawn apart sideways: the spring to the bound, then mu f_n times the way."""
+    overlap, draws = 1e-4, 1e-4
+    pair = spheres_of_material(
+        np.array([[0, 0, 0], [1 - overlap, 0, 0]]), np.array([0.5, 0.5]), Material(1.0, 0.2, density=1.0, friction=0.3),
+        tangential_force=np.zeros((1, 3)),
+    )  # fmt: skip
+    c = pair.contacts
+    way = np.linspace(0, draws, 101)
+    moved = np.zeros((101, 12))
+    moved[:, 3] = way  # y of the second sphere
+    lost = lost_energy(pair, way, moved, np.gradient(moved, way, axis=0))
+    bound = float(c.friction[0])
+    told = bound * (draws - bound / c.tangential_stiffness[0])
+    assert lost.slider[0] == pytest.approx(told, rel=1e-9)
+    assert lost.total[-1] == pytest.approx(told, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("given", "word"),
+    [
+        ({"young": 1.0, "kn": 2.0}, "not both"),
+        ({}, "needs young"),
+        ({"young": -1.0}, "young = -1"),
+        ({"young": 1.0, "poisson": 0.6}, "poisson = 0.6"),
+        ({"young": 1.0, "restitution": 0.0}, "restitution = 0"),
+        ({"young": 1.0, "friction": -0.1}, "friction = -0.1"),
+        ({"kn": 1.0, "exponent": 1.2}, "exponent = 1.2"),
+        ({"young": np.nan}, "young = nan"),
+        ({"young": 1.0}, "how heavy"),
+    ],
+)
+def test_what_no_material_has_is_named(given, word):
+    with pytest.raises(BadInputError, match=word):
+        spheres_of_material([[0.0, 0.0, 0.0]], [0.5], Material(**given))
+
+
+def test_where_there_is_no_volume_none_is_guessed(reference_packing):
+    layer = reference_packing(1.0)
+    with pytest.raises(BadInputError, match="along y it is neither periodic nor between two flat walls"):
+        stress(layer)
+    assert stress(layer, 2.0) == pytest.approx(0.5 * stress(layer, 1.0))
+    with pytest.raises(BadInputError, match="periodic along all of its axes"):
+        elastic_moduli(layer)
+    with pytest.raises(BadInputError, match="Plane waves need a box that is periodic along y"):
+        dispersion(layer, 1)
+
+
+def test_a_bent_chain_straightens_without_resistance():
+    """Its forces, 1e-12 of its springs, are too small to hold it."""
+    link = 1 - 1e-12
+
+    def chain(turn):
+        place = link * np.array([[0, 0, 0], [np.cos(turn), np.sin(turn), 0], [2 * np.cos(turn), 0, 0]])
+        material = Material(1.0, density=1.0, friction=0.0)
+        box = np.diag([link * (1 + 2 * np.cos(turn)), 3.0, 3.0])
+        return spheres_of_material(place, np.full(3, 0.5), material, box=box, periodic=[True] * 3)
+
+    straight, bent = (elastic_moduli(chain(each)).tensor[0, 0, 0, 0] for each in (0.0, 0.1))
+    assert straight > 0
+    assert abs(bent) < 1e-8 * straight
+
+
+def test_time_steps_beside_the_rules():
+    step, rules = timestep_rules(crystal(0.0, 1e-3))
+    assert step / rules["o_sullivan_bray"] == pytest.approx(1.860, abs=1e-3)
+    assert rules["oscillator"] > step > rules["o_sullivan_bray"]
+    assert rules["rayleigh"] > step

@@ -1,0 +1,184 @@
+"""Contacts with forces of other codes: a live packing of LAMMPS through tables of six digits, and bad tables."""
+
+import numpy as np
+import pytest
+from periodic_box import at_rest
+from scipy.linalg import eigvals
+
+from faultgouge.analysis import (
+    FaultgougeError,
+    damping_matrix,
+    elastic_moduli,
+    mass_weighted,
+    stability,
+    stiffness_matrix,
+)
+from faultgouge.analysis.files.contact_tables import material_of, read_contacts, read_spheres, verdict_within_digits
+from faultgouge.pywrap import from_lammps
+
+LAW = "kn=1000,kt=800,friction=0.5,rescales=1,gamma=100,gamma_t=100"
+
+
+@pytest.fixture(scope="module")
+def live(tmp_path_factory):
+    """Spheres at rest in LAMMPS, and their dumps with LAMMPS's own six digits."""
+    folder = tmp_path_factory.mktemp("tables")
+    lmp = at_rest(3, folder / "log.lammps", count=24)
+    lmp.commands_string(f"""
+compute ids all property/local patom1 patom2
+compute forces all pair/local dist force p1 p2 p3
+dump spheres all custom 1 {folder}/spheres.dump id x y z radius mass
+dump contacts all local 1 {folder}/local.dump index c_ids[*] c_forces[*]
+run 0
+""")
+    found = from_lammps(lmp)
+    lmp.close()
+    return folder, found
+
+
+def six(values):
+    return " ".join(f"{each:.6g}" for each in values)
+
+
+def write_tables(folder, packing):
+    """The same contacts as the other codes write them."""
+    c = packing.contacts
+    first, second = packing.ids[c.i], packing.ids[c.j]
+    whole = c.normal_force[:, None] * c.normal + c.tangential_force
+    size = np.linalg.norm(c.tangential_force, axis=1)
+    along = c.tangential_force / size[:, None]
+    zero = np.zeros((len(c), 3))
+    fstat = np.column_stack(
+        [0 * size, first - 1, second - 1, zero, c.overlap, 0 * size, c.normal_force, size, c.normal, -along]
+    )
+    rows = {
+        # MercuryDPM: each contact from both sides, and here with the tangential force of the second
+        "mercury.fstat": ["# 0 24", "# info", "# info", *map(six, fstat)],
+        # YADE: forces on the second
+        "yade.txt": [
+            "id1 id2 fnx fny fnz fsx fsy fsz",
+            *(f"{a - 1} {b - 1} {six(-n)} {six(-t)}" for a, b, n, t in zip(
+                first, second, c.normal_force[:, None] * c.normal, c.tangential_force, strict=True)),
+        ],
+        # LIGGGHTS: pos id force, from either side
+        "liggghts.dump": [
+            "ITEM: TIMESTEP", "0", "ITEM: NUMBER OF ENTRIES", str(len(c)), "ITEM: BOX BOUNDS pp pp pp", *3 * ["0 1"],
+            f"ITEM: ENTRIES {' '.join(f'c_f[{k}]' for k in range(1, 13))}",
+            *(f"0 0 0 0 0 0 {b} {a} 0 {six(-f)}" for a, b, f in zip(first, second, whole, strict=True)),
+        ],
+        "table.csv": [
+            "id1,id2,fn,ftx,fty,ftz",
+            *(f"{a},{b},{six([n, *t]).replace(' ', ',')}" for a, b, n, t in zip(
+                first, second, c.normal_force, c.tangential_force, strict=True)),
+        ],
+    }  # fmt: skip
+    for name, lines in rows.items():
+        (folder / name).write_text("\n".join([*lines, ""]))
+    order = np.argsort(packing.ids)
+    place = np.column_stack([packing.position, packing.radius])[order]
+    edge = packing.box[1, 1]
+    lines = [f"{len(place)} 0 0 0 0 {edge:.17g} {edge:.17g} {edge:.17g}"]
+    (folder / "mercury.data").write_text(
+        "\n".join([*lines, *(f"{six(r[:3])} 0 0 0 {six(r[3:])} {six(np.zeros(7))}" for r in place), ""])
+    )
+
+
+LOCAL = ["index", "id1", "id2", "dist", "fn", "ftx", "fty", "ftz"]
+LIGGGHTS = ["x1", "y1", "z1", "x2", "y2", "z2", "id1", "id2", "image", "fx", "fy", "fz"]
+BY_INDEX = ("mercury.fstat", "yade.txt")
+
+
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("local.dump", LOCAL),
+        ("table.csv", None),
+        ("liggghts.dump", LIGGGHTS),
+        ("mercury.fstat", None),
+        ("yade.txt", None),
+    ],
+)
+def test_the_verdict_of_a_table_is_the_live_one(live, name, columns):
+    folder, packing = live
+    write_tables(folder, packing)
+    spheres = read_spheres(folder / "spheres.dump")
+    if name in BY_INDEX:  # codes that count from 0
+        object.__setattr__(spheres, "id", spheres.id - 1)
+    found = read_contacts(spheres, folder / name, material_of(LAW), columns)
+    assert len(found.contacts) == len(packing.contacts)
+    assert ("with the other sign" in found.remarks[0]) == (name == "mercury.fstat")
+    verdict, says = verdict_within_digits(found)
+    told = stability(packing)
+    assert verdict.stable == told.stable is True
+    assert verdict.growth_rate == pytest.approx(told.growth_rate, rel=1e-4)
+    assert says.startswith("six digits tell: 5 tables that round to this one")
+    assert elastic_moduli(found).shear == pytest.approx(elastic_moduli(packing).shear, rel=1e-4)
+
+
+def test_the_command_takes_tables(live, faultgouge, tmp_path):
+    folder, _ = live
+    done = faultgouge(
+        "import", str(folder / "spheres.dump"), "--contacts", str(folder / "local.dump"), "--columns", ",".join(LOCAL),
+        "--material", LAW, "-o", str(tmp_path / "p.h5"),
+    )  # fmt: skip
+    assert "stable: every motion decays" in done.stdout
+    assert "six digits tell" in done.stdout
+    again = faultgouge("timestep", str(tmp_path / "p.h5"))
+    assert "largest stable time step" in again.stdout
+
+
+def test_digits_that_do_not_tell_are_told(live):
+    """Dashpots are weakened until the fastest growth is zero: whether a motion grows is then a matter of digits."""
+    folder, packing = live
+    write_tables(folder, packing)
+
+    def of(gamma):
+        law = material_of(LAW.replace("gamma=100,gamma_t=100", f"gamma={gamma:.17g},gamma_t=0"))
+        return read_contacts(read_spheres(folder / "spheres.dump"), folder / "table.csv", law)
+
+    def growth(gamma):
+        found = of(gamma)
+        a, g = (mass_weighted(each, found).toarray() for each in (stiffness_matrix(found), damping_matrix(found)))
+        s = eigvals(np.block([[np.zeros_like(a), np.eye(len(a))], [-a, -g]]))
+        return s.real[np.abs(s) > 1e-3 * np.abs(s).max()].max()
+
+    low, high = 1e-9, 1e3
+    assert growth(low) > 0 > growth(high)
+    while high / low > 1 + 1e-9:
+        low, high = (middle, high) if growth(middle := np.sqrt(low * high)) > 0 else (low, middle)
+    _, says = verdict_within_digits(of(float(high)))
+    assert says.startswith("six digits do not tell: of 5 tables that round to this one the verdict is ")
+
+
+SPHERES = "id,x,y,z,radius,mass\n1,0,0,0,0.5,1\n2,0.999,0,0,0.5,1\n3,5,0,0,0.5,1\n"
+CONTACTS = "id1,id2,fn,ftx,fty,ftz\n1,2,1.0,0,0.1,0\n"
+
+
+@pytest.mark.parametrize(
+    ("spheres", "contacts", "material", "word"),
+    [
+        ("", CONTACTS, "young=1", "is empty"),
+        (SPHERES.replace("radius", "size"), CONTACTS, "young=1", "no column radius"),
+        (SPHERES.replace("0.999,0,0,0.5", "0.999,0,0,-0.5"), CONTACTS, "young=1", "radius of sphere 2 is -0.5"),
+        (SPHERES.replace("\n2,", "\n1,"), CONTACTS, "young=1", "sphere 1 twice"),
+        (SPHERES.replace("0.999", "nan"), CONTACTS, "young=1", "line 3: it has a number that is not finite"),
+        (SPHERES.replace("0.999,0", "0.999"), CONTACTS, "young=1", "line 3: it has 5 columns"),
+        (SPHERES.replace("0.999", "near"), CONTACTS, "young=1", "'near' is no number"),
+        (SPHERES, CONTACTS.replace("id2", "other"), "young=1", "no column id2"),
+        (SPHERES, CONTACTS.replace("1,2,", "1,7,"), "young=1", "names sphere 7"),
+        (SPHERES, CONTACTS.replace("1,2,", "1,1,"), "young=1", "touches itself"),
+        (SPHERES, CONTACTS.replace("1,2,", "1,3,"), "young=1", "1 and 3 have a contact and are 4 apart"),
+        (SPHERES, CONTACTS.replace("fn,", "f,"), "young=1", "says no forces"),
+        (SPHERES, CONTACTS.replace("1,2,", "1,0,"), "young=1", "no px, py, pz"),
+        (SPHERES, CONTACTS.replace("0.1", "0.7"), "young=1", "0.7 f_n, beyond the coefficient of friction 0.5"),
+        (SPHERES, CONTACTS, "young=1", "out of balance by"),
+        (SPHERES, CONTACTS, "yung=1", "'yung=1': give young"),
+        (SPHERES, CONTACTS, "young=1,poisson=2", "poisson = 2"),
+    ],
+)
+def test_a_bad_table_is_refused_in_one_sentence(tmp_path, spheres, contacts, material, word):
+    (tmp_path / "s.csv").write_text(spheres)
+    (tmp_path / "c.csv").write_text(contacts)
+    with pytest.raises(FaultgougeError, match=word) as raised:
+        read_contacts(read_spheres(tmp_path / "s.csv"), tmp_path / "c.csv", material_of(material))
+    assert "\n" not in str(raised.value)

@@ -1,0 +1,76 @@
+"""Closed forms and results of others: the page comes out of its numbers, and these come out again."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from research.validation import compute
+from research.validation.make import CELLS, write_page
+
+FOLDER = Path(__file__).parents[2] / "research" / "validation"
+FOUND = json.loads((FOLDER / "validation.json").read_text())
+
+
+def test_the_page_comes_out_of_the_numbers(tmp_path):
+    assert write_page(tmp_path).read_text() == (FOLDER / "README.md").read_text()
+
+
+def test_the_crystal_of_duffy_and_mindlin():
+    """C11 to what the present stress adds, a tenth of the overlap; C44 and C12 to half of the overlap."""
+    again = compute.duffy_mindlin((0.0, 0.45), (1e-3, 1e-7))
+    kept = [row for row in FOUND["duffy_mindlin"] if row["nu"] in (0.0, 0.45) and row["overlap"] != 1e-5]
+    for row, stored in zip(again, kept, strict=True):
+        assert row == pytest.approx(stored, rel=1e-3, abs=1e-13)  # differences of numbers of 16 digits
+    for row in FOUND["duffy_mindlin"]:
+        assert abs(row["c11"]) < 0.1 * row["overlap"]
+        assert max(abs(row["c44"]), abs(row["c12"])) < 0.6 * row["overlap"]
+
+
+def test_lattice_dynamics_of_the_crystal_in_lammps():
+    """An overlap of 1e-4 is a difference of places that has twelve digits."""
+    [row] = [compute.lattice_dynamics(compute.crystal_in_lammps(1e-2, CELLS), CELLS)]
+    assert row["eigenvalues"] == 432
+    assert row["difference"] < 1e-12
+    assert all(each["difference"] < 3e-12 for each in FOUND["lattice"])
+
+
+def sentences_hold(rows):
+    for row in rows:
+        # K of LAMMPS's forces at k_t = 1e-4 k_n is small beside the rounding of a slip that began at zero
+        assert row["over_lammps"] == pytest.approx(1, abs=2e-5 if row["share"] == 1e-4 else 1e-6)
+    frictionless, *others = rows
+    weak = [row for row in others if row["share"] <= 1e-3]
+    for row in weak:
+        assert row["shear"] / frictionless["shear"] - 1 == pytest.approx(28 * row["share"], rel=0.1)
+        assert row["band"] == row["rotating"] == row["bearing"]
+
+
+def test_sentences_of_ishima():
+    sentences_hold(FOUND["ishima"])
+    assert FOUND["ishima"][-1]["band"] == 0
+
+
+@pytest.mark.slow
+def test_sentences_of_ishima_in_lammps():
+    again = compute.ishima((0.0, 1e-3))
+    sentences_hold(again)
+    assert again[1]["shear"] == pytest.approx(FOUND["ishima"][2]["shear"], rel=1e-6)
+
+
+def test_circle_of_hu():
+    for row in FOUND["circles"]:
+        assert row["off"] < (3e-2 if row["loaded"] else 1e-12)
+        assert (row["overdamped"] > 100) == (row["share"] > 2)
+
+
+@pytest.mark.slow
+def test_circle_of_hu_again():
+    for row, stored in zip(compute.circles(), FOUND["circles"], strict=True):
+        assert row == pytest.approx(stored, rel=1e-3, abs=1e-13)
+
+
+def test_the_rule_of_osullivan_and_bray_is_safe():
+    assert compute.time_steps((0.0,), 1e-3) == [pytest.approx(FOUND["time_steps"][0], rel=1e-9)]
+    assert FOUND["time_steps"][0]["over_rule"] == pytest.approx(1.86, abs=1e-3)
+    assert all(row["over_rule"] > 1.8 for row in FOUND["time_steps"])
