@@ -45,9 +45,9 @@ from scipy.sparse import csr_array
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError, Window, find_onset
 from faultgouge.analysis.motion.energy_norm import EnergyNorm
-from faultgouge.analysis.windows import LIMITS, System, find_windows
-from faultgouge.analysis.windows.search import windows_along
-from faultgouge.analysis.windows.slices.first_window import first_window
+from faultgouge.analysis.windows import System, find_windows
+from faultgouge.analysis.windows.search import Search
+from faultgouge.analysis.windows.sliced_search import SlicedSearch
 from faultgouge.pywrap import Equilibrium, LoadPath, Scene, scene_path, settle
 from faultgouge.pywrap.lammps.engine import Engine
 from faultgouge.pywrap.runs.ramp_loads import ramp_loads
@@ -98,8 +98,7 @@ def compare_searches(path: LoadPath[Equilibrium], forces: np.ndarray, kind: dict
     few = find_windows(damped(path, kind), forces, look=lambda a, b: [fx for fx in inside if a < fx < b])
     times.append(time.process_time())
     all_loads = np.unique(np.concatenate([forces, [fx for fx in inside if fx < forces[-1]]]))
-    narrowest = LIMITS.narrowest * float(forces[-1])
-    *_, (_, every) = windows_along(damped(path, kind), all_loads, narrowest)
+    *_, (_, every) = Search(damped(path, kind), 1e-7 * float(forces[-1])).along(all_loads)
     times.append(time.process_time())
     undamped, seconds, whole = np.diff(times)
     differences, stated = edges(few, every)
@@ -128,7 +127,7 @@ def against_all_eigenvalues(
     """The first window from slices, and whether all eigenvalues of the companion matrix agree with it."""
     system = damped(path, kind)
     begin = time.process_time()
-    window, doubtful = first_window(system, forces)
+    window, doubtful = SlicedSearch(system).first_window(forces)
     row: Row = {"seconds": f"{time.process_time() - begin:.2f}"}
     onset = np.inf if window is None else window.fx_onset
 

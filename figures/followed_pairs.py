@@ -1,8 +1,8 @@
 """The pairs of eigenvalues of a ramp, each followed through the loads, and the verdict at each load.
 
 A pair is followed from the load at which it is complex first. Its image at another load is the pair of modes that lies
-closest to its planes (:meth:`~faultgouge.analysis.windows.SystemModes.images`). If the planes of the image are not
-those of the pair, the pair is unknown at that load, and it may be found again at a later one. If no pair of the ramp is
+closest to its planes (`Plane.closest` of :mod:`~faultgouge.analysis.windows.pair_over_load`). If these are not those of
+the pair, the pair is unknown at that load, and it may be found again at a later one. If no pair of the ramp is
 complex, the two real modes of the last load that are closest to merging are followed.
 """
 
@@ -23,7 +23,8 @@ from faultgouge.analysis import (
 from faultgouge.analysis.counted import counted
 from faultgouge.analysis.has_configuration import HasConfiguration
 from faultgouge.analysis.motion.eigenvalues import is_negative, is_zero, zero_uncertainties, zero_uncertainty
-from faultgouge.analysis.windows import Space, System, SystemModes, force_bearing
+from faultgouge.analysis.windows import Motions, System, force_bearing
+from faultgouge.analysis.windows.pair_over_load import Plane
 
 from .mode import Complexes, displacement
 
@@ -45,14 +46,14 @@ class FollowedPair:
     eigenvalues : ndarray of complex, shape (S, 2)
         Both members, 1 / time^2: the one with the positive imaginary part, or the lower one, first; nan where the pair
         is unknown.
-    planes : mapping of int to Space
+    planes : mapping of int to Plane
         The two modes at each load at which the pair is known.
     packings : sequence of Packing or Configuration
         The equilibria.
     """
 
     eigenvalues: Complexes
-    planes: Mapping[int, Space]
+    planes: Mapping[int, Plane]
     packings: Sequence[HasConfiguration]
 
     @cached_property
@@ -107,8 +108,8 @@ def follow_eigenvalues(packings: Sequence[HasConfiguration], progress: Progress 
     followed = _Followed(packings)
     values, verdicts = [], []
     for k, packing in enumerate(progress(packings)):
-        modes = SystemModes.of(System.of(packing))
-        values.append(modes.values)
+        modes = Motions.of(System.of(packing))
+        values.append(modes.with_conjugates()[0])
         verdicts.append(_verdict_on(force_bearing(packing), modes, alone=len(packings) == 1))
         followed.add(k, modes)
     followed.close()
@@ -126,11 +127,11 @@ class _Followed:
 
     def __init__(self, packings: Sequence[HasConfiguration]) -> None:
         self.packings = packings
-        self.pairs: list[dict[int, Space]] = []
-        self._modes: dict[int, SystemModes] = {}
-        self._last: SystemModes | None = None
+        self.pairs: list[dict[int, Plane]] = []
+        self._modes: dict[int, Motions] = {}
+        self._last: Motions | None = None
 
-    def add(self, k: int, modes: SystemModes) -> None:
+    def add(self, k: int, modes: Motions) -> None:
         """The next load, with all of its modes."""
         size = 32.0 * modes.right.size  # right and left vectors
         if size * (len(self._modes) + 1) <= MEMORY:
@@ -138,10 +139,11 @@ class _Followed:
         self._last, taken = modes, set()
         for known, members in zip(self.pairs, self._members(k, modes), strict=True):
             if members is not None and members not in taken:
-                known[k] = modes.space(members)
-                if modes.conjugate(members):
+                known[k] = Plane.of(modes, members)
+                if len(members) == 1:
                     taken.add(members)
-        self.pairs += [{k: modes.space(members)} for members in modes.complex_pairs if members not in taken]
+        complex_ = ((int(each),) for each in np.flatnonzero(modes.grows))
+        self.pairs += [{k: Plane.of(modes, members)} for members in complex_ if members not in taken]
 
     def close(self) -> None:
         """Follow all pairs back, to loads at which they are not yet known."""
@@ -154,31 +156,38 @@ class _Followed:
                 if image is not None:
                     known[k] = image
 
-    def _members(self, k: int, modes: SystemModes) -> list[tuple[int, int] | None]:
+    def _members(self, k: int, modes: Motions) -> list[tuple[int, ...] | None]:
         """The members of each pair at this load, followed from its last load, or else from its closest load."""
         last = [max(known) for known in self.pairs]
-        found = modes.images([known[n] for known, n in zip(self.pairs, last, strict=True)])
+        found = _images_of(modes, [known[n] for known, n in zip(self.pairs, last, strict=True)])
         fx = self.packings[k].fx
         closest = [min(known, key=lambda n: abs(self.packings[n].fx - fx)) for known in self.pairs]
         lost = [each for each, members in enumerate(found) if members is None and closest[each] != last[each]]
-        again = modes.images([self.pairs[each][closest[each]] for each in lost])
+        again = _images_of(modes, [self.pairs[each][closest[each]] for each in lost])
         for each, members in zip(lost, again, strict=True):
             found[each] = members
         return found
 
-    def _images(self, pairs: Sequence[Space], k: int) -> list[Space | None]:
+    def _images(self, pairs: Sequence[Plane], k: int) -> list[Plane | None]:
         """Each of some pairs at a load, None where the pair is unknown there."""
         if k in self._modes:
             modes = self._modes[k]
-            return [None if members is None else modes.space(members) for members in modes.images(pairs)]
+            return [None if members is None else Plane.of(modes, members) for members in _images_of(modes, pairs)]
         system = System.of(self.packings[k])
         images = [pair.at(system) for pair in pairs]
-        return [
-            image if image is not None and image.like(pair) else None for image, pair in zip(images, pairs, strict=True)
-        ]
+        return [image if image.like(pair) else None for image, pair in zip(images, pairs, strict=True)]
 
 
-def _verdict_on(packing: HasConfiguration, modes: SystemModes, alone: bool) -> Stability:
+def _images_of(modes: Motions, pairs: Sequence[Plane]) -> list[tuple[int, ...] | None]:
+    """The modes closest to each of some pairs, None where their planes are not like those of the pair."""
+    found: list[tuple[int, ...] | None] = []
+    for pair in pairs:
+        members = tuple(pair.closest(modes))
+        found.append(members if Plane.of(modes, members).like(pair) else None)
+    return found
+
+
+def _verdict_on(packing: HasConfiguration, modes: Motions, alone: bool) -> Stability:
     """Whether a packing moves; of one among many the motion of contacts at Coulomb's bound is not followed."""
     slide = int(packing.configuration.contacts.one_sided.sum())
     reasons = []
@@ -189,20 +198,20 @@ def _verdict_on(packing: HasConfiguration, modes: SystemModes, alone: bool) -> S
     return stability(packing, spectrum_of_stiffness=_spectrum_of(packing, modes), reasons=reasons)
 
 
-def _spectrum_of(packing: HasConfiguration, modes: SystemModes) -> Spectrum:
+def _spectrum_of(packing: HasConfiguration, modes: Motions) -> Spectrum:
     """The spectrum of a packing whose modes are known, fastest growing pair first."""
-    found = Modes(modes.values, modes.right, modes.left, packing.axes)
+    found = Modes(*modes.with_conjugates(), packing.axes)
     rounding = modes.system.rounding
-    particle = np.arange(len(modes.right)) % len(packing.configuration)
-    zero = zero_uncertainties(packing, rounding, particle, modes.left, modes.right)
-    numbers = zip(modes.values, found.overlap, found.participation, found.rotation, strict=True)
+    particle = np.arange(len(found.right)) % len(packing.configuration)
+    zero = zero_uncertainties(packing, rounding, particle, found.left, found.right)
+    numbers = zip(found.values, found.overlap, found.participation, found.rotation, strict=True)
     pairs = [Mode(complex(value), *map(float, rest)) for value, *rest in numbers if value.imag > 0]
-    below = is_negative(modes.values, found.overlap, rounding, zero)
-    free = ~below & is_zero(modes.values, found.overlap, zero_uncertainty(packing, rounding), zero)
+    below = is_negative(found.values, found.overlap, rounding, zero)
+    free = ~below & is_zero(found.values, found.overlap, zero_uncertainty(packing, rounding), zero)
     return Spectrum(
-        eigenvalues=modes.values,
+        eigenvalues=found.values,
         pairs=tuple(sorted(pairs, key=lambda pair: -pair.growth_rate)),
-        negative=np.sort(modes.values[below].real),
+        negative=np.sort(found.values[below].real),
         noise_pairs=0,  # they have lost their imaginary parts
         rattlers=packing.rattlers,
         rounding=rounding,
@@ -211,16 +220,16 @@ def _spectrum_of(packing: HasConfiguration, modes: SystemModes) -> Spectrum:
     )
 
 
-def _about_to_meet(modes: SystemModes) -> list[Space]:
+def _about_to_meet(modes: Motions) -> list[Plane]:
     """The two real modes that are closest to meeting; none of a packing with fewer than two."""
     try:
-        first, second, _ = closest_to_meeting(modes)
+        first, second, _ = closest_to_meeting(Modes(modes.values, modes.right, modes.left))
     except ValueError:
         return []
-    return [modes.space((first, second))]
+    return [Plane.of(modes, (first, second))]
 
 
-def _along(packings: Sequence[HasConfiguration], known: dict[int, Space]) -> FollowedPair:
+def _along(packings: Sequence[HasConfiguration], known: dict[int, Plane]) -> FollowedPair:
     """A pair with its eigenvalues."""
     found = np.full((len(packings), 2), complex(np.nan, np.nan))
     for k, pair in known.items():
@@ -228,7 +237,7 @@ def _along(packings: Sequence[HasConfiguration], known: dict[int, Space]) -> Fol
     return FollowedPair(found, known, packings)
 
 
-def _members_of(pair: Space) -> tuple[Complexes, Complexes]:
+def _members_of(pair: Plane) -> tuple[Complexes, Complexes]:
     """Eigenvalues of both members, and their eigenvectors on the plane in columns."""
     own, vectors = np.linalg.eig(pair.block)
     order = np.lexsort((-own.imag, own.real))

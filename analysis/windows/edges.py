@@ -20,10 +20,15 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from ..arrays import Floats
-from .states import State
+from ..errors import FaultgougeError
+from .states import Motions
 from .system import System
 
 Kind = Literal["coalescence", "hopf", "steady", "contact change", "start"]
+
+
+class LostPairError(FaultgougeError):
+    """A motion cannot be followed to another load; the text is one sentence."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,7 @@ class Edge:
     kind: Kind
 
     @classmethod
-    def start(cls, state: State, k: int) -> "Edge":
+    def start(cls, state: Motions, k: int) -> "Edge":
         """The edge of a motion that grows at the smallest load."""
         return cls(state.fx, 0.0, _value(state.system, state.values[k]), float(state.overlap[k]), "start")
 

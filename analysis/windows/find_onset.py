@@ -18,22 +18,19 @@ from ..packing.packing import Packing
 from ..progress import Watch, report_progress, show_progress
 from .edges import Edge, Increments, Window
 from .find_windows import WindowsSoFar, check_increasing, find_windows, windows_up_to
+from .limits import LIMITS, Limits
 from .onset import RAISE_LOAD, NoGrowthError, Onset, OnsetError
+from .ranks import ALONE, Ranks
 from .search import Look, SystemOfLoad
-from .slices.ranks import ALONE, Ranks
 from .system import System, force_bearing, full_operator
-
-ALL_WINDOWS = 300
-"""Disks up to which all windows are sought, from all eigenvalues: half a second for a decomposition, which grows with
-the cube of the number. Beyond, the first window is sought in slices of the spectrum."""
 
 LAPACK_COORDINATES = 5000
 """Coordinates up to which all eigenvalues at the first load are asked for: half a minute, and as their cube."""
 
 
-def takes_all_modes(packing: HasConfiguration, modes: tuple[int, int] | None = None) -> bool:
+def takes_all_modes(packing: HasConfiguration, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
     """Whether a packing is small enough for all of its modes to be searched, and for all windows to be found."""
-    return modes is None and packing.coordinates <= 3 * ALL_WINDOWS
+    return modes is None and packing.coordinates <= 3 * limits.all_windows
 
 
 def find_onset(
@@ -47,6 +44,7 @@ def find_onset(
     watch: Watch | None = None,
     ranks: Ranks = ALONE,
     folder: Path | None = None,
+    limits: Limits = LIMITS,
 ) -> Onset:
     """Find the windows of growing motion between the smallest and the largest load.
 
@@ -107,7 +105,7 @@ def find_onset(
     start = equilibrium(float(loads[0]))
     if dissipation and not start.damped:
         raise ValueError("The packing has no dissipation: call find_onset without dissipation=True.")
-    search = _OnsetSearch(equilibrium, start, loads, modes, first, ranks, folder)
+    search = _OnsetSearch(equilibrium, start, loads, modes, first, ranks, folder, limits)
     with show_progress(watch):
         if not dissipation:
             return search.undamped_onset()
@@ -125,11 +123,12 @@ class _OnsetSearch:
     first: bool
     ranks: Ranks
     folder: Path | None
+    limits: Limits
 
     @property
     def takes_all(self) -> bool:
         """Whether all modes are searched, and all windows can be found."""
-        return takes_all_modes(self.start, self.modes)
+        return takes_all_modes(self.start, self.modes, self.limits)
 
     def undamped(self, fx: float) -> System:
         """The system at a load, without dissipation."""
@@ -153,9 +152,10 @@ class _OnsetSearch:
                 known=known,
             )
             return found[:1] if self.first else found, ()
-        from .slices.first_window import first_window  # with libraries that nothing else needs
+        from .sliced_search import SlicedSearch  # with libraries that nothing else needs
 
-        one, doubtful = first_window(system, self.loads, self.modes, self.ranks, self.folder)
+        search = SlicedSearch(system, self.modes, self.ranks, self.folder, self.limits)
+        one, doubtful = search.first_window(self.loads)
         return (one,) if one else (), doubtful
 
     def undamped_onset(self) -> Onset:
@@ -164,8 +164,10 @@ class _OnsetSearch:
         if not windows:
             raise OnsetError.among(self.modes, float(self.loads[-1]), doubtful)
         opens = windows[0].kind == "start"
-        if opens and self.takes_all:
-            at_start = at_start or spectrum(force_bearing(self.start))
+        if opens and at_start is None and self.modes is None:
+            at_start = spectrum(force_bearing(self.start)) if self.takes_all else _complex_at_start(self.start)
+            if at_start is not None and at_start.pairs and not self.takes_all and windows[0].eigenvalue >= 0:
+                windows = (_fastest(self.start, at_start),)
         complete = self.takes_all and not self.first and not windows[0].eigenvalue < 0
         return Onset(windows, complete, doubtful, self.modes, at_start if opens else None, ends)
 
@@ -214,14 +216,14 @@ class _OnsetSearch:
             return (_at_start(start, float(negative[0]), 1.0),), (), None, start.fx
         branch = _Branch(self.equilibrium, start, self.loads)
         # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
-        if self.modes is None and (not self.takes_all or (self.first and not isinstance(start, Packing))):
+        if self.modes is None and (self.first or not self.takes_all) and not isinstance(start, Packing):
             found = _complex_at_start(start)
             if found is not None:
                 return (_fastest(start, found),), (), found, None
         try:
             return *self.windows_of(branch), None, branch.ends
         except NoEquilibriumError:  # beyond the first increment, which the search asks for in any case
-            found = _complex_at_start(start) if self.takes_all else None
+            found = _complex_at_start(start) if self.modes is None else None
             if found is None:
                 raise
             return (_fastest(start, found),), (), found, branch.ends

@@ -12,7 +12,7 @@ from ..progress import report_progress
 from .edges import Window
 from .quiet import Quiet
 from .search import Look, Search, SystemOfLoad
-from .states import State
+from .states import Motions
 from .system import System
 
 FEW_COORDINATES = 60
@@ -71,7 +71,7 @@ def windows_up_to(
     narrowest: float | None = None,
     look: Look = lambda below, above: (),
     first: bool = False,
-    decompose: Callable[[System], State] = State.of,
+    decompose: Callable[[System], Motions] = Motions.of,
 ) -> Iterator[tuple[float, tuple[Window, ...]]]:
     """Yield each load but the smallest, with all windows up to this load; the windows are those of `find_windows`."""
     loads = check_increasing(forces)

@@ -1,15 +1,103 @@
 """One pair of modes through equilibria on the way to its onset: its normal form and its eigenvalues at each load."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
+from scipy.linalg import LinAlgError
 
-from ..motion.eigenvalues import Complexes
-from ..packing.packing import Packing
+from ..arrays import Complexes, Floats
 from ..responses.normal_form import NormalForm
-from .space import Space
+from ..packing.packing import Packing
+from .states import DENSE, Motions
 from .system import System
-from .system_modes import SystemModes
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """Two modes of a system without dissipation by the planes that they span, smooth where the two coalesce.
+
+    Attributes
+    ----------
+    system : System
+        A.
+    right, left : ndarray, shape (n, 2)
+        Orthonormal bases V and U of the right and of the left plane.
+    """
+
+    system: System
+    right: Floats
+    left: Floats
+
+    @classmethod
+    def of(cls, state: Motions, members: Sequence[int]) -> "Plane":
+        """Of one of a complex pair, or of two real modes of a state."""
+        right, left = (_plane(each[:, list(members)]) for each in (state.right, state.left))
+        return cls(state.system, right, left)
+
+    @property
+    def fx(self) -> float:
+        """The load, force per top disk."""
+        return self.system.fx
+
+    def block_of(self, image: Any) -> Floats:
+        """(U^T V)^-1 U^T times the image of V under any matrix, shape (2, 2)."""
+        return np.asarray(np.linalg.solve(self.left.T @ self.right, self.left.T @ image))
+
+    @cached_property
+    def block(self) -> Floats:
+        """A on the planes, 1 / time^2."""
+        return self.block_of(self.system.stiffness @ self.right)
+
+    @property
+    def mean(self) -> float:
+        """Half the trace of the block, 1 / time^2."""
+        return 0.5 * float(np.trace(self.block))
+
+    @property
+    def traceless(self) -> Floats:
+        """The block less its mean, 1 / time^2."""
+        return np.asarray(self.block - self.mean * np.eye(2))
+
+    @property
+    def discriminant(self) -> float:
+        """(lambda_1 - lambda_2)^2, 1 / time^4."""
+        b = self.block
+        return float((b[0, 0] - b[1, 1]) ** 2 + 4 * b[0, 1] * b[1, 0])
+
+    def like(self, other: "Plane") -> bool:
+        """Whether both have the same planes rather than not: all principal angles below 60 degrees."""
+        ends = (self.right, other.right), (self.left, other.left)
+        return min(float(np.linalg.norm(a.T @ b, -2)) for a, b in ends) > 0.5
+
+    def closest(self, state: Motions) -> list[int]:
+        """One of a complex pair, or two real modes, that lie closest to these planes; ValueError of a single mode."""
+        weight = np.linalg.norm(self.right.T @ state.right, axis=0) * np.linalg.norm(self.left.T @ state.left, axis=0)
+        return _best(state, weight)
+
+    def at(self, system: System) -> "Plane":
+        """The closest two modes at another load."""
+        state = _modes_near(system, self.mean)
+        return Plane.of(state, self.closest(state))
+
+
+def pair_about(state: Motions, eigenvalue: float) -> Plane:
+    """The complex pair, or the two real modes, closest to an eigenvalue, 1 / time^2."""
+    return Plane.of(state, _best(state, 1 / (np.abs(state.values - eigenvalue) + np.finfo(float).tiny)))
+
+
+def _best(state: Motions, weight: Floats) -> list[int]:
+    """One of a complex pair, or two real modes, with the largest sum of weights."""
+    alone, pairs = np.flatnonzero(~state.grows), np.flatnonzero(state.grows)
+    best = [int(k) for k in alone[np.argsort(weight[alone])[-2:]]]
+    two = weight[best].sum() if len(best) == 2 else -np.inf
+    if len(pairs) and 2 * weight[pairs].max() > two:
+        return [int(pairs[np.argmax(weight[pairs])])]
+    if len(best) < 2:
+        raise ValueError("a system of one mode has no pair")
+    return best
 
 
 def normal_forms(packings: Sequence[Packing], eigenvalue: float) -> list[NormalForm]:
@@ -32,6 +120,12 @@ def normal_forms(packings: Sequence[Packing], eigenvalue: float) -> list[NormalF
     return [normal_form(pair) for pair in _follow_pair(packings, eigenvalue)]
 
 
+def normal_form(pair: Plane) -> NormalForm:
+    """The normal form of two modes."""
+    dual = np.linalg.solve(pair.left.T @ pair.right, pair.left.T).T
+    return NormalForm.of_block(dual.T @ (pair.system.stiffness @ pair.right), pair.discriminant, pair.right, dual)
+
+
 def pair_eigenvalues(packings: Sequence[Packing], eigenvalue: float) -> Complexes:
     """Both eigenvalues of one pair, from its onset on through other loads.
 
@@ -51,7 +145,7 @@ def pair_eigenvalues(packings: Sequence[Packing], eigenvalue: float) -> Complexe
         1 / time^2; nan from where on the planes are not recognised any more.
     """
     values = np.full((len(packings), 2), np.nan, dtype=np.complex128)
-    before: Space | None = None
+    before: Plane | None = None
     for row, pair in zip(values, _follow_pair(packings, eigenvalue), strict=True):
         if before is not None and not before.like(pair):
             break
@@ -61,21 +155,26 @@ def pair_eigenvalues(packings: Sequence[Packing], eigenvalue: float) -> Complexe
     return values
 
 
-def normal_form(pair: Space) -> NormalForm:
-    """The normal form of two modes of a system."""
-    right, left = pair.right, pair.left
-    dual = np.linalg.solve(left.T @ right, left.T).T
-    return NormalForm.of_block(dual.T @ pair.system.image(right), pair.discriminant, right, dual)
-
-
-def _follow_pair(packings: Sequence[Packing], eigenvalue: float) -> Iterator[Space]:
-    """The pair at each load: followed from the load before, and sought among all modes where that leads nowhere."""
-    pair: Space | None = None
+def _follow_pair(packings: Sequence[Packing], eigenvalue: float) -> Iterator[Plane]:
+    """The pair at each load: the two modes, conjugates or both real, closest to the planes of the load before."""
+    pair: Plane | None = None
     for packing in packings:
         system = System.of(packing)
-        image = None if pair is None else pair.at(system)
-        if image is None:
-            modes = SystemModes.of(system)
-            image = modes.space(modes.nearest(pair) if pair else modes.about(eigenvalue))
-        pair = image
+        pair = pair_about(_modes_near(system, eigenvalue), eigenvalue) if pair is None else pair.at(system)
         yield pair
+
+
+def _modes_near(system: System, value: float) -> Motions:
+    """The modes next to an eigenvalue, or all."""
+    if len(system.active) > DENSE:
+        try:
+            return Motions.near(system, [value], [12])
+        except LinAlgError:
+            pass
+    return Motions.of(system)
+
+
+def _plane(vectors: Complexes) -> Floats:
+    """Orthonormal real basis, shape (n, 2), of the plane of two real or two complex conjugate vectors."""
+    both = np.hstack([vectors.real, vectors.imag])
+    return np.asarray(np.linalg.svd(both, full_matrices=False)[0][:, :2])

@@ -21,7 +21,7 @@ from scipy.linalg import LinAlgError
 
 from ..arrays import Complexes, Floats
 from .search import lowest
-from .states import State
+from .states import Motions
 from .system import System
 
 MIXING = 0.2
@@ -43,11 +43,12 @@ class Quiet:
         System without dissipation -> all of its motions.
     """
 
-    def __init__(self, undamped: Callable[[System], State]) -> None:
+    def __init__(self, undamped: Callable[[System], Motions]) -> None:
         self._undamped = undamped
-        self._known: dict[float, tuple[Complexes, NDArray[np.bool_], State]] = {}
+        self.crowded = False  # whether dashpots mix a third of all motions beyond the second order
+        self._known: dict[float, tuple[Complexes, NDArray[np.bool_], Motions]] = {}
 
-    def __call__(self, here: System, there: System) -> tuple[State, State] | None:
+    def __call__(self, here: System, there: System) -> tuple[Motions, Motions] | None:
         """The motions at both loads; None if they are too many, or not known."""
         if not np.array_equal(here.active, there.active):
             return None
@@ -56,32 +57,27 @@ class Quiet:
         doubt = doubt_a | doubt_b | self._approach(below, above, a, b)
         places = np.flatnonzero(doubt)
         if not len(places):
-            return State.none(here), State.none(there)
+            return Motions.none(here), Motions.none(there)
         groups = [each for each in np.split(places, np.flatnonzero(np.diff(places) > 3) + 1)]
         counts = [int(each[-1] - each[0]) + 4 for each in groups]
         if sum(counts) > MOST:
             return None
         try:
             below, above = (
-                State.near(system, [1j * np.sqrt(np.mean(values[each[[0, -1]]].real)) for each in groups], counts)
+                Motions.near(system, [1j * np.sqrt(np.mean(values[each[[0, -1]]].real)) for each in groups], counts)
                 for system, values in ((here, a), (there, b))
             )
         except LinAlgError:
             return None
         return below, above
 
-    def _suspects(self, system: System) -> tuple[Complexes, NDArray[np.bool_], State]:
+    def _suspects(self, system: System) -> tuple[Complexes, NDArray[np.bool_], Motions]:
         """lambda of all motions without dissipation, by real part, and which of them may grow."""
         if system.fx in self._known:
             return self._known[system.fx]
         state = self._undamped(System(system.fx, system.stiffness))
-        pairs = np.flatnonzero(state.grows)
-        values, x, y = (
-            np.concatenate([each, each[..., pairs].conj()], axis=-1) for each in (state.values, state.right, state.left)
-        )
-        order = np.argsort(values.real, kind="stable")
-        values, x, y = values[order], x[:, order], y[:, order]
-        if not len(pairs):
+        values, x, y = state.with_conjugates()
+        if not np.any(values.imag):
             x, y = x.real, y.real
         with np.errstate(divide="ignore", invalid="ignore"):
             gamma = (y.conj().T @ (system.damping @ x)) / np.sum(y.conj() * x, axis=0)[:, None]
@@ -92,11 +88,12 @@ class Quiet:
             shift = s[:, None] ** 2 * gamma * gamma.T / apart
             s = 1j * np.sqrt(values - shift.sum(axis=1) - 0.25 * own**2 + 0j) - 0.5 * own
             trusted = np.sqrt(np.abs(shift / apart)).max(axis=1) < MIXING
+            self.crowded = self.crowded or np.count_nonzero(~trusted) > len(values) / 3
             quiet = trusted & (-2 * s.real > SPARE * np.abs(own)) & (values.imag == 0) & (values.real > 0)
         self._known[system.fx] = values, ~quiet, state
         return self._known[system.fx]
 
-    def _approach(self, below: State, above: State, a: Complexes, b: Complexes) -> NDArray[np.bool_]:
+    def _approach(self, below: Motions, above: Motions, a: Complexes, b: Complexes) -> NDArray[np.bool_]:
         """Which levels may come as close to a neighbour between two loads as half of their distance there."""
         span, near = above.fx - below.fx, np.zeros(len(a), bool)
         ends = []

@@ -5,9 +5,9 @@ Without dissipation two real eigenvalues of A meet, and go on as a complex pair.
 .. math:: D = (\lambda_1 - \lambda_2)^2
 
 are smooth functions of the matrix where the two meet (Kato, *Perturbation Theory for Linear Operators*, 1966, II.1),
-so that a backward stable solver returns D with an error of rounding times |A|, although each eigenvalue errs by the root
-of that. D < 0 is a complex pair. With dissipation :math:`\mathrm{Re}\, s` of one eigenvalue goes through zero. So a
-motion *grows* where -D, or Re s, is positive, and a window begins and ends where this number changes its sign.
+so that a backward stable solver returns D with an error of rounding times |A|, although each eigenvalue errs by the
+root of that. D < 0 is a complex pair. With dissipation :math:`\mathrm{Re}\, s` of one eigenvalue goes through zero. So
+a motion *grows* where -D, or Re s, is positive, and a window begins and ends where this number changes its sign.
 
 **Between two loads a and b** all motions are known at both ends, with slopes. The shapes of motions that grow tell
 which of these are the same at both ends. If one motion more grows at one end, its edge lies in between, and is solved
@@ -32,9 +32,9 @@ import numpy as np
 from ..arrays import Complexes, Floats, Indices
 from ..errors import NoEquilibriumError, TurningPointError
 from .edges import Edge, Window, sign_change
-from .states import State
+from .states import Motions
 from .system import System
-from .tracks import Doubt, Point, Track, nearest_pair
+from .tracks import DoubtError, Track, TrackPoint, nearest_pair
 
 SystemOfLoad = Callable[[float], System]
 """Load -> the system there."""
@@ -42,7 +42,7 @@ SystemOfLoad = Callable[[float], System]
 Look = Callable[[float, float], Iterable[float]]
 """Two neighbouring loads of a ramp -> further loads between them that are to be looked at."""
 
-Few = Callable[[System, System], tuple[State, State] | None]
+Few = Callable[[System, System], tuple[Motions, Motions] | None]
 """The motions that may change between two loads, at both; None if all motions have to be looked at."""
 
 BEND = 0.05
@@ -96,13 +96,13 @@ class Search:
         narrowest: float,
         few: Few | None = None,
         first: bool = False,
-        decompose: Callable[[System], State] = State.of,
+        decompose: Callable[[System], Motions] = Motions.of,
     ) -> None:
         self.at, self.narrowest, self.few, self.first = system, narrowest, few, first
         self._decompose = decompose
         self.growing: list[tuple[complex, Edge]] | None = None  # eigenvalues at the load reached so far
         self.closed: list[Window] = []
-        self._known: dict[float, State] = {}
+        self._known: dict[float, Motions] = {}
         self._before: System | None = None
 
     @property
@@ -168,7 +168,7 @@ class Search:
                 continue
         return None
 
-    def state(self, system: System) -> State:
+    def state(self, system: System) -> Motions:
         """All motions of a system, kept as long as its load is not passed."""
         found = self._known.get(system.fx)
         if found is None:
@@ -186,7 +186,7 @@ class Search:
             if few and len(self.growing) != below.grows.sum():
                 few, below, above = None, self.state(here), self.state(there)
             changes = self._changes(below, above)
-        except Doubt as doubt:
+        except DoubtError as doubt:
             if there.fx - here.fx > self.narrowest:
                 fx = doubt.fx if doubt.fx is not None else here.fx + 0.47 * (there.fx - here.fx)
                 margin = 0.02 * (there.fx - here.fx)
@@ -211,7 +211,7 @@ class Search:
         self._before = here
         self._known = {fx: each for fx, each in self._known.items() if fx >= there.fx}
 
-    def _undivided(self, below: State, above: State) -> Changes:
+    def _undivided(self, below: Motions, above: Motions) -> Changes:
         """What changes on an increment that is not divided: an unsolved edge is uncertain by half of it."""
         rows, columns = np.flatnonzero(below.grows), np.flatnonzero(above.grows)
         same = [(int(rows[i]), int(columns[j])) for i, j in assign(below.alike(above, rows, columns) + 1e-300)]
@@ -224,12 +224,12 @@ class Search:
             [(k, Edge.between(loads, below.system, below.values[k], below.overlap[k])) for k in ended],
         )
 
-    def _changes(self, below: State, above: State) -> Changes:
-        """What happens between two loads; a Doubt if that is not sure."""
+    def _changes(self, below: Motions, above: Motions) -> Changes:
+        """What happens between two loads; a DoubtError if that is not sure."""
         kind = self._changes_of_motions if below.system.dissipative else self._changes_of_pairs
         return kind(below, above, below.slopes(above.system), above.slopes(below.system))
 
-    def _changes_of_pairs(self, below: State, above: State, drift_a: Complexes, drift_b: Complexes) -> Changes:
+    def _changes_of_pairs(self, below: Motions, above: Motions, drift_a: Complexes, drift_b: Complexes) -> Changes:
         """As `_changes`, without dissipation: what changes is real at one load and a complex pair at the other."""
         rows, columns = np.flatnonzero(below.grows), np.flatnonzero(above.grows)
         alike = below.alike(above, rows, columns)
@@ -237,22 +237,28 @@ class Search:
         begun = [int(j) for j in columns if j not in {j for _, j in same}]
         ended = [int(i) for i in rows if i not in {i for i, _ in same}]
         if len(begun) + len(ended) > 1:
-            raise Doubt
+            raise DoubtError
         levels_a, levels_b = np.flatnonzero(~below.grows), np.flatnonzero(~above.grows)
         begins, ends = [], []
         for k in begun:
-            inside = Point.pair(above, drift_b, k)
+            inside = TrackPoint.pair(above, drift_b, k)
             outside, levels_a = _levels_of(inside, below, drift_a, levels_a)
             begins.append((k, self._edge(Track(self.at, outside, inside), inside.fx, outside.fx)))
         for k in ended:
-            inside = Point.pair(below, drift_a, k)
+            inside = TrackPoint.pair(below, drift_a, k)
             outside, levels_b = _levels_of(inside, above, drift_b, levels_b)
             ends.append((k, self._edge(Track(self.at, inside, outside), inside.fx, outside.fx)))
+        if not (below.whole and above.whole):  # some have no partner, as another one is nearer to the point there
+            alike = below.alike(above, levels_a, levels_b)
+            pairs = [(levels_a[i], levels_b[j]) for i, j in assign(alike) if alike[i, j] > ALIKE]
+            levels_a, levels_b = (
+                (np.array(sorted(each), dtype=int) for each in zip(*pairs, strict=True)) if pairs else ([], [])
+            )
         if len(levels_a) != len(levels_b):
-            raise Doubt
+            raise DoubtError
         self._check_levels(below, above, drift_a, drift_b, levels_a, levels_b)
         for i, j in same:
-            pair = Point.pair(below, drift_a, i), Point.pair(above, drift_b, j)
+            pair = TrackPoint.pair(below, drift_a, i), TrackPoint.pair(above, drift_b, j)
             span = above.fx - below.fx
             ends_of_pair = ((each.numbers[1].real, span * each.slopes[1].real) for each in pair)
             width, place = lowest(*(np.array([-number]) for end in ends_of_pair for number in end))
@@ -261,9 +267,15 @@ class Search:
         return Changes(same, begins, ends)
 
     def _check_levels(
-        self, below: State, above: State, drift_a: Complexes, drift_b: Complexes, levels_a: Indices, levels_b: Indices
+        self,
+        below: Motions,
+        above: Motions,
+        drift_a: Complexes,
+        drift_b: Complexes,
+        levels_a: Indices,
+        levels_b: Indices,
     ) -> None:
-        """A Doubt if two real levels meet between two loads at which they are neighbours."""
+        """A DoubtError if two real levels meet between two loads at which they are neighbours."""
         before = self._before
         arrival = drift_a if before is None or before.fx >= below.fx else below.slopes(before)
         span = above.fx - below.fx
@@ -278,14 +290,18 @@ class Search:
         width, place = lowest(g0**2, 2 * g0 * v0, g1**2, 2 * g1 * v1)
         near = width * span > self.narrowest
         bent = lowest(g0**2, 2 * g0 * v2, g1**2, 2 * g1 * v1)[0] * span > self.narrowest
+        bent |= np.abs(v2 - v0) > g0  # their speed is another one, so that the equilibrium may have jumped
         if np.any(bent & ~near):
-            raise Doubt  # they would meet if they went on as on the way to the lower load
+            raise DoubtError  # they would meet if they went on as on the way to the lower load
         for k in np.flatnonzero(near):
-            ends = Point.pair(below, drift_a, *levels_a[k : k + 2]), Point.pair(above, drift_b, *levels_b[k : k + 2])
+            ends = (
+                TrackPoint.pair(below, drift_a, *levels_a[k : k + 2]),
+                TrackPoint.pair(above, drift_b, *levels_b[k : k + 2]),
+            )
             self._look_inside(Track(self.at, *ends), float(place[k]))
 
     def _look_inside(self, track: Track, place: float) -> None:
-        """Look where the growth of a pair may have the other sign than at both ends: a Doubt if it has.
+        """Look where the growth of a pair may have the other sign than at both ends: a DoubtError if it has.
 
         Parabolas through the lowest value and its neighbours lead to the place where growth is nearest to a change of
         its sign.
@@ -293,8 +309,9 @@ class Search:
         (below, above), sign = track.ends, np.sign(track.growth(track.ends[0]))
         span = above - below
         fx = below + float(np.clip(place, 0.01, 0.99)) * span
+        least = np.inf
         for _ in range(LOOKS):
-            track.growth(fx)
+            found, expected = sign * track.growth(fx), least
             loads = sorted(track.known)
             values = [sign * track.growth(load) for load in loads]
             lowest_of = int(np.argmin(values))
@@ -302,13 +319,17 @@ class Search:
             low, three = loads[lowest_of], slice(begin, begin + 3)
             curve, slope, least = np.polyfit((np.array(loads[three]) - low) / span, values[three], 2)
             if values[lowest_of] < 0 and not 2 * np.sqrt(-values[lowest_of] / max(curve, 0.0)) * span < self.narrowest:
-                raise Doubt(low)
+                raise DoubtError(low)
+            if not curve > 0 or (len(loads) == 3 and lowest_of != 1):
+                raise DoubtError(fx)  # it does not dip where the slopes say so: the loads are too far apart
             fx, least = low - 0.5 * float(slope / curve) * span, least - 0.25 * slope**2 / curve
-            if not below < fx < above or least > BEND * max(values[three]):
+            if not below < fx < above:
                 return
+            if least > BEND * max(values[three]) and abs(found - expected) < 0.5 * least:
+                return  # the parabola has told what was then found
             if min(abs(fx - load) for load in loads) < 0.5 * self.narrowest:
                 return
-        raise Doubt(fx)
+        raise DoubtError(fx)
 
     def _edge(self, track: Track, inside: float, outside: float) -> Edge:
         """The edge of a motion that grows at one of two loads; in doubt unless its growth begins or ends once."""
@@ -319,13 +340,13 @@ class Search:
                 return track.edge(change)
             width = self._width_beside(track, change.loads)
             if width > self.narrowest:
-                raise Doubt
+                raise DoubtError
             return track.edge(change)
         left, right = (track.at(fx) for fx in (change.loads[0], change.loads[-1]))
         jump = float(np.abs(left.stiffness - right.stiffness).max())
         largest, usual = (max(abs(track.growth(fx)) for fx in loads) for loads in (change.loads, ends))
         if jump < 1e-7 * left.frequency**2 and largest > 1e-3 * usual:
-            raise Doubt(change.fx)  # the equilibrium does not jump: the motion has become another one on the way
+            raise DoubtError(change.fx)  # the equilibrium does not jump: the motion has become another one on the way
         return track.edge(change)
 
     def _width_beside(self, track: Track, loads: list[float]) -> float:
@@ -340,7 +361,7 @@ class Search:
             widths.append(abs(step) * float(lowest(*(np.array([number]) for number in numbers))[0][0]))
         return max(widths)
 
-    def _changes_of_motions(self, below: State, above: State, drift_a: Complexes, drift_b: Complexes) -> Changes:
+    def _changes_of_motions(self, below: Motions, above: Motions, drift_a: Complexes, drift_b: Complexes) -> Changes:
         """As `_changes`, with dissipation."""
         alike = below.alike(above)
         if not (below.whole and above.whole):  # some have no partner, as another one is nearer to the point there
@@ -349,20 +370,20 @@ class Search:
         origin = {j: i for i, j in image.items()}
         rows, columns = (np.flatnonzero(each.grows).tolist() for each in (below, above))
         if any(i not in image for i in rows) or any(j not in origin for j in columns):
-            raise Doubt
+            raise DoubtError
         for i in {*rows, *(origin[j] for j in columns)}:
             if alike[i, image[i]] < max(ALIKE, 0.8 * alike[i].max(), 0.8 * alike[:, image[i]].max()):
-                raise Doubt
+                raise DoubtError
         known = np.array(sorted(image.items()), dtype=int).reshape(-1, 2).T
         span = above.fx - below.fx
         a, b, slope_a, slope_b = below.values[known[0]], above.values[known[1]], drift_a[known[0]], drift_b[known[1]]
         p, q = neighbours(a, span * slope_a, b, span * slope_b)
         width, place = excursion(*((each[p], each[q]) for each in (a, span * slope_a, b, span * slope_b)))
         if width.max(initial=0.0) * span > self.narrowest:
-            raise Doubt(below.fx + float(place[np.argmax(width)]) * span)
+            raise DoubtError(below.fx + float(place[np.argmax(width)]) * span)
 
         def edge(i: int, j: int, begins: bool) -> Edge:
-            track = Track(self.at, Point.motion(below, drift_a, i), Point.motion(above, drift_b, j))
+            track = Track(self.at, TrackPoint.motion(below, drift_a, i), TrackPoint.motion(above, drift_b, j))
             return self._edge(track, *(track.ends[::-1] if begins else track.ends))
 
         same = [(i, image[i]) for i in rows if above.grows[image[i]]]
@@ -371,11 +392,11 @@ class Search:
         return Changes(same, begun, ended)
 
 
-def _levels_of(inside: Point, state: State, drift: Complexes, levels: Indices) -> tuple[Point, Indices]:
-    """The two real levels that are a complex pair at another load, and all others; a Doubt if that is not sure."""
+def _levels_of(inside: TrackPoint, state: Motions, drift: Complexes, levels: Indices) -> tuple[TrackPoint, Indices]:
+    """The two real levels that are a complex pair at another load, and all others; a DoubtError if that is not sure."""
     step = state.fx - inside.fx
     i, j = nearest_pair(state.values[levels], inside.numbers + step * inside.slopes)
-    return Point.pair(state, drift, int(levels[i]), int(levels[j])), np.delete(levels, [i, j])
+    return TrackPoint.pair(state, drift, int(levels[i]), int(levels[j])), np.delete(levels, [i, j])
 
 
 def assign(weight: Floats) -> list[tuple[int, int]]:

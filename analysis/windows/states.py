@@ -37,7 +37,7 @@ DENSE_FACTORS = 600
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class Motions:
     """Motions at one load, by increasing real part of lambda, or imaginary part of s; one of each two conjugates.
 
     Attributes
@@ -70,7 +70,7 @@ class State:
         return self.system.fx
 
     @classmethod
-    def of(cls, system: System) -> "State":
+    def of(cls, system: System) -> "Motions":
         """All motions, by LAPACK, but for coordinates that feel no force."""
         z = system.first_order
         values, left, right = eig(z, left=True, check_finite=False)
@@ -81,13 +81,13 @@ class State:
         return cls._kept(system, values, right, left, overlap)
 
     @classmethod
-    def none(cls, system: System) -> "State":
+    def none(cls, system: System) -> "Motions":
         """No motion at all."""
         nothing = np.zeros((system.stiffness.shape[0], 0))
         return cls(system, np.zeros(0, complex), nothing, nothing, np.zeros(0), np.zeros(0, bool), False)
 
     @classmethod
-    def near(cls, system: System, points: Sequence[complex], counts: Sequence[int]) -> "State":
+    def near(cls, system: System, points: Sequence[complex], counts: Sequence[int]) -> "Motions":
         """The motions nearest to some points, so many about each; LinAlgError if they do not converge.
 
         Right and left vectors come from two Krylov spaces. The left ones are turned to be dual to the right ones, which
@@ -116,7 +116,7 @@ class State:
         return replace(cls._kept(system, values[once], right, left, overlap[once]), whole=False)
 
     @classmethod
-    def _kept(cls, system: System, values: Any, right: Any, left: Any, overlap: Floats) -> "State":
+    def _kept(cls, system: System, values: Any, right: Any, left: Any, overlap: Floats) -> "Motions":
         noise = SAFETY * system.rounding
         if system.damping is None:
             grows = values.imag * overlap > noise
@@ -135,6 +135,15 @@ class State:
             full /= np.linalg.norm(full, axis=1)[:, None]
         return cls(system, np.asarray(values[order], complex), *full, overlap[order], grows[order])
 
+    def with_conjugates(self) -> tuple[Complexes, Any, Any]:
+        """Eigenvalues with right and left vectors, both of each two conjugates, by real part."""
+        pairs = np.flatnonzero(self.values.imag > 0)
+        values, x, y = (
+            np.concatenate([each, each[..., pairs].conj()], axis=-1) for each in (self.values, self.right, self.left)
+        )
+        order = np.lexsort((values.imag, values.real))
+        return values[order], x[:, order], y[:, order]
+
     def slopes(self, other: System) -> Complexes:
         """First-order change of each eigenvalue over the load, on the way to another load, shape (k,)."""
         x, y, here = self.right, self.left.conj(), self.system
@@ -146,7 +155,7 @@ class State:
             found = np.sum(y * force, axis=0) / np.sum(y * slant, axis=0) / (other.fx - here.fx)
         return np.nan_to_num(np.asarray(found, complex), nan=0.0, posinf=0.0, neginf=0.0)
 
-    def alike(self, other: "State", rows: Any = slice(None), columns: Any = slice(None)) -> Floats:
+    def alike(self, other: "Motions", rows: Any = slice(None), columns: Any = slice(None)) -> Floats:
         """|x^H x'| |y^H y'| of motions of two loads, shape (k, k'); with dissipation times how near the s are."""
         x, y = self.right[:, rows].conj().T, self.left[:, rows].conj().T
         weight = np.abs(x @ other.right[:, columns]) * np.abs(y @ other.left[:, columns])

@@ -9,11 +9,11 @@ from scipy.linalg import LinAlgError
 from ..arrays import Complexes
 from ..errors import NoEquilibriumError
 from .edges import Edge, SignChange
-from .states import State, eigenvalues_near, overlap_near
+from .states import Motions, eigenvalues_near, overlap_near
 from .system import System
 
 
-class Doubt(Exception):
+class DoubtError(Exception):
     """The search cannot decide what happens on an increment; `fx` is a load inside at which to look, or None."""
 
     def __init__(self, fx: float | None = None) -> None:
@@ -22,7 +22,7 @@ class Doubt(Exception):
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
+class TrackPoint:
     """A motion at one load: the mean and D of two eigenvalues without dissipation, or s; and their slopes."""
 
     fx: float
@@ -30,7 +30,7 @@ class Point:
     slopes: Complexes
 
     @classmethod
-    def pair(cls, state: State, drift: Complexes, *members: int) -> "Point":
+    def pair(cls, state: Motions, drift: Complexes, *members: int) -> "TrackPoint":
         """Two real eigenvalues of a state, or one of a complex pair."""
         values, slopes = state.values[list(members)], drift[list(members)]
         if len(members) == 1:
@@ -40,7 +40,7 @@ class Point:
         return cls(state.fx, np.array(numbers), np.array([slopes.mean(), 2 * gap * (slopes[0] - slopes[1])]))
 
     @classmethod
-    def motion(cls, state: State, drift: Complexes, member: int) -> "Point":
+    def motion(cls, state: Motions, drift: Complexes, member: int) -> "TrackPoint":
         """One motion with dissipation."""
         return cls(state.fx, state.values[[member]], drift[[member]])
 
@@ -52,11 +52,11 @@ class Track:
     ----------
     at : callable
         Load -> System.
-    below, above : Point
+    below, above : TrackPoint
         The motion at the ends.
     """
 
-    def __init__(self, at: Callable[[float], System], below: Point, above: Point) -> None:
+    def __init__(self, at: Callable[[float], System], below: TrackPoint, above: TrackPoint) -> None:
         self.at, self.points = at, (below, above)
         self.ends = below.fx, above.fx
         self.known = {each.fx: each.numbers for each in self.points}
@@ -85,7 +85,7 @@ class Track:
         return sum(weight * known[load] for weight, load in zip(weights, near, strict=True))
 
     def numbers(self, fx: float) -> Complexes:
-        """Its numbers at a load; a Doubt if there is no equilibrium, or if the motion is not recognised."""
+        """Its numbers at a load; a DoubtError if there is no equilibrium, or if the motion is not recognised."""
         if fx in self.known:
             return self.known[fx]
         if fx in self._beside:
@@ -95,7 +95,7 @@ class Track:
             point = expected[0].real if self.pairs else expected[0]
             values = eigenvalues_near(self.at(fx), point)
         except (NoEquilibriumError, LinAlgError):
-            raise Doubt from None
+            raise DoubtError from None
         self.known[fx] = _pair_of(values, expected) if self.pairs else _motion_of(values, expected)
         return self.known[fx]
 
@@ -104,7 +104,7 @@ class Track:
         numbers = self.numbers(fx)
         return float(-numbers[1].real if self.pairs else numbers[0].real)
 
-    def growth_slope(self, end: Point) -> float:
+    def growth_slope(self, end: TrackPoint) -> float:
         """The slope of the growth at an end."""
         return float(-end.slopes[1].real if self.pairs else end.slopes[0].real)
 
@@ -121,10 +121,10 @@ class Track:
 
 
 def nearest_pair(values: Complexes, expected: Complexes) -> tuple[int, int]:
-    """The two of some real levels whose mean and distance are as expected; a Doubt if two others are nearly so."""
+    """The two of some real levels whose mean and distance are as expected; a DoubtError if two others are nearly so."""
     i, j = np.triu_indices(len(values), 1)
     if not len(i):
-        raise Doubt
+        raise DoubtError
     k = _nearest(0.5 * (values[i] + values[j]), (values[i] - values[j]) ** 2, expected)
     return int(i[k]), int(j[k])
 
@@ -136,7 +136,7 @@ def _nearest(means: Complexes, gaps: Complexes, expected: Complexes) -> int:
     )
     first, second = np.argsort(cost)[:2] if len(cost) > 1 else (0, None)
     if second is not None and cost[first] > 0.5 * cost[second]:
-        raise Doubt
+        raise DoubtError
     return int(first)
 
 
@@ -147,7 +147,7 @@ def _pair_of(values: Complexes, expected: Complexes) -> Complexes:
     means = np.concatenate([complex_.real, 0.5 * (real[i] + real[j])])
     gaps = np.concatenate([-4 * complex_.imag**2, (real[i] - real[j]) ** 2])
     if not len(means):
-        raise Doubt
+        raise DoubtError
     k = _nearest(means, gaps, expected)
     return np.array([means[k], gaps[k]], complex)
 

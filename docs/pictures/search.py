@@ -12,8 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from faultgouge.analysis import complex_windows
-from faultgouge.analysis.windows import Space, SystemModes
-from faultgouge.analysis.windows.between import stretch
+from faultgouge.analysis.windows import Motions, System
+from faultgouge.analysis.windows.search import lowest
+from faultgouge.analysis.windows.tracks import TrackPoint
 from faultgouge.figures.style import INK, STYLE
 
 Operator = Callable[[float], np.ndarray]
@@ -39,13 +40,16 @@ def turning(fx: float) -> np.ndarray:
 
 def discriminant(operator: Operator, fx: float) -> float:
     """D of the two modes next to 10."""
-    return pair_at(operator, fx).discriminant
+    return float(pair_at(operator, fx, fx + 1.0).numbers[1].real)
 
 
-def pair_at(operator: Operator, fx: float) -> Space:
-    """The two modes next to 10."""
-    modes = SystemModes.of_operator(fx, operator(fx))
-    return modes.space(modes.about(10.0))
+def pair_at(operator: Operator, fx: float, other: float) -> TrackPoint:
+    """The two modes next to 10, with their slopes towards another load."""
+    here, there = (System(load, operator(load)) for load in (fx, other))
+    state = Motions.of(here)
+    drift = state.slopes(there)
+    near = np.argsort(np.abs(state.values - 10.0))
+    return TrackPoint.pair(state, drift, *([near[0]] if state.grows[near[0]] else near[:2]))
 
 
 def draw(axes: Axes, operator: Operator, title: str, says: str) -> None:
@@ -57,14 +61,15 @@ def draw(axes: Axes, operator: Operator, title: str, says: str) -> None:
         axes.plot(part, d, color="C0")
     axes.axhline(0, color=INK, linewidth=0.5)
     axes.fill_between(loads, 0, values, where=values < 0, color="C3", alpha=0.3, linewidth=0)
-    ends = [pair_at(operator, fx) for fx in (0.0, 1.0)]
-    slopes = -ends[0].slope(ends[1].system), ends[1].slope(ends[0].system)
-    for pair, slope in zip(ends, slopes, strict=True):
-        reach = np.array([-0.09, 0.09])
-        axes.plot(pair.fx + reach, pair.discriminant + slope * reach, color="C1", linewidth=1.6)
-        axes.plot(pair.fx, pair.discriminant, "o", color="C1")
-    if ends[0].discriminant * ends[1].discriminant > 0:
-        width, middle = stretch(ends[:1], ends[1:])
+    ends = [pair_at(operator, 0.0, 1.0), pair_at(operator, 1.0, 0.0)]
+    numbers = [(float(end.numbers[1].real), float(end.slopes[1].real)) for end in ends]
+    reach = np.array([-0.09, 0.09])
+    for end, (value, slope) in zip(ends, numbers, strict=True):
+        axes.plot(end.fx + reach, value + slope * reach, color="C1", linewidth=1.6)
+        axes.plot(end.fx, value, "o", color="C1")
+    if numbers[0][0] * numbers[1][0] > 0:
+        sign = np.sign(numbers[0][0])
+        width, middle = (float(each[0]) for each in lowest(*(np.array([sign * n]) for end in numbers for n in end)))
         if width > 0:
             axes.plot([middle - width / 2, middle + width / 2], [-0.16, -0.16], color="C1", linewidth=2.5)
     for window in complex_windows(operator, [0.0, 1.0]):

@@ -5,7 +5,7 @@ Weak damping moves the eigenvalue :math:`s = i\sqrt\lambda` of an undamped motio
 motion is damped, G being positive. Where two eigenvalues are about to coalesce, :math:`y^H x \to 0` with opposite
 signs of the two: one of them is damped more and more, and the other one begins to grow *before* they meet. With the 2 x
 2 block :math:`B = m + N` of the pair (tr N = 0, :math:`D = (\lambda_1 - \lambda_2)^2 = 2\,\mathrm{tr} N^2`) and with
-:math:`G_B = (U^T V)^{-1} U^T G V` on the same bases (:mod:`~faultgouge.analysis.windows.space`) the two rates
+:math:`G_B = (U^T V)^{-1} U^T G V` on the same bases (:mod:`~faultgouge.analysis.windows.pair_over_load`) the two rates
 are
 
 .. math:: \mathrm{Re}\,s_\pm = -\tfrac14 \left[ \mathrm{tr}\, G_B \pm \frac{2\,\mathrm{tr}(N G_B)}{\sqrt D} \right],
@@ -34,7 +34,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from faultgouge.analysis import Floats, NoEquilibriumError, Packing, Window, damping_matrix, mass_weighted
-from faultgouge.analysis.windows import LostPairError, Space, System, SystemModes, follow_to, force_bearing, track
+from faultgouge.analysis.windows import Motions, System, force_bearing
+from faultgouge.analysis.windows.pair_over_load import Plane, pair_about
 
 DIGITS = 1e-12
 """Width to which the limit is bracketed, in units of the load."""
@@ -56,7 +57,7 @@ class WeakLimit:
     frequency: float
 
 
-def damping_block(packing: Packing, pair: Space) -> Floats:
+def damping_block(packing: Packing, pair: Plane) -> Floats:
     """G_B of a packing's damping on the bases of a pair, shape (2, 2), 1 / time."""
     damping = mass_weighted(damping_matrix(force_bearing(packing)), packing)
     return np.asarray(pair.block_of(damping @ pair.right))
@@ -104,7 +105,7 @@ def weak_limit(
         # of a balanced pair h at the coalescence is rounding noise of either sign
         fx = above if h(above) >= 0 else float(brentq(h, float(below), above, xtol=DIGITS * abs(above)))
         pair, packing = pair_at(fx), equilibrium(fx)
-    except (LostPairError, NoEquilibriumError):
+    except NoEquilibriumError:
         return None
     g = damping_block(packing.with_dissipation(cn, ct), pair)
     sign = -np.sign(np.trace(pair.traceless @ g))  # the mode in which the two terms cancel
@@ -174,12 +175,17 @@ def balancing_ratio(packing: Packing, window: Window) -> float:
     return float(-along / across) if across else np.inf
 
 
-def _follow_pair(equilibrium: Callable[[float], Packing], window: Window) -> Callable[[float], Space]:
+def _follow_pair(equilibrium: Callable[[float], Packing], window: Window) -> Callable[[float], Plane]:
     """The undamped pair at any load, from its coalescence: the plane of two parallel vectors, made invariant."""
 
     def system(fx: float) -> System:
         return System.of(equilibrium(fx))
 
-    onset = system(window.fx_onset)
-    modes = SystemModes.of(onset)
-    return track(system, {onset.fx: follow_to(modes.space(modes.about(window.eigenvalue)), replace(onset))})
+    known = {window.fx_onset: pair_about(Motions.of(system(window.fx_onset)), window.eigenvalue)}
+
+    def at(fx: float) -> Plane:
+        if fx not in known:
+            known[fx] = known[min(known, key=lambda load: abs(load - fx))].at(system(fx))
+        return known[fx]
+
+    return at

@@ -2,7 +2,7 @@ r"""Count the complex pairs of a packing by bases of the symmetric part, slice b
 
 All eigenvalues of E coordinates take some :math:`10 E^3` operations or more: hours for 10,000 disks. Here the
 eigenvectors X of the symmetric part of the operator A are computed in slices
-(:mod:`~faultgouge.analysis.windows.slices.lanczos`), and three neighbouring slices span a space, from which inverse
+(:mod:`~faultgouge.analysis.windows.slices`), and three neighbouring slices span a space, from which inverse
 iteration finds the corresponding space of A with a shift :math:`\sigma` in the middle slice, on both sides:
 
 .. math:: R \leftarrow (A - \sigma)^{-1} R, \qquad L \leftarrow (A - \sigma)^{-T} L, \qquad R_0 = L_0 = X .
@@ -28,7 +28,7 @@ from scipy.sparse.linalg import splu
 
 from faultgouge.analysis import Packing, dynamical_matrix
 from faultgouge.analysis.windows import LIMITS, Limits
-from faultgouge.analysis.windows.slices.slices import slices
+from faultgouge.analysis.windows.slices import slices
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

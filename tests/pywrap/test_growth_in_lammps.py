@@ -11,7 +11,7 @@ from faultgouge.analysis import (
     spectrum,
     transient_gain,
 )
-from faultgouge.analysis.windows import System, SystemModes
+from faultgouge.analysis.windows import Motions, System
 from faultgouge.pywrap import Engine, Scene, settle
 from faultgouge.pywrap.runs.scene_path import scene_path
 from faultgouge.pywrap.runs.undamped import time_step
@@ -49,7 +49,7 @@ def test_growth_rate_and_frequency_are_those_of_the_spectrum(loaded):
     pair = max(spectrum(packing).pairs, key=lambda each: each.growth_rate)
     dt = time_step(packing)
     omega = complex(discrete_frequency(pair.eigenvalue, dt))
-    modes = SystemModes.of(System.of(packing))
+    modes = Motions.of(System.of(packing))
     mode = modes.right[:, np.argmin(np.abs(modes.values - pair.eigenvalue))].real
     # from far above the noise of 1e-25 to far below the square of the slip limits
     time, msd, velocity = run(displace(packing, mode, 1e-8), packing, 540.0, 12000, dt)
@@ -115,9 +115,10 @@ def test_growth_with_dashpots_is_that_of_the_eigenvalue(path, fx, cn, unstable):
     """Over six decades of D; at 0.015 it is the dashpots that make the packing unstable."""
     packing = path(fx).with_dissipation(cn=cn)
     assert len(spectrum(packing).pairs) == unstable
-    (mode,) = SystemModes.of(System.of(packing, dissipation=True)).growing
+    modes = Motions.of(System.of(packing, dissipation=True))
+    (k,) = np.flatnonzero(modes.grows)
     # 0.15 of the limit: damped runs are of second order in the step, and 3e-4 off there
-    rate, shape, dt = 2 * mode.mean.real, mode.shapes[0][:, 0], 3 * time_step(packing)
+    rate, shape, dt = 2 * modes.values[k].real, modes.right[:, k], 3 * time_step(packing)
     # from rest, displaced along the mode at its largest
     largest = (shape * np.exp(-0.5j * np.angle(np.sum(shape**2)))).real
     start = largest / np.sqrt(np.concatenate([packing.mass, packing.mass, packing.inertia_factor * packing.mass]))

@@ -158,14 +158,14 @@ def _tell_undamped(mu: float, undamped: Onset | None, tell: Tell) -> dict[str, f
 def _check_all_windows(scene: Scene, modes: tuple[int, int] | None) -> None:
     """Refuse --all where the first window alone is sought."""
     from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.windows import ALL_WINDOWS
+    from faultgouge.analysis.windows import LIMITS
 
     if modes is not None:
         raise BadInputError("--all goes without --modes: among some modes the first window is sought; leave one out")
     disks = scene.packing.disks
-    if disks > ALL_WINDOWS:
+    if disks > LIMITS.all_windows:
         raise BadInputError(
-            f"--all finds all windows of up to {ALL_WINDOWS} disks, and the packing has {disks}: leave --all "
+            f"--all finds all windows of up to {LIMITS.all_windows} disks, and the packing has {disks}: leave --all "
             "out for the first window, or take a smaller packing"
         )
 

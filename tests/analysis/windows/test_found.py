@@ -16,8 +16,8 @@ from faultgouge.analysis.errors import OutputError
 from faultgouge.analysis.factors.lanczos import SliceError
 from faultgouge.analysis.progress import show_progress
 from faultgouge.analysis.windows import Ranks, System, full_operator
-from faultgouge.analysis.windows.slices.first_window import first_window
-from faultgouge.analysis.windows.slices.store import Border, Candidate, DamagedSliceError, SlicePass, SliceResult
+from faultgouge.analysis.windows.sliced_search import SlicedSearch
+from faultgouge.analysis.windows.store import Border, Candidate, DamagedSliceError, SlicePass, SliceResult
 
 PASSING = replace(FEW, largest_basis=0, wait_seconds=0.1)
 """Slices of 24 modes, in bases that are not kept in memory."""
@@ -64,7 +64,7 @@ def search(ramp):
 
         def search(watch=None, **how):
             with show_progress(watch):
-                return first_window(system, np.array(path.grid[20:]), limits=PASSING, **how)
+                return SlicedSearch(system, limits=PASSING, **how).first_window(np.array(path.grid[20:]))
 
         return search
 
@@ -192,10 +192,7 @@ def test_an_error_that_ends_all_ranks_does_not_wait_for_them():
 
 def numbers(found):
     """All that is kept of some slices."""
-    candidates = [
-        [(each.onset, each.inside, each.right.tolist(), each.left.tolist()) for each in increment]
-        for increment in found.candidates
-    ]
+    candidates = [list(map(tuple, increment)) for increment in found.candidates]
     return found.border, candidates
 
 
@@ -204,8 +201,7 @@ def numbers(found):
 def test_no_flipped_bit_goes_unnoticed(tmp_path_factory, data):
     """What is read is what was written (some bytes of a zip file mean nothing), or the damage is said."""
     folder = tmp_path_factory.mktemp("pass")
-    plane = np.arange(6.0).reshape(3, 2)
-    written = SliceResult(Border((3, 9), 1.5, 2.5, 0.1), [[Candidate(0.1, 0.2, plane, -plane)], []])
+    written = SliceResult(Border((3, 9), 1.5, 2.5, 0.1), [[Candidate(0.1, 0.2, 3.0 + 1e-3j, -0.5 + 2j)], []])
     SlicePass(folder).keep(written)
     (kept,) = SlicePass.read(folder).found
     assert numbers(kept) == numbers(written)

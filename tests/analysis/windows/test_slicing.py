@@ -10,7 +10,7 @@ from scipy.sparse import csc_array, diags_array
 
 from faultgouge.analysis.factors.lanczos import SliceError, factor_shifted
 from faultgouge.analysis.windows import LIMITS, Limits, Ranks
-from faultgouge.analysis.windows.slices.slices import slices
+from faultgouge.analysis.windows.slices import slices
 
 FEW = Limits(slice_size=24, count_spacing=60, first_look=20, one_basis=50)
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from families import DIGITS, OTHERS, crossing, embedded, normal_form
 from rich.console import Console
-from scipy.sparse import csr_array
 
 from faultgouge.analysis import (
     Contacts,
@@ -18,11 +17,9 @@ from faultgouge.analysis import (
     find_onset,
 )
 from faultgouge.analysis.uncertain_digits import with_uncertainty
-from faultgouge.analysis.windows import Limits, NoGrowthError, System, SystemModes, force_bearing, full_operator
-from faultgouge.analysis.windows.between import Few, deepest_dip
-from faultgouge.analysis.windows.screens.pairs import PairScreen
-from faultgouge.analysis.windows.search import windows_along
-from faultgouge.analysis.windows.system_modes import assign_modes
+from faultgouge.analysis.windows import Limits, Motions, NoGrowthError, System, force_bearing, full_operator
+from faultgouge.analysis.windows.pair_over_load import Plane
+from faultgouge.analysis.windows.search import assign, lowest
 
 
 @pytest.mark.parametrize("d", [0.01, 0.3])
@@ -38,13 +35,6 @@ def test_normal_form(d, points):
     assert window.overlap < 1e-2
 
 
-def searched(operator, loads, screen=None):
-    """The windows of a family of matrices; all modes of all loads are looked at unless a screen names a few."""
-    along = windows_along(lambda fx: System(fx, csr_array(operator(fx))), np.array(loads), 1e-7, screen)
-    *_, (_, windows) = along
-    return windows
-
-
 def test_window_behind_a_bend():
     """Levels that approach, and are bent apart in the last increment: its chord alone shows no window."""
 
@@ -52,16 +42,15 @@ def test_window_behind_a_bend():
         gap = 1 - f if f < 1.1 else 5 * (f - 1.1) - 0.1
         return embedded([[10 + gap, 0.05], [-0.05, 10 - gap]])
 
-    first, second = searched(bent, [0.0, 0.5, 0.9, 1.3])
+    first, second = complex_windows(bent, [0.0, 0.5, 0.9, 1.3])
     assert (first.fx_onset, first.fx_end) == (pytest.approx(0.95, abs=DIGITS), pytest.approx(1.05, abs=DIGITS))
     assert (second.fx_onset, second.fx_end) == (pytest.approx(1.11, abs=DIGITS), pytest.approx(1.13, abs=DIGITS))
 
 
-@pytest.mark.parametrize("search", [complex_windows, searched])
 @pytest.mark.parametrize(
     ("speed", "others", "couplings", "last"), [(5, (13.0, 10.7), (1.1, 0.02), 1.0), (2, (11.0, 12.0), (0.1, 0.05), 1.5)]
 )
-def test_partners_may_change(search, speed, others, couplings, last):
+def test_partners_may_change(speed, others, couplings, last):
     """One level meets another one, parts, and meets a third: two windows of two pairs within one increment."""
 
     def three(f):
@@ -73,7 +62,7 @@ def test_partners_may_change(search, speed, others, couplings, last):
     def complex_beside(edge):
         return [np.count_nonzero(np.linalg.eigvals(three(edge + side)).imag > 1e-9) for side in (-1e-6, 1e-6)]
 
-    first, second = search(three, [0.0, last])
+    first, second = complex_windows(three, [0.0, last])
     assert first.fx_end < second.fx_onset < last
     for window in (first, second):
         assert complex_beside(window.fx_onset) == [0, 1]
@@ -145,20 +134,20 @@ def test_noise_loses_its_imaginary_part():
         inner[0, 1] = 1.0
         matrix = basis @ inner @ basis.T
         split += np.iscomplex(np.linalg.eigvals(matrix)).any()
-        assert not SystemModes.of_operator(0.0, matrix).complex_pairs
+        assert not Motions.of(System(0.0, matrix)).grows.any()
         inner[1, 0] = -1e-8  # imaginary parts of 1e-4
-        assert len(SystemModes.of_operator(0.0, basis @ inner @ basis.T).complex_pairs) == 1
+        assert Motions.of(System(0.0, basis @ inner @ basis.T)).grows.sum() == 1
     assert split > 0
 
 
-def test_deepest_dip_of_parabolas():
+def test_the_lowest_place_of_parabolas():
     """(t - 0.3)^2 - w^2 from its ends: the width is 2 w, and what a twentieth of the smaller end adds."""
     for w in (0.0, 1e-3, 0.1):
         d0, d1 = 0.09 - w * w, 0.49 - w * w
-        width, at = deepest_dip(*(np.array([v]) for v in (d0, -0.6, d1, 1.4)), 0.05)
+        width, at = lowest(*(np.array([v]) for v in (d0, -0.6, d1, 1.4)))
         assert at[0] == pytest.approx(0.3, abs=1e-12)
         assert width[0] == pytest.approx(2 * np.sqrt(w * w + 0.05 * d0 * 4 * 0.3 * 0.7), rel=1e-9)
-    width, _ = deepest_dip(*(np.array([v]) for v in (1.0, -0.1, 1.0, 0.1)), 0.05)
+    width, _ = lowest(*(np.array([v]) for v in (1.0, -0.1, 1.0, 0.1)))
     assert width[0] == 0
 
 
@@ -179,33 +168,6 @@ def test_the_error_of_no_onset_gives_each_user_his_own_advice(error):
     assert str(error("The packing flows")) == "The packing flows"
 
 
-@pytest.mark.parametrize("mu", [1.0, pytest.param(0.8, marks=pytest.mark.long)])
-@pytest.mark.slow
-def test_what_nothing_happens_on_is_not_decomposed(ramp, mu, monkeypatch):
-    """The same windows as from all modes at every load, which are computed next to the edges alone."""
-    path, decomposed, decompose = ramp(mu, 1e-3, 22), [], SystemModes.of
-    loads = path.grid[12:]
-
-    def count_decompositions(system):
-        decomposed.append(system.fx)
-        return decompose(system)
-
-    def operator(fx):
-        return full_operator(path(fx))
-
-    monkeypatch.setattr(SystemModes, "of", count_decompositions)
-    quick = searched(operator, loads, PairScreen())
-    few, decomposed[:] = len(decomposed), []
-    every = searched(operator, loads)
-    assert len(decomposed) >= len(loads)
-    assert few <= 4 * len(quick)
-    assert len(quick) == len(every)
-    # what equilibria of a residual of 1e-10 on ten disks can tell of the load
-    for one, other in zip(quick, every, strict=True):
-        assert one.fx_onset == pytest.approx(other.fx_onset, abs=one.error + other.error + 3e-11)
-        assert (one.fx_end, one.kind) == (other.fx_end, other.kind)
-
-
 def family_with_a_long_window(f):
     """A pair that is complex from 0.35 to 8.6, and one that is so between 5.2 and 5.3, in an orthonormal basis."""
     matrix = np.diag(np.concatenate([[100.0, 100.0, 200.0, 200.0], 300 + 50 * OTHERS]))
@@ -217,18 +179,6 @@ def family_with_a_long_window(f):
 def test_open_windows_keep_their_names_over_increments_that_are_skipped():
     edges = [(window.fx_onset, window.fx_end) for window in complex_windows(family_with_a_long_window, np.arange(10.0))]
     np.testing.assert_allclose(edges, [(0.35, 8.6), (5.2, 5.3)], atol=1e-9)
-
-
-def test_what_the_screening_misses_is_walked_again():
-    """A window that opens on increments said to be quiet is found as soon as anything makes us look."""
-
-    screen = PairScreen()
-
-    def blind(here, there, known, depth):
-        return Few([], 0) if there.stiffness[1, 0] > -5.0 else screen(here, there, known, depth)
-
-    first = searched(lambda f: family_with_a_long_window(0.3 * f), np.arange(10.0), blind)[0]
-    assert first.fx_onset == pytest.approx(0.35 / 0.3, abs=1e-9)
 
 
 @pytest.mark.slow
@@ -246,24 +196,22 @@ def test_a_complex_pair_is_not_torn_by_a_level_beside_it():
     """A level mixes with one direction of the pair's plane; the nearest two are still conjugates."""
     operator = np.diag([2.0, 2.0, 2.1, 5.0])
     operator[0, 1], operator[1, 0] = 1.0, -1.0
-    modes = SystemModes.of_operator(0.0, operator)
-    pair = modes.space(modes.complex_pairs[0])
+    modes = Motions.of(System(0.0, operator))
+    pair = Plane.of(modes, np.flatnonzero(modes.grows))
     turn, angle = np.eye(4), np.radians(65)
     turn[1:3, 1:3] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
-    turned = SystemModes.of_operator(1.0, turn @ operator @ turn.T)
-    first, second = turned.nearest(pair)
-    assert turned.partner[first] == second
+    turned = Motions.of(System(1.0, turn @ operator @ turn.T))
+    assert pair.closest(turned) == np.flatnonzero(turned.grows).tolist()
 
 
 def test_modes_that_cross_keep_their_names():
     """Coupled so weakly that the levels pass each other within the increment, and strongly enough not to."""
     for product, exchanged in ((1e-6, True), (-1e-6, True), (4.0, False)):
-        operator = crossing(0.37, product)
-        here, there = SystemModes.of_operator(0.0, operator(0.0)), SystemModes.of_operator(1.0, operator(1.0))
-        expected = np.arange(12)
+        here, there = (Motions.of(System(fx, crossing(0.37, product)(fx))) for fx in (0.0, 1.0))
+        expected = [(k, k) for k in range(12)]
         if exchanged:
-            expected[:2] = 1, 0
-        np.testing.assert_array_equal(assign_modes(here, there), expected)
+            expected[:2] = [(0, 1), (1, 0)]
+        assert sorted(assign(here.alike(there))) == expected
 
 
 @pytest.mark.parametrize("noise", [1e-12, 1e-9, 1e-6])

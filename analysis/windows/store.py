@@ -1,7 +1,7 @@
 """Results of a search in the slices of a spectrum, and the folder that keeps them.
 
 A *pass* goes through all slices of the spectrum, for a few neighbouring loads. A slice of 100,000 disks takes 13 s, and
-its result is small: the pairs that may turn complex, and the eigenvalues that neighbouring slices must agree on. So the
+its result is small: the motions that may grow, and the eigenvalues that neighbouring slices must agree on. So the
 rank that has searched a slice writes one file for the slice, in one step, and a search that was cut off goes on from
 these files. Several searches may share a folder: each takes slices that no other has taken.
 
@@ -19,19 +19,18 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from uuid import uuid4
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Floats
-from ...errors import BadInputError
-from ...factors.lanczos import Border
-from ...files.atomic_write import make_folder, write_whole
-from ..limits import Limits
-from ..system import System
+from ..errors import BadInputError
+from ..factors.lanczos import Border
+from ..files.atomic_write import make_folder, write_whole
+from .limits import Limits
+from .system import System
 
 Shift = tuple[float, tuple[int, int]]
 """The shift of a slice, and the numbers of the first eigenvalue that belongs to it and of the first that does not."""
@@ -53,23 +52,26 @@ class DamagedSliceError(BadInputError):
     """The file of a slice cannot be read: one sentence."""
 
 
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A pair that turns complex in its cluster, or a mode that begins to grow.
+class Candidate(NamedTuple):
+    """A motion that begins to grow in its slice.
 
     Attributes
     ----------
     onset, inside : float
-        The load from which on the pair is complex, or the mode grows, and one at which it still does; force per top
-        disk.
-    right, left : ndarray, shape (n, 2)
-        Its planes, in the n coordinates of the operator; real and imaginary parts of the vectors of a mode.
+        The load from which on it grows, and one at which it still does; force per top disk.
+    value, slope : complex
+        lambda, or s with dissipation, at the load `inside`, and its change over the load.
     """
 
     onset: float
     inside: float
-    right: Floats
-    left: Floats
+    value: complex
+    slope: complex
+
+    def expected(self, fx: float, real: bool) -> complex:
+        """Where its eigenvalue is at another load, or the real part of a pair."""
+        value = self.value + self.slope * (fx - self.inside)
+        return value.real if real else value
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,16 +83,13 @@ class SliceResult:
     border : Border
         Which slice it is.
     candidates : sequence of sequence of Candidate
-        The pairs that turn complex in its clusters, or the modes that begin to grow, increment by increment.
-    bears : float
-        |A - A^T| of the operator up to which dissipation surely holds all modes of the slice, 1 / time^2.
+        The motions that begin to grow in it, increment by increment.
     crowded : bool
-        Whether dashpots couple more of its modes than a cluster can have.
+        Whether dashpots couple more of its motions than a slice can hold.
     """
 
     border: Border
     candidates: Sequence[Sequence[Candidate]]
-    bears: float = 0.0
     crowded: bool = False
 
 
@@ -154,12 +153,10 @@ class SlicePass:
             _name(found.border.modes),
             modes=found.border.modes,
             border=found.border[1:],
-            bears=found.bears,
             crowded=found.crowded,
             increments=len(found.candidates),
             increment=[k for k, _ in flat],
-            loads=[(each.onset, each.inside) for _, each in flat],
-            planes=[(each.right, each.left) for _, each in flat],
+            motions=np.array([each for _, each in flat], complex),
         )
 
     def keep_shifts(self, shifts: Sequence[Shift]) -> None:
@@ -185,7 +182,7 @@ def pass_folder(parent: Path, places: Sequence[System], modes: tuple[int, int], 
     digest = hashlib.sha256(repr((version("faultgouge"), modes, limits)).encode())
     for place in places:
         digest.update(repr(place.fx).encode())
-        for matrix in place.matrices:
+        for matrix in [each for each in (place.stiffness, place.damping) if each is not None]:
             for array in (matrix.data, matrix.indices, matrix.indptr):
                 digest.update(np.ascontiguousarray(array).data)
     return parent / digest.hexdigest()[:NAMES_OF_SLICES]
@@ -213,10 +210,10 @@ def _read_candidates(path: Path) -> SliceResult:
     with _open_slice(path) as data:
         first, stop = (int(number) for number in data["modes"])
         candidates: list[list[Candidate]] = [[] for _ in range(int(data["increments"]))]
-        for k, loads, planes in zip(data["increment"], data["loads"], data["planes"], strict=True):
-            candidates[int(k)].append(Candidate(float(loads[0]), float(loads[1]), *planes))
+        for k, (onset, inside, *motion) in zip(data["increment"], data["motions"], strict=True):
+            candidates[int(k)].append(Candidate(float(onset.real), float(inside.real), *map(complex, motion)))
         border = Border((first, stop), *(float(each) for each in data["border"]))
-        return SliceResult(border, candidates, float(data["bears"]), bool(data["crowded"]))
+        return SliceResult(border, candidates, bool(data["crowded"]))
 
 
 def _shifts(path: Path) -> list[Shift]:

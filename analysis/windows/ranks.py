@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from ...errors import FaultgougeError
+from ..errors import FaultgougeError
 
 Mine = TypeVar("Mine")
 

@@ -1,7 +1,7 @@
 """The slices of a spectrum, shared by threads and by ranks.
 
-Several ranks count together (:mod:`~faultgouge.analysis.windows.slices.ranks`). Each then finds a run of neighbouring
-slices that no other search has found or taken (:mod:`~faultgouge.analysis.windows.slices.store`), by
+Several ranks count together (:mod:`~faultgouge.analysis.windows.ranks`). Each then finds a run of neighbouring
+slices that no other search has found or taken (:mod:`~faultgouge.analysis.windows.store`), by
 :mod:`~faultgouge.analysis.factors.lanczos`.
 """
 
@@ -14,11 +14,11 @@ import numpy as np
 from scipy.sparse import csc_array
 from threadpoolctl import threadpool_limits
 
-from ...arrays import Floats
-from ...errors import FaultgougeError
-from ...factors.inertia import count_places, places_of_numbers
-from ...factors.lanczos import Border, Factorization, Slice, SlicedSpectrum, compare_slices, factor_shifted
-from ..limits import LIMITS, Limits
+from ..arrays import Floats
+from ..errors import FaultgougeError
+from ..factors.inertia import count_places, places_of_numbers
+from ..factors.lanczos import Border, Factorization, Slice, SlicedSpectrum, compare_slices, factor_shifted
+from .limits import LIMITS, Limits
 from .ranks import ALONE, Ranks
 from .store import NEW_PASS, Shift, SlicePass, Take
 

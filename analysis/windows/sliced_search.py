@@ -1,0 +1,358 @@
+"""The first window of a large packing, in slices of the spectrum.
+
+Motions mix with their neighbours in the spectrum only. The eigenvectors X of the symmetric part of A at one load, a
+slice of 120 neighbouring modes with `Limits.margin` more on either side, make A and G small: :math:`X^T A X` and
+:math:`X^T G X`, which are taken as a straight line between two loads. The search of small packings finds the windows
+of this small family, and so *announces* motions that begin to grow. The system itself confirms each: the same search,
+with the few eigenvalues next to the announced one (`Motions.near`) in place of all. So an edge has the same digits as in
+the search among all modes. A basis serves as long as its symmetric couplings are small against the spacing of
+levels.
+
+**Where slices are wrong.** Between two loads the small family is a straight line, which the system is not where
+contacts open, close or slide. What is announced is then not there, or elsewhere, and the increment is divided. The
+finest parts that are still in doubt are named with the result. Strong dashpots couple more motions than a slice can
+hold: all loads before the window are then named.
+
+The eigenvectors of slices take most of the time, and one slice needs nothing of another: ranks and searches that name
+the same folder share them (:mod:`~faultgouge.analysis.windows.slices`).
+"""
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
+from itertools import chain, pairwise
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+from scipy.linalg import LinAlgError, eigh
+from scipy.sparse import csc_array, csr_array
+
+from ..arrays import Floats
+from ..errors import FaultgougeError, NoEquilibriumError
+from ..factors.lanczos import Slice
+from ..progress import report_progress
+from .edges import Increments, LostPairError, Window
+from .limits import LIMITS, Limits
+from .quiet import Quiet
+from .ranks import ALONE, Ranks
+from .search import DoubtError, Search
+from .states import Motions
+from .store import NEW_PASS, Candidate, SlicePass, SliceResult, pass_folder
+from .system import System
+
+Small = tuple[Floats, ...]
+"""A and, with dissipation, G in a basis."""
+
+
+class SlicedSearch:
+    """The search for the first window of a family of large systems.
+
+    Parameters
+    ----------
+    at : callable
+        Load -> System.
+    modes, ranks, folder, limits
+        As of :func:`~faultgouge.analysis.find_onset`.
+    """
+
+    def __init__(
+        self,
+        at: Callable[[float], System],
+        modes: tuple[int, int] | None = None,
+        ranks: Ranks = ALONE,
+        folder: Path | None = None,
+        limits: Limits = LIMITS,
+    ) -> None:
+        self.at, self.modes, self.ranks, self.folder, self.limits = at, modes, ranks, folder, limits
+        self.doubtful: list[tuple[float, float]] = []
+        self.passed: list[System] = []
+        self.crowded = False
+        self._kept: list[Slice] = []
+
+    def first_window(self, loads: Floats) -> tuple[Window | None, Increments]:
+        """The first window along a ramp, if there is one, and the increments before it that are in doubt.
+
+        Loads beyond the one above the onset are not asked for, except those of `Limits.increments_ahead` increments.
+        The window's end is None where its motion grows at the next load.
+
+        Raises
+        ------
+        NoEquilibriumError
+            If a load has none before a motion is seen to grow.
+        SliceError
+            If a part of the spectrum is not found.
+        """
+        here, done = self.at(float(loads[0])), 1
+        first: Window | None = None
+        while done < len(loads) and first is None:
+            ahead = 1 if self._keeps(here) else self.limits.increments_ahead
+            places = [here, *self._reach(loads[done : done + ahead])]
+            first = self._walk(places, 0)
+            here = places[-1]
+            done += len(places) - 1
+        last = here.fx if first is None else first.fx_onset
+        if self.crowded and last > loads[0]:
+            self.doubtful = [(float(loads[0]), max(each.fx for each in self.passed))]
+        return first, tuple(each for each in self.doubtful if each[0] < last)
+
+    def _reach(self, loads: Floats) -> list[System]:
+        """The systems at loads as far as there are equilibria; the error if there is none at the first."""
+        places: list[System] = []
+        for load in loads:
+            try:
+                places.append(self.at(float(load)))
+            except NoEquilibriumError:
+                if not places:
+                    raise
+                break
+        return places
+
+    def _walk(self, places: Sequence[System], depth: int) -> Window | None:
+        """The first window on some increments: parts of one that was divided `depth` times."""
+        for (here, there), candidates in zip(pairwise(places), self._announced(places), strict=True):
+            if not self.passed or self.passed[-1].fx < here.fx:
+                self.passed.append(here)
+            window, doubt = self._earliest(candidates, here, there, depth == self.limits.depth)
+            parts = self._parts(here, there) if doubt and depth < self.limits.depth else []
+            if parts:
+                window = self._walk([here, *parts, there], depth + 1) or window
+            elif doubt:
+                self.doubtful.append((here.fx, there.fx))
+            if window is not None:
+                return window
+        return None
+
+    def _parts(self, here: System, there: System) -> list[System]:
+        """Where an increment is divided; nowhere if one of the parts has no equilibrium at its end."""
+        loads = here.fx + (there.fx - here.fx) * np.arange(1, self.limits.parts) / self.limits.parts
+        try:
+            return [self.at(float(load)) for load in loads]
+        except NoEquilibriumError:
+            return []
+
+    # What the system itself has
+
+    def _earliest(
+        self, candidates: list[Candidate], here: System, there: System, finest: bool
+    ) -> tuple[Window | None, bool]:
+        """The first window of the system itself among those announced, and whether it is in doubt.
+
+        On the finest increments the search goes on at a doubt, and raises the error behind it if it finds no window.
+        """
+        off, first, doubt = 2 * self.limits.reach * (there.fx - here.fx), None, False
+        lost: FaultgougeError | None = None
+        for candidate in candidates:
+            if first is not None and candidate.onset > first.fx_onset + off:
+                break
+            report_progress(f"a motion that may grow from about F_x = {candidate.onset:.6g}: its onset")
+            try:
+                window = self._confirm(candidate, here, there)
+            except (NoEquilibriumError, LostPairError) as error:
+                window, doubt, lost = None, True, error
+            if window is None:
+                doubt = doubt or candidate.onset < there.fx - off
+            elif first is None or window.fx_onset < first.fx_onset:
+                doubt = doubt or (window.fx_onset > here.fx and abs(window.fx_onset - candidate.onset) > off)
+                first = window
+            if doubt and not finest:
+                break
+        if finest and first is None and isinstance(lost, NoEquilibriumError):
+            raise lost
+        return first, doubt
+
+    def _confirm(self, candidate: Candidate, here: System, there: System) -> Window | None:
+        """The first window of the system itself next to an announced one; None if there is none.
+
+        A motion that grows at the lower load already, as no slice has seen, is followed back along the loads that were
+        passed.
+        """
+        below = [each for each in self.passed if each.fx <= here.fx]
+        for begin in reversed(below):
+            end = there if begin is below[-1] else below[below.index(begin) + 1]
+            windows = self._windows_near(candidate, begin, end)
+            if not windows:
+                return None
+            if windows[0].kind != "start" or begin is below[0]:
+                return windows[0]
+        return None
+
+    def _windows_near(self, candidate: Candidate, here: System, there: System) -> Sequence[Window]:
+        """The windows of the few motions next to an announced one."""
+        known = {each.fx: each for each in (here, there)}
+
+        def near(below: System, above: System) -> tuple[Motions, Motions]:
+            try:
+                one, other = (
+                    Motions.near(each, [candidate.expected(each.fx, not each.dissipative)], [10])
+                    for each in (below, above)
+                )
+            except LinAlgError:
+                raise DoubtError from None
+            return one, other
+
+        def lost(system: System) -> NoReturn:
+            what = (
+                f"a motion of the frequency {candidate.value.imag:.6g}"
+                if system.dissipative
+                else f"the pair of eigenvalues about {candidate.value.real:.6g}"
+            )
+            raise LostPairError(
+                f"{what} cannot be told from its neighbours between F_x = {here.fx:.10g} and {there.fx:.10g}: take "
+                "smaller increments"
+            )
+
+        narrowest = 1e-7 * max(abs(here.fx), abs(there.fx))
+        search = Search(lambda fx: known.get(fx) or self.at(fx), narrowest, near, decompose=lost)
+        *_, (_, found) = search.along(np.array([here.fx, there.fx]))
+        return found
+
+    # What slices announce
+
+    def _announced(self, places: Sequence[System]) -> list[list[Candidate]]:
+        """The motions that slices announce on each increment, by increasing onset, of all ranks and searches."""
+        first, stop = self._range(places[0])
+        while True:
+            stored = self._stored(places)
+            fresh = self.ranks.together(partial(self._search_slices, places, stored))
+            found = sorted(chain(stored.found, *fresh), key=lambda each: each.border.modes)
+            if stored.folder is None or sum(each.border.size for each in found) == stop - first:
+                break
+            if not any(fresh):
+                time.sleep(self.limits.wait_seconds)
+        self.crowded = self.crowded or any(each.crowded for each in found)
+        increments = zip(*(each.candidates for each in found), strict=True)
+        return [sorted(chain(*each), key=lambda candidate: candidate.onset) for each in increments]
+
+    def _stored(self, places: Sequence[System]) -> SlicePass:
+        """Results that other searches have left; none if bases are kept, since later increments need them."""
+        if self.folder is None or self._keeps(places[0]):
+            return NEW_PASS
+        folder = pass_folder(self.folder, places, self._range(places[0]), self.limits)
+        return self.ranks.together(lambda: SlicePass.read(folder) if self.ranks.rank == 0 else NEW_PASS)[0]
+
+    def _search_slices(self, places: Sequence[System], stored: SlicePass) -> list[SliceResult]:
+        """Results of this rank's slices, without the slices that are stored."""
+        found: list[SliceResult] = []
+        first, stop = self._range(places[0])
+        before = sum(each.size for each in stored.borders)
+        done, wanted = (-(-modes // self.ranks.size) for modes in (before, stop - first))
+        where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
+        known = f"{before} of {stop - first} modes are known" if stored.shifts else "modes are counted"
+        report_progress(f"{where}: {known}")
+        failure: FaultgougeError | None = None
+        for basis in self._bases(places[0], stored):
+            done += basis.own.stop - basis.own.start
+            report_progress(f"{where}: {min(done, wanted)} of {wanted} modes")
+            try:
+                found.append(self._search_slice(basis, places))
+            except FaultgougeError as error:
+                failure = failure or error  # it waits: the ranks meet at the end of their bases
+                continue
+            stored.keep(found[-1])
+        if failure is not None:
+            raise failure
+        return found
+
+    def _search_slice(self, basis: Slice, places: Sequence[System]) -> SliceResult:
+        """The windows of the small families between the loads."""
+        small = [reduce_system(basis.vectors, each, places[0].active) for each in places]
+        quiet, found = Quiet(Motions.of), []
+        for (here, there), (a, b) in zip(pairwise(places), pairwise(small), strict=True):
+            found.append(list(self._windows_of(basis, (here.fx, a), (there.fx, b), quiet)))
+        return SliceResult(basis.border, found, quiet.crowded)
+
+    def _windows_of(
+        self, basis: Slice, here: tuple[float, Small], there: tuple[float, Small], quiet: Quiet
+    ) -> Iterator[Candidate]:
+        """The windows of one slice's own motions between two loads."""
+        increment = there[0] - here[0]
+
+        def small(fx: float) -> System:
+            share = (fx - here[0]) / increment
+            return System(
+                fx, *((1 - share) * one + share * other for one, other in zip(here[1], there[1], strict=True))
+            )
+
+        last = there[0] + self.limits.reach * increment
+        few = quiet if len(here[1]) == 2 else None
+        *_, (_, windows) = Search(small, self.limits.window * increment, few).along(np.array([here[0], last]))
+        own, spacing = basis.values[basis.own], basis.border.spacing
+        for window in windows:
+            if not own[0] - spacing <= window.frequency**2 <= own[-1] + spacing:
+                continue  # twice is better than not at all, where two slices meet
+            end = last if window.fx_end is None else window.fx_end
+            inside = there[0] if window.fx_onset < there[0] <= end else 0.5 * (window.fx_onset + end)
+            state = Motions.of(small(inside))
+            growing = np.flatnonzero(state.grows)
+            if len(growing):
+                value = window.onset.eigenvalue
+                k = growing[np.argmin(np.abs(state.values[growing].real - np.real(value)))]
+                if len(here[1]) == 2:
+                    k = growing[np.argmin(np.abs(state.values[growing].imag - np.imag(value)))]
+                slope = state.slopes(small(here[0] if inside > here[0] else last))[k]
+                yield Candidate(window.fx_onset, inside, complex(state.values[k]), complex(slope))
+
+    # Bases
+
+    def _range(self, place: System) -> tuple[int, int]:
+        """Numbers of the first mode that is looked at and of the first that is not; ValueError if there are none."""
+        count = len(place.active)
+        first, stop = self.modes or (0, count)
+        if not 0 <= first < min(stop, count):
+            raise ValueError(f"modes {first}:{stop} is no part of the {count} modes of this packing, 0:{count}")
+        return first, min(stop, count)
+
+    def _keeps(self, place: System) -> bool:
+        """Whether there is memory for the bases of all modes that are looked at."""
+        first, stop = self._range(place)
+        margins = 2 * self.limits.margin * max(1, round((stop - first) / self.limits.slice_size))
+        return (stop - first + margins) * len(place.active) <= self.limits.largest_basis
+
+    def _bases(self, place: System, stored: SlicePass) -> Iterable[Slice]:
+        """The bases of this rank's slices; those of an earlier load as long as those of all ranks serve."""
+        mine = [self._mixing(each, place) for each in self._kept]
+        mixing = [each for one in self.ranks.together(lambda: mine) for each in one]
+        if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing:
+            return self._kept
+        self._kept = []  # its memory is free before that for the next ones is taken
+        bases: Iterable[Slice] = self._new_bases(place, stored)
+        if self._keeps(place):
+            bases = self._kept = list(bases)
+        return bases
+
+    def _mixing(self, basis: Slice, place: System) -> float:
+        """The typical symmetric coupling of a basis over the spacing of its levels; a new basis has none."""
+        if len(basis.vectors) != len(place.active):
+            return np.inf
+        block = reduce_system(basis.vectors, System(place.fx, place.stiffness), place.active)[0]
+        symmetric = 0.5 * (block + block.T)
+        symmetric -= np.diag(np.diag(symmetric))
+        parts = np.array_split(np.arange(len(block)), max(1, len(block) // 60))
+        widths = [max(float(np.ptp(basis.values[each])), np.finfo(float).tiny) for each in parts]
+        return float(
+            np.median(
+                [np.linalg.norm(symmetric[np.ix_(each, each)]) / w for each, w in zip(parts, widths, strict=True)]
+            )
+        )
+
+    def _new_bases(self, place: System, stored: SlicePass) -> Iterator[Slice]:
+        """The bases of slices of the spectrum; a small operator has one, which the first rank makes."""
+        matrix = csr_array(place.stiffness)[place.active][:, place.active]
+        symmetric = csc_array(0.5 * (matrix + matrix.T))
+        if len(place.active) <= self.limits.one_basis:
+            if self.ranks.rank == 0 and not stored.found:
+                values, vectors = eigh(symmetric.toarray(), driver="evd", overwrite_a=True, check_finite=False)
+                yield Slice(0, values, vectors, slice(*self._range(place)))
+            return
+        from .slices import slices  # with libraries that nothing else needs
+
+        yield from slices(
+            symmetric, self.limits.margin, self._range(place), self.limits, ranks=self.ranks, stored=stored
+        )
+
+
+def reduce_system(vectors: Floats, system: System, active: Floats) -> Small:
+    """X^T A X and, with dissipation, X^T G X."""
+    matrices = [system.stiffness] if system.damping is None else [system.stiffness, system.damping]
+    return tuple(vectors.T @ (csr_array(each)[active][:, active] @ vectors) for each in matrices)
