@@ -78,7 +78,7 @@ DECAYS = (1.0, 0.98, 0.9, 0.5)
 MARGIN = 40
 """Neighbours of a slice on either side."""
 
-WORST, CHANGES = 24, 12
+WORST, CHANGES = 16, 16
 """Motions whose error is made smaller at a time, and how often."""
 
 SURE = 1e-3

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis.files.signal_files import read_signal
-from ...analysis.motion.signals import Signal, pulse
+from ...analysis.responses.signals import Signal, pulse
 from .signal_keys import absolute_signal, check_signal
 from .validation import NamesFile, NotNegative, Positive, Section, is_number, refusal_sentence
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis.files.signal_files import read_signal
-from ...analysis.motion.signals import Signal, SignalError, pulse, sweep
+from ...analysis.responses.signals import Signal, SignalError, pulse, sweep
 from .validation import NamesFile, NotNegative, Positive, Section, refusal_sentence
 
 KINDS = ("pulse", "sweep")

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from faultgouge.analysis.motion.normal_form import NormalForm
-from faultgouge.analysis.motion.power_law import PowerLaw
+from faultgouge.analysis.responses.normal_form import NormalForm
+from faultgouge.analysis.responses.power_law import PowerLaw
 from faultgouge.figures.pages import render
 from faultgouge.pywrap.lammps.dynamics import Weakening
 from faultgouge.studies.triggering import Forecast, Sensitivity, Triggering, judge, summary
