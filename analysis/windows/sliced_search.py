@@ -4,8 +4,8 @@ Motions mix with their neighbours in the spectrum only. The eigenvectors X of th
 slice of 120 neighbouring modes with `Limits.margin` more on either side, make A and G small: :math:`X^T A X` and
 :math:`X^T G X`, which are taken as a straight line between two loads. The search of small packings finds the windows
 of this small family, and so *announces* motions that begin to grow. The system itself confirms each: the same search,
-with the few eigenvalues next to the announced one (`Motions.near`) in place of all. So an edge has the same digits as in
-the search among all modes. A basis serves as long as its symmetric couplings are small against the spacing of
+with the few eigenvalues next to the announced one (`Motions.near`) in place of all. So an edge has the same digits as
+in the search among all modes. A basis serves as long as its symmetric couplings are small against the spacing of
 levels.
 
 **Where slices are wrong.** Between two loads the small family is a straight line, which the system is not where
