@@ -4,8 +4,8 @@ Motions mix with their neighbours in the spectrum only. The eigenvectors X of th
 slice of 120 neighbouring modes with `Limits.margin` more on either side, make A and G small: :math:`X^T A X` and
 :math:`X^T G X`, which are taken as a straight line between two loads. The search of small packings finds the windows
 of this small family, and so *announces* motions that begin to grow. The system itself confirms each: the same search,
-with the few eigenvalues next to the announced one (`Motions.near`) in place of all. So an edge has the same digits as in
-the search among all modes. A basis serves as long as its symmetric couplings are small against the spacing of
+with the few eigenvalues next to the announced one (`Motions.near`) in place of all. So an edge has the same digits as
+in the search among all modes. A basis serves as long as its symmetric couplings are small against the spacing of
 levels.
 
 **Where slices are wrong.** Between two loads the small family is a straight line, which the system is not where
@@ -28,7 +28,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, eigh
 from scipy.sparse import csc_array, csr_array
 
-from ..arrays import Floats
+from ..arrays import Floats, Indices
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..factors.lanczos import Slice
 from ..progress import report_progress
@@ -352,7 +352,7 @@ class SlicedSearch:
         )
 
 
-def reduce_system(vectors: Floats, system: System, active: Floats) -> Small:
+def reduce_system(vectors: Floats, system: System, active: Indices) -> Small:
     """X^T A X and, with dissipation, X^T G X."""
     matrices = [system.stiffness] if system.damping is None else [system.stiffness, system.damping]
     return tuple(vectors.T @ (csr_array(each)[active][:, active] @ vectors) for each in matrices)

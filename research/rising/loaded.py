@@ -96,8 +96,7 @@ def loaded(seed: int, history: str, rate: float) -> Row:
                     "vibrates": [float(np.mean(vibration > share * drift)) for share in VIBRATIONS],
                     "peak": float(peak.max()),
                     "moved": float(np.sqrt(np.mean((now.position - packing.position) ** 2))),
-                    "at_bound": int(np.sum(now.sliding)),
-                    "contacts": len(pairs),
+                    "mobilised": int(np.sum(now.mobilised)),
                     "changed": len(pairs ^ known),
                 }
             )
