@@ -37,7 +37,7 @@ SLIP_COLUMNS = (
 """Columns of the table of slips."""
 
 
-@command(app, "faultgouge drive drive.toml -o drive.h5")
+@command(app, "faultgouge examples drive && faultgouge drive drive.toml -o drive.h5")
 def drive(scene: ScenePath, output: Out = Path("drive.h5")) -> Answer | None:
     """Draw the upper layer with a spring whose far end moves: the layer sticks and slips.
 

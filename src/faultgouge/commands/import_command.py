@@ -61,7 +61,7 @@ SlipsFile = Annotated[
 
 @app.command(
     "import",
-    epilog="Example: faultgouge import pour.data --top 12 --kn 2e5 --fy 3 --relax -o packing.h5",
+    epilog="Example: faultgouge examples pour && faultgouge import pour.in -o packing.h5",
 )
 def import_(
     context: typer.Context,
@@ -108,17 +108,19 @@ def import_(
         ),
     ] = None,
 ) -> None:
-    """Convert a packing of another code to a run.h5 for draw, spectrum, and the key packing.file of a scene.
+    """Run a LAMMPS deck and give the verdict on its last state, or convert a packing of another code, to a run.h5.
 
-    A packing in balance is imported unchanged, to the bit. With --relax, a packing out
+    spectrum, draw and the key packing.file of a scene take the run.h5. A packing in
+    balance is imported unchanged, to the bit. With --relax, a packing out
     of balance comes to rest under law and load. It relaxes without friction, and
     friction then starts with zero slips. If the file has slips, it relaxes with
     friction. The command prints how far the disks moved.
 
     A LAMMPS deck (NAME.in, in.NAME) is run in its own folder, as lmp -in does there, and
     its last state is stored unchanged, with LAMMPS's own granular styles, disks or
-    spheres. With --relax LAMMPS first runs on with drag until the packing rests. A state
-    that cannot be taken is kept in a restart file, with a deck that goes on from it.
+    spheres. The command ends with the first sentence of the verdict. With --relax
+    LAMMPS first runs on with drag until the packing rests. A state that cannot be
+    taken is kept in a restart file, with a deck that goes on from it.
     """
     from faultgouge.analysis import BadInputError, PackingFileError
 

@@ -42,7 +42,7 @@ Slices = Annotated[
 ]
 
 
-@app.command(epilog="Example: faultgouge onset paper.toml --json")
+@app.command(epilog="Example: faultgouge onset scene.toml --json")
 def onset(
     context: typer.Context,
     scene: ScenePath,

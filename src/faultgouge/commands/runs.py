@@ -14,20 +14,16 @@ from ..signal_guard import keeps
 from .terminal import (
     Answer,
     Out,
-    ScenePath,
-    check_output,
+    SceneFile,
     command,
     growth_in,
-    hold_lock,
     lock_output,
     print_line,
     progress,
-    read_scene,
     report_fallback,
     say,
     say_remark,
     status,
-    stored_files,
 )
 
 if TYPE_CHECKING:
@@ -61,24 +57,21 @@ def init(
         print_line(f"written to {output}; next: faultgouge onset {output}")
 
 
-@app.command(epilog="Example: faultgouge settle paper.toml -o run.h5")
-def settle(scene: ScenePath, output: Out = Path("run.h5")) -> None:
+@command(app, "faultgouge settle scene.toml -o run.h5", reads="settle", task="settle", records=True, as_json=False)
+def settle(scene: SceneFile, output: Out = Path("run.h5")) -> Answer:
     """Settle the packing of a scene under its load, at F_x = 0."""
     from faultgouge.pywrap import Record
 
-    wanted = read_scene(scene, "settle", "settle")
-    check_output(output, scene, *stored_files(wanted))
-    hold_lock(output)
-    with Record(output, wanted, saved=keeps) as record:
+    with Record(output, scene, saved=keeps) as record:
         say_remark(record)
-        last = _settle_or_read(wanted, record)
+        last = _settle_or_read(scene, record)
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
             record.finish()
-    print_line(f"{last}; written to {output}")
+    return Answer([f"{last}; written to {output}"])
 
 
-@command(app, "mpiexec -n 2 faultgouge ramp paper.toml -o run.h5")
-def ramp(scene: ScenePath, output: Out = Path("run.h5")) -> Answer | None:
+@command(app, "mpiexec -n 2 faultgouge ramp scene.toml -o run.h5", reads="ramp", task="ramp", records=True)
+def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Answer | None:
     """Raise F_x from equilibrium to equilibrium, and store each equilibrium.
 
     With turning points in ramp.until, F_x goes up, down and below zero. When F_x
@@ -90,17 +83,14 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5")) -> Answer | None:
     from faultgouge.pywrap.runs.ramp_loads import all_loads, count_behind
     from faultgouge.pywrap.scenes.validation import require_section
 
-    wanted = read_scene(scene, "ramp", "ramp")
-    check_output(output, scene, *stored_files(wanted))
-    hold_lock(output)
-    settings = require_section(wanted.ramp, "ramp")
-    with Record(output, wanted, saved=keeps) as record:
+    settings = require_section(scene.ramp, "ramp")
+    with Record(output, scene, saved=keeps) as record:
         say_remark(record)
-        start = _settle_or_read(wanted, record)
+        start = _settle_or_read(scene, record)
         loads = all_loads(settings)
         total, done = len(loads), count_behind(settings, record.forces)
-        dumps = output.with_suffix("") if wanted.output is not None and wanted.output.dumps else None
-        for equilibrium in progress(ramp_up(wanted, start, dumps=dumps, behind=done), "equilibria", total, done):
+        dumps = output.with_suffix("") if scene.output is not None and scene.output.dumps else None
+        for equilibrium in progress(ramp_up(scene, start, dumps=dumps, behind=done), "equilibria", total, done):
             report_fallback(equilibrium)
             record.append(equilibrium)
         record.finish()
@@ -123,8 +113,8 @@ def ramp(scene: ScenePath, output: Out = Path("run.h5")) -> Answer | None:
     return Answer(says, result)
 
 
-@command(app, "faultgouge perturb paper.toml -o run.h5")
-def perturb(scene: ScenePath, output: Out = Path("perturb.h5")) -> Answer | None:
+@command(app, "faultgouge perturb scene.toml -o run.h5", reads="perturb", task="perturb", records=True)
+def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Answer | None:
     """Run the dynamics from the equilibrium at perturb.fx, and record D(t).
 
     Without perturb.fx the load is just beyond the onset, which is found first; with
@@ -137,22 +127,19 @@ def perturb(scene: ScenePath, output: Out = Path("perturb.h5")) -> Answer | None
     from faultgouge.pywrap import Record
     from faultgouge.pywrap.scenes.validation import require_section
 
-    wanted = read_scene(scene, "perturb", "perturb")
-    check_output(output, scene, *stored_files(wanted))
-    hold_lock(output)
-    require_section(wanted.perturb, "perturb")
-    mus = wanted.law.mus
+    require_section(scene.perturb, "perturb")
+    mus = scene.law.mus
     if len(mus) > 1:
         say(f"the run uses mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene")
-    with Record(output, wanted, task="perturb", saved=keeps) as record:
+    with Record(output, scene, task="perturb", saved=keeps) as record:
         say_remark(record)
         if record.last is None:
-            record.append(_start(wanted))
+            record.append(_start(scene))
         assert record.last is not None
-        weakening = _weakening(wanted, record)
-        run = record.undamped(wanted, record.last, weakening=weakening)
+        weakening = _weakening(scene, record)
+        run = record.undamped(scene, record.last, weakening=weakening)
         largest = 0.0
-        for sample in progress(run, "samples", _lines(wanted, record.last)):
+        for sample in progress(run, "samples", _lines(scene, record.last)):
             last, largest = sample, max(largest, sample.msd)
         record.finish()
     if not is_root():

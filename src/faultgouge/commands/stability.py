@@ -11,17 +11,7 @@ import typer
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
 from .studies import TRIED, try_cases
-from .terminal import (
-    AsJson,
-    Frame,
-    lock_folder,
-    print_json,
-    print_line,
-    refuse_scene,
-    say,
-    status,
-    stored_packing,
-)
+from .terminal import Answer, Frame, command, lock_folder, refuse_scene, say, status, stored_packing
 
 if TYPE_CHECKING:
     from ..analysis import Stability
@@ -34,7 +24,7 @@ Follow = Annotated[
 ]
 
 
-@app.command(epilog="Example: faultgouge stability pour.in --follow")
+@command(app, "faultgouge examples pour && faultgouge stability pour.in --follow")
 def stability(
     file: Annotated[
         Path | None,
@@ -52,28 +42,24 @@ def stability(
     frame: Frame = -1,
     output: Annotated[Path, typer.Option("-o", "--output", hidden=True)] = Path("stability"),
     quick: Annotated[bool, typer.Option("--quick", hidden=True)] = False,
-    as_json: AsJson = False,
-) -> None:
+) -> Answer | None:
     """Say whether a packing is stable: with its own dashpots and drag, and its contacts at Coulomb's bound as they are.
 
     The first sentence is the verdict. A deck is run as LAMMPS runs it, and its last
     state is looked at. Without a file this is the old name of `faultgouge extremes`.
     """
     if file is None:
-        _extremes(output, quick, as_json)
-        return
+        return _extremes(output, quick)
     if rise not in (None, "fx"):
         raise typer.BadParameter(f"--rise {rise}: the load rises along fx")
     if followed is not None and not 0 < followed < inf:
         raise typer.BadParameter(f"--time {followed:g}: the time that motion is followed is a positive number")
     if file.suffix == ".in" or file.name.startswith("in."):
-        _of_deck(file, rise, followed, follow, as_json)
-        return
+        return _of_deck(file, rise, followed, follow)
     packing = stored_packing(refuse_scene(file), frame)
     if rise and not packing.configuration.top.any():
         raise typer.BadParameter(f"--rise: {file} has no upper layer that a load could push; leave it out")
-    if is_root():
-        _tell(verdict_of(packing, rise, followed, follow=follow), as_json)
+    return _answer(verdict_of(packing, rise, followed, follow=follow)) if is_root() else None
 
 
 def verdict_of(packing: HasConfiguration, *given: Any, **options: Any) -> Stability:
@@ -91,41 +77,36 @@ def first_sentence(packing: HasConfiguration) -> str:
     return "\n".join([told.sentences[0], *told.remarks])
 
 
-def _of_deck(file: Path, rise: str | None, time: float | None, follow: bool, as_json: bool) -> None:
-    """Run a deck, and say whether its last state is stable while LAMMPS is there."""
+def _of_deck(file: Path, rise: str | None, time: float | None, follow: bool) -> Answer | None:
+    """Run a deck, and say whether its last state is stable; to follow its motion, while LAMMPS is there."""
     from faultgouge.pywrap.granular.run_deck import run_deck
+
+    found: list[Answer] = []
 
     def use(lmp: Any, packing: HasConfiguration) -> None:
         if is_root():
-            _tell(verdict_of(packing, rise, time, follow=lmp if follow else None), as_json)
+            found.append(_answer(verdict_of(packing, rise, time, follow=lmp)))
 
     with status(f"{file}: LAMMPS runs"):
-        packing = run_deck(file, use=use if follow else None)
+        packing = run_deck(file, use=use) if follow else run_deck(file)
     if not follow and is_root():
-        _tell(verdict_of(packing, rise, time), as_json)
+        found.append(_answer(verdict_of(packing, rise, time)))
+    return found[0] if found else None
 
 
-def _tell(verdict: Stability, as_json: bool) -> None:
-    if as_json:
-        print_json(verdict.as_dict())
-    else:
-        print_line(str(verdict))
+def _answer(verdict: Stability) -> Answer:
+    return Answer([str(verdict)], verdict.as_dict())
 
 
-def _extremes(output: Path, quick: bool, as_json: bool) -> None:
+def _extremes(output: Path, quick: bool) -> Answer:
     """The stiff and extreme cases under their name until version 1, with the JSON under its old name, too."""
     say("faultgouge stability without a file is called faultgouge extremes now")
     keeps(TRIED.format(output=output), output)
     with lock_folder(output):
         try:
-            answer = try_cases(output, quick)
+            return try_cases(output, quick)
         finally:
             if is_root() and (output / "extremes.json").exists():
                 from faultgouge.analysis.files.atomic_write import write_whole
 
                 write_whole(output / "stability.json", (output / "extremes.json").read_bytes())
-    if as_json:
-        print_json(answer.result or {})
-    (say if as_json else print_line)(answer.written)
-    if answer.fails:
-        answer.fails()

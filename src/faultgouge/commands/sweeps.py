@@ -26,9 +26,14 @@ DryRun = Annotated[
 ]
 
 
-@command(app, "faultgouge sweep genericity.toml -o sweep", as_json=False)
+@command(app, "faultgouge examples sweep && faultgouge sweep sweep.toml -o sweep", as_json=False)
 def sweep(
-    file: Annotated[Path, typer.Argument(metavar="SWEEP", help="The sweep, a TOML file.", show_default=False)],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SWEEP", help="The sweep, a TOML file; `faultgouge examples sweep` has one.", show_default=False
+        ),
+    ],
     output: Folder = Path("sweep"),
     shard: Shard = "1/1",
     workers: Workers = None,

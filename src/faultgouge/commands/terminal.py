@@ -38,7 +38,10 @@ P = ParamSpec("P")
 SECONDS_BETWEEN_LINES = 60.0
 """Seconds between two lines of progress off a terminal."""
 
-ScenePath = Annotated[Path, typer.Argument(metavar="SCENE", help="The scene, a TOML file.", show_default=False)]
+ScenePath = Annotated[
+    Path,
+    typer.Argument(metavar="SCENE", help="The scene, a TOML file; `faultgouge init` writes one.", show_default=False),
+]
 Out = Annotated[Path, typer.Option("-o", "--output", help="The file to write; an interrupted run continues.")]
 Folder = Annotated[Path, typer.Option("-o", "--output", help="The folder to write; an interrupted study continues.")]
 NewFolder = Annotated[Path, typer.Option("-o", "--output", help="The folder for numbers, pictures and page.")]
@@ -62,7 +65,7 @@ PackingFile = Annotated[
     Path,
     typer.Argument(
         metavar="FILE",
-        help="run.h5, or NAME.disks from the dumps of a deck.",
+        help="What `ramp`, `perturb`, `drive` or `import` has written (.h5), or NAME.disks from the dumps of a deck.",
         show_default=False,
         callback=refuse_scene,
     ),
@@ -106,6 +109,7 @@ def command(
     reads: str | None = None,
     task: Task | None = None,
     kept: str | None = None,
+    records: bool = False,
     as_json: bool = True,
     hidden: bool = False,
 ) -> Callable[[Callable[P, Answer | None]], Callable[P, Answer | None]]:
@@ -128,6 +132,8 @@ def command(
     kept : str, optional
         The option `output` is a folder, which is made and kept from other runs; and what an interrupt leaves in it, in
         words that name it as {output}.
+    records : bool
+        The option `output` is the file of a `Record`, which is none of the files of the scene.
     as_json : bool
         Whether the command has the option --json.
     """
@@ -140,7 +146,11 @@ def command(
             given = own.bind(*args, **options)
             given.apply_defaults()
             if reads is not None:
-                given.arguments["scene"] = read_scene(given.arguments["scene"], reads, task)
+                path = given.arguments["scene"]
+                given.arguments["scene"] = read_scene(path, reads, task)
+                if records:
+                    check_output(given.arguments["output"], path, *stored_files(given.arguments["scene"]))
+                    hold_lock(given.arguments["output"])
             if kept is not None:
                 keeps(kept.format(**given.arguments), given.arguments["output"])
             with nullcontext() if kept is None else lock_folder(given.arguments["output"]):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..mpi_rank import is_root
-from .terminal import AsJson, Frame, NewFolder, lock_folder, print_json, print_line, refuse_scene, say, status
+from .terminal import Answer, Frame, NewFolder, command, lock_folder, print_line, refuse_scene, say, status
 
 if TYPE_CHECKING:
     from ..analysis import Configuration, ElasticModuli, Packing, PlaneWave, Vibrations
@@ -34,13 +34,8 @@ MaterialOf = Annotated[
 ]
 
 
-@app.command(epilog="Example: faultgouge timestep spheres.csv --material young=7e10,poisson=0.25,density=2500")
-def timestep(
-    file: AnyPacking,
-    material: MaterialOf = None,
-    frame: Frame = -1,
-    as_json: AsJson = False,
-) -> None:
+@command(app, "faultgouge settle scene.toml -o run.h5 && faultgouge timestep run.h5")
+def timestep(file: AnyPacking, material: MaterialOf = None, frame: Frame = -1) -> Answer:
     """Compute the largest stable time step of a packing, beside the rules that users have.
 
     It is the step of velocity Verlet with the packing's own contacts and dashpots, and
@@ -51,13 +46,11 @@ def timestep(
     configuration = _packing(file, frame, material).configuration
     with status(f"{file}: time step"):
         step, rules = timestep_rules(configuration)
-    document = {"largest": float(step), "error": step.error, "certain": step.certain, "rules": rules}
-    if as_json:
-        # infinite where nothing touches: JSON has no such number
-        return print_json({k: None if v == float("inf") else v for k, v in document.items()})
     error = f" (at most {step.error:.2g} shorter)" if step.error else ""
-    print_line(f"{configuration!r}".removeprefix("<Configuration: ").removesuffix(">"))
-    print_line(f"largest stable time step {step:.6g}{error}; all steps up to {step.certain:.6g} are stable for certain")
+    says = [
+        f"{configuration!r}".removeprefix("<Configuration: ").removesuffix(">"),
+        f"largest stable time step {step:.6g}{error}; all steps up to {step.certain:.6g} are stable for certain",
+    ]
     names = {
         "rayleigh": "Rayleigh's formula (Li, Xu and Thornton), of which 0.1 to 0.3 is usual",
         "o_sullivan_bray": "0.17 sqrt(m/k) (O'Sullivan and Bray)",
@@ -65,10 +58,13 @@ def timestep(
         "p_wave": "R sqrt(rho/E) with k = E R, a sound wave through a sphere (YADE)",
     }
     for name, value in rules.items():
-        if value is None:
-            print_line(f"  {names[name]}: does not apply to these contacts")
-        else:
-            print_line(f"  {names[name]}: {value:.6g}, {value / step:.3g} of the largest")
+        what = (
+            "does not apply to these contacts" if value is None else f"{value:.6g}, {value / step:.3g} of the largest"
+        )
+        says.append(f"  {names[name]}: {what}")
+    document = {"largest": float(step), "error": step.error, "certain": step.certain, "rules": rules}
+    # infinite where nothing touches: JSON has no such number
+    return Answer(says, {key: None if value == float("inf") else value for key, value in document.items()})
 
 
 @app.command(epilog="Example: faultgouge vibrations packing.h5 -o vibrations")
