@@ -88,7 +88,7 @@ class Quiet:
             shift = s[:, None] ** 2 * gamma * gamma.T / apart
             s = 1j * np.sqrt(values - shift.sum(axis=1) - 0.25 * own**2 + 0j) - 0.5 * own
             trusted = np.sqrt(np.abs(shift / apart)).max(axis=1) < MIXING
-            self.crowded = self.crowded or np.count_nonzero(~trusted) > len(values) / 3
+            self.crowded = self.crowded or bool(np.count_nonzero(~trusted) > len(values) / 3)
             quiet = trusted & (-2 * s.real > SPARE * np.abs(own)) & (values.imag == 0) & (values.real > 0)
         self._known[system.fx] = values, ~quiet, state
         return self._known[system.fx]

@@ -182,7 +182,7 @@ class Search:
             few = self.few(here, there) if self.few else None
             below, above = few or (self.state(here), self.state(there))
             if self.growing is None:
-                self.growing = [(below.values[k], Edge.start(below, k)) for k in np.flatnonzero(below.grows)]
+                self.growing = [(below.values[k], Edge.start(below, int(k))) for k in np.flatnonzero(below.grows)]
             if few and len(self.growing) != below.grows.sum():
                 few, below, above = None, self.state(here), self.state(there)
             changes = self._changes(below, above)
@@ -251,9 +251,7 @@ class Search:
         if not (below.whole and above.whole):  # some have no partner, as another one is nearer to the point there
             alike = below.alike(above, levels_a, levels_b)
             pairs = [(levels_a[i], levels_b[j]) for i, j in assign(alike) if alike[i, j] > ALIKE]
-            levels_a, levels_b = (
-                (np.array(sorted(each), dtype=int) for each in zip(*pairs, strict=True)) if pairs else ([], [])
-            )
+            levels_a, levels_b = (np.array(sorted(int(pair[end]) for pair in pairs), dtype=np.int64) for end in (0, 1))
         if len(levels_a) != len(levels_b):
             raise DoubtError
         self._check_levels(below, above, drift_a, drift_b, levels_a, levels_b)

@@ -28,7 +28,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, eigh
 from scipy.sparse import csc_array, csr_array
 
-from ..arrays import Floats
+from ..arrays import Floats, Indices
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..factors.lanczos import Slice
 from ..progress import report_progress
@@ -352,7 +352,7 @@ class SlicedSearch:
         )
 
 
-def reduce_system(vectors: Floats, system: System, active: Floats) -> Small:
+def reduce_system(vectors: Floats, system: System, active: Indices) -> Small:
     """X^T A X and, with dissipation, X^T G X."""
     matrices = [system.stiffness] if system.damping is None else [system.stiffness, system.damping]
     return tuple(vectors.T @ (csr_array(each)[active][:, active] @ vectors) for each in matrices)
