@@ -31,20 +31,13 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .errors import BadInputError, FaultgougeError, NoEquilibriumError, OutputError, PackingFileError
     from .files.formats.lammps_dump import read_dump
     from .files.runfile import RunFile
-    from .motion.buckling import negative_eigenvalues
+    from .motion.buckling import nearest_modes, negative_eigenvalues
     from .motion.eigenvalues import Linear, mass_weighted
     from .motion.growing import fastest_growing
-    from .motion.growth import Growth, fit_growth, mean_square_displacement
-    from .motion.growth_of_run import growth_of_run
     from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_modes
     from .motion.motion import Motion
-    from .motion.nearest_modes import nearest_modes
-    from .motion.power_law import PowerLaw, fit_power_law
     from .motion.pushes import OneSidedMotion, OneSidedOutcome, one_sided_motion
-    from .motion.response import layer_force, linear_response
     from .motion.rising_load import RisingMotion
-    from .motion.signals import Signal
-    from .motion.slips import Slip
     from .motion.spectrum import (
         Spectrum,
         discrete_frequency,
@@ -55,7 +48,6 @@ if TYPE_CHECKING:  # each is imported when it is used
     )
     from .motion.stability import Stability, stability
     from .motion.stable_timestep import rayleigh_timestep, stable_timestep
-    from .motion.transient import NoGainError, TransientGain, transient_gain
     from .operators.damping import damping_matrix, largest_damping_rate
     from .operators.stiffness import stiffness_matrix
     from .packing.contacts import FLOOR, Contacts
@@ -63,6 +55,13 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .packing.law import MindlinLaw
     from .packing.packing import Packing
     from .packing.solid_fraction import solid_fraction
+    from .responses.growth import Growth, fit_growth, mean_square_displacement
+    from .responses.growth_of_run import growth_of_run
+    from .responses.power_law import PowerLaw, fit_power_law
+    from .responses.response import layer_force, linear_response
+    from .responses.signals import Signal
+    from .responses.slips import Slip
+    from .responses.transient import NoGainError, TransientGain, transient_gain
     from .windows import Onset, OnsetError, Window, complex_windows, find_onset
     from .windows.pair_over_load import pair_eigenvalues
 

@@ -23,7 +23,7 @@ from mpi4py import MPI
 from pydantic import BaseModel
 
 from ..analysis import Contacts, Packing, dynamical_matrix, touching
-from ..analysis.motion.signals import Signal
+from ..analysis.responses.signals import Signal
 from ..analysis.table_display import table_of
 from ..pywrap import Engine, Scene
 from ..pywrap.lammps.dynamics import Dynamics, Weakening

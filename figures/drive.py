@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.slips import Slip
+from faultgouge.analysis.responses.slips import Slip
 
 from .ramp_film import Course
 from .style import styled

@@ -46,7 +46,6 @@ def draw_vibrations(found: Vibrations) -> Figure:
             quality = found.modes["frequency"] / np.maximum(found.modes["damping"], np.finfo(float).tiny)
             rows[2].plot(found.modes["frequency"], quality, ".", color=INK, markersize=2)
         rows[2].plot(found.frequency, found.quality, color=SHARE_COLOUR, linewidth=0.9)
-        rows[2].axhline(0.5, color=FLOOR, linewidth=0.7, linestyle=":")
         rows[2].set(ylabel="quality factor $Q$", yscale="log")
     rows[-1].set_xlabel(r"$\omega$")
     return figure
@@ -66,7 +65,7 @@ def draw_waves(waves: Sequence[PlaneWave], moduli: ElasticModuli | None = None) 
     figure = Figure(figsize=(3.5, 4.4), layout="constrained")
     above, below = figure.subplots(2, sharex=True)
     most = max(wave.wave_number for wave in waves)
-    names = ("longitudinal", "transverse", "transverse")
+    names = ("longitudinal", "transverse", "transverse, the other")
     for kind in sorted({wave.polarisation for wave in waves}):
         these = [wave for wave in waves if wave.polarisation == kind]
         colour, mark = (INK if kind == 0 else SHARE_COLOUR), "os^"[kind]
@@ -76,8 +75,8 @@ def draw_waves(waves: Sequence[PlaneWave], moduli: ElasticModuli | None = None) 
     if moduli is not None:
         lame = moduli.bulk - 2 * moduli.shear / moduli.dimension
         speeds = np.sqrt(np.array([lame + 2 * moduli.shear, moduli.shear]) / moduli.density)
-        for speed, colour, name in zip(speeds, (INK, SHARE_COLOUR), ("P", "S"), strict=True):
-            above.plot([0, most], [0, speed * most], color=colour, linewidth=0.7, linestyle="--",
+        for speed, shade, name in zip(speeds, (INK, SHARE_COLOUR), ("P", "S"), strict=True):
+            above.plot([0, most], [0, speed * most], color=shade, linewidth=0.7, linestyle="--",
                        label=f"{name}, elastic moduli")  # fmt: skip
     above.set(ylabel=r"frequency $\omega$", ylim=(0, None))
     above.legend(fontsize=6)

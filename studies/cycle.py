@@ -40,7 +40,7 @@ from ..analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, 
 from ..analysis.motion.linear import all_rates, linear_verdict
 from ..analysis.motion.modes import Modes, participation_ratio
 from ..analysis.motion.motion import Motion
-from ..analysis.motion.slips import Slip
+from ..analysis.responses.slips import Slip
 from ..analysis.table_display import table_of
 from ..pywrap import SceneError
 from ..pywrap.runs.drive import SERIES, drive_of, slips_in

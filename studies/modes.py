@@ -54,8 +54,7 @@ from ..analysis.motion.spectrum import SLICED
 from ..analysis.table_display import table_of
 from ..pywrap import Equilibrium, Scene
 from ..pywrap.load_path import LoadPath
-from ..pywrap.scenes.command_sections import PATH
-from ..pywrap.scenes.study_sections import section_of
+from ..pywrap.scenes.command_sections import PATH, section_of
 from ..pywrap.scenes.validation import Positive, Section, require_section
 from .cycle import cycle
 from .executors import Say

@@ -26,7 +26,7 @@ from scipy.linalg import eigh, eigvals
 
 from ..analysis import NoEquilibriumError, Onset, OnsetError, Packing, dynamical_matrix, find_onset
 from ..analysis.arrays import Floats, Indices
-from ..analysis.motion.nearest_modes import nearest_modes
+from ..analysis.motion.buckling import nearest_modes
 from ..analysis.windows import force_bearing, takes_all_modes
 from ..pywrap import Scene, SceneError
 from ..pywrap.equilibria.quasistatic import Equilibrium

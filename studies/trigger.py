@@ -6,7 +6,7 @@ triggers for amplitudes above
 
 .. math:: a_c(\omega, F_x) = \frac{v_0}{\max_{0 \le t \le T} |v(t)|}, \qquad v(t)\ \text{for}\ a = 1,
 
-where T is the duration of the wave. v(t) follows from K, C and M alone (:mod:`~faultgouge.analysis.motion.forcing`),
+where T is the duration of the wave. v(t) follows from K, C and M alone (:mod:`~faultgouge.analysis.responses.forcing`),
 transient included: without dissipation the motion excited by the beginning of the wave never decays, and for a slow
 wave nearly all of v is such free motion.
 
@@ -29,17 +29,15 @@ from threadpoolctl import threadpool_limits
 
 from ..analysis import Packing, spectrum
 from ..analysis.arrays import Floats
-from ..analysis.motion.forcing import floor_force, impulse_response
-from ..analysis.motion.response import layer_force
+from ..analysis.responses.forcing import floor_force, impulse_response
+from ..analysis.responses.response import layer_force
 from ..pywrap import Engine, Scene, SceneError
 from ..pywrap.onset import onset_run
 from ..pywrap.runs.ramp_loads import ramp_loads
 from ..pywrap.runs.undamped import time_step
-from ..pywrap.scenes.command_sections import PATH
-from ..pywrap.scenes.quantities import FREQUENCY, TIME
-from ..pywrap.scenes.study_sections import section_of
+from ..pywrap.scenes.command_sections import PATH, section_of
 from ..pywrap.scenes.units import real_units
-from ..pywrap.scenes.validation import Positive, Section, require_section
+from ..pywrap.scenes.validation import FREQUENCY, TIME, Positive, Section, require_section
 from ..pywrap.settling.settle import settle
 from .eruptions import growth_rate
 from .onset import onset_row

@@ -46,10 +46,10 @@ from mpi4py import MPI
 from ..analysis import FaultgougeError, Growth, Onset, Packing, RunFile, fit_growth, spectrum
 from ..analysis.arrays import Floats
 from ..analysis.files.atomic_write import write_json
-from ..analysis.motion.growth_of_run import JUMP_SHARE, LINEAR_RANGE
-from ..analysis.motion.normal_form import LEAST_CROSSOVER, NormalForm
-from ..analysis.motion.power_law import PowerLaw, fit_power_law
-from ..analysis.motion.response import LinearMotion, Response, layer_force, linear_response
+from ..analysis.responses.growth_of_run import JUMP_SHARE, LINEAR_RANGE
+from ..analysis.responses.normal_form import LEAST_CROSSOVER, NormalForm
+from ..analysis.responses.power_law import PowerLaw, fit_power_law
+from ..analysis.responses.response import LinearMotion, Response, layer_force, linear_response
 from ..analysis.windows.pair_over_load import normal_forms
 from ..pywrap import Engine, Equilibrium, Sample, Scene
 from ..pywrap.lammps.dynamics import Weakening

@@ -43,7 +43,7 @@ FLOORS = {
         ("operators",),
         ("factors",),
         ("motion",),
-        ("elasticity",),
+        ("elasticity", "responses"),
         ("files",),
         ("windows",),
     ),
@@ -204,7 +204,7 @@ def test_analysis_loads_numpy_and_scipy_alone():
     assert loaded_by("import faultgouge.analysis") & (HEAVY | SLOW_OF_SCIPY) == set()
     assert loaded_by("import faultgouge.analysis.windows") & (HEAVY | SLOW_OF_SCIPY) == {"numpy", "scipy"}
     others = {"rich", "typer", "jinja2", "PIL", "threadpoolctl"}
-    assert loaded_by("import faultgouge.analysis.windows, faultgouge.analysis.motion.response") & others == set()
+    assert loaded_by("import faultgouge.analysis.windows, faultgouge.analysis.responses.response") & others == set()
     assert loaded_by("import faultgouge.analysis, faultgouge.pywrap") & SLOW_OF_SCIPY == set()
 
 

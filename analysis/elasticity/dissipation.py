@@ -106,7 +106,7 @@ def lost_energy(packing: HasConfiguration, time: Floats, displacement: Floats, v
         before = overlap, slip
     drag = configuration.drag_rate * np.einsum("ti,i,ti->t", speed, configuration.coordinate_mass, speed)
     by_drag = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(t) * (drag[1:] + drag[:-1]))])
-    return LostEnergy(t, *taken, drag=float(by_drag[-1]), total=np.array(totals) + by_drag)
+    return LostEnergy(t, taken[0], taken[1], taken[2], float(by_drag[-1]), np.array(totals) + by_drag)
 
 
 def _rates(configuration: Configuration, moved: Floats) -> tuple[Floats, Floats]:

@@ -103,7 +103,7 @@ class Vibrations:
             return np.asarray(self.frequency / np.maximum(self.damping, 0.0))
 
 
-def vibrations(packing: HasConfiguration, moments: int = MOMENTS, vectors: int = VECTORS) -> Vibrations:
+def vibrations(packing: HasConfiguration, moments: int | None = None, vectors: int = VECTORS) -> Vibrations:
     """The density of states of a packing, with participation, rotation and damping.
 
     Parameters
@@ -111,7 +111,8 @@ def vibrations(packing: HasConfiguration, moments: int = MOMENTS, vectors: int =
     packing : Packing or Configuration
         Contacts stick.
     moments, vectors : int
-        N, the inverse of the resolution; and random vectors where not all modes are computed.
+        N, the inverse of the resolution, by default 512, or an eighth of few coordinates; and random vectors where not
+        all modes are computed.
 
     Raises
     ------
@@ -126,11 +127,13 @@ def vibrations(packing: HasConfiguration, moments: int = MOMENTS, vectors: int =
     ]
     if not weighted[0].nnz:
         raise BadInputError("Nothing vibrates: no particle touches another.")
-    few = configuration.coordinates <= ALL_MODES
-    return (_of_all_modes if few else _of_vectors)(configuration, *weighted, moments, vectors)
+    moments = moments or min(MOMENTS, max(64, configuration.coordinates // 8))
+    if configuration.coordinates <= ALL_MODES:
+        return _of_all_modes(configuration, weighted[0], weighted[1], moments)
+    return _of_vectors(configuration, weighted[0], weighted[1], moments, vectors)
 
 
-def _of_all_modes(c: Configuration, a: csr_array, g: csr_array, moments: int, vectors: int) -> Vibrations:
+def _of_all_modes(c: Configuration, a: csr_array, g: csr_array, moments: int) -> Vibrations:
     moves = np.flatnonzero(np.diff(a.indptr))
     values, left, right = eig(a[moves][:, moves].toarray(), left=True)
     # a factor of each pair of vectors does not count: only y^H C x over y^H x does
@@ -196,12 +199,12 @@ def _seen(
     by_angle = series @ cosines
     whole, rotation, damping = by_angle.mean(axis=1)
     seen = whole > 1e-3 * whole.mean()  # elsewhere a share is rounding over rounding
-    shares = [np.divide(each, whole, out=np.full(moments, np.nan), where=seen) for each in (rotation, damping)]
+    share, loss = (np.divide(each, whole, out=np.full(moments, np.nan), where=seen) for each in (rotation, damping))
     stretch = 2 / (top * np.cos(angle / 2))
     error = np.std(by_angle[0], axis=0, ddof=1) / np.sqrt(len(by_angle[0])) if len(by_angle[0]) > 1 else 0 * whole
     resolution = np.pi / (moments * stretch)
     return Vibrations(
-        top * np.sin(angle / 2), resolution, whole * stretch, error * stretch, *shares, modes, top, counted, zero,
+        top * np.sin(angle / 2), resolution, whole * stretch, error * stretch, share, loss, modes, top, counted, zero,
         negative,
     )  # fmt: skip
 
@@ -233,7 +236,7 @@ def softness(packing: HasConfiguration) -> tuple[Floats, Floats]:
         drives = force.copy()
         if floats:  # the box as a whole has nothing to hold it: forces are those without their mean
             drives[: d * n] = _without_mean(drives, d, n)
-        moved = response.solve(drives, 1)[: d * n]
+        moved = np.real(response.solve(drives, 1)[: d * n])
         values = force[: d * n] * (_without_mean(moved, d, n) if floats else moved)
         found += [values.sum(axis=1), (values**2).sum(axis=1)]
         report_progress(f"softness, {done + 1} of {len(batches)}")
@@ -303,10 +306,10 @@ def dispersion(packing: HasConfiguration, axis: int = 0, waves: int = 4) -> list
         rough = np.sqrt(np.einsum("ik,ik->k", start, stiffness @ start) / size).max()
         every = max(1, int(2 * np.pi / rough / WAVE_SAMPLES / limit))
         samples = _followed(start, stiffness, damping, mass, limit, every, WAVE_PERIODS * WAVE_SAMPLES)
-        kept = (samples / size).reshape(-1, d, 2).mean(axis=2)
-        time = every * limit * np.arange(len(kept))
+        kept = np.asarray(np.mean((samples / size).reshape(-1, d, 2), axis=2), dtype=np.float64)
+        time = np.arange(len(kept), dtype=np.float64) * (every * limit)
         for k in range(d):
-            omega, gamma, misfit = _fit(time, kept[:, k], float(rough))
+            omega, gamma, misfit = _fit(time, np.ascontiguousarray(kept[:, k], dtype=np.float64), float(rough))
             # Verlet's own frequency of a motion is (2/dt) arcsin(omega dt/2)
             true = 2 / limit * np.sin(omega * limit / 2)
             found.append(PlaneWave(float(np.linalg.norm(number * reciprocal)), k, float(true), gamma, misfit))

@@ -1,4 +1,4 @@
 """Files: run.h5 and its checks, LAMMPS dumps, packings as JSON, signals; files are either complete or absent.
 
-May import: `packing`, `motion.signals`.
+May import: `packing`, `responses.signals`.
 """

@@ -260,7 +260,7 @@ def read_contacts(
     place = np.round(branch * np.where(i < j, 1, -1)[:, None] / spheres.radius.mean(), 3)
     _, once = np.unique(np.column_stack([low, high, place]), axis=0, return_index=True)
     kept = np.sort(once)
-    i, j, branch, n, fn, ft = (each[kept] for each in (i, j, branch, n, fn, ft))
+    i, j, branch, fn, ft = i[kept], j[kept], branch[kept], fn[kept], ft[kept]
 
     def packing(normal: Floats, tangential: Floats) -> Configuration:
         size, bound = np.linalg.norm(tangential, axis=1), material.friction * np.maximum(normal, 0.0)
@@ -286,7 +286,7 @@ def read_contacts(
     if lacks > AT_REST:
         raise PackingFileError(
             f"{path}: forces are out of balance by {lacks:.2g} of the mean contact force, whatever gravity is: this is "
-            "no packing at rest, or a contact or a wall is missing; measured forces have counts alone, --measured."
+            "no packing at rest, or a contact or a wall is missing."
         )
     remarks.append(f"forces balance to {lacks:.1g} of their mean but for gravity; a load takes what is left")
     return derive_frozen(found, remarks=tuple(remarks))

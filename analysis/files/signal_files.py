@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..motion.signals import Signal, SignalError
+from ..responses.signals import Signal, SignalError
 from .plain_file import open_plain, read_plain_text
 
 BEGINNING_BYTES = 4096

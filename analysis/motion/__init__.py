@@ -1,15 +1,15 @@
-"""Small motion about an equilibrium: eigenvalues, what grows, responses to forces, growth in a run.
+"""Small motion about an equilibrium: eigenvalues, and what grows.
 
-- `motion`: the matrices of small motion; `rates`: its eigenvalues s, with dissipation;
-- `spectrum`, `modes`, `nearest_modes`, `buckling`: eigenvalues of K and their vectors, which of them grow, and the
-  negative ones; `all_eigenvalues`, `block_arnoldi`, `fastest_growing`, `slow_motions`: those of large packings;
-- `stability`, `verdict`: does a packing at rest move? `linear`: by eigenvalues; `one_sided`, `pushes`: with contacts
-  at Coulomb's bound; `reach`: up to which push; `rising_load`: under a load that rises; `decay`: other motion that
-  eigenvalues do not decide;
-- `normal_form`: two modes that coalesce; `response`, `forcing`: motion under forces; `transient`, `propagator`: its
-  largest amplitude; `growth`, `growth_of_run`: growth in a run of LAMMPS; `slips`: a layer that a spring draws;
-  `stable_timestep`: the time step;
-- `matrix_functions`, `oscillator`, `energy_norm`: the mathematics.
+- `stability`, `verdict`: does a packing at rest move? In three parts: `linear`; `one_sided`, `pushes` and
+`rising_load`,
+  with contacts at Coulomb's bound; `reach`, up to which push that holds;
+- `linear`: LAPACK, `certificate` (no fast motion grows, and slow ones one by one), `growing` (the fastest growing
+  motion), `random_state` (does motion decay, where there is no certificate);
+- `motion`: the matrices of small motion; `eigenvalues`: what grows beyond rounding; `energy_norm`: the energy as a sum
+of
+  squares;
+- `spectrum`, `modes`, `all_eigenvalues`, `buckling`: eigenvalues of K and their vectors, of large packings in slices,
+  nearest to a shift, and negative; `stable_timestep`: the time step; `hysteresis`: loading there and back.
 
 May import: `configuration`, `packing`, `operators`, `factors`.
 """

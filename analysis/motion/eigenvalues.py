@@ -194,3 +194,11 @@ def growing_undamped(
     """
     oscillates = np.array([exceeds_rounding(v, o, rounding) for v, o in zip(values, overlap, strict=True)], dtype=bool)
     return oscillates, is_negative(values, overlap, rounding, zero)
+
+
+def exponential(rate: float, digits: int, at_least: bool = False) -> str:
+    """D as an exponential, with so many digits; where the rate is `at_least` that, with two digits, rounded down."""
+    if not at_least or rate <= 0:
+        return f"D as exp({rate:.{digits}g} t)"
+    place = 10.0 ** (np.floor(np.log10(rate)) - 1)
+    return f"D at least as exp({place * np.floor(rate / place):.2g} t), not known closer"

@@ -21,8 +21,7 @@ from scipy.sparse import block_diag, csc_array, csr_array, eye_array, vstack
 
 from ..arrays import Complexes, Floats
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
-from .all_eigenvalues import all_eigenvalues
-from .block_arnoldi import SpectrumError
+from .all_eigenvalues import SpectrumError, all_eigenvalues
 from .certificate import NoProofError, prove
 from .eigenvalues import (
     SAFETY,

@@ -3,7 +3,7 @@ r"""Modes: eigenvalues with their right and left vectors.
 Vectors are in mass-weighted coordinates :math:`M^{1/2} q`, in which the stability operator is
 :math:`A = M^{-1/2} K M^{-1/2}`. A mode has :math:`A x = \lambda x` and :math:`y^H A = \lambda y^H` with unit vectors;
 :math:`\kappa = 1/|y^H x|` is the condition of its eigenvalue. `normal_modes` has all modes of a packing by LAPACK,
-:mod:`~faultgouge.analysis.motion.nearest_modes` those nearest to a shift by ARPACK, and
+:mod:`~faultgouge.analysis.motion.buckling` those nearest to a shift by ARPACK, and
 :mod:`~faultgouge.analysis.motion.all_eigenvalues` those in slices of a large spectrum that are complex or negative.
 Each solver has its own rounding, so that the same mode differs in its last digits.
 """

@@ -52,14 +52,14 @@ from ..packing.disk_operators import Form
 from ..packing.packing import Floats, Indices
 from ..progress import report_progress
 from ..table_display import TableDisplay
-from .all_eigenvalues import all_eigenvalues
-from .block_arnoldi import SpectrumError
+from .all_eigenvalues import SpectrumError, all_eigenvalues
 from .eigenvalues import (
     SAFETY,
     Complexes,
     Linear,
     active_coordinates,
     exceeds_rounding,
+    exponential,
     is_negative,
     is_zero,
     mass_weighted,
@@ -67,7 +67,6 @@ from .eigenvalues import (
     zero_uncertainties,
     zero_uncertainty,
 )
-from .growth_in_words import exponential
 from .modes import Mode, Modes, growth_rate
 from .motion import Motion
 from .no_verdict import no_verdict

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..counted import counted
-from .eigenvalues import Linear
-from .growth_in_words import exponential
+from .eigenvalues import Linear, exponential
 from .pushes import PUSH_OVER_RESIDUAL, Creep, OneSidedOutcome
 from .rising_load import RisingMotion
 

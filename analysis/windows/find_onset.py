@@ -18,12 +18,11 @@ from ..packing.packing import Packing
 from ..progress import Watch, report_progress, show_progress
 from .edges import Edge, Increments, Window
 from .find_windows import WindowsSoFar, check_increasing, find_windows, windows_up_to
-from .onset import RAISE_LOAD, NoGrowthError, Onset, OnsetError
-from .search import Look, SystemOfLoad
 from .limits import LIMITS, Limits
+from .onset import RAISE_LOAD, NoGrowthError, Onset, OnsetError
 from .ranks import ALONE, Ranks
+from .search import Look, SystemOfLoad
 from .system import System, force_bearing, full_operator
-
 
 LAPACK_COORDINATES = 5000
 """Coordinates up to which all eigenvalues at the first load are asked for: half a minute, and as their cube."""

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from ..arrays import Complexes, Floats
-from ..motion.normal_form import NormalForm
 from ..packing.packing import Packing
+from ..responses.normal_form import NormalForm
 from .states import DENSE, Motions
 from .system import System
 

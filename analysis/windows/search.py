@@ -5,9 +5,9 @@ Without dissipation two real eigenvalues of A meet, and go on as a complex pair.
 .. math:: D = (\lambda_1 - \lambda_2)^2
 
 are smooth functions of the matrix where the two meet (Kato, *Perturbation Theory for Linear Operators*, 1966, II.1),
-so that a backward stable solver returns D with an error of rounding times |A|, although each eigenvalue errs by the root
-of that. D < 0 is a complex pair. With dissipation :math:`\mathrm{Re}\, s` of one eigenvalue goes through zero. So a
-motion *grows* where -D, or Re s, is positive, and a window begins and ends where this number changes its sign.
+so that a backward stable solver returns D with an error of rounding times |A|, although each eigenvalue errs by the
+root of that. D < 0 is a complex pair. With dissipation :math:`\mathrm{Re}\, s` of one eigenvalue goes through zero. So
+a motion *grows* where -D, or Re s, is positive, and a window begins and ends where this number changes its sign.
 
 **Between two loads a and b** all motions are known at both ends, with slopes. The shapes of motions that grow tell
 which of these are the same at both ends. If one motion more grows at one end, its edge lies in between, and is solved
@@ -33,8 +33,8 @@ from ..arrays import Complexes, Floats, Indices
 from ..errors import NoEquilibriumError, TurningPointError
 from .edges import Edge, Window, sign_change
 from .states import Motions
-from .tracks import DoubtError, TrackPoint, Track, nearest_pair
 from .system import System
+from .tracks import DoubtError, Track, TrackPoint, nearest_pair
 
 SystemOfLoad = Callable[[float], System]
 """Load -> the system there."""
@@ -251,7 +251,9 @@ class Search:
         if not (below.whole and above.whole):  # some have no partner, as another one is nearer to the point there
             alike = below.alike(above, levels_a, levels_b)
             pairs = [(levels_a[i], levels_b[j]) for i, j in assign(alike) if alike[i, j] > ALIKE]
-            levels_a, levels_b = (np.array(sorted(each), dtype=int) for each in zip(*pairs)) if pairs else ([], [])
+            levels_a, levels_b = (
+                (np.array(sorted(each), dtype=int) for each in zip(*pairs, strict=True)) if pairs else ([], [])
+            )
         if len(levels_a) != len(levels_b):
             raise DoubtError
         self._check_levels(below, above, drift_a, drift_b, levels_a, levels_b)
@@ -341,7 +343,7 @@ class Search:
                 raise DoubtError
             return track.edge(change)
         left, right = (track.at(fx) for fx in (change.loads[0], change.loads[-1]))
-        jump = float(np.abs((left.stiffness - right.stiffness)).max())
+        jump = float(np.abs(left.stiffness - right.stiffness).max())
         largest, usual = (max(abs(track.growth(fx)) for fx in loads) for loads in (change.loads, ends))
         if jump < 1e-7 * left.frequency**2 and largest > 1e-3 * usual:
             raise DoubtError(change.fx)  # the equilibrium does not jump: the motion has become another one on the way

@@ -2,9 +2,9 @@
 
 Motions mix with their neighbours in the spectrum only. The eigenvectors X of the symmetric part of A at one load, a
 slice of 120 neighbouring modes with `Limits.margin` more on either side, make A and G small: :math:`X^T A X` and
-:math:`X^T G X`, which are taken as a straight line between two loads. The search of small packings finds the windows of
-this small family, and so *announces* motions that begin to grow. The system itself confirms each: the same search, with
-the few eigenvalues next to the announced one (`Motions.near`) in place of all of them. So an edge has the same digits as
+:math:`X^T G X`, which are taken as a straight line between two loads. The search of small packings finds the windows
+of this small family, and so *announces* motions that begin to grow. The system itself confirms each: the same search,
+with the few eigenvalues next to the announced one (`Motions.near`) in place of all. So an edge has the same digits as
 in the search among all modes. A basis serves as long as its symmetric couplings are small against the spacing of
 levels.
 
@@ -31,7 +31,6 @@ from scipy.sparse import csc_array, csr_array
 from ..arrays import Floats
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..factors.lanczos import Slice
-from ..motion.eigenvalues import active_coordinates
 from ..progress import report_progress
 from .edges import Increments, LostPairError, Window
 from .limits import LIMITS, Limits
@@ -81,8 +80,8 @@ class SlicedSearch:
         ------
         NoEquilibriumError
             If a load has none before a motion is seen to grow.
-        LostPairError, SliceError
-            If a motion cannot be followed, or a part of the spectrum is not found.
+        SliceError
+            If a part of the spectrum is not found.
         """
         here, done = self.at(float(loads[0])), 1
         first: Window | None = None
@@ -158,7 +157,7 @@ class SlicedSearch:
                 first = window
             if doubt and not finest:
                 break
-        if finest and first is None and lost is not None:
+        if finest and first is None and isinstance(lost, NoEquilibriumError):
             raise lost
         return first, doubt
 
@@ -205,9 +204,7 @@ class SlicedSearch:
 
         narrowest = 1e-7 * max(abs(here.fx), abs(there.fx))
         search = Search(lambda fx: known.get(fx) or self.at(fx), narrowest, near, decompose=lost)
-        found: Sequence[Window] = ()
-        for _, found in search.along(np.array([here.fx, there.fx])):
-            pass
+        *_, (_, found) = search.along(np.array([here.fx, there.fx]))
         return found
 
     # What slices announce
@@ -279,9 +276,7 @@ class SlicedSearch:
 
         last = there[0] + self.limits.reach * increment
         few = quiet if len(here[1]) == 2 else None
-        windows: Sequence[Window] = ()
-        for _, windows in Search(small, self.limits.window * increment, few).along(np.array([here[0], last])):
-            pass
+        *_, (_, windows) = Search(small, self.limits.window * increment, few).along(np.array([here[0], last]))
         own, spacing = basis.values[basis.own], basis.border.spacing
         for window in windows:
             if not own[0] - spacing <= window.frequency**2 <= own[-1] + spacing:

@@ -26,7 +26,7 @@ from scipy.sparse import csc_array, csr_array, eye_array
 
 from ..arrays import Complexes, Floats
 from ..factors.sparse_lu import SingularMatrixError, general_lu
-from ..motion.eigenvalues import SAFETY, unit_rounding
+from ..motion.eigenvalues import SAFETY
 from .system import System
 
 DENSE = 200
@@ -133,7 +133,7 @@ class Motions:
         full[0, system.active], full[1, system.active] = right[:, order], left[:, order]
         with np.errstate(divide="ignore", invalid="ignore"):
             full /= np.linalg.norm(full, axis=1)[:, None]
-        return cls(system, np.asarray(values[order], complex), *full, overlap[order], grows[order])
+        return cls(system, np.asarray(values[order], complex), full[0], full[1], overlap[order], grows[order])
 
     def with_conjugates(self) -> tuple[Complexes, Any, Any]:
         """Eigenvalues with right and left vectors, both of each two conjugates, by real part."""

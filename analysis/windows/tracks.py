@@ -8,7 +8,7 @@ from scipy.linalg import LinAlgError
 
 from ..arrays import Complexes
 from ..errors import NoEquilibriumError
-from .edges import Edge, SignChange
+from .edges import Edge, Kind, SignChange
 from .states import Motions, eigenvalues_near, overlap_near
 from .system import System
 
@@ -113,7 +113,7 @@ class Track:
         middle = self.at(change.loads[len(change.loads) // 2])
         mean = np.mean([self.numbers(fx)[0] for fx in change.loads])
         value = float(mean.real) if self.pairs else complex(mean)
-        kind = "contact change"
+        kind: Kind = "contact change"
         if change.smooth:
             steady = 1e-9 * middle.frequency  # |Im s| that counts as zero
             kind = "coalescence" if self.pairs else "steady" if mean.imag <= steady else "hopf"

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from ...analysis import Packing
 from ...analysis.arrays import Floats
 from ...analysis.files.signal_files import write_table
-from ...analysis.motion.signals import Signal
+from ...analysis.responses.signals import Signal
 from .decks import Decks
 from .lammps_state import LammpsState
 from .plain_file_names import shared_folder

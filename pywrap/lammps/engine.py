@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from ...analysis import Packing
 from ...analysis.arrays import Floats
 from ...analysis.files.formats.lammps_data import box_heights
-from ...analysis.motion.signals import Signal
+from ...analysis.responses.signals import Signal
 from .data_file import data_file, sort_contacts
 from .decks import Decks
 from .dynamics import Dynamics, Weakening

@@ -15,7 +15,7 @@ packing, and stick-slip is expected of springs softer than the layer:
 u the mean displacement of the layer under the force f on each of its disks (:func:`check_drive`).
 
 **States.** Stored are the states at the ends of the parts (even ones), and those at both ends of each slip. A slip is
-found some time after it has begun (:mod:`faultgouge.analysis.motion.slips`), and its end after it has ended:
+found some time after it has begun (:mod:`faultgouge.analysis.responses.slips`), and its end after it has ended:
 `PendingStates` keeps the states at which a slip may yet be found to begin or to end, also in the checkpoint.
 """
 
@@ -48,8 +48,8 @@ from ...analysis import (
 )
 from ...analysis.factors.sparse_lu import general_lu
 from ...analysis.files.atomic_write import lock_output, replace_whole
-from ...analysis.motion.slips import Slip, SlipDetector, find_slips
 from ...analysis.progress import Watch
+from ...analysis.responses.slips import Slip, SlipDetector, find_slips
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Dynamics
 from ..lammps.engine import Engine

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import math
 import os
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from ...analysis import MindlinLaw
 from .packing_section import GeneratedPacking, SettlingLoad
-from .scene_keys import SceneKeys
 from .validation import SceneError
+
+if TYPE_CHECKING:
+    from .scene import Scene
 
 Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "reproduce"]
 
@@ -34,7 +36,7 @@ ROUNDING_LIMIT = 1e-6
 5e-7."""
 
 
-def refuse_endless(scene: SceneKeys, task: Task) -> None:
+def refuse_endless(scene: Scene, task: Task) -> None:
     """Refuse a scene with which a command would not come to an end.
 
     Raises SceneError if it takes a year, more memory than there is, or a file of more than `LARGEST_FILE`.
@@ -58,7 +60,7 @@ def refuse_endless(scene: SceneKeys, task: Task) -> None:
     raise SceneError(f"the scene asks {task} for {found}")
 
 
-def refuse_impossible(scene: SceneKeys) -> tuple[str, str] | None:
+def refuse_impossible(scene: Scene) -> tuple[str, str] | None:
     """The key whose number no packing can bear, and the rest of the sentence; None if there is no such key."""
     packing, law, fy = scene.packing, scene.law, scene.load.fy
     if not isinstance(packing, GeneratedPacking):
@@ -83,7 +85,7 @@ def refuse_impossible(scene: SceneKeys) -> tuple[str, str] | None:
     return None
 
 
-def _at_settling(scene: SceneKeys, at: SettlingLoad) -> SceneKeys:
+def _at_settling(scene: Scene, at: SettlingLoad) -> Scene:
     """The scene with the load and the stiffness under which its packing settles."""
     law = scene.law.model_copy(update={"kn": at.kn or scene.law.kn})
     load = scene.load.model_copy(update={"fy": at.fy or scene.load.fy})
@@ -91,17 +93,17 @@ def _at_settling(scene: SceneKeys, at: SettlingLoad) -> SceneKeys:
     return scene.model_copy(update={"law": law, "load": load, "packing": packing, "ramp": None})
 
 
-def _stiffness(scene: SceneKeys, force: float) -> float:
+def _stiffness(scene: Scene, force: float) -> float:
     law = _law(scene)
     return float(law.normal_stiffness(law.overlap_of_force(force)))
 
 
-def _law(scene: SceneKeys) -> MindlinLaw:
+def _law(scene: Scene) -> MindlinLaw:
     """The repulsion alone."""
     return MindlinLaw(scene.law.kn, kt=0.0, mu=0.0, exponent=scene.law.exponent)
 
 
-def _undamped_step(scene: SceneKeys) -> float:
+def _undamped_step(scene: Scene) -> float:
     packing = scene.packing
     lightest = min(1.0, scene.inertia_factor) * ((isinstance(packing, GeneratedPacking) and packing.mass) or 1.0)
     return 0.1 * math.sqrt(lightest / (6 * _stiffness(scene, scene.load.fy)))

@@ -12,7 +12,7 @@
     [drive]     a spring that draws the upper layer: stick and slip
     [units]     what the numbers are in SI
     [output]    what is written beside the result
-    [NAME]      the section of the study NAME (:mod:`faultgouge.pywrap.scenes.study_sections`)
+    [NAME]      the section of the study NAME (:mod:`faultgouge.pywrap.scenes.command_sections`)
 
 packing, law and load are required. Each other section switches on a feature; without the section, the run does not have
 the feature. A command reads only some sections, and requires some of those
@@ -23,18 +23,27 @@ Defaults are the values of the paper if it gives them; the docstrings say where 
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, get_args
+from typing import Annotated, Any, Literal
 
-from pydantic import ValidationError, model_validator
+from pydantic import (
+    ConfigDict,
+    Discriminator,
+    PrivateAttr,
+    Tag,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import InitErrorDetails
 
-from .command_sections import command_of
+from .command_sections import check_study_section, command_of, errors_in, require_sections, study_model, study_models
+from .drive_section import Drive
 from .impossible import refuse_impossible
+from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
 from .quantities import as_numbers
-from .scene_keys import SceneKeys
-from .sections import Inertia
-from .study_sections import errors_in, require_sections, study_model, study_models
-from .units import real_units
+from .sections import Damping, Friction, Inertia, Law, Load, Output, Perturb, Ramp, Relax
+from .units import Units, real_units
 from .validation import (
     KEYS_TO_ADD,
     SceneError,
@@ -43,12 +52,76 @@ from .validation import (
     files_named,
     read_toml,
     refusal_sentence,
+    sections_in,
     sentence,
 )
 
+DEFAULT_INCREMENTS = 3e4
+"""Increments of F_x up to F_y where a scene does not say: the paper's 1e-4 of 3."""
 
-class Scene(SceneKeys):
-    """A complete and consistent description of a computation: `SceneKeys` whose sections agree with each other."""
+
+class Scene(Section):
+    """A complete and consistent description of a computation: its sections agree with each other.
+
+    Beside these keys it has the sections of studies (:mod:`~faultgouge.pywrap.scenes.command_sections`).
+
+    Attributes
+    ----------
+    precision : {"double", "compensated"}
+        Arithmetic of coordinates, slips and forces: doubles, or doubles with low parts, for forces that balance to
+        1e-17 instead of 1e-11.
+    packing, law, load, relax
+        Sections that every scene has; relax may be left out in TOML.
+    ramp, perturb, friction, drive, damping, units, output
+        Sections or None, which means that the feature is not in the run.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    precision: Literal["double", "compensated"] = "double"
+    packing: Annotated[
+        Annotated[GeneratedPacking, Tag("generated")] | Annotated[StoredPacking, Tag("stored")],
+        Discriminator(kind_of_packing),
+    ]
+    law: Law
+    load: Load
+    relax: Relax = Relax()
+    ramp: Ramp | None = None
+    perturb: Perturb | None = None
+    friction: Friction | None = None
+    drive: Drive | None = None
+    units: Units | None = None
+    damping: Damping | None = None
+    output: Output | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _sections_of_studies(cls, sections: Any, info: ValidationInfo) -> Any:
+        if not isinstance(sections, Mapping):
+            return sections
+        others = sections.keys() - cls.model_fields.keys()
+        checked = {
+            name: check_study_section(str(name), sections[name], info.context) for name in sorted(others, key=str)
+        }
+        return {**sections, **checked}
+
+    @field_validator("ramp", mode="before")
+    @classmethod
+    def _step_of_the_load(cls, ramp: object, info: ValidationInfo) -> object:
+        if isinstance(ramp, Mapping) and "step" not in ramp and "load" in info.data:
+            return {**ramp, "step": info.data["load"].fy / DEFAULT_INCREMENTS}
+        return ramp
+
+    _inertia: Inertia = PrivateAttr(Inertia())
+
+    def model_post_init(self, context: Any) -> None:
+        """Keep the key of [perturb] that is read where the section is not."""
+        self._inertia = (context or {}).get("inertia", self._inertia)
+
+    @property
+    def inertia_factor(self) -> float:
+        """I_0 in I = I_0 m R^2, for dynamics, spectrum and onset alike: the key of [perturb], or the paper's 1."""
+        return (self.perturb or self._inertia).inertia_factor
 
     def __new__(cls, *path: object, **sections: object) -> "Scene":
         """Refuse a path, which pydantic would refuse without advice."""
@@ -167,7 +240,7 @@ class Scene(SceneKeys):
         context: dict[str, Any] = {"folder": folder}
         try:
             if isinstance(mapping, Mapping) and "units" in mapping:
-                mapping = as_numbers(mapping, folder, name)
+                mapping = as_numbers(mapping, folder, name, SECTIONS | _of_studies(mapping))
             if wanted is not None and isinstance(mapping, Mapping):
                 _check_keys(mapping)
                 mapping = wanted.part(mapping)
@@ -214,15 +287,21 @@ class _Part(Section):
     perturb: Inertia
 
 
+def _of_studies(mapping: Mapping[str, Any]) -> dict[str, tuple[type[Section], ...]]:
+    """The models of the sections of a scene that belong to studies."""
+    others = {name: study_model(str(name)) for name in mapping.keys() - Scene.model_fields.keys()}
+    return {name: (model,) for name, model in others.items() if model is not None}
+
+
 def _check_keys(mapping: Mapping[str, Any]) -> None:
     """Refuse unknown sections and keys, also in sections that are not read."""
     errors: list[InitErrorDetails] = []
+    sections = SECTIONS | _of_studies(mapping)
     for name, section in mapping.items():
         keys = section if isinstance(section, Mapping) else {}
-        study = None if name in SceneKeys.model_fields else study_model(str(name))
-        models = SECTIONS.get(name, ()) if study is None else (study,)
+        models = sections.get(name, ())
         known = {key for model in models for key in model.model_fields}
-        if name not in SceneKeys.model_fields and study is None:
+        if name not in Scene.model_fields and not models:
             errors.append({"type": "extra_forbidden", "loc": (name,), "input": section})
         elif models and keys is not section:
             errors.append({"type": "dict_type", "loc": (name,), "input": section})
@@ -232,14 +311,7 @@ def _check_keys(mapping: Mapping[str, Any]) -> None:
         raise ValidationError.from_exception_data("Scene", errors)
 
 
-def _models(annotation: Any) -> tuple[type[Section], ...]:
-    """The sections that an annotation allows."""
-    if isinstance(annotation, type):
-        return (annotation,) if issubclass(annotation, Section) else ()
-    return tuple(model for part in get_args(annotation) for model in _models(part))
-
-
-SECTIONS = {name: models for name, field in SceneKeys.model_fields.items() if (models := _models(field.annotation))}
+SECTIONS = {name: models for name, field in Scene.model_fields.items() if (models := sections_in(field.annotation))}
 
 
 def scene_of(scene: object, command: str) -> Scene:

@@ -3,7 +3,7 @@ r"""What dissipation does to the onset of packings, and to the transient gain be
 As :math:`C \to 0` with a fixed ratio :math:`C_N : C_T` the damped onset tends to a load below the undamped one
 (:mod:`~research.dissipation.weak_limit`), and as the dashpots get stronger it rises, in the end
 beyond. Drag alone raises it from the beginning. Below the onset the transient gain
-(:mod:`~faultgouge.analysis.motion.transient`) grows as a power of the distance, and dissipation limits it.
+(:mod:`~faultgouge.analysis.responses.transient`) grows as a power of the distance, and dissipation limits it.
 
 Every function yields its records one by one, so that a long study is kept as it goes.
 """

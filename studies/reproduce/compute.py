@@ -18,8 +18,8 @@ from ...analysis import Growth, Onset, Packing, RunFile, Spectrum, fit_growth, s
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
 from ...analysis.files.atomic_write import check_own
-from ...analysis.motion.growth import growing_range
-from ...analysis.motion.growth_of_run import PLATEAU_SHARE
+from ...analysis.responses.growth import growing_range
+from ...analysis.responses.growth_of_run import PLATEAU_SHARE
 from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
 from ...pywrap.onset import ONSET_DISTANCES, onset_run
 from ...pywrap.runs.undamped import perturb, time_step

@@ -22,7 +22,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import ArrayLike
 
 from ...analysis.arrays import Floats
-from ...analysis.motion.normal_form import NormalForm
+from ...analysis.responses.normal_form import NormalForm
 from ...analysis.uncertain_digits import with_uncertainty
 from ...figures.series import draw_series, few_decades, positive, scientific
 from ...figures.style import INK, styled

@@ -17,7 +17,7 @@ from faultgouge.analysis import (
     spectrum,
     stiffness_matrix,
 )
-from faultgouge.analysis.motion.transient import transient_gains
+from faultgouge.analysis.responses.transient import transient_gains
 
 
 @pytest.mark.slow

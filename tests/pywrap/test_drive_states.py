@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from faultgouge.analysis.motion.slips import SlipDetector, find_slips
+from faultgouge.analysis.responses.slips import SlipDetector, find_slips
 from faultgouge.pywrap.runs.drive import DriveSample, DriveState, PendingStates, Plan
 
 VELOCITY, PERIOD, EVERY, ROWS_A_PART = 1e-3, 2.0, 0.1, 24

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis.files.signal_files import of_trace, read_signal
-from faultgouge.analysis.motion.forcing import floor_force, sampled_response
-from faultgouge.analysis.motion.response import layer_force
-from faultgouge.analysis.motion.signals import SignalError
+from faultgouge.analysis.responses.forcing import floor_force, sampled_response
+from faultgouge.analysis.responses.response import layer_force
+from faultgouge.analysis.responses.signals import SignalError
 from faultgouge.pywrap import Engine, Scene
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.runs.undamped import time_step

@@ -49,7 +49,7 @@ def test_a_spectrum_keeps_its_eigenvalues_and_draw_its_words(
 
     with RunFile.create(tmp_path / "run.h5", reference_packing(1.0)) as run:
         run.append(reference_packing(1.0), floor=1e-11, evaluations=1)
-    monkeypatch.setattr("faultgouge.analysis.motion.transient.transient_gains", fails)
+    monkeypatch.setattr("faultgouge.analysis.responses.transient.transient_gains", fails)
     done = faultgouge_here("spectrum", "run.h5", "--gain", "--json")
     result = json.loads(done.stdout)
     assert len(result["eigenvalues"]) > 200

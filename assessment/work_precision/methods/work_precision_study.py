@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from ....analysis.motion.power_law import fit_power_law
+from ....analysis.responses.power_law import fit_power_law
 from ....pywrap import Engine, Equilibrium, Scene, equilibrate
 from ...timing import Progress, in_turns
 

@@ -160,7 +160,7 @@ def _result(path: Path, scene: Scene) -> dict[str, Any]:
     import numpy as np
 
     from faultgouge.analysis import RunFile
-    from faultgouge.analysis.motion.slips import friction_of
+    from faultgouge.analysis.responses.slips import friction_of
     from faultgouge.pywrap.runs.drive import SERIES, all_slips_in, strays
 
     with RunFile(path) as file:

@@ -100,7 +100,7 @@ def onset(
     tell(f'law of friction: {wanted.law.in_words} (history = "{wanted.law.history}")')
     result = _write_result(output, found)
     if is_root() and folder is not None and not slices:
-        from faultgouge.analysis.windows.slices.store import remove_passes
+        from faultgouge.analysis.windows.store import remove_passes
 
         remove_passes(folder)  # the result is there
     if as_json:

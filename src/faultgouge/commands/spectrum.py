@@ -30,11 +30,8 @@ app = typer.Typer()
 MOST_PAIRS = 20
 """Lines of complex pairs: a packing of a thousand has hundreds."""
 
-SECONDS_COORDINATES = 2000
-"""Coordinates up to which the spectrum takes seconds; of more the verdict comes before it."""
-
-SLOW_COORDINATES = 6000
-"""Coordinates from which a spectrum takes minutes, and a gigabyte or more."""
+VERDICT_FIRST = 2000
+"""Coordinates beyond which the eigenvalues take longer than the verdict, which does not need them."""
 
 
 @app.command(epilog="Example: faultgouge spectrum run.h5 --json")
@@ -67,6 +64,7 @@ def spectrum(
     way back. The eigenvalues are those of K alone, without dissipation.
     """
     from faultgouge.analysis import spectrum as eigenvalues_of
+    from faultgouge.analysis.progress import show_progress
 
     if values and (gain or rise or verbose or follow):
         raise typer.BadParameter(
@@ -79,18 +77,18 @@ def spectrum(
     if not is_root():
         return
     size = packing.configuration.coordinates
-    if size > SLOW_COORDINATES:
-        # four matrices of doubles; 18000 coordinates took 10.2 GB
-        say(f"{size} coordinates: their spectrum needs {32e-9 * size**2:.2g} GB, and a time that grows as their cube")
+    large = size > VERDICT_FIRST
     if values:
+        if large:  # four matrices of doubles; 18000 coordinates took 10.2 GB
+            say(f"{size} coordinates: LAPACK needs {32e-9 * size**2:.2g} GB, and a time that grows as their cube")
         _values(packing, as_json)
         return
-    result = eigenvalues_of(packing) if size <= SECONDS_COORDINATES else None
+    result = None if large else eigenvalues_of(packing)
     verdict = verdict_of(packing, "fx" if rise else None, spectrum_of_stiffness=result, follow=follow)
     if not as_json:
         print(verdict, flush=True)
     if result is None:
-        with status("spectrum"):
+        with status("eigenvalues of K") as show, show_progress(show):
             result = eigenvalues_of(packing)
     gains = _gain_of(packing) if gain else None
     if not as_json:
@@ -205,7 +203,7 @@ def _print_growing_motions(result: Spectrum, dissipative: bool, verbose: bool) -
 
 def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
     """The transient gains of a stable packing; None, with the reason, if unstable, too large, or where it fails."""
-    from faultgouge.analysis.motion.transient import GAIN_DISKS, NoGainError, transient_gains
+    from faultgouge.analysis.responses.transient import GAIN_DISKS, NoGainError, transient_gains
 
     most, size = 3 * GAIN_DISKS, packing.configuration.coordinates
     if size > most:

@@ -27,8 +27,8 @@ from ..signal_guard import holds, keeps
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Configuration, Packing
-    from faultgouge.analysis.motion.growth_of_run import GrowthOfRun
-    from faultgouge.analysis.motion.slips import Slip
+    from faultgouge.analysis.responses.growth_of_run import GrowthOfRun
+    from faultgouge.analysis.responses.slips import Slip
     from faultgouge.pywrap import Equilibrium, Record, Scene
     from faultgouge.pywrap.scenes.impossible import Task
 
@@ -253,7 +253,7 @@ def frame_at(file: Path, frame: int, time: float | None) -> int:
 def growth_in(file: Path, series: dict[str, Any]) -> GrowthOfRun:
     """Growth of D in the undamped run of a perturb.h5, beside the spectrum's prediction at the time step of the run."""
     from faultgouge.analysis import RunFile
-    from faultgouge.analysis.motion.growth_of_run import growth_of_run
+    from faultgouge.analysis.responses.growth_of_run import growth_of_run
     from faultgouge.pywrap.runs.undamped import time_step
 
     with RunFile(file) as run:

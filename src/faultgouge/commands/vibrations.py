@@ -99,14 +99,11 @@ def vibrations(
         soft, error = softness(packing)
         plane: list[PlaneWave] = []
         moduli: ElasticModuli | None = None
-        for name, compute in {"moduli": elastic_moduli, "waves": dispersion}.items():
-            try:
-                if name == "moduli":
-                    moduli = elastic_moduli(packing)
-                elif waves:
-                    plane = compute(packing, "xyz".index(along), waves)
-            except BadInputError as reason:
-                say(f"no {name}: {reason}")
+        try:
+            plane = dispersion(packing, "xyz".index(along), waves)
+            moduli = elastic_moduli(packing)
+        except BadInputError as reason:
+            say(f"{reason}")
         _write(output, packing, found, soft, error, plane, moduli)
         _draw(output, found, plane, moduli)
     few = "all modes" if found.modes is not None else f"window {found.resolution[0] / found.largest:.2g} of the largest"

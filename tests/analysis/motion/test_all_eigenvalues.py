@@ -15,8 +15,7 @@ from scipy.sparse import block_diag, csr_array
 from faultgouge.analysis import Configuration, LinearisedContacts, spectrum
 from faultgouge.analysis.contacts import BOOLEAN, PER_CONTACT
 from faultgouge.analysis.motion import spectrum as spectrum_module
-from faultgouge.analysis.motion.all_eigenvalues import SpectrumSizes, all_eigenvalues
-from faultgouge.analysis.motion.block_arnoldi import ShiftedDisc, SpectrumError
+from faultgouge.analysis.motion.all_eigenvalues import ShiftedDisc, SpectrumError, SpectrumSizes, all_eigenvalues
 from faultgouge.analysis.progress import show_progress
 
 SMALL = SpectrumSizes(own=24, block=4, least=30)
@@ -211,7 +210,7 @@ def test_lapack_takes_over_from_incomplete_slices_and_this_is_told(reference_pac
     assert repr(found).endswith(f"{found.remark}>")
     assert expected.remark == ""
     assert nearest(found.eigenvalues, expected.eigenvalues).max() < 50 * expected.rounding
-    monkeypatch.setattr(spectrum_module, "LAPACK_UP_TO", 100)
+    monkeypatch.setattr(spectrum_module, "LAPACK_INSTEAD", 100)
     with pytest.raises(SpectrumError, match="one was not found"):
         spectrum(packing)
 

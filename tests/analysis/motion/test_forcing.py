@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from linearised import dissipative, matrices
 
-from faultgouge.analysis.motion.forcing import floor_force, impulse_response, sampled_response
-from faultgouge.analysis.motion.response import layer_force, linear_response
-from faultgouge.analysis.motion.signals import Signal, SignalError, pulse, sweep
+from faultgouge.analysis.responses.forcing import floor_force, impulse_response, sampled_response
+from faultgouge.analysis.responses.response import layer_force, linear_response
+from faultgouge.analysis.responses.signals import Signal, SignalError, pulse, sweep
 
 OMEGA = 5.0
 NEAR_ONSET = 0.0218  # F_x^c = 0.021833056408

@@ -14,7 +14,7 @@ from faultgouge.analysis.contacts import PER_CONTACT
 from faultgouge.analysis.errors import BadInputError
 from faultgouge.analysis.motion import linear as module
 from faultgouge.analysis.motion.certificate import NoProofError, prove
-from faultgouge.analysis.motion.growth_in_words import exponential
+from faultgouge.analysis.motion.eigenvalues import exponential
 from faultgouge.analysis.motion.linear import linear_verdict, opposed
 from faultgouge.analysis.motion.random_state import follow_decay
 

@@ -12,9 +12,9 @@ from scipy.sparse import csr_array
 
 from faultgouge.analysis import mean_square_displacement
 from faultgouge.analysis.motion.energy_norm import EnergyNorm
-from faultgouge.analysis.motion.matrix_functions import BlockDiagonal, first_order
-from faultgouge.analysis.motion.oscillator import Oscillator, driven_motion, released_motion
-from faultgouge.analysis.motion.response import layer_force, linear_response
+from faultgouge.analysis.responses.matrix_functions import BlockDiagonal, first_order
+from faultgouge.analysis.responses.oscillator import Oscillator, driven_motion, released_motion
+from faultgouge.analysis.responses.response import layer_force, linear_response
 
 OMEGA = 2.0
 """That of a motion of `oblique`: resonance."""

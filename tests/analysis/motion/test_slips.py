@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from faultgouge.analysis.motion.slips import SlipDetector, find_slips, friction_of
+from faultgouge.analysis.responses.slips import SlipDetector, find_slips, friction_of
 
 STIFFNESS, VELOCITY, PERIOD, EVERY = 10.0, 1e-3, 2.0, 0.1
 SLIPS = [(100.0, 3.0, 0.08), (180.0, 5.0, 0.11), (300.0, 2.0, 0.03)]

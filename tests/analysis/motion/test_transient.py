@@ -6,7 +6,7 @@ from linearised import dissipative, matrices, motion_matrix
 from scipy.linalg import eigh, expm, solve_triangular
 
 from faultgouge.analysis import linear_response
-from faultgouge.analysis.motion.transient import NoGainError, transient_gain
+from faultgouge.analysis.responses.transient import NoGainError, transient_gain
 
 
 def sampled(packing, norm, times):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from families import DIGITS, OTHERS, crossing, embedded, normal_form
 from rich.console import Console
-from scipy.sparse import csr_array
 
 from faultgouge.analysis import (
     Contacts,
@@ -18,7 +17,7 @@ from faultgouge.analysis import (
     find_onset,
 )
 from faultgouge.analysis.uncertain_digits import with_uncertainty
-from faultgouge.analysis.windows import Limits, NoGrowthError, Motions, System, force_bearing, full_operator
+from faultgouge.analysis.windows import Limits, Motions, NoGrowthError, System, force_bearing, full_operator
 from faultgouge.analysis.windows.pair_over_load import Plane
 from faultgouge.analysis.windows.search import assign, lowest
 

@@ -121,7 +121,7 @@ def test_a_push_beyond_the_stated_size_moves_otherwise(far_from_the_bound):
     expected = one_sided_motion(packing, velocity, times=times)
     _, most = expected.scales
     assert one_sided_motion(packing, velocity, times=np.linspace(0.0, 2.0, 4001)).scales[1] == pytest.approx(most, 0.05)
-    assert stability(packing).largest_push == pytest.approx(most, rel=0.7)
+    assert stability(packing).largest_energy < 0.5 * np.sum(here.coordinate_mass * (most * push) ** 2)
     d = expected.mean_square_displacement
     np.testing.assert_allclose(pushed_layer(packing, push, times, size=0.1 * most), d, rtol=0.1)
     assert np.any(np.abs(pushed_layer(packing, push, times, size=20 * most) / d - 1) > 0.5)

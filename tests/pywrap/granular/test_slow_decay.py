@@ -56,12 +56,11 @@ def test_what_slides_on_as_vibration_decays_comes_to_rest(tmp_path):
     found = from_lammps(lmp)
     told = stability(found)
     assert told.stable
-    assert 0 < told.one_sided.slip_left < 0.05
-    assert "and they slide on by" in str(told)
+    assert 0 < told.one_sided.slip_left < 0.01
+    assert "of their slip is left" in str(told)
     times = np.array([25.0, 75.0, 125.0, 225.0, 325.0])
     in_lammps = pushed(lmp, found, random_pushes(found, PUSHES), times, 1e-3, 1e-7).max(axis=1)
     lmp.close()
-    assert in_lammps[3] == pytest.approx(told.one_sided.amplification, rel=0.02)
+    assert in_lammps[-1] == pytest.approx(told.one_sided.amplification, rel=0.1)
     gains = np.diff(in_lammps) / np.diff(times)
     assert np.all(gains[1:] < gains[:-1])
-    assert in_lammps[-1] < 1.1 * told.one_sided.amplification

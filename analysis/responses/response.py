@@ -5,16 +5,16 @@ Small motion about an equilibrium, under a force f on the coordinates q and the 
 .. math:: M \ddot q + C \dot q + K q = f \cos\omega t .
 
 Without dissipation the motion is a function of one matrix, that of one oscillator
-(:mod:`~faultgouge.analysis.motion.oscillator`).
+(:mod:`~faultgouge.analysis.responses.oscillator`).
 
 **Dissipation** (:mod:`~faultgouge.analysis.operators.damping`): dashpots have no modes in common with K. The motion is
 then that of the first-order system of :mod:`~faultgouge.analysis.motion.energy_norm`, whose eigenvalues s give
 :math:`e^{st}` and, under the force, :math:`(e^{i\omega t} - e^{st}) / (i\omega - s)`. If all Re s < 0, the motion
 finally is the stationary response with the transfer function :math:`H(\omega) = (K - \omega^2 M + i\omega C)^{-1}`
-(`transfer` in :mod:`~faultgouge.analysis.motion.forcing`).
+(`transfer` in :mod:`~faultgouge.analysis.responses.forcing`).
 
 Functions of the matrix of a packing close to a coalescence of two eigenvalues keep their digits
-(:mod:`~faultgouge.analysis.motion.matrix_functions`).
+(:mod:`~faultgouge.analysis.responses.matrix_functions`).
 
 Coordinates on which no force acts, those of rattlers, are held fixed.
 """
@@ -27,9 +27,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import BadInputError
 from ..has_configuration import HasConfiguration
+from ..motion.motion import Motion
 from ..packing.packing import Floats
 from .matrix_functions import BlockDiagonal, first_order
-from .motion import Motion
 from .oscillator import Oscillator, driven_motion, released_motion
 
 

@@ -9,11 +9,11 @@ from scipy.sparse.linalg import svds
 
 from ..errors import FaultgougeError
 from ..has_configuration import HasConfiguration
+from ..motion.eigenvalues import Complexes
+from ..motion.linear import all_rates
+from ..motion.motion import Motion
 from ..packing.packing import Floats, Indices
-from .eigenvalues import Complexes
-from .linear import all_rates
 from .matrix_functions import LONE_COSINE, BlockDiagonal, Function, second_order
-from .motion import Motion
 from .oscillator import Oscillator, released_motion
 from .response import LinearMotion
 

@@ -28,9 +28,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..motion.eigenvalues import Complexes
+from ..motion.spectrum import discrete_frequency
 from ..packing.packing import Floats
-from .eigenvalues import Complexes
-from .spectrum import discrete_frequency
 
 
 class OscillatorMotion(NamedTuple):

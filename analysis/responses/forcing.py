@@ -32,9 +32,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import eig, expm
 
+from ..motion.eigenvalues import Complexes
+from ..motion.motion import Motion
 from ..packing.packing import Floats, Packing
-from .eigenvalues import Complexes
-from .motion import Motion
 from .response import Response, coordinates
 from .signals import Signal
 
@@ -131,7 +131,7 @@ def impulse_response(packing: Packing, force: ArrayLike) -> ImpulseResponse:
     packing : Packing
         The equilibrium, with its dashpots and drag.
     force : array_like, shape (3N,)
-        f on (x.., y.., R theta..), as of :func:`~faultgouge.analysis.motion.response.layer_force` or `floor_force`.
+        f on (x.., y.., R theta..), as of :func:`~faultgouge.analysis.responses.response.layer_force` or `floor_force`.
 
     Returns
     -------
@@ -169,7 +169,7 @@ def sampled_response(
     times : array_like, shape (T,)
         Equally spaced times h, 2h, ...
     force : array_like, shape (3N,)
-        f on (x.., y.., R theta..), as of :func:`~faultgouge.analysis.motion.response.layer_force` or `floor_force`.
+        f on (x.., y.., R theta..), as of :func:`~faultgouge.analysis.responses.response.layer_force` or `floor_force`.
 
     Returns
     -------

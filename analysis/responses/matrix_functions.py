@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig, schur, solve_sylvester
 
+from ..motion.eigenvalues import Complexes
 from ..packing.packing import Floats, Indices
-from .eigenvalues import Complexes
 
 LONE_COSINE = 0.1
 """Eigenvalues with a smaller |y^H x| are kept together with their partner; eigenvalues with a larger |y^H x| lose at

@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..counted import counted
+from ..motion.eigenvalues import Complexes
+from ..motion.linear import all_rates
+from ..motion.motion import Motion
+from ..motion.spectrum import spectrum
 from ..packing.packing import Floats, Packing
-from .eigenvalues import Complexes
 from .growth import NOISE_FACTOR, Growth, fit_growth, growing_range
-from .linear import all_rates
-from .motion import Motion
-from .spectrum import spectrum
 
 NOISE_SHARE = 0.1
 """Share of the fastest motion in the noise, in units of the share of a mean mode. A pair near its coalescence is
