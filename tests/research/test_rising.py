@@ -3,14 +3,10 @@
 import pytest
 
 from research.rising.compute import APART, RATES, RESTITUTIONS
-from research.rising.make import HERE, ONSETS, STARTS, VIBRATES, check, numbers, write_page
+from research.rising.make import HERE, ONSETS, STARTS, VIBRATES, check, numbers
 from research.tables import read_rows
 
 FOUND = numbers()
-
-
-def test_the_page_is_what_the_tables_make(tmp_path):
-    assert write_page(tmp_path).read_text() == (HERE / "README.md").read_text()
 
 
 def test_layers_that_rest_under_a_load_that_is_held_vibrate_under_one_that_rises():
