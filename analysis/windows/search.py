@@ -251,9 +251,7 @@ class Search:
         if not (below.whole and above.whole):  # some have no partner, as another one is nearer to the point there
             alike = below.alike(above, levels_a, levels_b)
             pairs = [(levels_a[i], levels_b[j]) for i, j in assign(alike) if alike[i, j] > ALIKE]
-            levels_a, levels_b = (
-                np.array(sorted(each), dtype=int) for each in (zip(*pairs, strict=True) if pairs else ([], []))
-            )
+            levels_a, levels_b = (np.array(sorted(int(pair[end]) for pair in pairs), dtype=np.int64) for end in (0, 1))
         if len(levels_a) != len(levels_b):
             raise DoubtError
         self._check_levels(below, above, drift_a, drift_b, levels_a, levels_b)

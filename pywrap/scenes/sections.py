@@ -90,7 +90,9 @@ class Law(Section):
     @classmethod
     def _each_once(cls, mu: float | tuple[float, ...]) -> float | tuple[float, ...]:
         if isinstance(mu, tuple) and len(set(mu)) < len(mu):
-            raise refusal_sentence("", f"= {list(mu)} names one value twice: give each once")
+            raise refusal_sentence(
+                "", f"= [{', '.join(f'{each:g}' for each in mu)}] names one value twice: give each once"
+            )
         return mu
 
     @field_validator("exponent")

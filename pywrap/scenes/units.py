@@ -35,7 +35,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -44,9 +44,6 @@ from ...analysis import MindlinLaw, PackingFileError
 from ...analysis.files.formats.tables import unit_registry
 from .packing_section import GeneratedPacking, StoredPacking
 from .validation import HERTZ_EXPONENT, Section, refusal_sentence
-
-if TYPE_CHECKING:
-    from .scene import Scene
 
 MISMATCH = 0.01
 """Relative difference of the overburden from that of the scene up to which the two count as one."""
@@ -269,8 +266,8 @@ class Layer(NamedTuple):
     top: int
 
 
-def real_units(scene: Scene) -> RealUnits | None:
-    """The units of a scene; None without a section [units].
+def real_units(scene: Any) -> RealUnits | None:
+    """The units of a `Scene`; None without a section [units].
 
     Raises
     ------
