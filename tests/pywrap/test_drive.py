@@ -207,7 +207,7 @@ REFUSED_SCENES = [
     ({"drive": {"spring": 10.0, "velocity": 1e-3, "protocol": [[1, 1]]}}, "give one of the two"),
     ({"drive": {"spring": "soft", "velocity": 1e-3}}, 'give a stiffness above 0, or "rigid"'),
     ({"drive": {"spring": 10.0, "velocity": 0.0}}, "moves nothing"),
-    ({"drive": {"spring": 1e-90, "velocity": 1e-300}}, "moves nothing"),
+    ({"drive": {"spring": 1e-90, "velocity": 1e-300}}, "give a number between 1e-100 and 1e\\+100"),
     ({"drive": {"spring": 10.0, "velocity": 1e-3}}, "drive.until is missing"),
     ({"drive": {"spring": 10.0, "protocol": [[1e-3, 0.0]]}}, "give pairs of a velocity and a time above 0"),
     ({"drive": {"spring": "rigid", "velocity": 1e-3, "slips": 3}}, "drive.until is missing"),

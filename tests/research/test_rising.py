@@ -71,9 +71,8 @@ def test_pages_have_the_count_of_the_tables():
     for page in ("README.md", "paper/results.md"):
         text = " ".join((HERE.parents[1] / page).read_text().split())
         for each in (FOUND["usual"][0.2]["rising"]["vibrate"], slow["slip"]):
-            assert re.search(rf"{each['count']} of {each['of']}\b[\w ]*\({count_of(each).split('(')[1][:-1]}", text), (
-                page
-            )
+            interval = count_of(each).split("(")[1][:-1]
+            assert re.search(rf"{each['count']} of {each['of']}\b[\w ]*\({interval}", text), page
         assert "{:.2g} of its way (median; {:.2g} to {:.2g})".format(*slow["part"]) in text, page
 
 
