@@ -213,7 +213,8 @@ def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, e
 
         size = symmetric.shape[0]
         # of a crystal many are equal, and a start of ones has no part of them; two digits do
-        start, operator = np.random.default_rng(0).standard_normal(size), LinearOperator((size, size), twice, dtype=float)
+        start = np.random.default_rng(0).standard_normal(size)
+        operator = LinearOperator((size, size), twice, dtype=float)
         found = eigsh(operator, 1, v0=start, tol=1e-2, return_eigenvectors=False)
         return float(np.exp(1.0)), min(end, float(1 / np.sqrt(1.02 * found[0])))
     root = cholesky(symmetric.toarray())  # R with R^T R = S: p = R z
