@@ -385,7 +385,9 @@ def _of_slice(
             break
         if basis.shape[1] > largest:
             if best <= 0 <= float((s.real + error)[chosen[left_over]].max()):
-                raise NoProofError(f"dashpots couple motions at {within[0]:.3g} to {within[1]:.3g} with too many others")
+                raise NoProofError(
+                    f"dashpots couple motions at {within[0]:.3g} to {within[1]:.3g} with too many others"
+                )
             break
         ordered = np.argsort(-(s.real + error)[chosen[left_over]])[:WORST]
         worst = np.flatnonzero(doubtful)[ordered]

@@ -160,7 +160,9 @@ def _of_parts(parts: list[Linear]) -> Linear:
     more = max(each.growth_rate + each.error for each in moves) - worst.growth_rate
     said = parts[0].said
     if said and worst is not parts[0]:
-        said = f"{said}; of {len(parts) - 1} groups of other particles one decays with D as exp({worst.growth_rate:.6g} t)"
+        said = (
+            f"{said}; of {len(parts) - 1} groups of other particles one decays with D as exp({worst.growth_rate:.6g} t)"
+        )
     return replace(worst, error=max(worst.error, more), free=free, said=said)
 
 
