@@ -83,8 +83,8 @@ WORST, LARGEST_SPACE = 16, 2.0
 first one: eigenvalues take up to a second each time."""
 
 MOST_SLOW, FEW_SLOW = 0.4, 400
-"""Share of the motions that may be slow, unless these are few, which take three slices. Where strong dashpots couple all
-motions, slices do not hold their s: with most of 1,200 slow, those at middle frequencies were not known."""
+"""Share of the motions that may be slow, unless these are few, which take three slices. Where strong dashpots couple
+all motions, slices do not hold their s: with most of 1,200 slow, those at middle frequencies were not known."""
 
 SURE = 1e-3
 """Error of a rate, as a share, that is small enough."""

@@ -47,7 +47,8 @@ def rows_of(seed: int) -> Iterator[Row]:
     columns = np.array(series).T
     period = layer_period(wanted.drive, start)
     assert period is not None
-    slips, _ = find_slips(*columns, wanted.drive.fastest, period)
+    time, force, displacement, energy = columns
+    slips, _ = find_slips(time, force, displacement, energy, wanted.drive.fastest, period)
     states, ended = list[Row](), 0.0
     for number, slip in enumerate(slips):
         for kind, time in (("before", slip.begins), ("control", ended + (slip.begins - ended) / 3)):
