@@ -26,10 +26,9 @@ from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.analysis.has_configuration import HasConfiguration
 from faultgouge.analysis.motion.hysteresis import layer_displacement, turning_points
 
-from .contact_colours import LEAST_SHARE
 from .followed_pairs import SECONDS_OF_1000, FollowedPair, Progress, RampEigenvalues, follow_eigenvalues
 from .images import Images
-from .packing_artist import PackingArtist
+from .packing_artist import LEAST_SHARE, PackingArtist
 from .pair import curve_through
 from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER
 

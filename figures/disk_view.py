@@ -1,17 +1,58 @@
-"""Images of disks and contacts in a picture, its walls, and the lines at which the picture repeats."""
+"""What lies in a picture: planes that particles touch, the box, images of disks, lines at which the picture repeats."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from faultgouge.analysis import Packing
+from faultgouge.analysis import Configuration, Packing
 from faultgouge.analysis.arrays import Floats, Indices
 from faultgouge.analysis.has_configuration import HasConfiguration
 
 from .style import figure_of
-from .surroundings import Wall, cell_of, walls_of, within_cell
+
+ALONG_AXIS = 1 - 1e-9
+"""Component of a normal from which on it is along an axis."""
+
+
+class Wall(NamedTuple):
+    """A wall: all that lies beyond a place along an axis, seen along sign times the axis."""
+
+    axis: int
+    sign: float
+    place: float
+
+    def cut(self, low: Floats, high: Floats) -> None:
+        """Move the lower or the upper corner of a frame to the wall, in place."""
+        (low if self.sign > 0 else high)[self.axis] = self.place
+
+
+def walls_of(configuration: Configuration) -> tuple[Wall, ...]:
+    """The planes along the axes that particles touch."""
+    c = configuration.contacts
+    at = np.flatnonzero(c.wall & (np.abs(c.normal).max(axis=1) > ALONG_AXIS))
+    axis = np.argmax(np.abs(c.normal[at]), axis=1)
+    sign = np.sign(c.normal[at, axis])
+    place = configuration.position[c.i[at], axis] - sign * (configuration.radius[c.i[at]] - c.overlap[at])
+    sides = sorted({*zip(axis.tolist(), sign.tolist(), strict=True)})
+    return tuple(Wall(a, s, float(np.mean(place[(axis == a) & (sign == s)]))) for a, s in sides)
+
+
+def cell_of(configuration: Configuration) -> Floats:
+    """Edges of the box in rows, shape (d, d), length; an open side of no length has a length of one."""
+    d = configuration.dimension
+    cell = configuration.box[:d, :d].copy()
+    cell[~cell.any(axis=1)] = np.eye(d)[~cell.any(axis=1)]
+    return cell
+
+
+def within_cell(configuration: Configuration, position: Floats) -> Floats:
+    """Positions, shape (N, d), moved into the box by whole edges along its periodic sides."""
+    d, cell = configuration.dimension, cell_of(configuration)
+    origin, periodic = configuration.origin[:d], configuration.periodic[:d]
+    share = (position - origin) @ np.linalg.inv(cell)
+    return np.asarray(origin + (share - np.where(periodic, np.floor(share), 0.0)) @ cell)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.responses.slips import Slip
 
-from .ramp_film import Course
+from .film import Course
 from .style import styled
 
 

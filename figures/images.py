@@ -10,8 +10,7 @@ from faultgouge.analysis import Configuration
 from faultgouge.analysis.arrays import Floats, Indices
 from faultgouge.analysis.has_configuration import HasConfiguration
 
-from .disk_view import View
-from .surroundings import Wall, cell_of, walls_of, within_cell
+from .disk_view import View, Wall, cell_of, walls_of, within_cell
 
 IMAGE_MARGIN = 0.5
 """Images of disks beyond the sides of a periodic box that move into sight, in units of the largest radius."""

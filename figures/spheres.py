@@ -22,8 +22,8 @@ from matplotlib.figure import Figure
 from faultgouge.analysis import Configuration
 from faultgouge.analysis.arrays import Floats
 
+from .disk_view import walls_of
 from .style import BULK, EDGE, FLOOR, INK
-from .surroundings import walls_of
 
 AZIMUTH, ELEVATION = np.radians([-62.0, 16.0])
 """Where the eye is."""

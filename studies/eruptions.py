@@ -39,10 +39,8 @@ from ..analysis.responses.growth_of_run import unstable_rates
 from ..pywrap import Engine, Scene, SceneError
 from ..pywrap.runs.ramp_loads import ramp_loads
 from ..pywrap.runs.undamped import time_step
-from ..pywrap.scenes.command_sections import PATH
-from ..pywrap.scenes.quantities import FORCE, TIME
-from ..pywrap.scenes.study_sections import section_of
-from ..pywrap.scenes.validation import Positive, Section, require_section
+from ..pywrap.scenes.command_sections import PATH, section_of
+from ..pywrap.scenes.validation import FORCE, TIME, Positive, Section, require_section
 from ..pywrap.settling.settle import settle
 from .packing_tools import contact_pairs, path_from, unit_of_time
 from .result_rows import Row, Rows, row_columns

@@ -54,8 +54,7 @@ from ..analysis.motion.spectrum import SLICED
 from ..analysis.table_display import table_of
 from ..pywrap import Equilibrium, Scene
 from ..pywrap.load_path import LoadPath
-from ..pywrap.scenes.command_sections import PATH
-from ..pywrap.scenes.study_sections import section_of
+from ..pywrap.scenes.command_sections import PATH, section_of
 from ..pywrap.scenes.validation import Positive, Section, require_section
 from .cycle import cycle
 from .executors import Say
@@ -362,7 +361,6 @@ def _write_plane_film(loads: Sequence[Mapping[str, Any]], path: Path) -> None:
     from matplotlib.figure import Figure
 
     from ..figures.film import Film
-    from ..figures.style import styled
     from ..figures.writers import write_film
 
     figure = Figure((5, 4), layout="constrained")
@@ -374,15 +372,11 @@ def _write_plane_film(loads: Sequence[Mapping[str, Any]], path: Path) -> None:
     axes.set(xlabel=r"$\mathrm{Re}\,\omega$", ylabel=r"$\mathrm{Im}\,\omega$", yscale="log")
     axes.set(xlim=(0, 1.05 * every[:, 0].max()), ylim=(0.5 * every[:, 1].min(), 2 * every[:, 1].max()))
 
-    class PlaneFilm(Film):
-        """The film of these loads."""
+    def show(number: int) -> None:
+        line.set_data(points[number][:, 0], points[number][:, 1])
+        words.set_text(_title(loads[number]))
 
-        def show(self, number: int) -> None:
-            """The frequencies of one load."""
-            line.set_data(points[number][:, 0], points[number][:, 1])
-            words.set_text(_title(loads[number]))
-
-    write_film(styled(PlaneFilm)(figure, [line, words], len(loads)), path, FRAMES_A_SECOND)
+    write_film(Film(figure, [line, words], show, len(loads)), path, FRAMES_A_SECOND)
 
 
 def _title(load: Mapping[str, Any]) -> str:

@@ -35,11 +35,9 @@ from ..pywrap import Engine, Scene, SceneError
 from ..pywrap.onset import onset_run
 from ..pywrap.runs.ramp_loads import ramp_loads
 from ..pywrap.runs.undamped import time_step
-from ..pywrap.scenes.command_sections import PATH
-from ..pywrap.scenes.quantities import FREQUENCY, TIME
-from ..pywrap.scenes.study_sections import section_of
+from ..pywrap.scenes.command_sections import PATH, section_of
 from ..pywrap.scenes.units import real_units
-from ..pywrap.scenes.validation import Positive, Section, require_section
+from ..pywrap.scenes.validation import FREQUENCY, TIME, Positive, Section, require_section
 from ..pywrap.settling.settle import settle
 from .eruptions import growth_rate
 from .onset import onset_row

@@ -195,7 +195,7 @@ class SlicedSpectrum:
         SliceError
             If eigenvalues do not converge, or neighbouring slices disagree.
         """
-        most, before, high = self.sizes.slice_size, None, np.inf
+        most, before, high, again = self.sizes.slice_size, None, np.inf, False
         while first < stop:
             solve, below = self.factorise(self.matrix, shift)
             ahead = below - first
@@ -210,7 +210,14 @@ class SlicedSpectrum:
                 continue
             part = self.slice_about(shift, (first, min(stop, 2 * below - first)), margin, (solve, below))
             if before is not None:
-                compare_slices(before, part.border)
+                try:
+                    compare_slices(before, part.border)
+                except SliceError:
+                    if again:
+                        raise
+                    shift, again = low + 0.8 * (shift - low), True
+                    continue
+            again = False
             yield part, partial(self._in_order, solve)
             first, before, low, high = part.border.modes[1], part.border, float(part.values[part.own][-1]), np.inf
             shift = low + 0.5 * most * max(part.border.spacing, 1e-9 * abs(low))

@@ -24,7 +24,7 @@ dissipation the velocity of creep falls with the vibration, no more slowly than 
 the slowest s, so that a velocity v displaces particles by at most :math:`v / |\mathrm{Re}\, s|` more. Without it the
 particles move on at a constant mean velocity.
 
-`benchmarks/verdict_numbers.py` has 70 packings beside LAMMPS, and what each number decides.
+`benchmarks/verdict_numbers.py` has 109 packings beside LAMMPS, and what each number decides.
 """
 
 from collections.abc import Iterator

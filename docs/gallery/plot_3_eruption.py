@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from faultgouge.analysis import spectrum
 from faultgouge.figures import draw_series
-from faultgouge.figures.run_film import RunFilm, RunMotion
+from faultgouge.figures.film import RunMotion, film_of_run
 from faultgouge.pywrap import Scene, perturb, reach
 
 scene = Scene.from_mapping(
@@ -38,7 +38,7 @@ growth = draw_series(time, msd)
 # Three frames of the film that ``faultgouge movie`` makes: displacements times a power of ten.
 
 run = RunMotion.of(start.packing, np.array([each[0] for each in moments]), np.array([each[1] for each in moments]))
-film = RunFilm(run, frames=3)
+film = film_of_run(run, frames=3)
 frames = Figure(figsize=(film.size[0] / 130, 3 * film.size[1] / 130))
 for number in range(3):
     axes = frames.add_axes((0, 1 - (number + 1) / 3, 1, 1 / 3))

@@ -3,13 +3,23 @@
 A command receives a scene with only the sections that it reads: other sections cannot make it fail, and are not part of
 its output. In the other sections only the keys are checked, because a misspelled key is always a mistake. A missing
 section that a command requires is reported before any work starts.
+
+A section such as [trigger] belongs to one study, which registers its model in its file, ``faultgouge/studies/NAME.py``;
+a scene with the section [NAME] imports this file. Numbers of a section that may have a unit say so in their annotation:
+``Annotated[Positive, TIME]`` (:mod:`~faultgouge.pywrap.scenes.quantities`).
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ... import registered
+from .validation import SceneError, Section
+
+S = TypeVar("S", bound=Section)
 
 BED = ("precision", "packing", "law", "load", "damping", "units", "perturb.inertia_factor")
 """Sections that determine the settled packing and its masses. Every command reads them, and of [perturb] one key."""
@@ -59,3 +69,51 @@ def command_of(name: str | None) -> Command | None:
     """What a command, a study or the task of a sweep reads; None of one that reads every section."""
     study = None if name is None or name in COMMANDS else registered.study_of(name)
     return COMMANDS.get(name or "") if study is None else Command(study.sections, study.needs)
+
+
+def study_model(name: str) -> type[Section] | None:
+    """The section that a study has registered; None if there is no such study, or it has no section."""
+    model: type[Section] | None = getattr(registered.study_of(name), "section", None)
+    return model
+
+
+def study_models() -> dict[str, tuple[type[Section], ...]]:
+    """The sections of all studies by name."""
+    return {name: (model,) for name in registered.names() if (model := study_model(name)) is not None}
+
+
+def check_study_section(name: str, given: object, context: Any) -> object:
+    """A section of a study, checked; the error of a section that no study has, or that is refused, has its place."""
+    model = study_model(name)
+    if model is None:
+        errors: list[Any] = [{"type": "extra_forbidden", "loc": (), "input": given, "msg": "unknown"}]
+    else:
+        try:
+            return model.model_validate(given, context=context)
+        except ValidationError as error:
+            errors = [*error.errors(include_url=False)]
+    placed = [{**each, "loc": (name, *each["loc"])} for each in errors]
+    raise PydanticCustomError("study_section", "[{name}] is refused", {"name": name, "errors": placed})
+
+
+def errors_in(error: ValidationError) -> list[ErrorDetails]:
+    """The errors of a scene, those of its studies' sections with the others."""
+    found: list[ErrorDetails] = []
+    for each in error.errors():
+        found += each["ctx"]["errors"] if each["type"] == "study_section" else [each]
+    return found
+
+
+def section_of(scene: Any, model: type[S]) -> S | None:
+    """The section of a study in a scene; None of a scene without it."""
+    return next((each for each in (scene.model_extra or {}).values() if isinstance(each, model)), None)
+
+
+def require_sections(scene: Any, needs: tuple[str, ...], advice: Mapping[str, str]) -> None:
+    """Raise SceneError if the scene lacks a section; `advice` has the keys to add, or the model of the study says."""
+    for name in needs:
+        if getattr(scene, name, None) is None:
+            model = study_model(name)
+            fields = {} if model is None else model.model_fields
+            keys = [field.description or key for key, field in fields.items() if field.is_required()]
+            raise SceneError(f"the scene has no section [{name}]: add it, with {advice.get(name, ', '.join(keys))}")

@@ -9,9 +9,20 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from ...analysis.files.signal_files import read_signal
 from ...analysis.responses.signals import Signal, pulse
 from .signal_keys import absolute_signal, check_signal
-from .validation import NamesFile, NotNegative, Positive, Section, is_number, refusal_sentence
-
-Velocity = Annotated[float, Field(allow_inf_nan=False)]
+from .validation import (
+    FORCE,
+    FREQUENCY,
+    SPRING,
+    TIME,
+    VELOCITY,
+    NamesFile,
+    NotNegative,
+    Number,
+    Positive,
+    Section,
+    refusal_sentence,
+    rule,
+)
 
 LOADINGS = 2.0
 """Time for each slip of a run that ends after a number of slips, in units of the time in which the spring loads a layer
@@ -56,36 +67,24 @@ class Drive(Section):
         What the signal is: the force on each disk of the upper layer along x, or the velocity of the floor.
     """
 
-    spring: Positive | Literal["rigid"]
-    velocity: Velocity | None = None
-    protocol: tuple[tuple[Velocity, Positive], ...] | None = None
-    until: Positive | None = None
+    spring: Annotated[Positive | Literal["rigid"], SPRING, rule('give a stiffness above 0, or "rigid"')]
+    velocity: Annotated[Number | None, VELOCITY] = None
+    protocol: Annotated[
+        Annotated[
+            tuple[Annotated[tuple[Number, Positive], Field(strict=False)], ...], Field(min_length=1, strict=False)
+        ]
+        | None,
+        (VELOCITY, TIME),
+        rule("give pairs of a velocity and a time above 0, as in [[1e-3, 100], [0, 50]]"),
+    ] = None
+    until: Annotated[Positive | None, TIME] = None
     slips: Annotated[int, Field(ge=1)] | None = None
-    states: Positive | None = None
+    states: Annotated[Positive | None, TIME] = None
     signal: Annotated[str | None, NamesFile()] = None
-    at: NotNegative | None = None
-    omega: Positive | None = None
-    scale: Velocity = 1.0
+    at: Annotated[NotNegative | None, TIME] = None
+    omega: Annotated[Positive | None, FREQUENCY] = None
+    scale: Annotated[Number, FORCE] = 1.0
     on: Literal["layer", "floor"] = "layer"
-
-    @field_validator("spring", mode="before")
-    @classmethod
-    def _stiffness(cls, spring: object) -> object:
-        if spring != "rigid" and not (is_number(spring) and spring > 0):
-            raise refusal_sentence("", f'= {spring!r} is refused: give a stiffness above 0, or "rigid"')
-        return spring
-
-    @field_validator("protocol", mode="before")
-    @classmethod
-    def _pairs(cls, protocol: object) -> object:
-        if protocol is None:
-            return None
-        stages = protocol if isinstance(protocol, (list, tuple)) else ()
-        pairs = [stage for stage in stages if isinstance(stage, (list, tuple)) and len(stage) == 2]
-        if not stages or len(pairs) < len(stages) or not all(is_number(v) and is_number(t) and t > 0 for v, t in pairs):
-            rule = "give pairs of a velocity and a time above 0, as in [[1e-3, 100], [0, 50]]"
-            raise refusal_sentence("", f"= {protocol!r} is refused: {rule}")
-        return tuple((float(velocity), float(time)) for velocity, time in pairs)
 
     @field_validator("signal")
     @classmethod

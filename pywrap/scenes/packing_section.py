@@ -14,7 +14,7 @@ from ...analysis.arrays import Floats
 from ...analysis.files.formats import Disks, format_of, is_hdf5, packing_of, upper_layer
 from ..lammps.restart_file import read_disks
 from .random_start import layer_size, random_start
-from .validation import NamesFile, Positive, Section, refusal_sentence
+from .validation import FORCE, LENGTH, MASS, STIFFNESS, NamesFile, Positive, Section, refusal_sentence
 
 SPARSEST = 10.0
 """Width of the box, in lengths of all disks in one row, beyond which nothing would ever touch."""
@@ -33,8 +33,8 @@ class SettlingLoad(Section):
         Normal stiffness, force / length^exponent.
     """
 
-    fy: Positive | None = None
-    kn: Positive | None = None
+    fy: Annotated[Positive | None, FORCE] = None
+    kn: Annotated[Positive | None, STIFFNESS] = None
 
     @model_validator(mode="after")
     def _not_empty(self) -> "SettlingLoad":
@@ -76,8 +76,8 @@ class GeneratedPacking(Section):
     """
 
     disks: int = Field(100, gt=0, le=10_000_000)
-    radii: Annotated[tuple[Positive, ...], Field(min_length=1, strict=False)] = (0.5, 0.7)
-    width: Positive = 11.9
+    radii: Annotated[tuple[Positive, ...], Field(min_length=1, strict=False), LENGTH] = (0.5, 0.7)
+    width: Annotated[Positive, LENGTH] = 11.9
     # the default becomes a number in the validator, which knows disks, radii and width
     top: int = Field(None, gt=0)  # type: ignore[assignment]
     seed: int = Field(7, ge=0, lt=2**63)
@@ -85,7 +85,7 @@ class GeneratedPacking(Section):
     settle_friction: bool = False
     settle_at: SettlingLoad | None = None
     masses: Literal["equal", "spheres"] = "equal"
-    mass: Positive | None = None
+    mass: Annotated[Positive | None, MASS] = None
 
     @field_validator("top", mode="before")
     @classmethod

@@ -20,56 +20,32 @@ import numpy as np
 from pydantic import ValidationError
 
 from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
-from .study_sections import study_model
-from .units import HERTZ_EXPONENT, MISMATCH, Layer, RealUnits, check_exponent, hertz_stiffness, layer_of, units_of
-from .units_section import Units, is_stress, quantity
-from .validation import SceneError, is_number
-
-Powers: TypeAlias = tuple[float, float, float]
-"""Powers of mass, length and time."""
-
-MASS: Powers = (1, 0, 0)
-LENGTH: Powers = (0, 1, 0)
-TIME: Powers = (0, 0, 1)
-FREQUENCY: Powers = (0, 0, -1)
-VELOCITY: Powers = (0, 1, -1)
-FORCE: Powers = (1, 1, -2)
-STRESS: Powers = (1, -1, -2)
-STIFFNESS: Powers = (1, 1 - HERTZ_EXPONENT, -2)
-DASHPOT: Powers = (1, 1 - HERTZ_EXPONENT, -1)
-VISCOSITY: Powers = (1, 0, -1)
-SPRING: Powers = (1, 0, -2)
-
-DIMENSIONS: Mapping[str, Mapping[str, Powers | tuple[Powers, Powers]]] = {
-    "packing": {"radii": LENGTH, "width": LENGTH, "mass": MASS},
-    "packing.settle_at": {"fy": FORCE, "kn": STIFFNESS},
-    "law": {"kn": STIFFNESS, "kt": STIFFNESS},
-    "damping": {"cn": DASHPOT, "ct": DASHPOT, "tau": TIME},
-    "load": {"fy": FORCE},
-    "relax": {"damping": VISCOSITY, "time_step": TIME},
-    "ramp": {"step": FORCE, "until": FORCE, "force_tolerance": FORCE},
-    "perturb": {
-        "fx": FORCE,
-        "time": TIME,
-        "time_step": TIME,
-        "amplitude": FORCE,
-        "omega": FREQUENCY,
-        "omega_end": FREQUENCY,
-    },
-    "friction": {"v0": VELOCITY, "v_ss": VELOCITY},
-    "drive": {
-        "spring": SPRING,
-        "velocity": VELOCITY,
-        "protocol": (VELOCITY, TIME),
-        "until": TIME,
-        "states": TIME,
-        "at": TIME,
-        "omega": FREQUENCY,
-        "scale": FORCE,
-    },
-}
-"""Dimension of each number of a scene, or of each pair of numbers; all others have none. The sections of studies have
-theirs in the annotations of their keys."""
+from .units import (
+    MISMATCH,
+    Layer,
+    RealUnits,
+    Units,
+    check_exponent,
+    hertz_stiffness,
+    is_stress,
+    layer_of,
+    quantity,
+    units_of,
+)
+from .validation import (
+    FORCE,
+    HERTZ_EXPONENT,
+    LENGTH,
+    MASS,
+    STIFFNESS,
+    STRESS,
+    VELOCITY,
+    Powers,
+    SceneError,
+    Section,
+    is_number,
+    sections_in,
+)
 
 WAVES = {"perturb": "amplitude", "drive": "scale"}
 """Sections with a wave, and their keys that are a velocity where the wave is on the floor."""
@@ -87,7 +63,11 @@ STIFFNESS_OF_ONE = 2e5
 Scene: TypeAlias = Mapping[str, Any]
 
 
-def as_numbers(scene: Scene, folder: Path, name: str) -> Scene:
+Dimensions: TypeAlias = Mapping[str, Mapping[str, Powers | tuple[Powers, Powers]]]
+"""Dimensions of the numbers of each section, or table in a section, by its path and by key."""
+
+
+def as_numbers(scene: Scene, folder: Path, name: str, models: Mapping[str, tuple[type[Section], ...]]) -> Scene:
     """A scene as TOML contains it, with numbers in place of quantities, and with the values that its grains determine.
 
     Parameters
@@ -98,6 +78,8 @@ def as_numbers(scene: Scene, folder: Path, name: str) -> Scene:
         From which a relative packing.file counts.
     name : str
         Of the scene, for messages.
+    models : mapping
+        The models of each section.
 
     Returns
     -------
@@ -112,7 +94,8 @@ def as_numbers(scene: Scene, folder: Path, name: str) -> Scene:
     """
     try:
         units = Units.model_validate(scene["units"])
-        if _is_plain(scene):
+        dimensions = dimensions_of(models)
+        if _is_plain(scene, dimensions):
             return scene
         check_exponent(_section(scene, "law").get("exponent", HERTZ_EXPONENT))
         converted = {**scene, "packing": _packing_in_numbers(units, _section(scene, "packing"))}
@@ -121,26 +104,27 @@ def as_numbers(scene: Scene, folder: Path, name: str) -> Scene:
     except ValueError as error:
         raise SceneError(f"{name}: {error}.") from None
     try:
-        return _convert(converted, units, layer_of(_checked_packing(converted["packing"], folder)))
+        return _convert(converted, units, layer_of(_checked_packing(converted["packing"], folder)), dimensions)
     except ValidationError:
         return converted
     except ValueError as error:
         raise SceneError(f"{name}: {error}.") from None
 
 
-def _is_plain(scene: Scene) -> bool:
+def _is_plain(scene: Scene, dimensions: Dimensions) -> bool:
     """Whether every number is one already, and none is left to the grains."""
     given = "kn" in _section(scene, "law") and "fy" in _section(scene, "load")
-    return given and not any(_texts(path, key, scene) for path, keys in _dimensions(scene).items() for key in keys)
+    return given and not any(_texts(path, key, scene) for path, keys in dimensions.items() for key in keys)
 
 
-def _dimensions(scene: Scene) -> Mapping[str, Mapping[str, Powers | tuple[Powers, Powers]]]:
-    """`DIMENSIONS`, with those of the studies' sections that the scene has."""
-    found = dict(DIMENSIONS)
-    for name in scene.keys() - DIMENSIONS.keys():
-        fields = getattr(study_model(str(name)), "model_fields", {})
-        powers = {key: [each for each in field.metadata if isinstance(each, tuple)] for key, field in fields.items()}
-        found[str(name)] = {key: each[0] for key, each in powers.items() if each}
+def dimensions_of(models: Mapping[str, tuple[type[Section], ...]]) -> Dimensions:
+    """The dimension of each number, or of each pair of numbers, of some sections; all others have none."""
+    found: dict[str, dict[str, Any]] = {}
+    for path, each in models.items():
+        fields = [field for model in each for field in model.model_fields.items()]
+        found[path] = {key: mark for key, field in fields for mark in field.metadata if isinstance(mark, tuple)}
+        tables = {f"{path}.{key}": inner for key, field in fields if (inner := sections_in(field.annotation))}
+        found |= {name: {**keys} for name, keys in dimensions_of(tables).items()}
     return found
 
 
@@ -204,7 +188,7 @@ def _checked_packing(section: Mapping[str, Any], folder: Path) -> GeneratedPacki
     return model.model_validate(own, context={"folder": folder})
 
 
-def _convert(scene: Scene, units: Units, layer: Layer) -> Scene:
+def _convert(scene: Scene, units: Units, layer: Layer, dimensions: Dimensions) -> Scene:
     """A scene whose packing has numbers."""
     law, load = dict(_section(scene, "law")), dict(_section(scene, "load"))
     if isinstance(law.get("kn", ""), str):
@@ -215,7 +199,7 @@ def _convert(scene: Scene, units: Units, layer: Layer) -> Scene:
     if "fy" not in load and units.overburden is not None:
         load["fy"] = _round(units.si("overburden") / real.overburden)
     found: Scene = {**scene, "law": law, "load": load}
-    for path, keys in _dimensions(scene).items():
+    for path, keys in dimensions.items():
         texts = {key: powers for key, powers in keys.items() if _texts(path, key, found)}
         if texts:
             found = _put(found, path, _section_in_numbers(path, _section(found, path), texts, real))

@@ -12,29 +12,46 @@
     [drive]     a spring that draws the upper layer: stick and slip
     [units]     what the numbers are in SI
     [output]    what is written beside the result
-    [NAME]      the section of the study NAME (:mod:`faultgouge.pywrap.scenes.study_sections`)
+    [NAME]      the section of the study NAME (:mod:`faultgouge.pywrap.scenes.command_sections`)
 
 packing, law and load are required. Each other section switches on a feature; without the section, the run does not have
 the feature. A command reads only some sections, and requires some of those
 (:mod:`faultgouge.pywrap.scenes.command_sections`). The user chooses the units: k_n and k_t are force /
 length^law.exponent, 3/2 by default. The units of the paper are the mass of a disk and the diameter of a small disk.
 Defaults are the values of the paper if it gives them; the docstrings say where it does not.
+
+`refuse_impossible` finds numbers that no packing can bear: overlaps beyond the contact law, forces near the rounding of
+the coordinates. `refuse_endless` finds a command that would take years, more memory than there is, or a file that no
+disk holds.
 """
 
+from __future__ import annotations
+
+import math
+import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, get_args
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import ValidationError, model_validator
+from pydantic import (
+    ConfigDict,
+    Discriminator,
+    PrivateAttr,
+    Tag,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import InitErrorDetails
 
-from .command_sections import command_of
-from .impossible import refuse_impossible
+from ...analysis import MindlinLaw
+from .command_sections import check_study_section, command_of, errors_in, require_sections, study_model, study_models
+from .drive_section import Drive
+from .packing_section import GeneratedPacking, SettlingLoad, StoredPacking, kind_of_packing
 from .quantities import as_numbers
-from .scene_keys import SceneKeys
-from .sections import Inertia
-from .study_sections import errors_in, require_sections, study_model, study_models
-from .units import real_units
+from .sections import Damping, Friction, Inertia, Law, Load, Output, Perturb, Ramp, Relax
+from .units import Units, real_units
 from .validation import (
     KEYS_TO_ADD,
     SceneError,
@@ -43,21 +60,102 @@ from .validation import (
     files_named,
     read_toml,
     refusal_sentence,
+    sections_in,
     sentence,
 )
 
+Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "reproduce"]
 
-class Scene(SceneKeys):
-    """A complete and consistent description of a computation: `SceneKeys` whose sections agree with each other."""
+DOUBLE_ROUNDING = 2.3e-16
+"""Relative rounding of a double, rounded up."""
 
-    def __new__(cls, *path: object, **sections: object) -> "Scene":
+STEPS_OF_A_YEAR = 1e13
+"""A year of LAMMPS's steps: 2e-6 s each and more, on a core of 2020."""
+LARGEST_FILE = 1e13
+"""10 TB."""
+BYTES_IN_MEMORY = 4000
+"""Bytes for each disk, at the least: LAMMPS, the matrices and their factors."""
+BYTES_WRITTEN = 150
+"""Bytes of one equilibrium in run.h5, for each disk."""
+ROUNDING_LIMIT = 1e-6
+"""Rounding of a force, in units of F_y, beyond which no bed comes to rest: 30 disks do at 1e-7, and fly apart at
+5e-7."""
+
+DEFAULT_INCREMENTS = 3e4
+"""Increments of F_x up to F_y where a scene does not say: the paper's 1e-4 of 3."""
+
+
+class Scene(Section):
+    """A complete and consistent description of a computation: its sections agree with each other.
+
+    Beside these keys it has the sections of studies (:mod:`~faultgouge.pywrap.scenes.command_sections`).
+
+    Attributes
+    ----------
+    precision : {"double", "compensated"}
+        Arithmetic of coordinates, slips and forces: doubles, or doubles with low parts, for forces that balance to
+        1e-17 instead of 1e-11.
+    packing, law, load, relax
+        Sections that every scene has; relax may be left out in TOML.
+    ramp, perturb, friction, drive, damping, units, output
+        Sections or None, which means that the feature is not in the run.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    precision: Literal["double", "compensated"] = "double"
+    packing: Annotated[
+        Annotated[GeneratedPacking, Tag("generated")] | Annotated[StoredPacking, Tag("stored")],
+        Discriminator(kind_of_packing),
+    ]
+    law: Law
+    load: Load
+    relax: Relax = Relax()
+    ramp: Ramp | None = None
+    perturb: Perturb | None = None
+    friction: Friction | None = None
+    drive: Drive | None = None
+    units: Units | None = None
+    damping: Damping | None = None
+    output: Output | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _sections_of_studies(cls, sections: Any, info: ValidationInfo) -> Any:
+        if not isinstance(sections, Mapping):
+            return sections
+        others = sections.keys() - cls.model_fields.keys()
+        checked = {
+            name: check_study_section(str(name), sections[name], info.context) for name in sorted(others, key=str)
+        }
+        return {**sections, **checked}
+
+    @field_validator("ramp", mode="before")
+    @classmethod
+    def _step_of_the_load(cls, ramp: object, info: ValidationInfo) -> object:
+        if isinstance(ramp, Mapping) and "step" not in ramp and "load" in info.data:
+            return {**ramp, "step": info.data["load"].fy / DEFAULT_INCREMENTS}
+        return ramp
+
+    _inertia: Inertia = PrivateAttr(Inertia())
+
+    def model_post_init(self, context: Any) -> None:
+        """Keep the key of [perturb] that is read where the section is not."""
+        self._inertia = (context or {}).get("inertia", self._inertia)
+
+    @property
+    def inertia_factor(self) -> float:
+        """I_0 in I = I_0 m R^2, for dynamics, spectrum and onset alike: the key of [perturb], or the paper's 1."""
+        return (self.perturb or self._inertia).inertia_factor
+
+    def __new__(cls, *path: object, **sections: object) -> Scene:
         """Refuse a path, which pydantic would refuse without advice."""
         if path:
             raise SceneError("Scene takes sections by name: Scene.from_toml(path) reads a file.")
         return super().__new__(cls)
 
     @model_validator(mode="after")
-    def _consistent(self) -> "Scene":
+    def _consistent(self) -> Scene:
         self._check_perturb()
         cannot = refuse_impossible(self)
         if cannot is not None:
@@ -116,9 +214,7 @@ class Scene(SceneKeys):
             raise refusal_sentence("damping.tau", says)
 
     @classmethod
-    def from_toml(
-        cls, path: str | Path, packing: Mapping[str, Any] | None = None, command: str | None = None
-    ) -> "Scene":
+    def from_toml(cls, path: str | Path, packing: Mapping[str, Any] | None = None, command: str | None = None) -> Scene:
         """Read a scene.
 
         Parameters
@@ -142,7 +238,7 @@ class Scene(SceneKeys):
         return cls._check(whole, path.parent, str(path), command)
 
     @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any], folder: str | Path = ".", command: str | None = None) -> "Scene":
+    def from_mapping(cls, mapping: Mapping[str, Any], folder: str | Path = ".", command: str | None = None) -> Scene:
         """Make a scene from a mapping with the contents of a TOML file.
 
         Parameters
@@ -162,12 +258,12 @@ class Scene(SceneKeys):
         return cls._check(mapping, Path(folder), "scene", command)
 
     @classmethod
-    def _check(cls, mapping: Mapping[str, Any], folder: Path, name: str, command: str | None) -> "Scene":
+    def _check(cls, mapping: Mapping[str, Any], folder: Path, name: str, command: str | None) -> Scene:
         wanted = command_of(command)
         context: dict[str, Any] = {"folder": folder}
         try:
             if isinstance(mapping, Mapping) and "units" in mapping:
-                mapping = as_numbers(mapping, folder, name)
+                mapping = as_numbers(mapping, folder, name, SECTIONS | _of_studies(mapping))
             if wanted is not None and isinstance(mapping, Mapping):
                 _check_keys(mapping)
                 mapping = wanted.part(mapping)
@@ -214,15 +310,21 @@ class _Part(Section):
     perturb: Inertia
 
 
+def _of_studies(mapping: Mapping[str, Any]) -> dict[str, tuple[type[Section], ...]]:
+    """The models of the sections of a scene that belong to studies."""
+    others = {name: study_model(str(name)) for name in mapping.keys() - Scene.model_fields.keys()}
+    return {name: (model,) for name, model in others.items() if model is not None}
+
+
 def _check_keys(mapping: Mapping[str, Any]) -> None:
     """Refuse unknown sections and keys, also in sections that are not read."""
     errors: list[InitErrorDetails] = []
+    sections = SECTIONS | _of_studies(mapping)
     for name, section in mapping.items():
         keys = section if isinstance(section, Mapping) else {}
-        study = None if name in SceneKeys.model_fields else study_model(str(name))
-        models = SECTIONS.get(name, ()) if study is None else (study,)
+        models = sections.get(name, ())
         known = {key for model in models for key in model.model_fields}
-        if name not in SceneKeys.model_fields and study is None:
+        if name not in Scene.model_fields and not models:
             errors.append({"type": "extra_forbidden", "loc": (name,), "input": section})
         elif models and keys is not section:
             errors.append({"type": "dict_type", "loc": (name,), "input": section})
@@ -232,14 +334,7 @@ def _check_keys(mapping: Mapping[str, Any]) -> None:
         raise ValidationError.from_exception_data("Scene", errors)
 
 
-def _models(annotation: Any) -> tuple[type[Section], ...]:
-    """The sections that an annotation allows."""
-    if isinstance(annotation, type):
-        return (annotation,) if issubclass(annotation, Section) else ()
-    return tuple(model for part in get_args(annotation) for model in _models(part))
-
-
-SECTIONS = {name: models for name, field in SceneKeys.model_fields.items() if (models := _models(field.annotation))}
+SECTIONS = {name: models for name, field in Scene.model_fields.items() if (models := sections_in(field.annotation))}
 
 
 def scene_of(scene: object, command: str) -> Scene:
@@ -260,3 +355,80 @@ def scene_of(scene: object, command: str) -> Scene:
     if isinstance(scene, (str, Path)):
         return Scene.from_toml(scene, command=command)
     raise SceneError(f"{command} takes a Scene, or the path of its .toml file, and no {type(scene).__name__}.")
+
+
+def refuse_endless(scene: Scene, task: Task) -> None:
+    """Refuse a scene with which a command would not come to an end.
+
+    Raises SceneError if it takes a year, more memory than there is, or a file of more than `LARGEST_FILE`.
+    """
+    disks, ramp, perturb = scene.packing.disks, scene.ramp, scene.perturb
+    equilibria = 1.0 + (ramp.length / ramp.step if ramp is not None and task not in ("settle", "perturb") else 0.0)
+    steps = 0.0
+    if perturb is not None and task in ("perturb", "reproduce"):
+        steps = perturb.time / (perturb.time_step or _undamped_step(scene))
+    memory, written = disks * BYTES_IN_MEMORY, disks * BYTES_WRITTEN * equilibria
+    if steps > STEPS_OF_A_YEAR:
+        found = f"{steps:.2g} time steps, a year and more: lower perturb.time, or raise perturb.time_step"
+    elif memory > _installed_memory():
+        found = (
+            f"{memory / 1e9:.2g} GB of memory, and this machine has {_installed_memory() / 1e9:.2g}: take fewer disks"
+        )
+    elif task == "ramp" and written > LARGEST_FILE:
+        found = f"a file of {written / 1e12:.2g} TB: take a larger ramp.step, or fewer disks"
+    else:
+        return
+    raise SceneError(f"the scene asks {task} for {found}")
+
+
+def refuse_impossible(scene: Scene) -> tuple[str, str] | None:
+    """The key whose number no packing can bear, and the rest of the sentence; None if there is no such key."""
+    packing, law, fy = scene.packing, scene.law, scene.load.fy
+    if not isinstance(packing, GeneratedPacking):
+        return None
+    if packing.settle_at is not None:
+        cannot = refuse_impossible(_at_settling(scene, packing.settle_at))
+        if cannot is not None:
+            return "packing.settle_at", f"does not settle, since {' '.join(cannot)}"
+    overlap = _law(scene).overlap_of_force(fy)
+    smallest = min(packing.radii)
+    if not overlap < smallest:
+        return "load.fy", (
+            f"= {fy:g} presses two disks {overlap:.2g} into each other, deeper than the smallest radius {smallest:g}, "
+            f"where the contact law does not hold: lower it, or raise law.kn = {law.kn:g}"
+        )
+    rounding = DOUBLE_ROUNDING * packing.width * _stiffness(scene, fy) / fy
+    if not rounding < ROUNDING_LIMIT:
+        return "law.kn", (
+            f"= {law.kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is {rounding:.1g} of F_y, "
+            "and no packing comes to rest: lower it, or raise load.fy"
+        )
+    return None
+
+
+def _at_settling(scene: Scene, at: SettlingLoad) -> Scene:
+    """The scene with the load and the stiffness under which its packing settles."""
+    law = scene.law.model_copy(update={"kn": at.kn or scene.law.kn})
+    load = scene.load.model_copy(update={"fy": at.fy or scene.load.fy})
+    packing = scene.packing.model_copy(update={"settle_at": None})
+    return scene.model_copy(update={"law": law, "load": load, "packing": packing, "ramp": None})
+
+
+def _stiffness(scene: Scene, force: float) -> float:
+    law = _law(scene)
+    return float(law.normal_stiffness(law.overlap_of_force(force)))
+
+
+def _law(scene: Scene) -> MindlinLaw:
+    """The repulsion alone."""
+    return MindlinLaw(scene.law.kn, kt=0.0, mu=0.0, exponent=scene.law.exponent)
+
+
+def _undamped_step(scene: Scene) -> float:
+    packing = scene.packing
+    lightest = min(1.0, scene.inertia_factor) * ((isinstance(packing, GeneratedPacking) and packing.mass) or 1.0)
+    return 0.1 * math.sqrt(lightest / (6 * _stiffness(scene, scene.load.fy)))
+
+
+def _installed_memory() -> float:
+    return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")

@@ -6,13 +6,27 @@ Defaults are the values of the paper if it gives them; the docstrings say where 
 import re
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis.packing.law import EXPONENTS, LEAST_RESCALED, known_exponents
 from .signal_keys import SignalKeys
-from .validation import NotNegative, Positive, Section, is_number, refusal_sentence
+from .validation import (
+    DASHPOT,
+    FORCE,
+    STIFFNESS,
+    TIME,
+    VELOCITY,
+    VISCOSITY,
+    NotNegative,
+    Number,
+    Positive,
+    Section,
+    is_number,
+    refusal_sentence,
+    rule,
+)
 
 NUMBER_PATTERN = r"\d+(?:\.\d*)?(?:[eE][-+]?\d+)?"
 """A number without a sign, in text."""
@@ -42,10 +56,13 @@ class Law(Section):
         smoothing, which creates no energy either (:mod:`~faultgouge.analysis.packing.law`).
     """
 
-    kn: Positive
+    kn: Annotated[Positive, STIFFNESS]
     # the default is of the form that a scene gives, and becomes a number in the validator
-    kt: NotNegative = Field("2/7 kn")  # type: ignore[assignment]
-    mu: float | tuple[float, ...] = 1.0
+    kt: Annotated[NotNegative, STIFFNESS] = Field("2/7 kn")  # type: ignore[assignment]
+    mu: Annotated[
+        NotNegative | Annotated[tuple[NotNegative, ...], Field(min_length=1, strict=False)],
+        rule("give a number of at least 0, or a list of such numbers"),
+    ] = 1.0
     exponent: float = 1.5
     history: Literal["total", "rescaled", "coulomb"] = "total"
 
@@ -69,15 +86,14 @@ class Law(Section):
             raise refusal_sentence("", f'= "{kt}" is no share of kn: give a number, or a share such as "2/7 kn"')
         return numerator * info.data["kn"] / denominator
 
-    @field_validator("mu", mode="before")
+    @field_validator("mu")
     @classmethod
-    def _one_or_several(cls, mu: object) -> object:
-        several = tuple(mu) if isinstance(mu, (list, tuple)) else (mu,)
-        if not several or not all(is_number(value) and value >= 0 for value in several):
-            raise refusal_sentence("", f"= {mu!r} is refused: give a number of at least 0, or a list of such numbers")
-        if len(set(several)) < len(several):
-            raise refusal_sentence("", f"= {mu!r} names one value twice: give each once")
-        return several if isinstance(mu, (list, tuple)) else mu
+    def _each_once(cls, mu: float | tuple[float, ...]) -> float | tuple[float, ...]:
+        if isinstance(mu, tuple) and len(set(mu)) < len(mu):
+            raise refusal_sentence(
+                "", f"= [{', '.join(f'{each:g}' for each in mu)}] names one value twice: give each once"
+            )
+        return mu
 
     @field_validator("exponent")
     @classmethod
@@ -118,9 +134,9 @@ class Damping(Section):
         Time of the drag -(m/tau) v and -(I/tau) omega on every disk, the paper's damping. None: no drag.
     """
 
-    cn: NotNegative = 0.0
-    ct: NotNegative = 0.0
-    tau: Positive | None = None
+    cn: Annotated[NotNegative, DASHPOT] = 0.0
+    ct: Annotated[NotNegative, DASHPOT] = 0.0
+    tau: Annotated[Positive | None, TIME] = None
 
     @model_validator(mode="after")
     def _not_empty(self) -> "Damping":
@@ -138,7 +154,7 @@ class Load(Section):
         Force F_y on each disk of the upper layer, downwards.
     """
 
-    fy: Positive
+    fy: Annotated[Positive, FORCE]
 
 
 class Relax(Section):
@@ -153,8 +169,8 @@ class Relax(Section):
         Step, time. None: a third of the stable step of a disk whose contacts carry ten times F_y.
     """
 
-    damping: Positive = 1.0
-    time_step: Positive | None = None
+    damping: Annotated[Positive, VISCOSITY] = 1.0
+    time_step: Annotated[Positive | None, TIME] = None
 
 
 class Ramp(Section):
@@ -174,23 +190,23 @@ class Ramp(Section):
         the scene's units. None: what the rounding of the coordinates allows.
     """
 
-    step: Positive
-    until: float | tuple[float, ...]
+    step: Annotated[Positive, FORCE]
+    until: Annotated[
+        Number | Annotated[tuple[Number, ...], Field(min_length=1, strict=False)],
+        FORCE,
+        rule("give a force, or a list of forces between which F_x goes"),
+    ]
     method: Literal["newton", "overdamped"] = "newton"
-    force_tolerance: Positive | None = None
+    force_tolerance: Annotated[Positive | None, FORCE] = None
 
-    @field_validator("until", mode="before")
+    @field_validator("until")
     @classmethod
-    def _turning_points(cls, until: object) -> object:
-        points = tuple(until) if isinstance(until, (list, tuple)) else (until,)
-        if not points or not all(is_number(point) for point in points):
-            raise refusal_sentence(
-                "", f"= {until!r} is refused: give a force, or a list of forces between which F_x goes"
-            )
+    def _turning_points(cls, until: float | tuple[float, ...]) -> float | tuple[float, ...]:
+        points = until if isinstance(until, tuple) else (until,)
         for here, there in pairwise((0.0, *points)):
             if here == there:
                 raise refusal_sentence("", f"= {until!r} leaves F_x at {here:g}: give a force at which F_x turns round")
-        return tuple(map(float, points)) if len(points) > 1 else float(points[0])
+        return points if len(points) > 1 else points[0]
 
     @model_validator(mode="after")
     def _one_step_at_least(self) -> "Ramp":
@@ -247,20 +263,12 @@ class Perturb(SignalKeys, Inertia):
         Step of velocity Verlet, time. None: from the largest eigenvalue of K.
     """
 
-    fx: NotNegative | None = None
-    target: Literal["top", "all"] | tuple[int, ...] = "top"
-    time_step: Positive | None = None
-
-    @field_validator("target", mode="before")
-    @classmethod
-    def _group_or_disks(cls, target: object) -> object:
-        if target in ("top", "all"):
-            return target
-        disks = tuple(target) if isinstance(target, (list, tuple)) else ()
-        if not disks or not all(type(disk) is int and disk >= 0 for disk in disks):
-            rule = 'give "top", "all" or a list of disks, counted from 0'
-            raise refusal_sentence("", f"= {target!r} is refused: {rule}")
-        return disks
+    fx: Annotated[NotNegative | None, FORCE] = None
+    target: Annotated[
+        Literal["top", "all"] | Annotated[tuple[Annotated[int, Field(ge=0)], ...], Field(min_length=1, strict=False)],
+        rule('give "top", "all" or a list of disks, counted from 0'),
+    ] = "top"
+    time_step: Annotated[Positive | None, TIME] = None
 
     @model_validator(mode="after")
     def _complete(self) -> "Perturb":
@@ -287,22 +295,17 @@ class Friction(Section):
     B: NotNegative = 0.2
     w: Positive = 0.4
     mu_ss: NotNegative = 0.8
-    v0: NotNegative | Literal["calibrated"] = "calibrated"
-    v_ss: Positive | str
+    v0: Annotated[
+        NotNegative | Literal["calibrated"], VELOCITY, rule('give a velocity of at least 0, or "calibrated"')
+    ] = "calibrated"
+    v_ss: Annotated[Positive | str, VELOCITY, rule('give a velocity above 0, or a multiple of v0 such as "10 v0"')]
 
-    @field_validator("v0", mode="before")
+    @field_validator("v_ss")
     @classmethod
-    def _threshold(cls, v0: object) -> object:
-        if v0 != "calibrated" and not (is_number(v0) and v0 >= 0):
-            raise refusal_sentence("", f'= {v0!r} is refused: give a velocity of at least 0, or "calibrated"')
-        return v0
-
-    @field_validator("v_ss", mode="before")
-    @classmethod
-    def _scale(cls, v_ss: object, info: ValidationInfo) -> object:
-        if not (_multiple_of_v0(v_ss) if isinstance(v_ss, str) else is_number(v_ss) and v_ss > 0):
-            rule = 'give a velocity above 0, or a multiple of v0 such as "10 v0"'
-            raise refusal_sentence("", f"= {v_ss!r} is refused: {rule}")
+    def _multiple(cls, v_ss: float | str, info: ValidationInfo) -> float | str:
+        if isinstance(v_ss, str) and not _multiple_of_v0(v_ss):
+            advice = 'give a velocity above 0, or a multiple of v0 such as "10 v0"'
+            raise refusal_sentence("", f"= {v_ss!r} is refused: {advice}")
         if isinstance(v_ss, str) and info.data.get("v0") == 0:
             raise refusal_sentence("", f'= "{v_ss}" is no velocity because v0 = 0: give a velocity above 0')
         return v_ss

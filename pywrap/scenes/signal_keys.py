@@ -6,11 +6,11 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import ValidationInfo, field_validator, model_validator
 
 from ...analysis.files.signal_files import read_signal
 from ...analysis.responses.signals import Signal, SignalError, pulse, sweep
-from .validation import NamesFile, NotNegative, Positive, Section, refusal_sentence
+from .validation import FORCE, FREQUENCY, TIME, NamesFile, NotNegative, Number, Positive, Section, refusal_sentence
 
 KINDS = ("pulse", "sweep")
 OF_FILES = ("channel", "scale", "stretch")
@@ -61,13 +61,13 @@ class SignalKeys(Section):
         What of the floor's motion the signal gives; None is its velocity.
     """
 
-    time: Positive
-    amplitude: NotNegative = 0.0
-    omega: NotNegative | None = None
-    omega_end: Positive | None = None
+    time: Annotated[Positive, TIME]
+    amplitude: Annotated[NotNegative, FORCE] = 0.0
+    omega: Annotated[NotNegative | None, FREQUENCY] = None
+    omega_end: Annotated[Positive | None, FREQUENCY] = None
     signal: Annotated[str | None, NamesFile()] = None
     channel: str | None = None
-    scale: Annotated[float, Field(allow_inf_nan=False)] | None = None
+    scale: Number | None = None
     stretch: Positive | None = None
     on: Literal["layer", "floor"] | None = None
     quantity: Literal["velocity", "acceleration", "displacement"] | None = None

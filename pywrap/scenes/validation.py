@@ -11,9 +11,9 @@ from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias, TypeGuard, TypeVar
+from typing import Annotated, Any, TypeAlias, TypeGuard, TypeVar, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, WrapValidator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ...analysis import BadInputError
@@ -35,8 +35,27 @@ def check_number(value: float) -> float:
     return value
 
 
+Number: TypeAlias = Annotated[float, Field(allow_inf_nan=False), AfterValidator(check_number)]
 Positive: TypeAlias = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(check_number)]
 NotNegative: TypeAlias = Annotated[float, Field(ge=0, allow_inf_nan=False), AfterValidator(check_number)]
+
+Powers: TypeAlias = tuple[float, float, float]
+"""Powers of mass, length and time: the dimension of a number, in the annotation of its key; of pairs, two of them."""
+
+HERTZ_EXPONENT = 1.5
+"""Exponent of Hertz's contact."""
+
+MASS: Powers = (1, 0, 0)
+LENGTH: Powers = (0, 1, 0)
+TIME: Powers = (0, 0, 1)
+FREQUENCY: Powers = (0, 0, -1)
+VELOCITY: Powers = (0, 1, -1)
+FORCE: Powers = (1, 1, -2)
+STRESS: Powers = (1, -1, -2)
+STIFFNESS: Powers = (1, 1 - HERTZ_EXPONENT, -2)
+DASHPOT: Powers = (1, 1 - HERTZ_EXPONENT, -1)
+VISCOSITY: Powers = (1, 0, -1)
+SPRING: Powers = (1, 0, -2)
 
 T = TypeVar("T")
 
@@ -74,6 +93,13 @@ class Section(BaseModel):
     """A section of a scene: no key is changed, unknown or of another type than its own."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, validate_default=True)
+
+
+def sections_in(annotation: Any) -> tuple[type[Section], ...]:
+    """The sections that an annotation allows."""
+    if isinstance(annotation, type):
+        return (annotation,) if issubclass(annotation, Section) else ()
+    return tuple(model for part in get_args(annotation) for model in sections_in(part))
 
 
 class NamesFile:
@@ -127,6 +153,18 @@ def refusal_sentence(key: str, says: str) -> PydanticCustomError:
     return PydanticCustomError("refused", "{key} {says}", {"key": key, "says": says})
 
 
+def rule(advice: str) -> WrapValidator:
+    """For a key of several types, or of a list: whatever its types refuse is refused with this advice."""
+
+    def check(value: Any, types: Any) -> Any:
+        try:
+            return types(value)
+        except ValidationError:
+            raise refusal_sentence("", f"= {value!r} is refused: {advice}") from None
+
+    return WrapValidator(check)
+
+
 def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[Section], ...]]) -> str:
     """An error of pydantic as: where, what is wrong, what to do; `sections` has the model of each section."""
     kind, context = error["type"], error.get("ctx", {})
@@ -143,10 +181,10 @@ def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[Section], ..
         return "a scene maps the names of sections to their keys, and this one is no mapping: give a dict"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return f"{place} is not a section: write [{place}] and its keys below"
-    rule = RULES[kind].format(**context) if kind in RULES else error["msg"]
+    advice = RULES[kind].format(**context) if kind in RULES else error["msg"]
     if kind == "float_type" and isinstance(error["input"], str):
-        rule += "; a number with a unit needs the section [units]"
-    return f"{place} = {reprlib.repr(error['input'])} is refused: {rule}"
+        advice += "; a number with a unit needs the section [units]"
+    return f"{place} = {reprlib.repr(error['input'])} is refused: {advice}"
 
 
 SAME_MEANING = {

@@ -79,7 +79,7 @@ def loaded(seed: int, history: str, rate: float) -> Row:
     rises = rate * (t / 2 - START / (2 * np.pi) * np.sin(np.pi * t / START))
     signal = Signal(np.append(t, START + 2 * last / rate), np.append(rises, rises[-1] + 2 * last))
     row: Row = {"seed": seed, "law": history, "rate": rate, "restitution": restitution, "time_step": step}
-    parts = []
+    parts = list[Row]()
     with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(step, signal=signal):
         lmp = engine.lammps
         lmp.command(f"run {round(START / step)} post no")
@@ -96,8 +96,7 @@ def loaded(seed: int, history: str, rate: float) -> Row:
                     "vibrates": [float(np.mean(vibration > share * drift)) for share in VIBRATIONS],
                     "peak": float(peak.max()),
                     "moved": float(np.sqrt(np.mean((now.position - packing.position) ** 2))),
-                    "at_bound": int(np.sum(now.sliding)),
-                    "contacts": len(pairs),
+                    "mobilised": int(np.sum(now.mobilised)),
                     "changed": len(pairs ^ known),
                 }
             )

@@ -49,10 +49,9 @@ def test_spectrum_of_a_run_file_is_that_of_the_packing_and_says_how_far_it_moves
 def test_spectrum_of_a_large_packing(faultgouge_here, beyond, monkeypatch):
     pairs = json.loads(faultgouge_here("spectrum", beyond / "ramp.h5", "--json").stdout)["pair_count"]
     monkeypatch.setattr("faultgouge.commands.spectrum.MOST_PAIRS", pairs - 1)
-    monkeypatch.setattr("faultgouge.commands.spectrum.SLOW_COORDINATES", 0)
-    done = faultgouge_here("spectrum", beyond / "ramp.h5")
-    assert "coordinates: their spectrum needs" in done.stderr
-    said = done.stdout
+    monkeypatch.setattr("faultgouge.commands.spectrum.VERDICT_FIRST", 0)
+    assert "coordinates: LAPACK needs" in faultgouge_here("spectrum", beyond / "ramp.h5", "--values").stderr
+    said = faultgouge_here("spectrum", beyond / "ramp.h5").stdout
     assert said.count("D grows as") == pairs - 1
     assert f"and 1 more: --json has all {pairs}" in said
 

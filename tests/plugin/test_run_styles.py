@@ -1,9 +1,14 @@
 """Ways of running LAMMPS that the styles do not serve: one sentence before the run."""
 
+import re
+from contextlib import closing
+
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from faultgouge.pywrap.lammps.decks import DECKS
+from faultgouge.pywrap.lammps.instance import lammps_instance
 
 FRICTIONLESS = "variable mu index 0.0\n"
 MODEL = f"variable decks index {DECKS}\ninclude {DECKS}/system.in\ntimestep 1e-3\n"
@@ -67,13 +72,15 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-@pytest.mark.slow
-def test_it_is_refused_in_a_sentence(lmp, tmp_path, case):
+def test_it_is_refused_in_a_sentence(tmp_path, monkeypatch, case):
+    """In this process, which saves the start of another one."""
     script, says = REFUSED[case]
     text = (DECKS / "system.in").read_text().replace("atom_style      sphere", "atom_style sphere 1")
     (tmp_path / "growing.in").write_text(text)
-    done = lmp(script.replace(f"{DECKS}/growing.in", "growing.in"), fails=True)
-    assert says in " ".join((done.stdout + done.stderr).split())
+    monkeypatch.chdir(tmp_path)
+    refused = pytest.raises(Exception, match=re.escape(says))
+    with closing(lammps_instance(MPI.COMM_SELF, None)) as instance, refused:
+        instance.commands_string(script.replace(f"{DECKS}/growing.in", "growing.in"))
 
 
 SERVED = {

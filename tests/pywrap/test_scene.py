@@ -12,8 +12,7 @@ from reference_layer import REFERENCE
 from faultgouge import registered
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.scenes.command_sections import COMMANDS, command_of
-from faultgouge.pywrap.scenes.impossible import refuse_endless
-from faultgouge.pywrap.scenes.scene import Scene, SceneError
+from faultgouge.pywrap.scenes.scene import Scene, SceneError, refuse_endless
 
 SHIPPED = str(DECKS / "packing100.data")
 
@@ -169,7 +168,7 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
         ({"law.kt": -1.0}, "law.kt = -1.0 is refused: give a number of at least 0."),
         ({"law.mu": [1.0, math.nan]}, "law.mu = [1.0, nan] is refused"),
         ({"law.mu": 10**400}, "is refused: give a number of at least 0, or a list"),
-        ({"law.mu": [1.0, 1]}, "law.mu = [1.0, 1] names one value twice: give each once."),
+        ({"law.mu": [1.0, 1]}, "law.mu = [1, 1] names one value twice: give each once."),
         # what no packing bears
         ({"law.kn": 5e-324}, "law.kn = 5e-324 is refused: give a number between 1e-100 and 1e+100"),
         ({"law.kt": 1e-320}, "law.kt"),

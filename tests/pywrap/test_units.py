@@ -9,9 +9,9 @@ from faultgouge import load
 from faultgouge.analysis import MindlinLaw
 from faultgouge.analysis.files.formats import write_packing
 from faultgouge.pywrap import Scene
-from faultgouge.pywrap.scenes.quantities import DIMENSIONS
+from faultgouge.pywrap.scenes.command_sections import study_models
+from faultgouge.pywrap.scenes.quantities import dimensions_of
 from faultgouge.pywrap.scenes.scene import SECTIONS
-from faultgouge.pywrap.scenes.study_sections import study_models
 from faultgouge.pywrap.scenes.units import dashpot, quality_factor, real_units, restitution
 
 QUARTZ = {
@@ -164,16 +164,17 @@ def test_a_drive_may_have_units():
 
 
 def test_every_number_of_a_scene_has_its_dimension_or_none():
-    """A key that is added to a section is added to `DIMENSIONS`, too, or here."""
+    """A number of a section says its dimension in its annotation, or has none and stands here."""
     plain = {"disks", "top", "seed", "frame", "mu", "exponent", "inertia_factor", "target", "scale", "stretch"}
     plain |= {"B", "w", "mu_ss", "distance", "runs", "fx_over_fy", "slips"}
-    for section, models in (SECTIONS | study_models()).items():
-        if section in ("units", "output"):
-            continue
-        for name, field in ((name, field) for model in models for name, field in model.model_fields.items()):
-            if any(kind in str(field.annotation) for kind in ("float", "int")):
-                own = any(isinstance(each, tuple) for each in field.metadata)  # of a study's section
-                assert own or name in DIMENSIONS.get(section, ()) or name in plain, f"{section}.{name}"
+    models = {name: each for name, each in (SECTIONS | study_models()).items() if name not in ("units", "output")}
+    fields = [(name, *field) for name, each in models.items() for model in each for field in model.model_fields.items()]
+    numbers = {
+        (name, key) for name, key, field in fields if any(one in str(field.annotation) for one in ("float", "int"))
+    }
+    known = dimensions_of(models)
+    assert {f"{name}.{key}" for name, key in numbers if key not in plain and key not in known[name]} == set()
+    assert {"fy", "kn"} == known["packing.settle_at"].keys()
 
 
 def test_the_mass_of_a_grain_is_that_of_the_scene():

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from faultgouge.analysis import FLOOR, Contacts, MindlinLaw, Packing, RunFile, stability, stiffness_matrix
+from faultgouge.analysis import FLOOR, Contacts, MindlinLaw, Packing, RunFile, stability
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 from faultgouge.analysis.motion.motion import Motion
-from faultgouge.pywrap import Equilibrium, Scene, SceneError
+from faultgouge.pywrap import Equilibrium, Scene
 from faultgouge.pywrap.runs.drive import SERIES, DriveRecord, settle_for_drive
-from faultgouge.studies.cycle import CYCLE_COLUMNS, cycle, cycle_state, null_vector, with_spring
+from faultgouge.studies.cycle import CYCLE_COLUMNS, cycle, cycle_state, with_spring
 
 SPRING = 10.0
 
@@ -34,13 +34,6 @@ def make_run(path, **drive):
             pass
         record.finish()
     return path
-
-
-@pytest.mark.filterwarnings("error")
-def test_matrix_without_rounding_has_a_null_vector():
-    vector = null_vector(np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 3.0]], complex))
-    assert np.allclose(np.abs(vector), [np.sqrt(0.5), np.sqrt(0.5), 0], atol=1e-12)
-    assert abs(vector[0] + vector[1]) < 1e-12
 
 
 @pytest.fixture(scope="module")
@@ -83,16 +76,6 @@ def test_the_layer_moves_as_the_spring_in_the_stiffness_says(tmp_path):
     assert np.abs(moved - linear).max() < 0.01 * size
     alone = linear_displacement(start, 0.0, spring * velocity, even)
     assert np.abs(moved - alone).max() > 0.1 * size
-
-
-def test_the_spring_resists_the_mean_displacement_of_the_layer_alone(slow):
-    with RunFile(slow) as file:
-        packing = file.packing(0)
-    added = stiffness_matrix(with_spring(packing, SPRING)) - stiffness_matrix(with_spring(packing, 0.0))
-    q = np.random.default_rng(0).standard_normal(packing.coordinates)
-    expected = np.zeros_like(q)
-    expected[: len(packing)] = SPRING * q[: len(packing)][packing.top].mean() * packing.top
-    np.testing.assert_allclose(added @ q, expected, atol=1e-9)
 
 
 def test_a_stored_configuration_keeps_its_spring(slow, tmp_path):
@@ -157,16 +140,6 @@ def test_motions_of_many_lone_disks_do_not_hide_a_motion_of_two():
     alone, beside = (cycle_state(two_and(lone), SPRING) for lone in (0, 25))
     assert alone["damped_sticking"] < 0
     assert beside["damped_sticking"] == pytest.approx(alone["damped_sticking"], rel=1e-6)
-
-
-def test_a_drive_without_a_spring_and_other_files_are_refused(tmp_path, faultgouge_here):
-    make_run(tmp_path / "rigid.h5", spring="rigid", velocity=1e-3, until=0.2, states=0.1)
-    with pytest.raises(SceneError, match="rigid drive"):
-        cycle(tmp_path / "rigid.h5", tmp_path)
-    (tmp_path / "scene.toml").write_text("[packing]\nseed = 1\n[law]\nkn = 2e5\nmu = 1.0\n[load]\nfy = 3.0\n")
-    faultgouge_here("settle", "scene.toml", "-o", "run.h5")
-    said = faultgouge_here("modes", "run.h5", code=2).stderr
-    assert "run.h5 is not a file of `faultgouge drive`" in said
 
 
 def test_modes_and_spectrum_of_a_drive_have_the_spring(slow, tmp_path, faultgouge_here):

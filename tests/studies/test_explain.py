@@ -9,9 +9,8 @@ import pytest
 from mpi4py import MPI
 from reference_layer import SMALL
 
-from faultgouge.assessment.explain import UndampedRun, affordable, explain, features, run_of, units_in_words
+from faultgouge.assessment.explain import UndampedRun, affordable, explain, features, run_of
 from faultgouge.pywrap import Scene, settle
-from faultgouge.pywrap.scenes.units import real_units
 
 SCENES = files("faultgouge") / "scenes"
 
@@ -121,21 +120,3 @@ def test_a_driven_scene_has_its_spring(tmp_path):
     assert {each.name: each for each in features(replace(own, motion={}), tmp_path)}[
         "spring"
     ].reason == "no section [drive]"
-
-
-def test_open_scene_has_no_period(run, tmp_path):
-    side = {feature.name: feature for feature in features(run, tmp_path)}["periodicity"]
-    again = {feature.name: feature for feature in features(side.without, tmp_path)}["periodicity"]
-    assert side.reason == "x has the period 11.9"
-    assert again.reason == "the sides are open"
-    assert again.without.packing.box_length is None
-
-
-def test_what_real_units_make_of_a_scene_is_told():
-    scene = Scene.from_toml(SCENES / "quartz.toml", command="settle")
-    units = {"kn": scene.law.kn, "fy": scene.load.fy} | real_units(scene).as_dict()
-    said = units_in_words(units)
-    assert said.startswith(
-        "law.kn = 200000 (Hertz's contact of the grains) and load.fy = 74.7 (1e+07 Pa on the layer);"
-    )
-    assert "one unit of the scene is 0.0001 m, 1.388e-09 kg, 9.331e-06 s and 0.001594 N" in said

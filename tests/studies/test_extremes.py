@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from functools import partial
 
 import pytest
 
@@ -66,14 +65,6 @@ def test_failures_are_told_and_the_others_go_on(tmp_path, monkeypatch):
     assert "extremes.png was not drawn (RuntimeError: no font at all)" in told[-1]
     with pytest.raises(ExtremeCasesError, match=r"6 of 9 cases failed: too large; no number; crash"):
         check(result)
-
-
-def test_the_command_counts_what_holds_was_refused_and_failed(faultgouge_here, monkeypatch):
-    cases = [case for case in TROUBLE if case.name != "traceback"]  # no command may print that word
-    monkeypatch.setattr("faultgouge.assessment.extremes.extremes", partial(extremes, cases=cases))
-    done = faultgouge_here("extremes", code=1)
-    assert "8 cases: 2 hold, 1 are refused in a sentence, 5 fail; written: extremes/extremes.md" in done.stdout
-    assert "5 of 8 cases failed" in done.stderr
 
 
 def test_results_are_written_as_they_come(tmp_path):

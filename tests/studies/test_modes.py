@@ -87,16 +87,6 @@ def test_the_command_leaves_rows_pictures_and_a_film(faultgouge, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_command_says_where_a_branch_ends_and_draws_a_packing_that_stays_stable(faultgouge_here, tmp_path):
-    small = {"packing": {"disks": 12, "width": 4.1, "seed": 3}, "modes": {"fx_over_fy": [0.03, 5.0]}}
-    (tmp_path / "scene.toml").write_text(toml(SCENE | small | {"ramp": {"step": 0.09, "until": 20.0}}))
-    done = faultgouge_here("modes", "scene.toml", "-o", "out", "--workers", "1")
-    assert "branch ends before the last load, so that loads are left out: 1; the first of them goes to" in done.stdout
-    assert "was not drawn" not in done.stderr
-    assert (tmp_path / "out/modes.png").stat().st_size > 5_000
-
-
-@pytest.mark.slow
 def test_loads_beyond_the_last_equilibrium_are_left_out():
     scene = Scene.from_mapping(SCENE | {"modes": {"fx_over_fy": [0.2, 5.0]}, "ramp": {"step": 0.03, "until": 20.0}})
     found = modes.row(scene, lambda mu: settle(scene, mu))

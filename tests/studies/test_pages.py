@@ -1,7 +1,6 @@
 """What studies leave: pages that fit a screen and say what tables say; a picture that cannot be drawn costs no page."""
 
 import json
-import re
 from dataclasses import replace
 
 import pytest
@@ -9,13 +8,10 @@ from reference_layer import SMALL
 from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import RunFile
-from faultgouge.figures.pages import PROSE_WIDTH, fill_paragraphs
-from faultgouge.figures.style import report_failure
 from faultgouge.pywrap import Scene
 from faultgouge.studies.reproduce.compute import growth_run, recorded_ramp, summary_of
 from faultgouge.studies.reproduce.page import report
 from faultgouge.studies.sweep.draw import draw_sweep
-from research.packing_tools import distance_of_bearing_disks
 
 
 @pytest.fixture
@@ -31,9 +27,6 @@ def messages():
     return []
 
 
-PROSE = "The exponent is 0.5 - 0.001 + 0.002 > 0, as in 1. and in # 2, over all of the many loads that are there. " * 3
-
-
 @pytest.mark.long
 def test_the_page_of_the_protocol_counts_no_windows_that_were_not_counted(tmp_path):
     """As of a packing of more than 300 disks, of which the first window alone is sought."""
@@ -46,27 +39,6 @@ def test_the_page_of_the_protocol_counts_no_windows_that_were_not_counted(tmp_pa
         (row,) = (line for line in page.splitlines() if line.startswith("| 1 |"))
         assert cell in row
         assert summary_of(scene, [each], growth)["ramps"][0]["onset"]["complete"] is each.complete
-
-
-def test_prose_and_items_are_folded_where_no_line_begins_a_list():
-    lines = fill_paragraphs(PROSE).split("\n")
-    assert max(map(len, lines)) <= PROSE_WIDTH
-    assert not [line for line in lines if re.match(r"([-+>#]|\d+\.) ", line)]
-    assert " ".join(lines).split() == PROSE.split()
-    first, *more = fill_paragraphs("- " + PROSE).split("\n")
-    assert first.startswith("- ")
-    assert all(re.match(r"  \S", line) for line in more)
-
-
-def test_tables_pictures_code_and_formulas_stay():
-    page = "\n".join(["| " + PROSE, "![" + PROSE + "](a.png)", "```", PROSE, "```", "$$", PROSE, "$$", "    " + PROSE])
-    assert fill_paragraphs(page) == page
-
-
-def test_an_interrupt_is_no_failed_picture(messages):
-    with pytest.raises(KeyboardInterrupt), report_failure("x.png", messages.append):
-        raise KeyboardInterrupt
-    assert messages == []
 
 
 def test_a_spectrum_keeps_its_eigenvalues_and_draw_its_words(
@@ -90,10 +62,3 @@ def test_a_sweep_keeps_its_rows(tmp_path, no_pictures, messages):
     row = {"values": {"packing.seed": 1}, "result": {"ramps": [{"mu": 1.0, "reach": 0.01, "ends": "onset"}]}}
     assert draw_sweep([row], tmp_path, messages.append) == ""
     assert "results.png was not drawn (RuntimeError" in messages[0]
-
-
-def test_disks_that_carry_nothing_have_no_part_in_d(reference_packing):
-    packing = reference_packing(1.0)
-    position = packing.position + 1e-3
-    position[packing.rattlers] += 1.0
-    assert distance_of_bearing_disks(packing, replace(packing, position=position)) == pytest.approx(2e-6, rel=1e-9)

@@ -85,12 +85,38 @@ def change(folder, says=None, result=None):
     return first["key"]
 
 
-def test_a_row_is_known_by_what_the_task_imports_of_its_own(folder):
-    before = keys(sweep_of(folder, "imports"))
-    for text, same in (("number = 1  # of another", True), ("number = 2", False)):
-        (folder / "tools" / "deeper.py").write_text(text)
+@pytest.mark.parametrize(
+    ("name", "text", "same"),
+    [
+        ("tools/deeper.py", "number = 1  # of another", True),
+        ("tools/deeper.py", "number = 2", False),
+        ("packing.json", "{ ", False),
+        ("signal.txt", "0 0\n0.5 2e-3\n1 0\n", False),
+        ("pyproject.toml", "version", False),
+    ],
+)
+def test_a_row_is_known_by_all_that_its_number_depends_on(folder, monkeypatch, name, text, same):
+    """Modules that the task imports of its own but for their comments, files of the scene by their content, version."""
+    (folder / "packing.json").write_text(REFERENCE.read_text())
+    (folder / "signal.txt").write_text("0 0\n0.5 1e-3\n1 0\n")
+    scene = {"packing": {"file": "packing.json"}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": SMALL["ramp"]}
+    scene |= {"perturb": {"fx": 0.0, "time": 1.0, "signal": "signal.txt"}, "friction": {"v0": 1e-6, "v_ss": "10 v0"}}
+
+    def known():
         user_function.cache_clear()
-        assert (keys(sweep_of(folder, "imports")) == before) is same
+        return keys(sweep_of(folder, "imports")) + keys(
+            Sweep.from_mapping({"task": "triggering", "scene": scene}, folder)
+        )
+
+    before = known()
+    assert known() == before
+    if name == "pyproject.toml":
+        monkeypatch.setattr(sweep_plan, "version", lambda _: "0.9")
+    elif name == "packing.json":
+        (folder / name).write_text(REFERENCE.read_text().replace("{", text, 1))
+    else:
+        (folder / name).write_text(text)
+    assert (known() == before) is same
 
 
 def test_a_row_of_a_function_of_a_package_is_known_by_the_modules_of_the_package(tmp_path, monkeypatch):
@@ -108,39 +134,6 @@ def test_a_row_of_a_function_of_a_package_is_known_by_the_modules_of_the_package
         user_function.cache_clear()
         found += keys(Sweep.from_mapping({"task": "grains_of_mine.tasks:task", "scene": SMALL}))
     assert found[0] == found[1] != found[2]
-
-
-def test_a_row_is_known_by_the_version_of_the_program(folder, monkeypatch):
-    before = keys(sweep_of(folder, "ends"))
-    monkeypatch.setattr(sweep_plan, "version", lambda _: "0.9")
-    assert not set(before) & set(keys(sweep_of(folder, "ends")))
-
-
-def test_a_row_is_known_by_the_content_of_the_files_of_its_scene(tmp_path):
-    """And not by their names: the same packing elsewhere has the same rows."""
-    found = []
-    for name in ("one.json", "same.json", "other.json"):
-        text = REFERENCE.read_text()
-        (tmp_path / name).write_text(text.replace("{", "{ ", 1) if name == "other.json" else text)
-        scene = {"packing": {"file": name}, "law": {"kn": 2e5}, "load": {"fy": 3.0}, "ramp": SMALL["ramp"]}
-        found += keys(Sweep.from_mapping({"task": "onset", "scene": scene}, tmp_path))
-    assert found[0] == found[1] != found[2]
-
-
-def test_a_signal_is_found_beside_the_sweep_and_counts_by_its_content(tmp_path):
-    found = []
-    for value in (1e-3, 2e-3):
-        (tmp_path / "signal.txt").write_text(f"0 0\n0.5 {value}\n1 0\n")
-        scene = SMALL | {
-            "perturb": {"fx": 0.0, "time": 1.0, "signal": "signal.txt"},
-            "friction": {"v0": 1e-6, "v_ss": "10 v0"},
-        }
-        found += keys(Sweep.from_mapping({"task": "triggering", "scene": scene}, tmp_path))
-        drive = {"spring": 3.0, "velocity": 1e-3, "until": 5.0, "signal": "signal.txt", "at": 1.0}
-        asked = {"task": "ask.py:ask", "scene": SMALL | {"drive": drive}}
-        (tmp_path / "ask.py").write_text("def ask(scene):\n    return {}\n")
-        found += keys(Sweep.from_mapping(asked, tmp_path))
-    assert len(set(found)) == 4
 
 
 def test_failures_are_tried_again_but_for_scenes_without_equilibrium(folder):

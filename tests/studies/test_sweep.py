@@ -7,7 +7,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import threading
 import time
 from itertools import product
@@ -15,18 +14,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reference_layer import BIN, REFERENCE, SMALL, on_ranks, toml
+from reference_layer import BIN, SMALL, on_ranks, toml
 
-from faultgouge.pywrap import Scene, SceneError, settle
+from faultgouge.pywrap import Equilibrium, Scene, SceneError, settle
 from faultgouge.pywrap.onset import onset_run
+from faultgouge.pywrap.runs.drive import DriveRecord, settle_for_drive
+from faultgouge.studies.cycle import cycle
 from faultgouge.studies.executors import Processes, open_executor
 from faultgouge.studies.statistics import median_interval
 from faultgouge.studies.sweep import workers
 from faultgouge.studies.sweep.draw import draw_sweep, onsets_figure, reach_of
-from faultgouge.studies.sweep.run_sweep import merge, read_results, remaining_work, run_sweep
+from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.user_function import user_function
 from faultgouge.studies.sweep.workers import WorkerError, compute_points
+from faultgouge.studies.trigger import trigger
 
 AXES = {"packing.seed": "1:4", "law.mu": [1.0, 0.5, -1.0]}
 TOML = 'task = "onset"\n' + toml({"sweep": {json.dumps(key): values for key, values in AXES.items()}})
@@ -73,13 +75,6 @@ def test_what_settles_alike(axes, changes, shared):
     assert (first.settling_key == second.settling_key) is shared
 
 
-def test_a_stored_packing_is_found_from_another_folder(tmp_path):
-    (tmp_path / "packing.json").write_bytes(REFERENCE.read_bytes())
-    mapping = {"task": "onset", "sweep": {"law.mu": [1.0]}, "scene": SMALL | {"packing": {"file": "packing.json"}}}
-    sweep = Sweep.from_mapping(mapping, tmp_path)
-    assert sweep.points[0].scene.packing.file == tmp_path / "packing.json"
-
-
 FUNCTIONS = '''
 import numpy as np
 
@@ -97,32 +92,59 @@ def three(scene, settled, more):
 '''
 
 
+BAD_SWEEPS = [
+    ('task = "onest"', "give one of"),
+    ('task = "onset"\nseeds = 3', "seeds is no key of a sweep"),
+    ('task = "onset"\n[sweep]\n"packing.seed" = "5:1"', "is no range"),
+    ('task = "onset"\n[sweep]\n"packing.seed" = []', "give a list of values"),
+    ('task = "onset"\n[sweep]\n"packing.seed" = "0:999999"\n"law.mu" = [1.0, 0.5]', "are more than 1000000"),
+    ('task = "onset"\n[sweep]\n"law.kn, law.mu" = [1.0]', "names 2 keys"),
+    ('task = "onset"\n[sweep]\n"law.mo" = [1.0]\n[scene.law]\nkn = 1.0', "law.mo is no key"),
+    ('task = "onset"\nsweep = 3', "is not a section"),
+    ("task = ", "not valid TOML"),
+    ('task = "none.py:contacts"', "there is no file"),
+    ('task = "ask.py:nothing"', "has no function nothing"),
+    ('task = "ask.py:three"', r"takes 3 arguments: a task is three\(scene\)"),
+    ('task = "no.such.module:f"', "cannot be imported"),
+    ('task = "broken.py:f"', "cannot be imported .SyntaxError"),
+    ('task = "ends.py:f"', r"cannot be imported .SystemExit: 0"),
+]
+
+
+def refused_sweep(folder, text):
+    for name, code in {"ask.py": FUNCTIONS, "broken.py": "def", "ends.py": "raise SystemExit(0)"}.items():
+        (folder / name).write_text(code)
+    (folder / "sweep.toml").write_text(text)
+    Sweep.from_toml(folder / "sweep.toml")
+
+
+def refused_trigger(folder, friction):
+    trigger(Scene.from_mapping(SMALL | friction), folder / "out")
+
+
+def refused_cycle(folder, _):
+    drive = {"spring": "rigid", "velocity": 1e-3, "until": 0.2, "states": 0.1}
+    scene = Scene.from_mapping(SMALL | {"damping": {"cn": 60.0, "ct": 17.0}, "drive": drive})
+    with DriveRecord(folder / "rigid.h5", scene) as record:
+        record.append(Equilibrium.of(settle_for_drive(scene)))
+        list(record.drive())
+        record.finish()
+    cycle(folder / "rigid.h5", folder / "out")
+
+
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("study", "given", "says"),
     [
-        ('task = "onest"', "give one of"),
-        ('task = "onset"\nseeds = 3', "seeds is no key of a sweep"),
-        ('task = "onset"\n[sweep]\n"packing.seed" = "5:1"', "is no range"),
-        ('task = "onset"\n[sweep]\n"packing.seed" = []', "give a list of values"),
-        ('task = "onset"\n[sweep]\n"packing.seed" = "0:999999"\n"law.mu" = [1.0, 0.5]', "are more than 1000000"),
-        ('task = "onset"\n[sweep]\n"law.kn, law.mu" = [1.0]', "names 2 keys"),
-        ('task = "onset"\n[sweep]\n"law.mo" = [1.0]\n[scene.law]\nkn = 1.0', "law.mo is no key"),
-        ('task = "onset"\nsweep = 3', "is not a section"),
-        ("task = ", "not valid TOML"),
-        ('task = "none.py:contacts"', "there is no file"),
-        ('task = "ask.py:nothing"', "has no function nothing"),
-        ('task = "ask.py:three"', r"takes 3 arguments: a task is three\(scene\)"),
-        ('task = "no.such.module:f"', "cannot be imported"),
-        ('task = "broken.py:f"', "cannot be imported .SyntaxError"),
-        ('task = "ends.py:f"', r"cannot be imported .SystemExit: 0"),
+        *((refused_sweep, text, says) for text, says in BAD_SWEEPS),
+        (refused_trigger, {}, r"no section \[friction\]"),
+        (refused_trigger, {"friction": {"v_ss": 1e-6}}, "rounding noise: give a velocity above 0"),
+        (refused_cycle, None, "rigid drive"),
     ],
 )
-def test_bad_sweeps_are_refused_in_a_sentence_before_work(tmp_path, text, says):
-    for name, code in {"ask.py": FUNCTIONS, "broken.py": "def", "ends.py": "raise SystemExit(0)"}.items():
-        (tmp_path / name).write_text(code)
-    (tmp_path / "sweep.toml").write_text(text)
+def test_bad_input_is_refused_in_a_sentence_before_work(tmp_path, study, given, says):
     with pytest.raises(SceneError, match=says):
-        Sweep.from_toml(tmp_path / "sweep.toml")
+        study(tmp_path, given)
+    assert not (tmp_path / "out").exists()
 
 
 def function_sweep(folder, function, axes=None):
@@ -155,14 +177,6 @@ def test_rows_of_a_function_are_known_by_its_code_and_shards_merge_without_it(tm
     assert not set(before) & {point.key for point in function_sweep(tmp_path, "contacts").points}
     file.unlink()
     assert [row["key"] for row in merge(parts, tmp_path / "whole", id)[1]] == before
-
-
-def test_known_rows_tell_how_long_a_scene_takes(tmp_path):
-    (tmp_path / "ask.py").write_text(FUNCTIONS)
-    sweep = function_sweep(tmp_path, "contacts")
-    assert "is not known before the first" in remaining_work(sweep.points)[-1]
-    known = [{"says": None, "cpu_seconds": seconds} for seconds in (1.0, 30.0, 90.0)]
-    assert remaining_work(sweep.points, known)[-1].startswith("about 60 s of one core")
 
 
 @pytest.mark.slow
@@ -214,13 +228,6 @@ def test_failures_are_rows_and_merge_refuses_what_does_not_belong_together(tmp_p
     assert [row["says"] for row in table(tmp_path / "c")] == [failed["says"]]
 
 
-def test_the_picture_counts_the_scenes_without_an_onset():
-    rows = [{"values": {"law.mu": mu}, "result": {"fx_c": mu / 50, "ends": "onset"}} for mu in (0.5, 1.0)]
-    rows.append({"values": {"law.mu": 0.2}, "result": {"reach": 0.03, "ends": "until"}})
-    share = onsets_figure([(row, reach_of(row)) for row in rows]).axes[0]
-    assert share.get_title() == "3 scenes: 2 with an onset, 1 without"
-
-
 def drawn(keys, scenes=20, end=0.03):
     """The picture of samples of random onsets, and the random onsets by sample."""
     random, rows, known = np.random.default_rng(1), [], {}
@@ -252,25 +259,6 @@ def test_the_picture_has_a_curve_and_a_median_with_its_interval_for_each_value()
         middle, low, high = median_interval(np.minimum(onsets, 0.03), onsets < 0.03)
         assert diamond.get_ydata()[0] == middle
         assert list(bar.get_ydata()) == [low, 0.03 if high is None else high]
-
-
-def test_in_the_picture_samples_of_one_value_stand_side_by_side():
-    figure, known = drawn({"law.mu": [0.5, 1.0], "units.overburden": ["1 MPa", "10 MPa"]})
-    share, mu, load = figure.axes
-    assert len(share.lines) == len(known) == 4
-    for axes in (mu, load):
-        places = [line.get_xdata()[0] for line in axes.lines if line.get_marker() == "D"]
-        assert len(set(places)) == 4
-    assert [text.get_text() for text in load.get_xticklabels()] == ["1 MPa", "10 MPa"]
-
-
-def test_of_many_samples_the_colour_is_one_key_and_of_few_scenes_there_is_no_median():
-    figure, _ = drawn({"law.mu": [0.2, 0.4, 0.6, 0.8, 1.0], "load.fy": [3.0, 300.0]}, scenes=5)
-    share, _, load = figure.axes
-    assert share.get_legend().get_texts()[0].get_text() == "law.mu = 0.2"
-    assert [line.get_color() for line in share.lines] == [f"C{number}" for number in (0, 0, 1, 1, 2, 2, 3, 3, 4, 4)]
-    assert load.get_xscale() == "log"
-    assert not [line for line in load.lines if line.get_marker() == "D"]
 
 
 @pytest.mark.slow
@@ -381,27 +369,6 @@ def test_a_point_that_kills_every_worker_is_not_tried_for_ever(sweep):
     with pytest.raises(WorkerError, match="fewer --workers"):
         list(compute_points(pool, sweep.task, sweep.points))
     pool.shutdown()
-
-
-WITHOUT_GUARD = """
-from pathlib import Path
-from faultgouge.studies.sweep.run_sweep import run_sweep
-from faultgouge.studies.sweep.sweep_plan import Sweep
-
-run_sweep(Sweep.from_toml("sweep.toml"), Path("out"), workers=2)
-"""
-
-
-@pytest.mark.long
-def test_a_script_without_its_guard_is_told_of_it_once(tmp_path):
-    """And not of memory, after four rounds of workers that end as they start."""
-    (tmp_path / "sweep.toml").write_text(TOML)
-    (tmp_path / "script.py").write_text(WITHOUT_GUARD)
-    command = [sys.executable, "script.py"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300)
-    says = [line for line in done.stderr.splitlines() if "WorkerError: " in line]
-    assert len(says) == 1
-    assert says[0].endswith('below the line `if __name__ == "__main__":`')
 
 
 SEEDS = """

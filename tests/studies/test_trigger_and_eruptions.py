@@ -10,7 +10,6 @@ import pytest
 from reference_layer import REFERENCE, SMALL, toml
 
 from faultgouge.analysis.files.atomic_write import FORMAT, FORMAT_KEY
-from faultgouge.figures.pages import render
 from faultgouge.pywrap import Scene, SceneError, perturb, reach, settle
 from faultgouge.studies.eruptions import StartOfRun as RunStart
 from faultgouge.studies.eruptions import erupt, eruptions
@@ -62,20 +61,6 @@ def test_distances_count_from_the_onset_with_dissipation(tmp_path):
     assert "without them it is F_x^c = 0.02183305" in (tmp_path / "out/trigger.md").read_text()
 
 
-@pytest.mark.parametrize(
-    ("more", "says"),
-    [
-        ({}, r"no section \[friction\]"),
-        ({"friction": {"v_ss": 1e-6}}, "rounding noise: give a velocity above 0"),
-    ],
-)
-def test_trigger_needs_a_threshold(tmp_path, more, says):
-    scene = Scene.from_mapping(BASE | more)
-    with pytest.raises(SceneError, match=says):
-        trigger(scene, tmp_path)
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.slow
 def test_a_threshold_below_rounding_noise_gives_no_amplitude():
     """Bisected down to the noise, it was given as the wave that triggers: 3.6e-19 where linear theory had 2.3e-15."""
@@ -106,18 +91,6 @@ def test_a_stable_packing_is_watched_for_a_time_of_its_own_units(units, monkeypa
         found[friction] = run["ends"], run["time"] / unit
     assert [ends for ends, _ in found.values()] == ["stable", "rises"]
     assert all(50 <= time < 52 for _, time in found.values())  # looked at 400 times in 200
-
-
-def test_the_page_of_eruptions_says_which_sizes_are_noise():
-    run = {"fx": 0.02, "damped": False, "rate": 0.01, "noise": 1e-25, "balance": 0.0, "slip": 0.0, "time": 9.0}
-    run |= {"kinetic_energy": 0.0, "lost": 0, "gained": 0, "sliding": 0, "ended": None}
-    words = {}
-    for name, more in {"noise": {"msd": 1e-24, "ends": "cut off"}, "grown": {"msd": 1e-10, "ends": "law"}}.items():
-        result = {"runs": [run | more], "scene": {"load": {"fy": 3.0}}}
-        page = render("faultgouge.studies", "eruptions.md.j2", units=None, **eruptions.page(result))
-        words[name] = " ".join(page.split())
-    assert "1 did not leave this noise in their time, and their sizes are those of the noise" in words["noise"]
-    assert "All sizes stand above it" in words["grown"]
 
 
 @pytest.mark.long

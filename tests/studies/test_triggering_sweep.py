@@ -7,7 +7,7 @@ import pytest
 from reference_layer import SMALL, toml
 
 from faultgouge.analysis import RunFile
-from faultgouge.pywrap import NoEquilibriumError, Scene, SceneError, settle
+from faultgouge.pywrap import NoEquilibriumError, Scene, settle
 from faultgouge.pywrap.onset import onset_run
 from faultgouge.studies import triggering
 from faultgouge.studies.reproduce import reproduce
@@ -144,21 +144,6 @@ def test_eruptions_are_counted():
     words = "\n".join(in_words(result))
     assert "mu = 1: an onset in 5 of 7 (71 %, 95 % interval 36 to 92 %)" in words
     assert "weakening friction lowers the onset in 5 of 6" in words
-
-
-def test_the_summary_keeps_what_was_found_before_a_failure():
-    broken = row(8, [end("onset", 0.01)], says="no eruption today")
-    result = summary_of_rows([broken, row(9, says="did not settle")])
-    assert (result["onsets"][0]["found"]["count"], result["lowered"]["of"], result["lowered_unknown"]) == (1, 0, 0)
-    assert in_words(summary_of_rows([row(9, says="did not settle")])) == []
-
-
-@pytest.mark.slow
-def test_what_cannot_be_studied_is_refused(tmp_path):
-    # the window is narrow: from 0.01159 to 0.01217
-    coarse = Scene.from_mapping(TRIGGERED | {"ramp": {"step": 1e-2, "until": 0.02}})
-    with pytest.raises(SceneError, match="no load of the ramp lies in a window"):
-        reproduce(coarse, tmp_path / "out", say=id)
 
 
 @pytest.mark.long

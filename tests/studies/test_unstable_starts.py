@@ -64,14 +64,6 @@ def test_all_windows_of_each_friction_coefficient_are_where_its_ramp_has_complex
 
 
 @pytest.mark.long
-def test_perturb_and_trigger(faultgouge_here, refusal, pairs):
-    assert f"the packing is unstable ({pairs[0]} complex pairs" in faultgouge_here("perturb", "scene.toml").stdout
-    done = faultgouge_here("trigger", "scene.toml", code=2)
-    assert BEFORE in done.stderr
-    assert "before any shear is added the packing is unstable already" in done.stderr
-
-
-@pytest.mark.long
 def test_a_sweep_infers_nothing_of_weakening():
     """With mu = 0.4 the sweep finds no equilibrium at the next load, which is no sign of a flow."""
     scene = Scene.from_mapping({name: UNSTABLE[name] for name in ("packing", "law", "load", "ramp")})
@@ -84,13 +76,3 @@ def test_a_sweep_infers_nothing_of_weakening():
 def test_two_unstable_starts_do_not_tell_whether_the_onset_is_lower():
     start, later = {"ends": "onset", "reach": 0.0}, {"ends": "onset", "reach": 0.01}
     assert [sign_test(*each) for each in ((start, start), (later, start), (start, later))] == [None, True, False]
-
-
-@pytest.mark.long
-def test_reproduce(faultgouge_here, tmp_path, pairs):
-    done = faultgouge_here("reproduce", "scene.toml", "-o", "out")
-    assert f"mu = 0.5: {BEFORE}: {pairs[0]} complex pairs" in done.stderr
-    assert "no figures 2, 5 and 6" in done.stderr
-    page = (tmp_path / "out/report.md").read_text()
-    assert "| 0.5 | unstable at 0 |" in page
-    assert f"At F_x = 0 the packing has {pairs[0]} complex pairs" in page

@@ -184,12 +184,12 @@ def movie(
     lock_output(context, output, file)
     if not is_root():
         return
-    from faultgouge.figures.mode_film import ModeFilm
+    from faultgouge.figures.film import film_of_modes
 
     film: Film
     if mode is not None and packing is not None:
         modes, what = modes_of(packing, mode)
-        film = ModeFilm(packing, modes, what, count, periods=periods, dots=dots)
+        film = film_of_modes(packing, modes, what, count, periods=periods, dots=dots)
     else:
         film = _film_of_file(file, count, color.value, span, dots)
     write_film(film, output, rate, lambda frames, total: progress(frames, "frames", total))
@@ -282,8 +282,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
     from faultgouge.analysis import PackingFileError, RunFile
     from faultgouge.analysis.files.configuration_file import holds_configuration
     from faultgouge.figures.drive import course_of
-    from faultgouge.figures.ramp_film import RampFilm
-    from faultgouge.figures.run_film import RunFilm, RunMotion
+    from faultgouge.figures.film import RunMotion, film_of_ramp, film_of_run
 
     if file.suffix == ".disks" or holds_configuration(file):
         raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
@@ -303,13 +302,13 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
             )
         course = course_of(*driven, [times[k] for k in shown], first, last)
     if motion is not None:
-        return RunFilm(motion if span is None else motion.between(*span), count, dots=dots)
+        return film_of_run(motion if span is None else motion.between(*span), count, dots=dots)
     if len(packings) < 2:
         raise PackingFileError(
             f"{file} has one equilibrium and no trajectory: ask for a mode with --mode, or run `faultgouge perturb` "
             "with trajectory = true under [output]"
         )
-    return RampFilm(packings, count, color, dots=dots, course=course, by_way=driven is not None)
+    return film_of_ramp(packings, count, color, dots=dots, course=course, by_way=driven is not None)
 
 
 def modes_of(packing: HasConfiguration, which: str) -> tuple[list[ModeShape], str]:

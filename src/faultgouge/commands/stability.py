@@ -100,7 +100,7 @@ def _of_deck(file: Path, rise: str | None, time: float | None, follow: bool, as_
             _tell(verdict_of(packing, rise, time, follow=lmp if follow else None), as_json)
 
     with status(f"{file}: LAMMPS runs"):
-        packing = run_deck(file, **({"use": use} if follow else {}))
+        packing = run_deck(file, use=use if follow else None)
     if not follow and is_root():
         _tell(verdict_of(packing, rise, time), as_json)
 
@@ -125,6 +125,7 @@ def _extremes(output: Path, quick: bool, as_json: bool) -> None:
 
                 write_whole(output / "stability.json", (output / "extremes.json").read_bytes())
     if as_json:
-        print_json(answer.result)
+        print_json(answer.result or {})
     (say if as_json else print_line)(answer.written)
-    answer.fails()
+    if answer.fails:
+        answer.fails()

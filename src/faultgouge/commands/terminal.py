@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from faultgouge.analysis.responses.growth_of_run import GrowthOfRun
     from faultgouge.analysis.responses.slips import Slip
     from faultgouge.pywrap import Equilibrium, Record, Scene
-    from faultgouge.pywrap.scenes.impossible import Task
+    from faultgouge.pywrap.scenes.scene import Task
 
 T = TypeVar("T")
 P = ParamSpec("P")
@@ -169,8 +169,7 @@ def command(
 def read_scene(path: Path, command: str, task: Task | None = None) -> Scene:
     """The part of a scene file that a command reads; a task that would never end is refused."""
     from faultgouge.analysis.files.formats import READERS
-    from faultgouge.pywrap.scenes.impossible import refuse_endless
-    from faultgouge.pywrap.scenes.scene import Scene
+    from faultgouge.pywrap.scenes.scene import Scene, refuse_endless
 
     if path.suffix == ".h5":
         raise typer.BadParameter(f"{path} is a stored run, and {command} reads a scene: give its .toml file")
