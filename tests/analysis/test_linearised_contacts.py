@@ -19,6 +19,7 @@ from faultgouge.analysis import (
     linear_response,
     normal_modes,
     solid_fraction,
+    spectrum,
     stable_timestep,
     stiffness_matrix,
     transient_gain,
@@ -403,3 +404,15 @@ def test_k_and_c_are_sums_over_contacts(d):
         each = [operator(derive_frozen(bed, contacts=twice.chosen([k]))).toarray() for k in range(len(twice))]
         # roundings of a dozen terms
         np.testing.assert_allclose(matrix.toarray(), np.sum(each, axis=0), rtol=0, atol=1e-14 * np.abs(each).max())
+
+
+def test_spin_about_the_only_contact_costs_nothing():
+    bed = make(3, walls=False, slides=False)
+    pair = bed.contacts.chosen(np.arange(1))
+    values = {name: getattr(bed, name) for name in bed.__dataclass_fields__} | {"contacts": pair}
+    two = Configuration(**values)
+    assert list(two.rattlers) == [2, 3, 4, 5]
+    found = spectrum(two)
+    # three translations and three twists or common turns, and the soft ones of a force that is not in balance
+    assert np.sum(np.abs(found.eigenvalues) < 1e-12 * np.abs(found.eigenvalues).max()) >= 6
+    assert len(found.pairs) == 0

@@ -10,7 +10,7 @@ import pytest
 from reference_layer import REFERENCE
 
 from faultgouge.analysis import RunFile, read_dump
-from faultgouge.pywrap import Equilibrium, Scene, SceneError
+from faultgouge.pywrap import EngineError, Equilibrium, Scene, SceneError, drive
 from faultgouge.pywrap.lammps.data_file import data_file
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.runs.drive import (
@@ -391,3 +391,17 @@ def test_error_of_a_clock_advance_is_that_of_one_more_draw():
     assert np.mean(covered) == pytest.approx(CONFIDENCE, abs=0.015)  # four standard errors
     assert advance_error([0.0, 0.0, 0.0], 0.1) == 0.1
     assert advance_error([0.0, None, 0.0], 0.1) is None
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"spring": "rigid", "velocity": 300.0},
+        {"spring": 10.0, "velocity": 1e-3, "signal": "pulse", "at": 0.1, "omega": 100.0, "scale": 1e6},
+    ],
+)
+def test_disks_that_move_through_one_another_end_the_run_with_what_to_change(scene, settings):
+    wanted = scene(**settings, until=1.0)
+    start = settle_for_drive(wanted)
+    with pytest.raises(EngineError, match=r"ended before t = 0\.\d+: take a slower drive, .* as LAMMPS stopped: "):
+        list(drive(wanted, start))

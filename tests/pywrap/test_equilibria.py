@@ -145,3 +145,8 @@ def test_histories_climb_with_newtons_method(history, precision):
     apart, different = (np.abs(force - forces[0]).max() / scale for force in forces[1:])
     assert apart < 0.1 * different
     assert different > 1e-3
+
+
+def test_harmonic_disks_settle_and_climb():
+    scene = Scene.from_mapping(SETTLED | {"law": {"kn": 3e3, "exponent": 1}})
+    assert all(each.packing.law.exponent == 1 and each.residual < 1e-10 for each in ramp(scene))

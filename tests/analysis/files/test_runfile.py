@@ -253,3 +253,11 @@ def test_what_is_not_in_the_file_or_not_for_this_machine_is_refused(sound, add, 
         add(run._file)
     with pytest.raises(PackingFileError, match=says):
         RunFile(sound)
+
+
+@HERTZ
+def test_a_file_without_a_checksum_is_refused(sound):
+    sound.write_bytes(sound.read_bytes()[512:])
+    for mode in ("r", "a"):
+        with pytest.raises(PackingFileError, match=r"run\.h5 is an HDF5 file, and no run of faultgouge"):
+            RunFile(sound, mode)
