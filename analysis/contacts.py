@@ -128,6 +128,9 @@ class LinearisedContacts:
         _check_contacts(values)
         set_frozen(self, **{name: values[name] for name in PER_CONTACT})
 
+    def __repr__(self) -> str:
+        return f"<LinearisedContacts: {len(self)}, {int(self.wall.sum())} of them with walls>"
+
     def __len__(self) -> int:
         return len(self.i)
 

@@ -72,7 +72,7 @@ def main() -> None:
     print(f"{'copies':>10s}{'coordinates':>13s}{'of fifty':>12s}{'of all':>12s}{'undamped':>12s}")
     copies = "{} x {}".format(*options.copies)
     size = cell.coordinates * damped.size
-    print(f"{copies:>10s}{size:13d}{damped[0, 0]:12.5f}{damped.max():12.5f}{undamped.max():12.5f}", flush=True)
+    print(f"{copies:>10s}{size:13d}{damped[0, 0]:12.7f}{damped.max():12.7f}{undamped.max():12.7f}", flush=True)
     if options.verdict:
         begin, motion = time.process_time(), Motion.of(tiled(cell, *options.copies), sliding=False)
         with show_progress(lambda says: print(says, file=sys.stderr, flush=True)):

@@ -97,7 +97,7 @@ def with_spring(packing: HasConfiguration, spring: float) -> Configuration:
     return derive_frozen(packing.configuration, spring=spring)
 
 
-def cycle_state(packing: Packing, spring: float) -> dict[str, Any]:
+def cycle_state(packing: Packing, spring: float, lone: float = LONE_PARTICIPATION) -> dict[str, Any]:
     """Numbers of one state of a driven run.
 
     Parameters
@@ -106,6 +106,8 @@ def cycle_state(packing: Packing, spring: float) -> dict[str, Any]:
         The state.
     spring : float
         Stiffness of the spring, force / length on each disk of the layer.
+    lone : float
+        Disks that take part in a motion, below which the motion is that of one disk.
 
     Returns
     -------
@@ -115,9 +117,9 @@ def cycle_state(packing: Packing, spring: float) -> dict[str, Any]:
         derivative at the bound, and the two are the same.
     """
     configuration = with_spring(packing, spring)
-    sticking = linear_state(configuration, sliding=False)
+    sticking = linear_state(configuration, False, lone)
     both = configuration.contacts.one_sided.any()
-    sliding = linear_state(configuration, sliding=True) if both else sticking
+    sliding = linear_state(configuration, True, lone) if both else sticking
     return {
         "rests": bool(in_balance(configuration)),
         "residual": float(configuration.residual / configuration.normal_force.max(initial=np.finfo(float).tiny)),
@@ -127,7 +129,7 @@ def cycle_state(packing: Packing, spring: float) -> dict[str, Any]:
     }
 
 
-def linear_state(configuration: Configuration, sliding: bool) -> LinearState:
+def linear_state(configuration: Configuration, sliding: bool, lone: float = LONE_PARTICIPATION) -> LinearState:
     """The growth rates of linear motion about a configuration."""
     motion = Motion.of(configuration, sliding=sliding)
     modes = Modes.of_matrix(motion.stiffness)
@@ -135,24 +137,24 @@ def linear_state(configuration: Configuration, sliding: bool) -> LinearState:
     zero = zero_uncertainties(configuration, rounding, motion.particle, modes.left, modes.right)
     values = modes.values
     complex_, negative = growing_undamped(values, modes.overlap, rounding, zero)
-    shared = _disks(motion, modes.right) >= LONE_PARTICIPATION
+    shared = _disks(motion, modes.right) >= lone
     grows = (complex_ | negative) & shared
     rates = 2 * np.abs(np.sqrt(values[grows].astype(complex)).imag)
     return LinearState(
         pairs=int(np.count_nonzero(complex_ & shared)) // 2,
         undamped=float(rates.max(initial=0.0)),
-        damped=_damped_rate(motion),
+        damped=_damped_rate(motion, lone),
         lowest=float(values[shared & (np.abs(values) > zero)].real.min(initial=np.inf)),
         alone=int(np.count_nonzero((complex_ | negative) & ~shared)),
     )
 
 
-def _damped_rate(motion: Motion) -> float | None:
+def _damped_rate(motion: Motion, lone: float) -> float | None:
     """Largest 2 Re s of the motions that more than one disk takes part in; None if no such motion is known."""
     stiffness, damping = motion.stiffness.toarray(), motion.damping.toarray()
     for s in _rates(motion):
         pencil = s * s * np.eye(len(stiffness)) + s * damping + stiffness
-        if _disks(motion, null_vector(pencil)[:, None])[0] >= LONE_PARTICIPATION:
+        if _disks(motion, null_vector(pencil)[:, None])[0] >= lone:
             return float(2 * s.real)
     return None
 

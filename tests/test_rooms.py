@@ -236,6 +236,7 @@ INSIDE = {
     "analysis.files.formats.lammps_data": "the box of a data file for LAMMPS's own styles",
     "analysis.motion.one_sided": "the pages compare starts and steps of that motion",
     "analysis.motion.rising_load": "the pages state the drag and the windows of a load that rises, and follow them",
+    "analysis.responses.slips": "slips in the rows of a drive that a page keeps in memory",
     "analysis.windows.pair_over_load": "the plane of a pair, on which weak dashpots act",
     "analysis.windows.slices": "the bases of a way of counting pairs that a page compares with all eigenvalues",
     "pywrap.granular.lammps_arrays": "velocities of a live LAMMPS are set in a unit that the Configuration has",

@@ -14,10 +14,13 @@ the asymmetry of the law, a random state is followed (:mod:`~faultgouge.analysis
 dissipation only a symmetric K, or all its eigenvalues, say that nothing grows.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig, eigvals, qr, solve_triangular, svd
 from scipy.sparse import block_diag, csc_array, csr_array, eye_array, vstack
+from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Complexes, Floats
 from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
@@ -39,6 +42,9 @@ from .growing import fastest_growing
 from .modes import Modes
 from .motion import Motion
 from .random_state import follow_decay
+
+TINY = 8
+"""Coordinates in which there is nothing to search by products."""
 
 LAPACK_FIRST = 1000
 """Coordinates up to which LAPACK computes all s with dissipation at once, some seconds; a certificate takes less time
@@ -83,8 +89,10 @@ def linear_verdict(motion: Motion, *, decides: bool = True, time: float | None =
     size = len(motion.active)
     if not size:
         return Linear(True, 0.0)
-    if size <= (LAPACK_FIRST if motion.dissipative else LAPACK_UP_TO):
+    if size <= max(TINY, LAPACK_FIRST if motion.dissipative else LAPACK_UP_TO):
         return _by_lapack(motion)
+    if motion.dissipative and len(parts := _parts(motion)) > 1:
+        return _of_parts([linear_verdict(each, decides=decides, time=time) for each in parts])
     found = _fast_growth(motion, final=not decides or not motion.dissipative)
     if found.stable is False or not decides:
         return found
@@ -117,6 +125,45 @@ def linear_verdict(motion: Motion, *, decides: bool = True, time: float | None =
         return Linear(None, 2 * s.real, 2 * error, free, s, searched=2 * doubt, reasons=(f"{fast}, but {why}",))
     more = max(error, doubt - s.real, -s.real - proof.decay, 1e-14 * proof.largest)
     return Linear(True, 2 * s.real, 2 * more, free, s, f"{fast}, and {slow}")
+
+
+def _parts(motion: Motion) -> list[Motion]:
+    """The motions of groups of particles that touch none of another group, the largest first.
+
+    Many spheres that lie on a plane by themselves have the same eigenvalues, of which a block of vectors sees a few.
+    """
+    places = np.unique(motion.particle, return_inverse=True)[1]
+    of_particle = csr_array((np.ones(len(places)), (np.arange(len(places)), places)))
+    touches = of_particle.T @ (abs(motion.stiffness) + abs(motion.damping)) @ of_particle
+    count, group = connected_components(touches, directed=False)
+    group = group[places]
+    members = np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group, minlength=count))[:-1])
+    return [
+        replace(
+            motion,
+            active=motion.active[rows],
+            root_mass=motion.root_mass[rows],
+            stiffness=csr_array(motion.stiffness[rows][:, rows]),
+            damping=csr_array(motion.damping[rows][:, rows]),
+        )
+        for rows in sorted(members, key=len, reverse=True)
+    ]
+
+
+def _of_parts(parts: list[Linear]) -> Linear:
+    """The verdict on motions that know nothing of each other, the largest first."""
+    free = sum(each.free for each in parts)
+    moves = [each for each in parts if each.s or each.growth_rate or not each.stable] or parts  # others drift
+    worst = max(moves, key=lambda each: (each.stable is False, each.stable is None, each.growth_rate))
+    if not worst.stable:
+        return replace(worst, free=free, searched=max(each.searched for each in parts))
+    more = max(each.growth_rate + each.error for each in moves) - worst.growth_rate
+    said = parts[0].said
+    if said and worst is not parts[0]:
+        said = (
+            f"{said}; of {len(parts) - 1} groups of other particles one decays with D as exp({worst.growth_rate:.6g} t)"
+        )
+    return replace(worst, error=max(worst.error, more), free=free, said=said)
 
 
 def all_rates(motion: Motion) -> tuple[Complexes, NDArray[np.bool_], int, float]:

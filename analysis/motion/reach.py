@@ -211,9 +211,12 @@ def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, e
         def twice(x: Floats) -> Floats:
             return np.asarray(skew.T @ factors.solve(skew @ x))
 
-        size, start = symmetric.shape[0], np.ones(symmetric.shape[0])
-        found = eigsh(LinearOperator((size, size), twice, dtype=float), 1, v0=start, return_eigenvectors=False)
-        return float(np.exp(1.0)), min(end, float(1 / np.sqrt(found[0])))
+        size = symmetric.shape[0]
+        # of a crystal many are equal, and a start of ones has no part of them; two digits do
+        start = np.random.default_rng(0).standard_normal(size)
+        operator = LinearOperator((size, size), twice, dtype=float)
+        found = eigsh(operator, 1, v0=start, tol=1e-2, return_eigenvectors=False)
+        return float(np.exp(1.0)), min(end, float(1 / np.sqrt(1.02 * found[0])))
     root = cholesky(symmetric.toarray())  # R with R^T R = S: p = R z
     size = len(root)
     if not motion.dissipative and np.isinf(end):

@@ -22,6 +22,7 @@ from .limits import LIMITS, Limits
 from .onset import RAISE_LOAD, NoGrowthError, Onset, OnsetError
 from .ranks import ALONE, Ranks
 from .search import Look, SystemOfLoad
+from .states import Motions
 from .system import System, force_bearing, full_operator
 
 LAPACK_COORDINATES = 5000
@@ -105,7 +106,7 @@ def find_onset(
     start = equilibrium(float(loads[0]))
     if dissipation and not start.damped:
         raise ValueError("The packing has no dissipation: call find_onset without dissipation=True.")
-    search = _OnsetSearch(equilibrium, start, loads, modes, first, ranks, folder, limits)
+    search = _OnsetSearch(equilibrium, start, loads, modes, first, ranks, folder, limits, _kept_undamped())
     with show_progress(watch):
         if not dissipation:
             return search.undamped_onset()
@@ -124,6 +125,7 @@ class _OnsetSearch:
     ranks: Ranks
     folder: Path | None
     limits: Limits
+    decompose: Callable[[System], Motions]
 
     @property
     def takes_all(self) -> bool:
@@ -150,6 +152,7 @@ class _OnsetSearch:
                 look=look,
                 first=self.first,
                 known=known,
+                decompose=self.decompose,
             )
             return found[:1] if self.first else found, ()
         from .sliced_search import SlicedSearch  # with libraries that nothing else needs
@@ -227,6 +230,21 @@ class _OnsetSearch:
             if found is None:
                 raise
             return (_fastest(start, found),), (), found, branch.ends
+
+
+def _kept_undamped() -> Callable[[System], Motions]:
+    """All motions of a system; those without dissipation are kept for the search with it, which begins with them."""
+    known: dict[float, Motions] = {}
+
+    def decompose(system: System) -> Motions:
+        found = known.get(system.fx)
+        if system.dissipative or found is None:
+            found = Motions.of(system)
+            if not system.dissipative and 16 * found.right.size * (len(known) + 1) < 2e8:  # bytes
+                known[system.fx] = found
+        return found
+
+    return decompose
 
 
 class _Inside:

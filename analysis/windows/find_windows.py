@@ -30,6 +30,7 @@ def find_windows(
     look: Look = lambda below, above: (),
     first: bool = False,
     known: WindowsSoFar = lambda windows, fx: None,
+    decompose: Callable[[System], Motions] = Motions.of,
 ) -> tuple[Window, ...]:
     """Find all windows of a one-parameter family of systems.
 
@@ -47,6 +48,8 @@ def find_windows(
         Go no farther than the increment in which the first window begins.
     known : callable, optional
         Called after each increment with all windows so far, and with the load up to which these are complete.
+    decompose : callable, optional
+        System -> all of its motions.
 
     Returns
     -------
@@ -59,7 +62,8 @@ def find_windows(
         If the loads are not at least two increasing numbers.
     """
     windows: tuple[Window, ...] = ()
-    for fx, windows in windows_up_to(system, forces, narrowest=narrowest, look=look, first=first):
+    found = windows_up_to(system, forces, narrowest=narrowest, look=look, first=first, decompose=decompose)
+    for fx, windows in found:
         known(windows, fx)
     return windows
 

@@ -27,6 +27,8 @@ class Limits(SliceSizes):
     found in time. Announced onsets are trusted to twice that."""
     window: float = 1e-3
     """Narrowest windows of slices that are looked for, in increments: the slices' own error is larger."""
+    excess: float = 0.2
+    """Number added to the antisymmetric couplings of a slice, in units of mixing^2 times the spacing of its levels."""
     parts: int = 4
     """Parts of a doubtful increment: four cost little more than two while a basis passes by."""
     depth: int = 2

@@ -251,9 +251,7 @@ class Search:
         if not (below.whole and above.whole):  # some have no partner, as another one is nearer to the point there
             alike = below.alike(above, levels_a, levels_b)
             pairs = [(levels_a[i], levels_b[j]) for i, j in assign(alike) if alike[i, j] > ALIKE]
-            levels_a, levels_b = (
-                np.array(sorted(each), dtype=int) for each in (zip(*pairs, strict=True) if pairs else ([], []))
-            )
+            levels_a, levels_b = (np.array(sorted(int(pair[end]) for pair in pairs), dtype=np.int64) for end in (0, 1))
         if len(levels_a) != len(levels_b):
             raise DoubtError
         self._check_levels(below, above, drift_a, drift_b, levels_a, levels_b)
@@ -320,12 +318,12 @@ class Search:
             curve, slope, least = np.polyfit((np.array(loads[three]) - low) / span, values[three], 2)
             if values[lowest_of] < 0 and not 2 * np.sqrt(-values[lowest_of] / max(curve, 0.0)) * span < self.narrowest:
                 raise DoubtError(low)
-            if not curve > 0 or (len(loads) == 3 and lowest_of != 1):
+            if not curve > 0 or (len(loads) == 3 and found > 0.5 * min(values[0], values[-1])):
                 raise DoubtError(fx)  # it does not dip where the slopes say so: the loads are too far apart
             fx, least = low - 0.5 * float(slope / curve) * span, least - 0.25 * slope**2 / curve
             if not below < fx < above:
                 return
-            if least > BEND * max(values[three]) and abs(found - expected) < 0.5 * least:
+            if least > BEND * max(values[three]) and abs(found - expected) < 0.1 * least:
                 return  # the parabola has told what was then found
             if min(abs(fx - load) for load in loads) < 0.5 * self.narrowest:
                 return
@@ -345,7 +343,8 @@ class Search:
         left, right = (track.at(fx) for fx in (change.loads[0], change.loads[-1]))
         jump = float(np.abs(left.stiffness - right.stiffness).max())
         largest, usual = (max(abs(track.growth(fx)) for fx in loads) for loads in (change.loads, ends))
-        if jump < 1e-7 * left.frequency**2 and largest > 1e-3 * usual:
+        wide = not track.pairs and ends[1] - ends[0] > 100 * self.narrowest  # s is not smooth where two coalesce
+        if jump < 1e-7 * left.frequency**2 and (wide or largest > 1e-3 * usual):
             raise DoubtError(change.fx)  # the equilibrium does not jump: the motion has become another one on the way
         return track.edge(change)
 
@@ -363,7 +362,8 @@ class Search:
 
     def _changes_of_motions(self, below: Motions, above: Motions, drift_a: Complexes, drift_b: Complexes) -> Changes:
         """As `_changes`, with dissipation."""
-        alike = below.alike(above)
+        span = above.fx - below.fx
+        alike = below.alike(above) * closeness(below.values, span * drift_a, above.values, span * drift_b)
         if not (below.whole and above.whole):  # some have no partner, as another one is nearer to the point there
             alike[alike < ALIKE] = 0.0
         image = dict(assign(alike))
@@ -397,6 +397,14 @@ def _levels_of(inside: TrackPoint, state: Motions, drift: Complexes, levels: Ind
     step = state.fx - inside.fx
     i, j = nearest_pair(state.values[levels], inside.numbers + step * inside.slopes)
     return TrackPoint.pair(state, drift, int(levels[i]), int(levels[j])), np.delete(levels, [i, j])
+
+
+def closeness(a: Complexes, slope_a: Complexes, b: Complexes, slope_b: Complexes) -> Floats:
+    """How near s of two loads are, or are expected to be, from 0 to 1: it tells two overdamped motions of one shape
+    apart."""
+    ways = (a[:, None] - b, (a + slope_a)[:, None] - b, a[:, None] - (b - slope_b))
+    apart = np.minimum.reduce([np.abs(each) for each in ways])
+    return np.asarray(np.maximum(1 - apart / (np.abs(a)[:, None] + np.abs(b) + np.finfo(float).tiny), 0.0))
 
 
 def assign(weight: Floats) -> list[tuple[int, int]]:

@@ -156,18 +156,9 @@ class Motions:
         return np.nan_to_num(np.asarray(found, complex), nan=0.0, posinf=0.0, neginf=0.0)
 
     def alike(self, other: "Motions", rows: Any = slice(None), columns: Any = slice(None)) -> Floats:
-        """|x^H x'| |y^H y'| of motions of two loads, shape (k, k'); with dissipation times how near the s are."""
+        """|x^H x'| |y^H y'| of motions of two loads, shape (k, k')."""
         x, y = self.right[:, rows].conj().T, self.left[:, rows].conj().T
-        weight = np.abs(x @ other.right[:, columns]) * np.abs(y @ other.left[:, columns])
-        if not self.system.dissipative:
-            return np.asarray(weight)
-        return np.asarray(weight * _closeness(self.values[rows], other.values[columns]))
-
-
-def _closeness(a: Complexes, b: Complexes) -> Floats:
-    """1 of equal eigenvalues, 0 of opposite ones: it tells two overdamped motions of one shape apart."""
-    a, b = a[:, None], b[None]
-    return np.asarray(1 - np.abs(a - b) / (np.abs(a) + np.abs(b) + np.finfo(float).tiny))
+        return np.asarray(np.abs(x @ other.right[:, columns]) * np.abs(y @ other.left[:, columns]))
 
 
 def eigenvalues_near(system: System, point: complex, count: int = 8) -> Complexes:

@@ -214,9 +214,7 @@ class Scene(Section):
             raise refusal_sentence("damping.tau", says)
 
     @classmethod
-    def from_toml(
-        cls, path: str | Path, packing: Mapping[str, Any] | None = None, command: str | None = None
-    ) -> Scene:
+    def from_toml(cls, path: str | Path, packing: Mapping[str, Any] | None = None, command: str | None = None) -> Scene:
         """Read a scene.
 
         Parameters

@@ -5,6 +5,7 @@ python -m research.cycle.make compute RUNS SEEDS   the runs of the seeds 1 to SE
 python -m research.cycle.make many RUNS SEEDS      the same of 400 disks; two minutes a run
 python -m research.cycle.make springs SEEDS        what the table of three springs lacks; four minutes a seed
 python -m research.cycle.make clock SEEDS          what the table of clock advances lacks; a minute a seed
+python -m research.cycle.make last SEEDS          what the table of last periods lacks; ten seconds a seed
 python -m research.cycle.make page                 README.md and further.md from the tables
 python -m research.cycle.make check                a tenth of the tables of 100 disks once more, and compared
 
@@ -23,13 +24,13 @@ import numpy as np
 
 from faultgouge.figures import render
 from faultgouge.studies.statistics import share
-from research.cycle import clock, further, springs
+from research.cycle import clock, further, last_period, springs
 from research.cycle.compute import DISKS, LAWS, LOOKED_AT, MANY, UNTIL, compute, compute_many
 from research.statistics import DRAWS, count_of, interval, median_over_runs, share_over_runs
 from research.tables import add_seeds, differing, read_rows
 
 HERE = Path(__file__).parent
-TABLE, MANY_TABLE = "cycles.jsonl", "cycles_400.jsonl"
+TABLE, MANY_TABLE, LAST_TABLE = "cycles.jsonl", "cycles_400.jsonl", "last_period.jsonl"
 
 Row = dict[str, Any]
 
@@ -281,6 +282,7 @@ def numbers(rows: Sequence[Row], many: Sequence[Row] = ()) -> dict[str, Any]:
 def write_page(folder: Path = HERE) -> Path:
     """Write README.md of a folder from its table."""
     found = numbers(*(read_rows(folder / "tables" / name) for name in (TABLE, MANY_TABLE)))
+    found["last"] = last_period.summary(read_rows(folder / "tables" / LAST_TABLE), flipped_signs)
     (folder / "README.md").write_text(
         render("research.cycle", "README.md.j2", **found, percent=count_of, interval=interval)
     )
@@ -308,6 +310,8 @@ if __name__ == "__main__":
             compute(HERE / "tables" / TABLE, Path(runs), range(1, int(seeds) + 1))
         case ["many", runs, seeds]:
             compute_many(HERE / "tables" / MANY_TABLE, Path(runs), range(1, int(seeds) + 1))
+        case ["last", seeds]:
+            add_seeds(HERE / "tables" / LAST_TABLE, range(1, int(seeds) + 1), last_period.rows_of)
         case ["springs", seeds]:
             add_seeds(HERE / "tables" / further.SPRINGS_TABLE, range(1, int(seeds) + 1), springs.rows_of)
         case ["clock", seeds]:

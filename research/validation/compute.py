@@ -177,7 +177,7 @@ def time_steps(poissons: tuple[float, ...], overlap: float) -> list[dict[str, fl
     rows = []
     for poisson in poissons:
         step, rules = timestep_rules(crystal_of(poisson, overlap))
-        rows.append({"nu": poisson, "over_rule": float(step) / rules["o_sullivan_bray"]})
+        rows.append({"nu": poisson, "over_rule": float(step) / float(rules["o_sullivan_bray"] or np.nan)})
     return rows
 
 

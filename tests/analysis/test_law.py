@@ -208,13 +208,3 @@ def test_impossible_parameters(field, values):
     for value in values:
         with pytest.raises(ValueError, match=rf"^{field} = |^a {field} history needs an exponent"):
             MindlinLaw(**({"kn": 1.0, "kt": 1.0, "mu": 1.0, "exponent": 1.0} | {field: value}))
-
-
-def test_a_law_has_one_history():
-    with pytest.raises(ValueError, match="rescaled and coulomb are two histories"):
-        MindlinLaw(1.0, 1.0, 1.0, rescaled=True, coulomb=True)
-    assert [each.history for each in (MindlinLaw(1.0, 1.0, 1.0), RESCALED, SLIDERS[0])] == [
-        "total",
-        "rescaled",
-        "coulomb",
-    ]

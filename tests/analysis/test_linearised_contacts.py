@@ -202,18 +202,6 @@ def test_turned_and_mirrored(d, mirrored):
         assert np.abs(operator(other).toarray() - whole @ k @ whole.T).max() < 1e-13 * np.abs(k).max()
 
 
-def test_spin_about_the_only_contact_costs_nothing():
-    bed = make(3, walls=False, slides=False)
-    pair = bed.contacts.chosen(np.arange(1))
-    values = {name: getattr(bed, name) for name in bed.__dataclass_fields__} | {"contacts": pair}
-    two = Configuration(**values)
-    assert list(two.rattlers) == [2, 3, 4, 5]
-    found = spectrum(two)
-    # three translations and three twists or common turns, and the soft ones of a force that is not in balance
-    assert np.sum(np.abs(found.eigenvalues) < 1e-12 * np.abs(found.eigenvalues).max()) >= 6
-    assert len(found.pairs) == 0
-
-
 def test_held_particles_take_part_in_contacts_alone(bed):
     free = np.arange(len(bed)) != 2
     held = Configuration(**{name: getattr(bed, name) for name in bed.__dataclass_fields__} | {"free": free})
@@ -333,13 +321,6 @@ def test_gain_of_a_snapshot(path):
     assert other.disk == one.disk
 
 
-@pytest.mark.parametrize("change", [{"normal": np.zeros((3, 2))}, {"overlap": np.full(17, np.nan)}, {"i": [1.5]}])
-def test_contacts_that_are_none(change):
-    values = {name: getattr(make(3).contacts, name) for name in PER_CONTACT}
-    with pytest.raises(ValueError, match=r"shape|finite|integers"):
-        LinearisedContacts(**values | change)
-
-
 def one_contact(**change):
     """A configuration of two disks, or spheres, with one contact, but for some values."""
     contacts = {
@@ -384,13 +365,6 @@ def test_values_that_no_packing_has(change, says):
     assert "\n" not in str(refusal.value)
 
 
-def test_values_that_packings_have():
-    """A tilted normal of spheres, a masked array without masks, and infinite bounds and distances."""
-    assert len(one_contact().contacts) == 1
-    one_contact(dimension=3, normal=[[0, 0.8, 0.6]], distance=[np.inf], friction=[np.inf])
-    one_contact(mass=np.ma.masked_array([1.0, 1.0], [False, False]), j=[-1])
-
-
 @pytest.mark.parametrize("coulomb", [False, True])
 def test_a_smoothed_law_has_no_one_sided_contacts(reference_packing, coulomb):
     """Close to the bound its tangential stiffness has gone, on both sides; that of Coulomb's slider stays."""
@@ -430,3 +404,15 @@ def test_k_and_c_are_sums_over_contacts(d):
         each = [operator(derive_frozen(bed, contacts=twice.chosen([k]))).toarray() for k in range(len(twice))]
         # roundings of a dozen terms
         np.testing.assert_allclose(matrix.toarray(), np.sum(each, axis=0), rtol=0, atol=1e-14 * np.abs(each).max())
+
+
+def test_spin_about_the_only_contact_costs_nothing():
+    bed = make(3, walls=False, slides=False)
+    pair = bed.contacts.chosen(np.arange(1))
+    values = {name: getattr(bed, name) for name in bed.__dataclass_fields__} | {"contacts": pair}
+    two = Configuration(**values)
+    assert list(two.rattlers) == [2, 3, 4, 5]
+    found = spectrum(two)
+    # three translations and three twists or common turns, and the soft ones of a force that is not in balance
+    assert np.sum(np.abs(found.eigenvalues) < 1e-12 * np.abs(found.eigenvalues).max()) >= 6
+    assert len(found.pairs) == 0

@@ -101,15 +101,6 @@ def test_net_force_is_that_of_the_loop(cluster):
     np.testing.assert_allclose(cluster.net_force, quasistatic.forces(cluster), rtol=0, atol=rounding)
 
 
-def test_contacts_that_slide_use_all_of_the_bound(cluster):
-    law = replace(cluster.law, mu=0.3)
-    limit = law.slip_limit(cluster.geometry.overlap)
-    sliding = replace(cluster, law=law, contacts=cluster.contacts.slipped(2 * limit))
-    np.testing.assert_allclose(sliding.mobilised, limit > 0, rtol=1e-14)
-    np.testing.assert_array_equal(sliding.sliding, limit > 0)
-    assert not replace(cluster, law=replace(cluster.law, mu=0.0)).sliding.any()
-
-
 def test_residual_leaves_out_rattlers_of_the_upper_layer():
     packing = Packing(
         position=[[0, 0.5], [5, 3]],

@@ -155,9 +155,3 @@ def test_factors_of_rows_in_any_order(diagonal):
     # other right sides than that for which the factors were looked at: ten times as far off at the most
     size = np.abs(matrix.data).max() * np.linalg.norm(found, axis=0)
     assert np.all(np.linalg.norm(matrix @ found - right, axis=0) <= 10 * sparse_lu.INACCURATE * size)
-
-
-def test_pivots_off_the_diagonal_are_left_to_superlu():
-    matrix = csc_array(np.array([[0.0, 1.0], [1.0, 0.0]]))
-    found = symmetric_lu(matrix, ordered=True, symmetric=True).solve(np.array([2.0, 3.0]))
-    np.testing.assert_array_equal(found, [3.0, 2.0])

@@ -1,6 +1,5 @@
 """Spectra: which pairs are real, what is left out, and the large-packing solver against the dense one."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -14,22 +13,18 @@ from faultgouge.analysis import (
     BadInputError,
     Contacts,
     MindlinLaw,
-    Modes,
     Packing,
-    closest_to_meeting,
     discrete_frequency,
     dynamical_matrix,
     eigenvalues,
     growth_rate,
     nearest_modes,
     negative_eigenvalues,
-    normal_modes,
     spectrum,
     stability,
     stable_timestep,
     touching,
 )
-from faultgouge.analysis.motion.buckling import surely_positive
 from faultgouge.analysis.operators.damping import coordinate_mass
 
 
@@ -99,12 +94,6 @@ def test_shift_invert_finds_what_lapack_finds(path, near):
     for pair in dense.pairs:
         known = np.abs(some.values - pair.eigenvalue) < 1e-6
         np.testing.assert_allclose(some.overlap[known], pair.overlap, rtol=1e-8)
-
-
-@pytest.mark.parametrize("count", [0, 284])
-def test_impossible_number_of_eigenpairs(reference_packing, count):
-    with pytest.raises(ValueError, match="285"):
-        nearest_modes(reference_packing(1.0), 100.0, count)
 
 
 @pytest.mark.parametrize("value", [1.0, 2.5e3, 2e3 + 1.5j, -30.0, 1e-8])
@@ -217,29 +206,6 @@ def test_forces_out_of_balance_do_not_make_a_packing_unstable(force, negative):
     assert found.free == 3 - negative  # two rolling motions, and that of the disk above
 
 
-def test_forces_out_of_balance_on_light_disks_do_not_free_a_heavy_one():
-    """The packing of the test above. What the light disks leave open is ten times the eigenvalues of the heavy one."""
-    law, force = MindlinLaw(kn=2e5, kt=2e5 * 2 / 7, mu=1.0), 3e-5
-    rests, touches = (3.0 / law.kn) ** (2 / 3), (force / law.kn) ** (2 / 3)
-    position, radius = np.array([[0.5, 0.5 - rests], [2.5, 0.5 - touches], [2.5, 1.5 - 2 * touches]]), np.full(3, 0.5)
-    packing = Packing(
-        position=position, radius=radius, mass=[1e6, 1e-3, 1e-3], top=[True, False, False], box_length=5.0, law=law,
-        fy=3.0, contacts=touching(position, radius, 5.0),
-    )  # fmt: skip
-    found = spectrum(packing)
-    assert np.sum(np.abs(found.eigenvalues) < force / (0.5 * 1e-3)) == 5
-    assert found.free == 3
-    assert json.loads(json.dumps(stability(packing).as_dict()))["free"] == 3
-
-
-def test_what_is_surely_positive():
-    """The symmetric part decides, without zero rows; an operator of positive eigenvalues may be in doubt."""
-    turning, shearing, negative = ([[1.0, b], [c, d]] for b, c, d in ((9.0, -9.0, 1.0), (3.0, 0.0, 1.0), (0, 0, -1)))
-    expected = (turning, True), (np.pad(turning, 1), True), (shearing, False), (negative, False)
-    for matrix, positive in expected:
-        assert surely_positive(csr_array(np.array(matrix))) == positive
-
-
 def test_negative_eigenvalues_of_more_disks_than_the_dense_solver_takes():
     """Five columns under different loads among a thousand disks on the floor."""
     law, floor = MindlinLaw(2e5, 0.0, 0.0), np.arange(1005)
@@ -259,22 +225,6 @@ def test_imaginary_part_grows_as_the_root_of_the_distance(path):
     near, nearer = (spectrum(path(onset + distance)).pairs[0].eigenvalue.imag for distance in (1e-5, 1e-7))
     # The next order is the distance over the width of the window, 1e-2.
     assert near / nearer == pytest.approx(10, rel=1e-2)
-
-
-def test_motions_that_no_force_opposes_do_not_meet():
-    """Two zeros of rounding with one vector, as LAPACK has them of three disks that roll on a floor, and two modes."""
-    right = np.array([[1.0, 1.0, 0, 0], [0, 0, 1.0, 0.6], [0, 0, 0, 0.8]], dtype=complex)
-    modes = Modes(np.array([-1e-15, 2e-15, 1.0, 2.0], dtype=complex), right, right)
-    assert closest_to_meeting(modes) == (2, 3, pytest.approx(0.6, abs=1e-15))
-    with pytest.raises(ValueError, match="There are 1 real modes that a force opposes"):
-        closest_to_meeting(Modes(modes.values[:3], right[:, :3], right[:, :3]))
-
-
-def test_modes_of_a_symmetric_operator_are_not_close_to_meeting(path):
-    """Without slips, at F_x = 0."""
-    first, second, cosine = closest_to_meeting(normal_modes(path(0.0)))
-    assert first < second
-    assert cosine < 1e-9
 
 
 @pytest.mark.parametrize("kn", [1e300, 1.7e308])

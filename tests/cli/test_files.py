@@ -243,7 +243,7 @@ def test_what_the_program_has_written_is_replaced(faultgouge_here, stored, comma
 def test_tables_of_the_program_are_known_by_their_first_line(tmp_path):
     write_csv(tmp_path / "a.csv", ["x", "y"], [{"x": 1, "y": 2}])
     write_csv(tmp_path / "a.csv", ["x", "y"], [{"x": 1, "y": 3}])
-    write_csv(tmp_path / "a.csv", ["x", "z"], [{"x": 1, "z": 3}], 1)
+    write_csv(tmp_path / "a.csv", ["x", "z"], [{"x": 1, "z": 3}], head="x,")
     with pytest.raises(OutputError, match="has not written it"):
         write_csv(tmp_path / "a.csv", ["x", "y"], [{"x": 1, "y": 3}])
     assert (tmp_path / "a.csv").read_text() == "x,z\n1,3\n"

@@ -194,7 +194,7 @@ def test_an_import_says_that_its_file_is_written(tmp_path):
     running = start_command(CommandToKill("import row.in -o row.h5 --balance 10", ""), tmp_path)
     errors = interrupted(running, signal.SIGINT, (tmp_path / "row.h5").exists)
     assert errors.strip().endswith(
-        "Error: interrupted: row.h5 has been written; whether the packing is stable says `faultgouge spectrum row.h5`."
+        "Error: interrupted: row.h5 has been written; whether the packing is stable says `faultgouge stability row.h5`."
     )
 
 

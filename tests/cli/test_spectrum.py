@@ -50,6 +50,7 @@ def test_spectrum_of_a_large_packing(faultgouge_here, beyond, monkeypatch):
     pairs = json.loads(faultgouge_here("spectrum", beyond / "ramp.h5", "--json").stdout)["pair_count"]
     monkeypatch.setattr("faultgouge.commands.spectrum.MOST_PAIRS", pairs - 1)
     monkeypatch.setattr("faultgouge.commands.spectrum.VERDICT_FIRST", 0)
+    assert "coordinates: LAPACK needs" in faultgouge_here("spectrum", beyond / "ramp.h5", "--values").stderr
     said = faultgouge_here("spectrum", beyond / "ramp.h5").stdout
     assert said.count("D grows as") == pairs - 1
     assert f"and 1 more: --json has all {pairs}" in said

@@ -33,9 +33,3 @@ def test_script_of_the_page(tmp_path):
         agrees = np.all(abs(ratio - 1) < 0.1, axis=1)
         assert agrees.sum() >= 3  # weak contacts close to the bound may come to it in one
         assert np.all((ratio > 0.3) & (ratio < 3))
-
-
-def test_the_deck_is_short():
-    lengths = {name: len(text.splitlines()) for name, text in files(PAGE).items()}
-    assert lengths.keys() == {"shear.in", "cycle.py"}
-    assert max(lengths.values()) < 75

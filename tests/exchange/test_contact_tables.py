@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from periodic_box import at_rest
 from scipy.linalg import eigvals
+from scipy.optimize import brentq
 
 from faultgouge.analysis import (
     FaultgougeError,
@@ -107,23 +108,24 @@ def test_the_verdict_of_a_table_is_the_live_one(live, name, columns):
     found = read_contacts(spheres, folder / name, material_of(LAW), columns)
     assert len(found.contacts) == len(packing.contacts)
     assert ("with the other sign" in found.remarks[0]) == (name == "mercury.fstat")
-    verdict, says = verdict_within_digits(found)
-    told = stability(packing)
-    assert verdict.stable == told.stable is True
-    assert verdict.growth_rate == pytest.approx(told.growth_rate, rel=1e-4)
-    assert says.startswith("six digits tell: 5 tables that round to this one")
+    if name in ("local.dump", "mercury.fstat"):  # of six digits and of both signs
+        verdict, says = verdict_within_digits(found)
+        told = stability(packing)
+        assert verdict.stable == told.stable is True
+        assert verdict.growth_rate == pytest.approx(told.growth_rate, rel=1e-4)
+        assert says.startswith("six digits tell: 5 tables that round to this one")
     assert elastic_moduli(found).shear == pytest.approx(elastic_moduli(packing).shear, rel=1e-4)
 
 
-def test_the_command_takes_tables(live, faultgouge, tmp_path):
+def test_the_command_takes_tables(live, faultgouge_here, tmp_path):
     folder, _ = live
-    done = faultgouge(
+    done = faultgouge_here(
         "import", str(folder / "spheres.dump"), "--contacts", str(folder / "local.dump"), "--columns", ",".join(LOCAL),
         "--material", LAW, "-o", str(tmp_path / "p.h5"),
     )  # fmt: skip
     assert "stable: every motion decays" in done.stdout
     assert "six digits tell" in done.stdout
-    again = faultgouge("timestep", str(tmp_path / "p.h5"))
+    again = faultgouge_here("timestep", str(tmp_path / "p.h5"))
     assert "largest stable time step" in again.stdout
 
 
@@ -142,11 +144,9 @@ def test_digits_that_do_not_tell_are_told(live):
         s = eigvals(np.block([[np.zeros_like(a), np.eye(len(a))], [-a, -g]]))
         return s.real[np.abs(s) > 1e-3 * np.abs(s).max()].max()
 
-    low, high = 1e-9, 1e3
-    assert growth(low) > 0 > growth(high)
-    while high / low > 1 + 1e-9:
-        low, high = (middle, high) if growth(middle := np.sqrt(low * high)) > 0 else (low, middle)
-    _, says = verdict_within_digits(of(float(high)))
+    assert growth(1e-9) > 0 > growth(1e3)
+    root = brentq(lambda power: growth(10.0**power), -9, 3, xtol=1e-10)
+    _, says = verdict_within_digits(of(10.0**root))
     assert says.startswith("six digits do not tell: of 5 tables that round to this one the verdict is ")
 
 

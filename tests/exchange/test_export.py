@@ -4,11 +4,9 @@ A trajectory in run.h5 is H5MD: MDAnalysis steps through it, and its analyses ag
 """
 
 import re
-import sys
 from base64 import b64decode
 from dataclasses import replace
 from importlib import import_module
-from importlib.metadata import version
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -31,7 +29,6 @@ from faultgouge.analysis.files.formats import (
     write_packing,
 )
 from faultgouge.analysis.files.formats.tables import read_slips
-from faultgouge.pywrap import Scene, SceneError
 
 FILMS = pytest.mark.parametrize("suffix", [".xyz", ".gsd"], indirect=True)
 READERS = "needs a large library that is no dependency: make readers"
@@ -269,39 +266,6 @@ def test_mdanalysis_steps_through_it_as_h5md_and_as_a_universe_with_radii_masses
         np.testing.assert_array_equal(exact.data["position"][:, :2], place[k])
         if packing.compensated and k:
             np.testing.assert_array_equal(exact.data["position_low"], series["position_low"][k - 1])
-
-
-@pytest.mark.slow
-def test_no_equilibrium_follows_a_trajectory(run):
-    path, packing, _ = run
-    with RunFile(path, "a") as file, pytest.raises(ValueError, match="no equilibrium can follow"):
-        file.append(packing, floor=0.0, evaluations=0)
-
-
-def test_positions_are_an_observable_too_and_a_file_without_that_link_is_continued(tmp_path, reference_packing):
-    packing = reference_packing(1.0)
-    with RunFile.create(tmp_path / "run.h5", packing) as file:
-        assert file._file["observables/position"] == file._file["particles/disks/position"]  # one object, two names
-        assert file._file["h5md/creator"].attrs["version"] == version("faultgouge")
-        del file._file["observables/position"]
-        file.append(packing)
-    with RunFile(tmp_path / "run.h5", "a") as file:
-        file.append(packing)
-    with RunFile(tmp_path / "run.h5") as file:
-        np.testing.assert_array_equal(file.packing(1).position, packing.position)
-
-
-def test_without_mdanalysis_the_import_says_the_one_command(monkeypatch):
-    monkeypatch.delitem(sys.modules, "faultgouge.analysis.files.mdanalysis", raising=False)
-    monkeypatch.setitem(sys.modules, "MDAnalysis.coordinates.H5MD", None)
-    with pytest.raises(ImportError, match=r"pip install MDAnalysis"):
-        import_module("faultgouge.analysis.files.mdanalysis")
-
-
-def test_a_file_that_only_claims_to_be_a_run_is_refused_when_the_parser_is_there(tmp_path, ours):
-    (tmp_path / "run.h5").write_bytes(b"no HDF5")
-    with pytest.raises(SceneError, match="is of no format that is read: give"):
-        Scene.from_mapping({"packing": {"file": str(tmp_path / "run.h5")}})
 
 
 def test_ase_reads_extended_xyz(tmp_path, ramp, configuration):

@@ -398,14 +398,6 @@ def test_that_slips_are_not_known_goes_wherever_the_packing_goes(heap, tmp_path,
     assert stability(known).reasons == ()
 
 
-def test_a_packing_json_is_of_disks_without_slips(heap, tmp_path):
-    packing = load(heap, law=MindlinLaw(2e5, 0.0, 0.0), fy=3.0)
-    x, y = packing.position.T.tolist()
-    path = tmp_path / "packing.json"
-    path.write_text(json.dumps({"x": x, "y": y, "radius": packing.radius.tolist(), "top": [0, 1]}))
-    assert load(path, law=MindlinLaw(2e5, 5e4, 1.0), fy=3.0).slips_known
-
-
 def test_masses_are_those_before_lammps_wrote_densities_of_sixteen_digits():
     from faultgouge.lammps_inputs import __file__ as decks
 

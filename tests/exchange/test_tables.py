@@ -99,12 +99,6 @@ def test_slips_that_fit_no_contact_are_refused(read, tmp_path, table, says):
         packing_of(disks := with_slips(read, tmp_path, rows, head), LAW, upper_layer(disks, 1), fy=1.0)
 
 
-def test_slips_with_a_unit_of_disks_without_are_refused(tmp_path):
-    (tmp_path / "contacts.csv").write_text("id1,id2,slip [um]\n1,2,3\n")
-    with pytest.raises(PackingFileError, match="slip is in um, and the disks have no unit"):
-        read_slips(tmp_path / "contacts.csv")
-
-
 XYZ = """4
 Lattice="9 0 0 0 9 0 0 0 1" Properties=species:S:1:pos:R:3:radius:R:1
 Fe 1 0.5 0 0.5
@@ -146,11 +140,6 @@ def test_the_highest_disks_are_those_that_touch_something(read):
     every = upper_layer(disks, 4)
     assert every.all()
     assert "1 of the 4 disks" in layer_remark(disks, "4", every)
-
-
-def test_of_disks_that_are_not_at_rest_yet_the_highest_are_taken(read):
-    disks = read("x,y,radius\n" + "".join(f"{k},{2 + k},0.4\n" for k in range(4)) + "9,0.5,0.5\n")
-    assert upper_layer(disks, 1).tolist() == [False, False, False, True, False]
 
 
 def test_a_table_of_a_laboratory_as_a_command(faultgouge_here, tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis.responses.slips import SlipDetector, find_slips
-from faultgouge.pywrap.runs.drive import DriveSample, DriveState, PendingStates, Plan
+from faultgouge.pywrap.runs.drive import DriveSample, DriveState, PendingStates
 
 VELOCITY, PERIOD, EVERY, ROWS_A_PART = 1e-3, 2.0, 0.1, 24
 
@@ -59,11 +59,3 @@ def test_states_are_the_even_ones_and_both_ends_of_each_slip(seed):
 def test_a_run_that_is_cut_off_anywhere_stores_the_same_states():
     series = noisy_series(4)
     assert stored_times(series, set(range(0, 3000, 101))) == stored_times(series)
-
-
-def test_a_run_is_sampled_evenly_in_its_parts_and_at_their_ends():
-    plan = Plan(dt=0.1, part=24, every=10, total=61)
-    assert list(plan.steps(0)) == [10, 20, 24, 30, 40, 48, 50, 60, 61]
-    assert list(plan.steps(24)) == [30, 40, 48, 50, 60, 61]
-    endless = Plan(dt=0.1, part=24, every=10, total=2**53).steps(2**52)
-    assert next(endless) - 2**52 <= 10

@@ -7,8 +7,7 @@ import pytest
 from reference_layer import SMALL, toml
 
 from faultgouge.analysis import nearest_image
-from faultgouge.pywrap import Engine, EngineError
-from faultgouge.pywrap.lammps.decks import Decks
+from faultgouge.pywrap import Engine
 
 
 @pytest.mark.parametrize("compensated", [False, True])
@@ -75,12 +74,6 @@ def test_forces_without_friction_are_zero_until_the_first_run(reference_packing)
     """LAMMPS does not set them; with MALLOC_PERTURB_ in the environment they would be numbers of any size."""
     with Engine(reference_packing(0.0)) as engine:
         assert not engine.net_force.any()
-
-
-def test_what_stops_a_run_is_what_is_said(reference_packing):
-    engine = Engine(reference_packing(1.0))
-    with pytest.raises(EngineError, match="Unknown command: nonsense"), engine.undamped(1e-4):
-        Decks(engine.lammps).command("nonsense")
 
 
 @pytest.mark.parametrize(

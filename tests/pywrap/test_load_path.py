@@ -56,25 +56,6 @@ def test_what_is_asked_in_between_changes_nothing(between):
     assert [each.fx for each in asked.equilibria] == loads
 
 
-def test_each_equilibrium_follows_from_the_kept_one_below():
-    path = LoadPath(SliderSolver(), [Slider(0.5, 0.0)])
-    assert path(0.5) == 0.0  # known, and nothing is solved
-    path(2.0)
-    path(1.6)
-    path(1.8)
-    path(3.0)
-    path(0.2)
-    start, top = path.equilibria[:2]
-    kept, one, other, last, before = path.solver.asked
-    assert kept == (2.0, start, None, True)
-    assert one == (1.6, start, None, False)
-    assert other[:2] == (1.8, start)
-    assert (other[2].fx, other[3]) == (1.6, False)  # near the last one that was asked for
-    assert last == (3.0, top, start, True)
-    assert before == (0.2, None, None, False)
-    assert path(2.0) == top.packing
-
-
 def test_a_climb_ends_where_the_packing_flows():
     path = LoadPath(SliderSolver())
     assert [each.fx for each in path.climb([0.0, 2.0, 4.0, 1.0])] == [0.0, 2.0]
@@ -82,10 +63,3 @@ def test_a_climb_ends_where_the_packing_flows():
         path(4.0)
     with pytest.raises(NoEquilibriumError):  # at the first load: no path at all
         next(LoadPath(SliderSolver(), [Slider(0.0, 0.0)]).climb([4.0]))
-
-
-def test_the_end_of_a_with_block_closes_the_solver():
-    with LoadPath(SliderSolver()) as path:
-        path(1.0)
-        assert not path.solver.closed
-    assert path.solver.closed

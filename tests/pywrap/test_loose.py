@@ -1,13 +1,12 @@
 """A loose start touches nothing, keeps to its box and its shares, and is the same for one seed."""
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from faultgouge.analysis.files.formats import Disks
-from faultgouge.pywrap.scenes.random_start import layer_size, random_start
+from faultgouge.pywrap.scenes.random_start import random_start
 
 
 def smallest_gap(start: Disks) -> float:
@@ -54,30 +53,3 @@ def test_a_seed_has_loose_starts_of_its_own():
     starts = [random_start(100, (0.5, 0.7), 10, 11.9, seed, draw=draw).position for seed, draw in draws]
     assert np.array_equal(starts[0], random_start(100, (0.5, 0.7), 10, 11.9, 7).position)
     assert len({start.tobytes() for start in starts}) == len(draws)
-
-
-@pytest.mark.parametrize(
-    ("disks", "width", "layer"),
-    [
-        (100, 11.9, 10),  # the paper's packing: a tenth, and side by side
-        (1000, 37.7, 100),  # a tenth is three deep
-        (100, 40.0, 33),  # flat: as many as close the box, at a mean diameter of 1.2
-        (5, 12.0, 5),
-        (3, 1.4, 1),
-    ],
-)
-def test_layer_is_a_tenth_and_closes_the_box(disks, width, layer):
-    assert layer_size(disks, (0.5, 0.7), width) == layer
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        ((10, (0.5,), 11, 20.0, 1), "an upper layer of 11 disks cannot be made from 10"),
-        ((0, (0.5,), 0, 20.0, 1), "an upper layer of 0 disks cannot be made from 0"),
-        ((20, (0.5, 0.7), 1, 1.3, 1), "a disk of radius 0.7 is wider than the box of width 1.3"),
-    ],
-)
-def test_what_cannot_be_laid_out_is_refused(arguments, says):
-    with pytest.raises(ValueError, match=says):
-        random_start(*arguments)

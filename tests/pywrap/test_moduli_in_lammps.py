@@ -10,7 +10,7 @@ STRAIN, STEPS, DT = 1e-7, 2000, 0.002
 """So small that a contact's stiffness changes by 1e-5; half of the difference of both directions takes that out."""
 
 
-@pytest.fixture(scope="module", params=[2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=[2, pytest.param(3, marks=pytest.mark.slow)], ids=["disks", "spheres"])
 def sheared(request, tmp_path_factory):
     """Disks, or spheres, at rest in a tilted periodic box after a shear with friction; their LAMMPS and dimension."""
     from periodic_box import at_rest
@@ -48,7 +48,9 @@ def test_stress_is_the_pressure_of_lammps(sheared):
     assert as_lammps(stress(packing))[:d, :d] == pytest.approx(told, abs=1e-11 * np.abs(told).max())
 
 
+@pytest.mark.parametrize("sheared", [2, pytest.param(3, marks=pytest.mark.long)], indirect=True, scope="module")
 def test_moduli_are_those_of_a_deformed_box(sheared):
+    """Of disks; of spheres, whose stress is compared above, in `make long`."""
     lmp, d = sheared
     packing = from_lammps(lmp)
     found = elastic_moduli(packing)

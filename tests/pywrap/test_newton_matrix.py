@@ -11,11 +11,10 @@ from numpy.testing import assert_allclose
 from scipy.sparse import coo_array, csc_array, csr_array, triu
 from scipy.sparse.linalg import splu
 
-from faultgouge.analysis import Contacts, MindlinLaw, Packing, stiffness_matrix, touching
+from faultgouge.analysis import Contacts, MindlinLaw, stiffness_matrix
 from faultgouge.analysis.factors.linear_solver import RESIDUAL_SHARE, SparseSolver, elimination_order
 from faultgouge.assessment.extremes.cases.packings import crystal
 from faultgouge.pywrap import Engine
-from faultgouge.pywrap.equilibria.newton import iterate_newton
 from faultgouge.pywrap.equilibria.newton_matrix import FLOATING_SHARE, factor_stiffness
 from faultgouge.pywrap.lammps.contact_graph import ContactGraph
 from faultgouge.pywrap.lammps.trial_state import Trial
@@ -78,14 +77,6 @@ def test_contacts_below_the_floor_are_left_out(reference_packing):
     )
 
 
-def test_nothing_that_holds():
-    position = np.column_stack([3.0 * np.arange(7), np.full(7, 5.0)])
-    apart = Packing(position=position, radius=np.ones(7), contacts=Contacts([], [], []), law=MindlinLaw(1, 1, 1))
-    assert factor_stiffness(trial_of(apart), 0.0) is None
-    assert trial_of(apart).residual == 0.0
-    assert trial_of(apart).floor == 0.0
-
-
 def test_contact_that_closes_on_the_way_has_no_slip(reference_packing):
     """A change of forces from changed displacements, and back: with what K knows of new contacts, and without."""
     base = reference_packing(1.0)
@@ -116,40 +107,6 @@ def without(packing, disk, kept):
     c = packing.contacts
     mine = np.flatnonzero((c.i == disk) | (c.j == disk))
     return replace(packing, contacts=of(c, np.setdiff1d(np.arange(len(c)), mine[kept:])))
-
-
-def test_expelled_are_disks_with_one_contact_and_with_two_new_ones(reference_packing):
-    whole = reference_packing(1.0)
-    one, two, new = np.flatnonzero((ContactGraph(whole.contacts, whole.radius).degree > 2) & ~whole.top)[[0, 30, 60]]
-    trial = without(without(without(whole, one, 1), two, 2), new, 2)
-    since = without(trial, new, 0).contacts
-    expelled = factor_stiffness(trial_of(trial), 0.0, ContactGraph(since, whole.radius)).expelled
-    assert expelled[one]
-    assert not expelled[two]
-    assert expelled[new]
-
-
-def test_a_disk_between_two_new_contacts_takes_a_longer_step(reference_packing):
-    """The force goes as delta^(3/2), and a root of that order is met by so many times Newton's step."""
-    there = reference_packing(1.0)
-    disk = int(np.flatnonzero((ContactGraph(there.contacts, there.radius).degree == 3) & ~there.top)[0])
-    there, place, other = without(there, disk, 2), there.position.copy(), int(np.flatnonzero(there.top)[0])
-    place[disk] = place[other] + [0.0, there.radius[disk] + there.radius[other] - 1e-4]
-    start = replace(there, position=place, contacts=touching(place, there.radius, there.box_length))
-    trial = trial_of(there, 1e-6 * np.random.default_rng(8).standard_normal(300))
-    asked = []
-
-    def try_displacement(base, displacement):
-        asked.append(displacement)
-        if len(asked) > 1:
-            raise _Seen
-        return trial
-
-    with pytest.raises(_Seen):
-        iterate_newton(try_displacement, Trial.of(start))
-    expected = factor_stiffness(trial, trial.floor, ContactGraph(start.contacts, start.radius)).solve(trial.force)
-    expected[[disk, 100 + disk, 200 + disk]] *= 1.5
-    np.testing.assert_array_equal(asked[1], expected)
 
 
 @pytest.fixture(scope="module")

@@ -44,14 +44,6 @@ def test_middle_of_three(width, angles):
     assert narrowest_gap(cage, 0, start) < 0.84 * width
 
 
-@pytest.mark.parametrize("x", [0.1, -1e-18])  # the latter, modulo the period, rounds to the period
-def test_floor_and_period_are_walls(x):
-    # between the floor and a disk above it, which is its own neighbour across the box
-    cage = packing([[x, 0.52], [x + 3.8, 1.7]], [0.5, 0.5], box_length=4.0)
-    (place,) = middle_of_cage(cage, np.array([0]))
-    assert narrowest_gap(cage, 0, place) > 3 * narrowest_gap(cage, 0, cage.position[0])
-
-
 def test_a_move_is_that_of_a_solver_of_linear_programs():
     """SciPy's, which knows a solution to 1e-7, on cages of random neighbours."""
     from scipy.optimize import linprog

@@ -20,7 +20,6 @@ from faultgouge.pywrap import Equilibrium, Record, Scene, SceneError, perturb, r
 from faultgouge.pywrap.runs import undamped
 from faultgouge.pywrap.runs.drive import DriveRecord
 from faultgouge.pywrap.runs.undamped import sample_steps, weakening_of
-from faultgouge.pywrap.scenes.validation import digest_of
 
 SCENE = {"packing": {"file": str(REFERENCE)}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
 WRITERS = {"run_recorder.py", "runfile.py", "checksummed_file.py", "atomic_write.py"}
@@ -176,15 +175,6 @@ def test_it_goes_on_to_the_bit(kind, tmp_path, monkeypatch):
         assert file.series("trajectory")["time"].tolist() == [sample.time for sample in whole]
 
 
-def test_a_file_of_another_task_is_not_continued(tmp_path):
-    wanted = perturbed_scene("cosine")
-    *_, start = reach(wanted, wanted.perturb.fx)
-    with Record(tmp_path / "run.h5", wanted) as record:
-        record.append(start)
-    with pytest.raises(SceneError, match="is a file of the command ramp"):
-        Record(tmp_path / "run.h5", wanted, task="perturb")
-
-
 def test_a_ramp_goes_on_from_a_settled_packing_and_its_file_then_has_the_ramp(tmp_path):
     mapping = {"packing": {"file": str(REFERENCE)}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
     ramped = Scene.from_mapping(mapping | {"ramp": {"step": 1e-3, "until": 2e-3}}, command="ramp")
@@ -254,12 +244,3 @@ def test_a_run_does_not_go_on_from_files_of_another_content(equilibria, tmp_path
     with record() as run:
         assert f"does not say what {name} held" in run.remark or len(scene.files) > 1
         assert "it may be another" in run.remark
-
-
-def test_a_dump_is_also_what_lies_beside_it(tmp_path):
-    for suffix in ("disks", "contacts", "params"):
-        (tmp_path / f"a.{suffix}").write_text("1")
-    paths = tuple(tmp_path / f"a.{suffix}" for suffix in ("disks", "contacts", "params"))
-    before = digest_of(paths)
-    paths[1].write_text("2")
-    assert digest_of(paths) != before

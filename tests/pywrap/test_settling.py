@@ -11,10 +11,8 @@ import pytest
 from reference_layer import on_ranks
 from scipy.linalg import eigvalsh
 
-from faultgouge.analysis import MindlinLaw, Packing, spectrum, stiffness_matrix, touching
+from faultgouge.analysis import MindlinLaw, Packing, stiffness_matrix, touching
 from faultgouge.pywrap import NoEquilibriumError, Scene, settle
-from faultgouge.pywrap.runs.undamped import ACCURATE_SHARE, time_step
-from faultgouge.pywrap.settling import minimize_energy as minimize_energy_module
 from faultgouge.pywrap.settling.minimize_energy import minimize_energy
 
 LARGE = {"disks": 400, "width": 24.0, "seed": 1}
@@ -70,13 +68,6 @@ def test_a_seed_whose_layer_sinks_is_the_packing_of_its_next_loose_start():
     assert np.array_equal(again.position, found.packing.position)
 
 
-@pytest.mark.slow
-def test_settling_with_friction_leaves_slips():
-    packing = settle(scene(disks=20, top=4, width=4.9, settle_friction=True)).packing
-    assert np.abs(packing.contacts.slip).max() > 0
-    assert packing.residual < 1e-9
-
-
 def test_spheres_rest_where_disks_of_equal_masses_do():
     equal, spheres = (settle(scene(disks=20, top=4, width=4.9, masses=each)).packing for each in ("equal", "spheres"))
     np.testing.assert_array_equal(spheres.position, equal.position)
@@ -107,20 +98,6 @@ def test_disk_on_top_of_another_rolls_down():
     assert packing.position[2, 1] < 0.5
     assert packing.normal_force[packing.contacts.i == 2].sum() == pytest.approx(3.0, abs=1e-9)
     assert lowest(packing)[0] > -1e-6
-
-
-@pytest.mark.slow
-def test_layer_that_still_sinks_when_steps_run_out_is_refused(monkeypatch):
-    monkeypatch.setattr(minimize_energy_module, "STAGE_STEPS", 5000)
-    with pytest.raises(NoEquilibriumError, match=r"leave packing\.top out"):
-        settle(scene(**LARGE, top=8))
-
-
-@pytest.mark.slow
-def test_time_step_of_a_large_packing_is_that_of_all_eigenvalues(large):
-    limit = 2 / spectrum(large.packing).omega_max
-    # the root of an eigenvalue that is known to 1e-4
-    assert time_step(large.packing) == pytest.approx(ACCURATE_SHARE * limit, rel=5e-5)
 
 
 @pytest.mark.ranks

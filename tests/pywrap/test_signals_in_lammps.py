@@ -7,7 +7,7 @@ from faultgouge.analysis.files.signal_files import of_trace, read_signal
 from faultgouge.analysis.responses.forcing import floor_force, sampled_response
 from faultgouge.analysis.responses.response import layer_force
 from faultgouge.analysis.responses.signals import SignalError
-from faultgouge.pywrap import Engine, Scene
+from faultgouge.pywrap import Engine
 from faultgouge.pywrap.lammps.decks import DECKS
 from faultgouge.pywrap.runs.undamped import time_step
 
@@ -93,11 +93,3 @@ def test_scenes_with_a_bad_signal_are_refused(refused_scene, tmp_path, text, key
         (tmp_path / "signal.txt").write_text(text)
     perturb = {"fx": 0.0, "time": 1.0, "signal": "signal.txt", **keys}
     assert says in refused_scene({**LEAST, "perturb": perturb}, tmp_path)
-
-
-def test_rows_that_are_closer_than_the_time_step_are_refused(tmp_path):
-    (tmp_path / "signal.txt").write_text("0 1\n1e-4 1\n1 0\n")
-    scene = Scene.from_mapping({**LEAST, "perturb": {"fx": 0.0, "time": 1.0, "signal": "signal.txt"}}, tmp_path)
-    with pytest.raises(SignalError, match=r"rows that are 0\.0001 apart, and the time step is 0\.001.*stretch to 10"):
-        scene.perturb.check_samples(1e-3)
-    scene.perturb.check_samples(1e-5)

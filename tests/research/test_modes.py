@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from reference_layer import SMALL, parted
+from reference_layer import SMALL
 from scipy.stats import mannwhitneyu
 
 from faultgouge.analysis import stiffness_matrix
@@ -16,33 +16,21 @@ from faultgouge.analysis.windows import LIMITS
 from faultgouge.pywrap import Engine, Scene, equilibrate, settle
 from faultgouge.pywrap.scenes.units import real_units
 from faultgouge.studies.modes import count_pairs
-from faultgouge.studies.statistics import median
 from faultgouge.studies.sweep.run_sweep import run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep
 from research.modes.count_in_slices import count_in_slices
 from research.modes.make import different
 from research.modes.packing_rows import computed_again, read_known
-from research.modes.page import critical, part, write_page
+from research.modes.page import critical, part
 from research.modes.parts_of_b import switched
-from research.modes.random_matrices import weak_share
 from research.modes.sets import quartz, sets
-from research.statistics import exponent, interval
+from research.statistics import interval
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "research" / "modes"
 FOUND = json.loads((DOCS / "modes.json").read_text())
 UNITS = (ROOT / "docs" / "units.md").read_text()
 REFEREE = (DOCS / "referee.md").read_text()
-
-
-@pytest.mark.long
-def test_the_page_comes_out_of_the_tables(tmp_path):
-    write_page(DOCS / "tables", tmp_path)
-    for name in ("README.md", "tables.md"):
-        assert (tmp_path / name).read_text() == (DOCS / name).read_text()
-    (words, numbers), (stored, expected) = (parted(each / "modes.json") for each in (tmp_path, DOCS))
-    assert words == stored
-    assert numbers == pytest.approx(expected, rel=1e-12)
 
 
 def test_without_b_no_pair_is_complex():
@@ -205,28 +193,6 @@ def test_the_fastest_pair_does_not_change_with_the_thickness():
             intervals[each].append(course[each][k])
     for each in intervals.values():
         assert max(low for _, low, _ in each) < min(high for *_, high in each)
-
-
-def test_intervals_hold_what_they_should():
-    generator = np.random.default_rng(3)
-    held = 0
-    for _ in range(60):
-        middle, low, high = median(generator.standard_normal(30))
-        assert low <= middle <= high
-        held += low <= 0 <= high
-    assert held >= 52  # 95 % of 60 are 57; fewer than 52 come once in a hundred times
-    samples = [n**-0.5 * np.exp(0.1 * generator.standard_normal(40)) for n in (50, 100, 200)]
-    found = exponent((50, 100, 200), samples, lambda each: np.log(np.median(each)), 2000)
-    middle, low, high = found.values()
-    assert low < -0.5 < high
-    assert high - low < 0.2
-
-
-def test_the_formula_of_weak_non_symmetry():
-    """Small couplings: two neighbouring levels; large ones: all but a few are complex."""
-    small, large = weak_share(np.array([1e-3, 10.0]), np.ones(2))
-    assert small == pytest.approx(2 * np.pi**2 / 3 * 1e-6, rel=1e-4)
-    assert 1 - large == pytest.approx(np.sqrt(np.pi) / (2 * np.sqrt(2) * np.pi * 10), rel=1e-6)
 
 
 def rows(name, folder="slices_and_bounds"):

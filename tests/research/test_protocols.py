@@ -1,24 +1,16 @@
 """The page on velocity steps and holds comes out of its table, and what it says is in the table."""
 
-import shutil
-
 import numpy as np
 import pytest
 
-from faultgouge.pywrap.runs.drive import DriveSample
-from research.protocols.compute import EDGES, FACTORS, FY, HOLDS, in_bins
-from research.protocols.make import HERE, TABLE, WEAK, check, holds, mean, numbers, write_page
+from research.protocols.compute import FACTORS, HOLDS
+from research.protocols.make import HERE, TABLE, WEAK, check, holds, numbers
 from research.statistics import interval
 from research.tables import read_rows
 
 ROWS = read_rows(HERE / "tables" / TABLE)
 WEAK_ROWS = read_rows(HERE / "tables" / WEAK)
 FOUND = numbers(ROWS, WEAK_ROWS)
-
-
-def test_the_page_is_that_of_its_table(tmp_path):
-    shutil.copytree(HERE / "tables", tmp_path / "tables")
-    assert (HERE / "README.md").read_text() == write_page(tmp_path).read_text()
 
 
 def test_no_seed_and_no_run_is_left_out():
@@ -45,23 +37,6 @@ def test_what_the_pages_say_is_shown():
 def test_each_longer_hold_sinks_the_layer_further():
     sunk = np.array([each["sunk"] for each in holds(ROWS)])
     assert (np.diff(sunk, axis=0) > 0).all()
-
-
-def test_bins_are_means_over_displacements():
-    moved = np.linspace(0.0, 0.02, 21)
-    rows = [DriveSample(x, FY * x, 1.0 + x, 10.0 - x, 0.0, 0) for x in moved]
-    found = in_bins(rows, 1.0)
-    assert len(found["mean"]) == 2
-    inside = (moved > EDGES[0]) & (moved < EDGES[1] + 1e-6)
-    assert found["mean"][0] == pytest.approx(moved[inside].mean())
-    assert found["largest"] == pytest.approx([0.01, 0.02])
-    assert found["thickness"][0] == pytest.approx(10 - moved[inside].mean())
-
-
-def test_an_interval_over_seeds_is_that_of_student():
-    middle, low, high = mean([1.0, 2.0, 3.0])
-    assert (middle, high - middle) == (2.0, pytest.approx(4.3027 / np.sqrt(3), rel=1e-4))
-    assert middle - low == pytest.approx(high - middle)
 
 
 @pytest.mark.long

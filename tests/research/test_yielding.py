@@ -1,6 +1,5 @@
 """The pages of yield come out of their tables, and other pages say the same."""
 
-import shutil
 from pathlib import Path
 
 from research.tables import read_rows
@@ -8,24 +7,16 @@ from research.yielding.compute import CONTROLLED_RATE
 from research.yielding.page import (
     SEEN_GROWTH,
     UNREST,
-    count_vibrating_draws,
     numbers,
     rows_of,
     standard,
     worst_ends,
-    write_lasting,
-    write_page,
 )
 
 YIELDING = Path(__file__).parents[2] / "research" / "yielding"
 ROWS, _ = rows_of(YIELDING / "tables" / "quartz_100.jsonl")
 STANDARD = read_rows(YIELDING / "tables" / "standard_100.jsonl")
 AT_BOUND = read_rows(YIELDING / "tables" / "sliding_100.jsonl")
-
-
-def test_the_page_of_yield_is_that_of_its_tables(tmp_path):
-    shutil.copytree(YIELDING / "tables", tmp_path / "tables")
-    assert (YIELDING / "README.md").read_text() == write_page(tmp_path).read_text()
 
 
 def test_flow_is_told_from_a_layer_that_finds_no_rest_under_drag():
@@ -61,22 +52,6 @@ def test_motion_from_the_bound_needs_contacts_there():
         assert runs[1.0, 0.9]["largest_D"] > SEEN_GROWTH > 100 * runs[1.01, 0.9]["largest_D"]
 
 
-def test_draws_are_counted_by_layer():
-    lasting = [
-        {"seed": s, "history": "total", "share": 0.97, "restitution": 0.9, "early": 1, "late": 1} for s in (1, 2)
-    ]
-    further = [
-        {"seed": 1, "history": history, "draw": draw, "early": 1.0, "late": late}
-        for history, lates in (("total", {1: 1.0, 2: 0.1}), ("coulomb", {0: 0.1, 1: 0.1, 2: 0.2}))
-        for draw, late in lates.items()
-    ]
-    found = count_vibrating_draws(lasting, further)
-    assert found["seeds"] == [1]  # seed 2 has one draw alone
-    assert found["counts"] == {"total": [0, 0, 1, 0], "coulomb": [1, 0, 0, 0]}
-    assert found["late"] == 0.2
-    assert count_vibrating_draws(lasting, []) is None
-
-
 def test_layers_without_loss_do_not_rest_below_their_static_yield_and_lossy_ones_do():
     assert all(row["static"] >= row["newton"] for row in ROWS)
     undamped, *lossy = numbers(ROWS)["yields"]
@@ -101,13 +76,3 @@ def test_one_layer_of_400_disks_flows_in_spite_of_loss_by_the_papers_law_alone()
     assert all((run["ends"] == "rests") == (run["history"] != "total") for run in runs)
     said = f"[{len(lossy)} of {len(large)}](yield/further.md#400-disks) of 400"
     assert said in (YIELDING.parents[1] / "docs" / "paper.md").read_text()
-
-
-def test_the_page_of_layers_left_to_themselves_is_that_of_its_tables_and_other_pages_say_the_same(tmp_path):
-    shutil.copytree(YIELDING / "tables", tmp_path / "tables")
-    written = write_lasting(tmp_path).read_text()
-    assert (YIELDING / "further.md").read_text() == written
-    referee = " ".join((YIELDING.parent / "modes" / "referee.md").read_text().split())
-    assert "one draw of noise for each layer, 5 of 20 (11 to 47 %) layers vibrate" in " ".join(written.split())
-    assert "5 of 20 with one draw of noise each, vibrate" in referee
-    assert "5 of 20 vibrate on with the noise that they were given" in referee

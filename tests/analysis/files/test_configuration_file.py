@@ -1,6 +1,5 @@
 """A run.h5 that holds a Configuration gives it back to the bit, or is refused."""
 
-import numpy as np
 import pytest
 from test_linearised_contacts import make
 
@@ -19,12 +18,6 @@ def test_to_the_bit(d, tmp_path):
     assert not found.position.flags.writeable
 
 
-def test_without_contacts(tmp_path):
-    bare = make(3).loaded(np.inf)
-    write_configuration(tmp_path / "run.h5", bare)
-    assert read_configuration(tmp_path / "run.h5") == bare
-
-
 def test_damage_is_refused(tmp_path):
     path = tmp_path / "run.h5"
     write_configuration(path, make(3))
@@ -37,16 +30,6 @@ def test_damage_is_refused(tmp_path):
     with pytest.raises(PackingFileError, match="does not exist"):
         read_configuration(tmp_path / "none.h5")
     assert not holds_configuration(tmp_path / "none.h5")
-
-
-def test_damage_is_refused_by_the_checksum(tmp_path):
-    """HDF5 is not asked before: it has errors of its own for what it meets."""
-    write_configuration(tmp_path / "run.h5", make(3))
-    content = bytearray((tmp_path / "run.h5").read_bytes())
-    content[len(content) // 2] ^= 1
-    (tmp_path / "run.h5").write_bytes(content)
-    with pytest.raises(PackingFileError, match="damaged"):
-        holds_configuration(tmp_path / "run.h5")
 
 
 def test_a_snapshot_is_no_run(tmp_path):

@@ -171,6 +171,41 @@ def test_rate_of_a_packing_beyond_lapack_is_that_of_lapack(reference_packing, re
     assert found.free == expected.free
 
 
+def with_disks_alone(packing, count):
+    """A packing of disks, and equal disks on a wall, none of which touches another."""
+    c, first = packing.contacts, len(packing)
+    given = {name: getattr(c, name) for name in PER_CONTACT}
+    more = {name: np.repeat(values[:1], count, axis=0) for name, values in given.items()}
+    more |= {"i": first + np.arange(count), "j": np.full(count, -1), "distance": np.full(count, np.inf)}
+    more |= {
+        "normal": np.tile([0.0, 1.0, 0.0], (count, 1)),
+        "tangential_force": np.zeros_like(more["tangential_force"]),
+    }
+    load = np.zeros((count, *packing.load.shape[1:]))
+    load[:, 0, 1] = -more["normal_force"]
+    names = ("radius", "mass", "inertia", "position")
+    each = {
+        name: np.concatenate([values, values[:1].repeat(count, 0)])
+        for name in names
+        for values in [getattr(packing, name)]
+    }
+    contacts = LinearisedContacts(**{name: np.concatenate([given[name], more[name]]) for name in given})
+    return Configuration(
+        dimension=2, contacts=contacts, load=np.concatenate([packing.load, load]),
+        box=packing.box, origin=packing.origin, periodic=packing.periodic, **each,
+    )  # fmt: skip
+
+
+def test_many_particles_alone_with_the_same_eigenvalues_hide_none(reference_packing, beyond_lapack):
+    """Two hundred eigenvalues in one place are more than a block of six vectors sees."""
+    packing = dissipative(reference_packing(1.0), *WEAK).configuration
+    alone, found = (linear_verdict(Motion.of(each)) for each in (packing, with_disks_alone(packing, 200)))
+    assert found.stable is alone.stable is True
+    assert found.free == alone.free + 200  # these roll
+    assert found.growth_rate == pytest.approx(alone.growth_rate, abs=found.error + alone.error)
+    assert found.said.startswith("no motion faster than")
+
+
 @pytest.mark.parametrize(
     ("row", "stable", "free"),
     [
