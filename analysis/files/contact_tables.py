@@ -128,8 +128,15 @@ def _table(path: Path, columns: Sequence[str] | None, frame: int = -1) -> tuple[
         if len(about["periodic"]) != 3:
             about["periodic"] = None
     else:
-        head = lines[0].lstrip("#/ \t")
-        kept = [(k, line) for k, line in enumerate(lines[1:], 2) if line.strip() and not line.lstrip().startswith("#")]
+        # the names stand in the first line, as of YADE behind a #, or in the first line that is no comment
+        plain = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), 0)
+        begin = plain if lines[plain].lstrip()[:1].isalpha() else 0
+        head = lines[begin].lstrip("#/ \t")
+        kept = [
+            (k, line)
+            for k, line in enumerate(lines[begin + 1 :], begin + 2)
+            if line.strip() and not line.lstrip().startswith("#")
+        ]
         if head.split()[0] == "format":  # YADE: #format x_y_z_r
             head, about = head.split()[-1].replace("_", " "), {"first": 0.0}  # O.bodies counts from 0
         split = (lambda text: [each.strip() for each in text.split(",")]) if "," in head else str.split

@@ -182,3 +182,15 @@ def test_a_bad_table_is_refused_in_one_sentence(tmp_path, spheres, contacts, mat
     with pytest.raises(FaultgougeError, match=word) as raised:
         read_contacts(read_spheres(tmp_path / "s.csv"), tmp_path / "c.csv", material_of(material))
     assert "\n" not in str(raised.value)
+
+
+def test_comments_before_the_names_of_a_table_are_passed_over(tmp_path):
+    """As in the example disks.csv; the names of YADE stand in a comment themselves."""
+    rows = "0,0,0,0.5\n0.99,0,0,0.5\n"
+    found = []
+    for name, head in (("plain", ""), ("told", "# two spheres\n# of a laboratory\n")):
+        (tmp_path / f"{name}.csv").write_text(f"{head}x,y,z,radius\n{rows}")
+        found.append(read_spheres(tmp_path / f"{name}.csv"))
+    assert (found[0].position == found[1].position).all()
+    (tmp_path / "yade.txt").write_text("#x y z r\n" + rows.replace(",", " "))
+    assert (read_spheres(tmp_path / "yade.txt").position == found[0].position).all()

@@ -61,6 +61,7 @@ def test_what_slides_on_as_vibration_decays_comes_to_rest(tmp_path):
     times = np.array([25.0, 75.0, 125.0, 225.0, 325.0])
     in_lammps = pushed(lmp, found, random_pushes(found, PUSHES), times, 1e-3, 1e-7).max(axis=1)
     lmp.close()
-    assert in_lammps[-1] == pytest.approx(told.one_sided.amplification, rel=0.1)
+    # followed for t = 342; a hundredth of the slip is left then
+    assert in_lammps[-1] == pytest.approx(told.one_sided.amplification, rel=0.01)
     gains = np.diff(in_lammps) / np.diff(times)
     assert np.all(gains[1:] < gains[:-1])
