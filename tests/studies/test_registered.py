@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 def strong(tmp_path, monkeypatch):
     """The file of the page among the studies."""
     page = (ROOT / "docs" / "howto.md").read_text()
-    (text,) = re.findall(r"```python\n(\"\"\"How many contacts.*?)```", page, re.DOTALL)
+    (text,) = re.findall(r"```py\n(\"\"\"How many contacts.*?)```", page, re.DOTALL)
     folder = tmp_path / "studies"
     folder.mkdir()
     (folder / "strong.py").write_text(text)
