@@ -304,7 +304,7 @@ def test_the_slowest_motion_of_a_thousand_spheres_decays_as_in_lammps(tmp_path):
     motion = Motion.of(here)
     told = linear_verdict(motion)
     assert told.stable
-    assert f"the slowest decays with D as exp({told.growth_rate:.6g} t)" in told.said
+    assert "motion from a random state decayed" in told.said  # this law rescales, and has no certificate
     kept, rows = opposed(motion), rows_of(lmp, here)
 
     def energy():
@@ -321,9 +321,10 @@ def test_the_slowest_motion_of_a_thousand_spheres_decays_as_in_lammps(tmp_path):
             squares.append(energy())
         means.append(np.mean(squares))
     lmp.close()
-    # 0.5 % was measured; two motions are left that differ by a tenth
+    # two motions are left that differ by a tenth: the decay of a random state is that of both, and its error is told
     rate = np.polyfit(np.arange(50, 100), np.log(means[50:]), 1)[0]
-    assert rate == pytest.approx(told.growth_rate, rel=0.05)
+    assert rate == pytest.approx(told.growth_rate, rel=0.1)
+    assert abs(rate - told.growth_rate) <= told.error
 
 
 def spheres_under_a_rising_load(lmp, here, slope, rate, chunk, count):
