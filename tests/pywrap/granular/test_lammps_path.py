@@ -75,14 +75,21 @@ def test_tilt_of_a_slope(layer):
 
 
 @pytest.mark.slow
-def test_a_path_of_many_loads_keeps_few_copies(layer, monkeypatch):
+def test_a_path_of_many_loads_keeps_few_copies(layer, monkeypatch, tmp_path):
     """However many loads there are; a load between two of them, whose copy has ended, is the same to the bit."""
     from faultgouge.pywrap import lammps_path
     from faultgouge.pywrap.granular import lammps_path as module
 
+    mark = (tmp_path / "mark").open("w")  # each copy inherits the open file; no process of another test has it
+
+    def holds(process: Path) -> bool:
+        try:
+            return any(os.readlink(each) == mark.name for each in process.glob("fd/*"))
+        except OSError:  # it ended meanwhile
+            return False
+
     def processes() -> int:
-        running = [each.read_text().rpartition(")")[2].split() for each in Path("/proc").glob("[0-9]*/stat")]
-        return sum(int(words[2]) == os.getpgrp() for words in running)
+        return sum(map(holds, Path("/proc").glob("[0-9]*")))
 
     def descriptors() -> int:
         return len(os.listdir("/dev/fd"))
