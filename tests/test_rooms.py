@@ -55,10 +55,7 @@ FLOORS = {
         ("runs",),
         ("onset",),
     ),
-    "faultgouge.assessment": (
-        ("timing",),
-        ("explain", "extremes", "work_precision"),
-    ),
+    "faultgouge.assessment": (("explain", "extremes", "work_precision"),),
 }
 """Rooms from the ground up. A room knows those below its floor, and none beside it."""
 
