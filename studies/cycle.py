@@ -44,9 +44,8 @@ from ..analysis.responses.slips import Slip
 from ..analysis.table_display import table_of
 from ..pywrap import SceneError
 from ..pywrap.runs.drive import SERIES, drive_of, slips_in
-from .executors import Progress, Say
 from .result_rows import write_csv
-from .study import draw_all
+from .study import Progress, Say, draw_all
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

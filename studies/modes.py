@@ -57,11 +57,10 @@ from ..pywrap.load_path import LoadPath
 from ..pywrap.scenes.command_sections import PATH, section_of
 from ..pywrap.scenes.validation import Positive, Section, require_section
 from .cycle import cycle
-from .executors import Say
 from .packing_tools import Start, path_from
 from .result_rows import Row, write_csv
 from .statistics import median
-from .study import draw_all, task
+from .study import Say, draw_all, task
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -20,14 +20,13 @@ from faultgouge.pywrap import Equilibrium, Scene, SceneError, settle
 from faultgouge.pywrap.onset import onset_run
 from faultgouge.pywrap.runs.drive import DriveRecord, settle_for_drive
 from faultgouge.studies.cycle import cycle
-from faultgouge.studies.executors import Processes, open_executor
 from faultgouge.studies.statistics import median_interval
 from faultgouge.studies.sweep import workers
 from faultgouge.studies.sweep.draw import draw_sweep, onsets_figure, reach_of
 from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep
 from faultgouge.studies.sweep.user_function import user_function
-from faultgouge.studies.sweep.workers import WorkerError, compute_points
+from faultgouge.studies.sweep.workers import Processes, WorkerError, compute_points, open_executor
 from faultgouge.studies.trigger import trigger
 
 AXES = {"packing.seed": "1:4", "law.mu": [1.0, 0.5, -1.0]}
@@ -368,6 +367,15 @@ def test_a_point_that_kills_every_worker_is_not_tried_for_ever(sweep):
     pool = Deadly(2)
     with pytest.raises(WorkerError, match="fewer --workers"):
         list(compute_points(pool, sweep.task, sweep.points))
+    pool.shutdown()
+
+
+@pytest.mark.slow
+def test_workers_that_end_as_they_start_are_told(monkeypatch):
+    monkeypatch.setattr(workers, "end_with", os._exit)
+    pool = Processes(2)
+    with pytest.raises(WorkerError, match="the workers end as they start; each reads a script anew"):
+        pool.submit(os.getpid).result()
     pool.shutdown()
 
 
