@@ -23,9 +23,8 @@ squared. The noise floor is the largest D of the first time unit, before any gro
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -104,8 +103,7 @@ class Eruptions(Section):
     time: Annotated[Positive, TIME] = 3000.0
 
 
-@dataclass(frozen=True, eq=False)
-class StartOfRun:
+class StartOfRun(NamedTuple):
     """Where a run begins, and how long it may take.
 
     Attributes
@@ -188,7 +186,7 @@ def erupt(start: StartOfRun) -> Row:
             before = dynamics.advance(0).kinetic_energy(packing)
             ended_motion, work = dynamics.work(WORK_STEPS)
             after = ended_motion.kinetic_energy(packing)
-    columns = {name: np.array([each[name] for each in samples]) for name in samples[0]}
+    columns = dict(zip(samples[0], row_columns(samples, *samples[0]), strict=True))
     time, msds = columns["time"], columns["msd"]
     noise = float(msds[time <= unit].max(initial=float(msds[0])))
     walk = WALK_FACTOR * packing.coordinate_rounding**2 * time[-1] / dt
@@ -198,20 +196,13 @@ def erupt(start: StartOfRun) -> Row:
         ended, upto = float(time[place]), slice(0, place + 1)
         ends = "opens" if columns["lost"][upto].any() else "slides" if columns["sliding"][upto].any() else "law"
         ends = ends if over else "cut off"
-    return {
-        "fx": packing.fx,
-        "damped": start.damped,
-        "rate": rate,
-        "time": float(time[-1]),
-        **{name: float(columns[name].max()) for name in ("msd", "kinetic_energy")},
-        "slip": float(np.abs(columns["slip"]).max()),
-        **{name: int(columns[name].max()) for name in ("lost", "gained", "sliding")},
-        "ended": ended,
-        "ends": "flows" if flows else ends,
-        "noise": noise,
-        "balance": float(abs(after - before - work) / max(abs(work), after, before)),
-        "series": {name: column.tolist() for name, column in columns.items()},
-    }
+    known = {"fx": packing.fx, "damped": start.damped, "rate": rate, "time": float(time[-1])}
+    most = {name: float(np.abs(columns[name]).max()) for name in ("msd", "kinetic_energy", "slip")}
+    contacts = {name: int(columns[name].max()) for name in ("lost", "gained", "sliding")}
+    balance = float(abs(after - before - work) / max(abs(work), after, before))
+    how = {"ended": ended, "ends": "flows" if flows else ends, "noise": noise, "balance": balance}
+    series = {name: column.astype(type(samples[0][name])).tolist() for name, column in columns.items()}
+    return known | most | contacts | how | {"series": series}
 
 
 def _is_over(samples: list[dict[str, float]], rate: float, unit: float) -> bool:
@@ -261,17 +252,17 @@ def _row(scene: Scene, _: object) -> Row:
     """A row of a sweep: size and end of the eruption at each load, without time series."""
     settings = _section(scene)
     starts, flows_beyond = _starts(scene, sorted(settings.load), settings.time)
-    return {"runs": [without_series(erupt(each)) for each in starts], "flows_beyond": flows_beyond}
+    return {"runs": [_without_series(erupt(each)) for each in starts], "flows_beyond": flows_beyond}
 
 
-def without_series(run: Row) -> Row:
+def _without_series(run: Row) -> Row:
     """A run without its samples and what is in its line besides."""
     return {key: value for key, value in run.items() if key not in ("scene", "version", "series", "longest")}
 
 
-def _runs(rows: Rows, wanted: Sequence[float], time: float) -> list[Row]:
-    """Runs of the given length at the given loads."""
-    runs = [row for row in rows.rows if row["fx"] in wanted and row["longest"] == time]
+def _runs(rows: Rows, settings: Eruptions) -> list[Row]:
+    """Runs of the length and at the loads of the scene."""
+    runs = [row for row in rows.rows if row["fx"] in settings.load and row["longest"] == settings.time]
     return sorted(runs, key=lambda row: (row["fx"], row["damped"]))
 
 
@@ -327,8 +318,8 @@ def _course_figure(series: dict[float, dict[str, list[float]]]) -> Figure:
 
 
 def _figures(result: Result, rows: Rows) -> Figures:
-    asked = result["scene"]["eruptions"]
-    series = {row["fx"]: row["series"] for row in _runs(rows, asked["load"], asked["time"]) if not row["damped"]}
+    asked = Eruptions.model_validate(result["scene"]["eruptions"])
+    series = {row["fx"]: row["series"] for row in _runs(rows, asked) if not row["damped"]}
     courses = {"courses": lambda: _course_figure(series)} if series else {}
     return {"sizes": lambda: _size_figure(result["runs"])} | courses
 
@@ -389,7 +380,7 @@ def eruptions(scene: Scene, work: Work) -> Result:
                 f"F_x = {found['fx']:g}: D up to {found['msd']:.2g}, the layer slips by {found['slip']:.2g}, "
                 f"{counted(found['lost'], 'contact')} open; {found['ends']} after t = {found['time']:.4g}"
             )
-    runs = _runs(rows, settings.load, time)
+    runs = _runs(rows, settings)
     if not runs:
         raise NoEquilibriumError(f"the packing bears none of the loads: it flows beyond F_x = {flows_beyond:g}")
-    return {"runs": [without_series(row) for row in runs]}
+    return {"runs": [_without_series(row) for row in runs]}
