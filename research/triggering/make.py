@@ -11,7 +11,6 @@ python -m research.triggering.make [FIRST] > research/triggering/triggered.jsonl
 import json
 import sys
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -71,7 +70,7 @@ def _try_seed(scene: Scene, seed: int) -> dict[str, Any]:
             says = "the onset of the weakened friction is not below it"
     except (OnsetError, NoEquilibriumError, SceneError) as error:
         return {"seed": seed, "says": str(error), "fx": None, "forecast": None}
-    return {"seed": seed, "says": says, "fx": fx, "forecast": asdict(foreseen)}
+    return {"seed": seed, "says": says, "fx": fx, "forecast": foreseen._asdict()}
 
 
 def _falls_short(foreseen: Forecast) -> str:
