@@ -33,7 +33,7 @@ from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
 from ...pywrap.onset import ONSET_DISTANCES, load_at_onset, onset_run
 from ...pywrap.runs.undamped import ACCURATE_SHARE, perturb, time_step
 from ...pywrap.scenes.sections import Perturb
-from ...pywrap.scenes.units import dashpot, quality_factor, real_units
+from ...pywrap.scenes.units import dashpot, real_units
 from ...pywrap.scenes.validation import require_section
 from ...pywrap.settling.settle import settle_bed
 from ..packing_tools import unit_of_time
@@ -372,27 +372,15 @@ def report(
     for one, other in pairwise(sorted(runs, key=lambda run: run.mu)):
         apart = other.fx_c - one.fx_c
         earlier.append(None if abs(apart) <= one.error + other.error else apart > 0)
-    triggering = found.found if isinstance(found, Triggered) else None
     names: dict[str, Any] = {"real": real, "scene": scene, "dashpot": None}
-    if isinstance(found, Triggered) and triggering is not None:
-        numbers, erupting = triggering_summary(found), triggering.runs["erupting"]
+    if isinstance(found, Triggered):
+        numbers = triggering_summary(found)
         jump = numbers["jump"]
-        names |= {
-            "numbers": numbers,
-            "sensitive": found.sensitive,
-            "calibrated": isinstance(require_section(triggering.scene.friction, "friction").v0, str),
-            "highest_speed": float(np.abs(erupting["layer_velocity"]).max()),
-            "jumped": None if jump is None else float(np.log10(jump / numbers["largest_D"]["perturbed"])),
-            "above_noise": ABOVE_NOISE,
-        }
-    if real is not None and units is not None:
-        fastest = max(growth.spectrum.pairs, key=lambda each: each.growth_rate)
-        wave = triggering if another is None else None
-        names |= {"fastest": fastest, "wave": wave, "erupted": None if wave is None else largest(wave.runs["erupting"])}
-        names["quality"] = quality_factor(0.5 * fastest.growth_rate + 1j * fastest.frequency)
-        if units.restitution is not None:
-            impact = units.si("impact_velocity") / real.velocity(1.0)
-            names["dashpot"] = dashpot(scene.law.kn, units.restitution, 1.0, impact)
+        jumped = None if jump is None else float(np.log10(jump / numbers["largest_D"]["perturbed"]))
+        names |= {"numbers": numbers, "sensitive": found.sensitive, "jumped": jumped, "above_noise": ABOVE_NOISE}
+    if real is not None and units is not None and units.restitution is not None:
+        impact = units.si("impact_velocity") / real.velocity(1.0)
+        names["dashpot"] = dashpot(scene.law.kn, units.restitution, 1.0, impact)
     return render(
         __package__ or "",
         "report.md.j2",
@@ -404,7 +392,7 @@ def report(
         residual=max(each.residual for run in runs for each in run.equilibria),
         earlier=earlier,
         growth=growth,
-        triggering=triggering,
+        triggering=found.found if isinstance(found, Triggered) else None,
         says=found,
         another=another,
         time_step_share=ACCURATE_SHARE,
