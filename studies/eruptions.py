@@ -32,6 +32,7 @@ from pydantic import Field
 from threadpoolctl import threadpool_limits
 
 from ..analysis import NoEquilibriumError, Packing, mean_square_displacement, nearest_image, spectrum
+from ..analysis.arrays import Floats
 from ..analysis.counted import counted
 from ..analysis.responses.growth import NOISE_FACTOR
 from ..analysis.responses.growth_of_run import unstable_rates
@@ -74,6 +75,9 @@ by a few hundred times in `QUIET_TIME`."""
 WALK_FACTOR = 10.0
 """Factor from the D of a random walk, one rounding of a coordinate a time step, below which D has not risen: strong
 drag leaves D at 1e-30 in the first time unit, and the walk is at 3e-25 after fifty."""
+
+AMOUNTS, COUNTS = ("time", "msd", "slip", "kinetic_energy"), ("lost", "gained", "sliding")
+"""What is sampled, and what of it are numbers of contacts."""
 
 ENDS = {
     "opens": ("a contact opens", "o"),
@@ -154,7 +158,7 @@ def erupt(start: StartOfRun) -> Row:
         # close together at first and farther apart later, no two at one step
         early = np.geomspace(min(100, last), last, SAMPLES_OF_RUN).astype(np.int64)
         steps = np.union1d(early, np.linspace(min(100, last), last, SAMPLES_OF_RUN).astype(np.int64))
-        samples: list[dict[str, float]] = []
+        samples: list[tuple[float, ...]] = []
         moved, position, done = np.zeros_like(packing.position), packing.position, 0
         over = flows = False
         with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(dt) as dynamics:
@@ -168,25 +172,18 @@ def erupt(start: StartOfRun) -> Row:
                 if abs(moved).max() < 0.25 * (packing.box_length or np.inf):
                     low = motion.position_low, packing.position_low
                     msd = mean_square_displacement(motion.position, packing.position, packing.box_length, *low)
-                there = contact_pairs(now)
-                samples.append(
-                    {
-                        "time": at * dt,
-                        "msd": float(msd),
-                        "slip": float(moved[packing.top, 0].mean()),
-                        "kinetic_energy": motion.kinetic_energy(packing),
-                        "lost": len(initial - there),
-                        "gained": len(there - contact_pairs(packing)),
-                        "sliding": len((contact_pairs(now, now.sliding) - slid) & initial),
-                    }
-                )
-                over, flows = _is_over(samples, rate, unit), abs(samples[-1]["slip"]) > 2 * packing.radius.max()
+                there, sliding = contact_pairs(now), contact_pairs(now, now.sliding) - slid
+                slip = float(moved[packing.top, 0].mean())
+                counts = len(initial - there), len(there - contact_pairs(packing)), len(sliding & initial)
+                samples.append((at * dt, float(msd), slip, motion.kinetic_energy(packing), *counts))
+                times, sizes, *_ = np.transpose(samples)
+                over, flows = _is_over(times, sizes, rate, unit), abs(slip) > 2 * packing.radius.max()
                 if over or flows:
                     break
             before = dynamics.advance(0).kinetic_energy(packing)
             ended_motion, work = dynamics.work(WORK_STEPS)
             after = ended_motion.kinetic_energy(packing)
-    columns = dict(zip(samples[0], row_columns(samples, *samples[0]), strict=True))
+    columns = dict(zip((*AMOUNTS, *COUNTS), np.transpose(samples), strict=True))
     time, msds = columns["time"], columns["msd"]
     noise = float(msds[time <= unit].max(initial=float(msds[0])))
     walk = WALK_FACTOR * packing.coordinate_rounding**2 * time[-1] / dt
@@ -198,23 +195,21 @@ def erupt(start: StartOfRun) -> Row:
         ends = ends if over else "cut off"
     known = {"fx": packing.fx, "damped": start.damped, "rate": rate, "time": float(time[-1])}
     most = {name: float(np.abs(columns[name]).max()) for name in ("msd", "kinetic_energy", "slip")}
-    contacts = {name: int(columns[name].max()) for name in ("lost", "gained", "sliding")}
+    contacts = {name: int(columns[name].max()) for name in COUNTS}
     balance = float(abs(after - before - work) / max(abs(work), after, before))
     how = {"ended": ended, "ends": "flows" if flows else ends, "noise": noise, "balance": balance}
-    series = {name: column.astype(type(samples[0][name])).tolist() for name, column in columns.items()}
+    series = {name: column.astype(int if name in COUNTS else float).tolist() for name, column in columns.items()}
     return known | most | contacts | how | {"series": series}
 
 
-def _is_over(samples: list[dict[str, float]], rate: float, unit: float) -> bool:
+def _is_over(time: Floats, msd: Floats, rate: float, unit: float) -> bool:
     """Whether a run is over, see the module."""
-    t = samples[-1]["time"]
+    now = time[-1]
     if rate == 0:
-        return t >= QUIET_TIME * unit
-    if t < DECADES_OF_D * np.log(10) / rate:
-        return False
-    quarter = max((each["msd"] for each in samples if t / 4 < each["time"] <= t / 2), default=0.0)
-    half = max(each["msd"] for each in samples if each["time"] > t / 2)
-    return half <= LATE_GROWTH_OF_D * quarter
+        return bool(now >= QUIET_TIME * unit)
+    quarter = msd[(now / 4 < time) & (time <= now / 2)].max(initial=0.0)
+    half = msd[time > now / 2].max()
+    return bool(now >= DECADES_OF_D * np.log(10) / rate and half <= LATE_GROWTH_OF_D * quarter)
 
 
 def _section(scene: Scene) -> Eruptions:

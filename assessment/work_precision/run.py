@@ -61,7 +61,7 @@ def report(
     output : Path
         The folder, made if need be.
     quick : bool
-        Whether to compute fewer points, in a minute instead of ten.
+        Whether to compute fewer points, in half a minute instead of two.
     progress : callable
         Called with the name of a list of runs and the list; returns an iterable that shows how far it is.
 

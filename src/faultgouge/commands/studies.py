@@ -131,7 +131,7 @@ def reproduce(
 )
 def report(
     output: NewFolder = Path("report"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer points: a minute instead of ten.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer points: half a minute instead of two.")] = False,
 ) -> Answer:
     """Measure error against run time: which method to use when, for seven tasks, with figures and numbers."""
     from faultgouge.assessment.work_precision.run import report as run_studies
