@@ -18,7 +18,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.ticker import LogLocator
 from numpy.typing import ArrayLike
 
 from ...analysis.arrays import Floats
@@ -205,20 +205,13 @@ def damping_figure(pairs: Sequence[NormalForm]) -> Figure:
         axes.plot(damping, amplitude, color=colour, linewidth=0.9)
         axes.plot([pair.tau_d, last], [undamped] * 2, color=colour, linewidth=0.6, linestyle=":")
         at = np.exp(np.interp(np.log(pair.tau_d), np.log(damping), np.log(amplitude)))
-        axes.plot([pair.tau_d], [at], "o", color=colour, label=r"$\tau = \tau_d$")
-        axes.plot([pair.half_gain_time()], [0.5 * undamped], "o", color=colour, fillstyle="none", label="half")
+        axes.plot([pair.tau_d], [at], "o", color=colour)
+        axes.plot([pair.half_gain_time()], [0.5 * undamped], "o", color=colour, fillstyle="none")
         words = rf"$\varepsilon = {scientific(pair.epsilon)}$"
         axes.text(0.9 * last, 1.1 * undamped, words, ha="right", va="bottom", color=colour)
     axes.set_xlim(min(pair.tau_d * DAMPING_TIMES[0] for pair in pairs), last)
     axes.set_ylim(top=3 * max(pair.amplitude() for pair in pairs))
     few_decades(axes)
-    handles = axes.get_legend_handles_labels()[0][:2]
-    names = [r"$\tau = \tau_d = 1/(\delta\sqrt{\varepsilon})$", r"half of the undamped amplitude"]
-    title = r"the pair at $\varepsilon = 1 - \eta/\delta$ from its coalescence"
-    key = figure.legend(handles, names, title=title, loc="outside upper center", ncols=2, columnspacing=1.0)
-    key.get_title().set_fontsize(7.5)
-    for handle in key.legend_handles:
-        handle.set_color(INK)  # type: ignore[union-attr]  # matplotlib types it as any artist; these are lines
     return figure
 
 
@@ -246,8 +239,7 @@ def response_figure(run: Curve, linear: Floats) -> Figure:
     lower.annotate(r"1 %", (0.99, 0.01), xycoords=lower.get_yaxis_transform(), ha="right", va="bottom", color="C0")
     lower.set(xlabel="$t$", ylabel=r"$|\Delta D|/\max D$")
     lower.set_ylim(top=1.0)
-    lower.yaxis.set_major_locator(LogLocator(numticks=5))
-    lower.yaxis.set_minor_locator(NullLocator())
+    few_decades(lower, 5)
     lower.margins(x=0)
     for axes, name in ((upper, "(a)"), (lower, "(b)")):
         axes.set_title(name, loc="left", fontsize=8.5, pad=3)
