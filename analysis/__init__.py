@@ -36,7 +36,8 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .motion.growing import fastest_growing
     from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_modes
     from .motion.motion import Motion
-    from .motion.pushes import OneSidedMotion, OneSidedOutcome, one_sided_motion
+    from .motion.one_sided import OneSidedMotion, one_sided_motion
+    from .motion.pushes import OneSidedOutcome
     from .motion.rising_load import RisingMotion
     from .motion.spectrum import (
         Spectrum,

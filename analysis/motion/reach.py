@@ -40,13 +40,11 @@ from scipy.linalg import cholesky, eig, eigh, expm, solve_triangular
 from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from ..arrays import Complexes, Floats
+from ..arrays import Complexes, Floats, Indices
 from ..factors.sparse_lu import Factors, SingularMatrixError, general_lu, symmetric_lu
-from ..operators.contact_changes import ContactChanges
 from ..progress import report_progress
 from .motion import Motion
 from .one_sided import OneSidedSystem
-from .stable_timestep import stable_timestep
 
 DENSE_GAIN = 600
 """Coordinates up to which the gain is computed: two seconds."""
@@ -95,28 +93,28 @@ class PushBound:
         Up to which time this holds; infinite if for ever.
     residual_energy : float
         Energy of the displacement by the residual forces.
-    unsettled : bool
-        Whether the residual forces alone may take a contact to another state.
+    unsettled : ndarray of int
+        Numbers of the contacts that the residual forces alone may take to another state; -1 for a gap that closes.
     """
 
     energy: float
     gain: float
     time: float
     residual_energy: float
-    unsettled: bool
+    unsettled: Indices
 
 
-def reach_of(motion: Motion, free: int = 0) -> PushBound | None:
+def reach_of(system: OneSidedSystem, free: int = 0) -> PushBound | None:
     """The bound for all pushes of a linear motion that does not grow; None if its energy is not positive.
 
     Parameters
     ----------
-    motion : Motion
-        With sticking contacts, none of them at Coulomb's bound.
+    system : OneSidedSystem
+        Of a configuration without contacts at Coulomb's bound.
     free : int
         Motions that no force opposes.
     """
-    step = float(stable_timestep(motion.configuration))
+    motion, step, changes = system.motion, system.stable_step, system.changes
     shift = (1 / (FREE_TIME * step)) ** 2 if free else 0.0
     symmetric = csc_array(0.5 * (motion.stiffness + motion.stiffness.T) + shift * eye_array(len(motion.active)))
     try:
@@ -126,29 +124,27 @@ def reach_of(motion: Motion, free: int = 0) -> PushBound | None:
     if factors.negative:
         return None
     gain, time = _gain(motion, symmetric, factors, step, FREE_TIME * step if free else np.inf)
-    system = OneSidedSystem(motion)
-    force = system.residual_force
-    moved = factors.solve(force)
-    residual = 0.5 * float(np.sum(force * moved))
-    if motion.configuration.stiffness is not None:  # the bounds of contacts are not known
-        return PushBound(np.inf, gain, time, residual, False)
-    changes = ContactChanges.of(motion.configuration)
-    radius, none = _radius(system, changes, factors), np.zeros((0, 1))
+    moved = factors.solve(system.residual_force)
+    residual = 0.5 * float(np.sum(system.residual_force * moved))
+    if system.configuration.stiffness is not None:  # the bounds of contacts are not known
+        return PushBound(np.inf, gain, time, residual, np.zeros(0, int))
     # a force that begins to act displaces twice as far as one at rest
-    paths = np.abs(system.rescaled[0] @ moved) if len(changes.wears) else none
-    first = system.contact_changes.first(2 * moved, np.zeros_like(moved), none, paths)
-    return PushBound(0.5 * radius**2 / gain, gain, time, residual, bool(first.min() < 1))
+    multiples = changes.multiples(2 * moved, 0 * moved, np.zeros((0, 1)), np.abs(system.rates @ moved))
+    unsettled = np.flatnonzero(np.minimum(multiples.reaches, multiples.opens).min(axis=1) < 1)
+    if multiples.closes.min(initial=np.inf) < 1:
+        unsettled = np.append(unsettled, -1)
+    return PushBound(0.5 * _radius(system, factors) ** 2 / gain, gain, time, residual, unsettled)
 
 
-def _radius(system: OneSidedSystem, changes: ContactChanges, factors: Factors) -> float:
+def _radius(system: OneSidedSystem, factors: Factors) -> float:
     """The smallest root of 2 E with which a contact changes.
 
     Contacts alone bound their share of S^-1, so that only those are solved for that may be the first.
     """
-    c, count, weight = system.motion.configuration.contacts, len(changes.bound), system.mass_weight
-    rows, viscous = csr_array(changes.rows @ weight), csr_array(changes.viscous @ weight)
-    dashpots = [[viscous[i * count : (i + 1) * count] for i in range(3)]] * 2
-    lost = np.array([[np.asarray(a.multiply(b).sum(axis=1)).ravel() for a in dashpots[0]] for b in dashpots[1]])
+    c, changes = system.configuration.contacts, system.changes
+    count, rows, viscous = len(c), csr_array(changes.rows), csr_array(changes.viscous)
+    dashpots = [viscous[i * count : (i + 1) * count] for i in range(3)]
+    lost = np.array([[np.asarray(a.multiply(b).sum(axis=1)).ravel() for a in dashpots] for b in dashpots])
     slope, bound, force = (each[:, 0] for each in (changes.bound_slope, changes.bound, changes.tangential))
     coupling = np.linalg.norm(0.5 * (c.closing + c.parting), axis=1) + slope
     sticks, closed = changes.sticks[:, 0], changes.overlap[:, 0].copy()
@@ -259,12 +255,12 @@ def _norm(matrix: Floats) -> float:
     return float(np.sqrt(eigsh(square, 1, v0=np.ones(len(matrix)), tol=1e-6, return_eigenvectors=False)[0]))
 
 
-def change_of_growing(motion: Motion, s: complex) -> float | None:
+def change_of_growing(system: OneSidedSystem, s: complex) -> float | None:
     """D at which the linear motion with the eigenvalue s takes the first contact to another state; None if none is
     known that changes."""
-    if motion.configuration.stiffness is not None:
+    if system.configuration.stiffness is not None:
         return None
-    system, identity = OneSidedSystem(motion), eye_array(len(motion.active))
+    motion, identity = system.motion, eye_array(len(system.motion.active))
     near = s * (1 + 1e-7)  # the vector of the nearest eigenvalue comes out in two steps
     factors = general_lu(csc_array(near**2 * identity + near * motion.damping + motion.stiffness.astype(complex)))
     shape: Complexes = np.random.default_rng(0).standard_normal(len(motion.active)).astype(complex)
@@ -274,8 +270,8 @@ def change_of_growing(motion: Motion, s: complex) -> float | None:
     turns = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
     z = np.real(shape[:, None] * turns)
     v = np.real(s * shape[:, None] * turns)
-    paths = np.zeros((system.rescaled[0].shape[0], PHASES))
-    first = system.contact_changes.first(z, v, np.zeros((system.sliders[1].shape[0], PHASES)), paths)
+    slid, paths = (np.zeros((matrix.shape[0], PHASES)) for matrix in (system.excess, system.rates))
+    first = system.changes.first(z, v, slid, paths)
     at = int(first.argmin())
     found = float(first[at] ** 2 * system.mean_square_displacement(z)[at])
     return found if np.isfinite(found) else None

@@ -3,6 +3,8 @@
 Matrices have small slices here, so that some ten of them are enough for a test.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,8 +16,9 @@ from scipy.sparse import block_diag, csr_array
 
 from faultgouge.analysis import Configuration, LinearisedContacts, spectrum
 from faultgouge.analysis.contacts import BOOLEAN, PER_CONTACT
+from faultgouge.analysis.motion import all_eigenvalues as module
 from faultgouge.analysis.motion import spectrum as spectrum_module
-from faultgouge.analysis.motion.all_eigenvalues import ShiftedDisc, SpectrumError, SpectrumSizes, all_eigenvalues
+from faultgouge.analysis.motion.all_eigenvalues import SpectrumError, SpectrumSizes, all_eigenvalues
 from faultgouge.analysis.progress import show_progress
 
 SMALL = SpectrumSizes(own=24, block=4, least=30)
@@ -136,21 +139,20 @@ def test_forty_equal_pairs_and_forty_equal_negative_ones_are_counted(coupled, sl
 
 @pytest.fixture
 def losing(monkeypatch):
-    """Discs that lose an eigenvalue, so many of them."""
+    """Discs that lose a real eigenvalue, so many of them."""
 
     def lose(times):
-        about, left = ShiftedDisc.about.__func__, [times]
+        about, left = module.eigenvalues_about, [times]
 
-        def about_without(cls, *arguments, **named):
-            disc = about(cls, *arguments, **named)
-            if left[0] == 0 or np.count_nonzero(disc.values.imag == 0) == 0:
-                return disc
+        def about_without(*given):
+            disc, enough = about(*given)
+            real = np.flatnonzero(disc.values.imag == 0)
+            if left[0] == 0 or not len(real):
+                return disc, enough
             left[0] -= 1
-            kept = np.arange(len(disc.values)) != np.flatnonzero(disc.values.imag == 0)[0]
-            changed = {name: getattr(disc, name) for name in disc.__dataclass_fields__}
-            return cls(**changed | {"values": disc.values[kept], "overlap": disc.overlap[kept]})
+            return replace(disc, values=np.delete(disc.values, real[0])), enough
 
-        monkeypatch.setattr(ShiftedDisc, "about", classmethod(about_without))
+        monkeypatch.setattr(module, "eigenvalues_about", about_without)
 
     return lose
 

@@ -18,7 +18,7 @@ from faultgouge.analysis import (
 )
 from faultgouge.analysis.motion import rising_load
 from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
-from faultgouge.analysis.motion.rising_load import DriftAndVibration, RisingMotion, Span, follow_load
+from faultgouge.analysis.motion.rising_load import DriftAndVibration, RisingMotion, Span, motion_under_load
 
 RISE = np.tile([1.0, 0.0], (3, 1))
 
@@ -33,7 +33,7 @@ def test_what_follows_a_load_that_rises_does_not_vibrate(exponent):
     assert rising.vibration == 0
     assert rising.time is None
     system = OneSidedSystem.of(at_rest)
-    followed = follow_load(system, forces_on_coordinates(at_rest, RISE), 30.0)
+    followed = motion_under_load(system, forces_on_coordinates(at_rest, RISE), 30.0, decays=False)
     assert rising.drift == pytest.approx(followed.drift, rel=1e-3)
     assert rising.next_change == pytest.approx(followed.next_change, rel=1e-2)
     assert followed.vibration < 1e-2 * rising.drift
@@ -76,12 +76,12 @@ def test_the_drift_of_a_slow_cycle_is_its_mean_velocity(monkeypatch):
     def windows(system, direction, length):
         for number in count():
             speed = 10.0 if number % 5 == 0 else 0.0
-            worn, slid = (np.zeros((each.shape[0], 1)) for each in (system.rescaled[0], system.sliders[1]))
+            worn, slid = (np.zeros((each.shape[0], 1)) for each in (system.rates, system.excess))
             moved, squares = speed * length * shape, speed**2 * length * shape**2
             yield Span(length, speed * length * z, worn, moved, squares, slid)
 
     monkeypatch.setattr(rising_load, "windows_under_load", windows)
-    found = follow_load(system, forces_on_coordinates(at_rest, RISE))
+    found = motion_under_load(system, forces_on_coordinates(at_rest, RISE), decays=False)
     size = np.sqrt(1 / 6)
     assert found.drift == pytest.approx(2 * size, abs=2 * found.drift_error)
     assert found.vibration == pytest.approx(4 * size, abs=2 * found.vibration_error)
@@ -111,7 +111,7 @@ def test_a_rise_that_comes_after_the_next_change_is_refused(monkeypatch):
 def test_spans_of_windows_are_joined_exactly(bound):
     system = OneSidedSystem.of(bound)
     direction = forces_on_coordinates(bound.configuration, np.random.default_rng(4).standard_normal((len(bound), 2)))
-    short = list(islice(rising_load.windows_under_load(system, direction, 0.2), 6))
+    short = list(islice(rising_load.windows_under_load(system, system.weight.T @ direction, 0.2), 6))
     whole = Span.joined(short)
     assert whole.time == pytest.approx(1.2)
     np.testing.assert_allclose(

@@ -137,14 +137,16 @@ def test_the_gain_of_energy_bounds_what_motion_gains_without_loss(path):
     """Of two hundred random states of a layer below its onset, none gains more; and the worst pushes come near."""
     from scipy.linalg import expm
 
-    from faultgouge.analysis import Motion, transient_gain
+    from faultgouge.analysis import transient_gain
+    from faultgouge.analysis.motion.one_sided import OneSidedSystem
     from faultgouge.analysis.motion.reach import reach_of
 
     packing = path(0.02)
-    reach = reach_of(Motion.of(packing))
+    system = OneSidedSystem.of(packing)
+    reach = reach_of(system)
     assert np.isinf(reach.time)
     assert 1 < transient_gain(packing, "energy").gain < reach.gain < 50
-    motion = Motion.of(packing)
+    motion = system.motion
     z, norm = motion.first_order, motion.energy_norm
     assert norm.positive
     step, state = expm(0.1 * z), np.random.default_rng(0).standard_normal((len(z), 200))
