@@ -49,58 +49,6 @@ class SpectrumError(FaultgougeError):
     """Eigenvalues were not found: one sentence."""
 
 
-@dataclass(frozen=True)
-class SpectrumSizes:
-    """Sizes and tolerances of slices, with their reasons."""
-
-    own: int = 36
-    """Eigenvalues of a slice. More cost more orthogonalisation, fewer cost more factors."""
-    block: int = 4
-    """Vectors that are solved for at a time, in the time of two by themselves. Larger blocks take more vectors."""
-    beyond: float = 1.1
-    """Radius of a disc in units of half its slice: what two neighbours both have."""
-    accuracy: float = 1e-5
-    """Error of an eigenvalue by one of the two spaces, in mean distances of eigenvalues; the error by both is of the
-    size of its square."""
-    oblique: float = 0.1
-    """|y^H x| below which a real eigenvalue may belong to a pair that is about to coalesce, and is marked."""
-    complete: float = 1e-3
-    """Error of the trace, in mean distances of eigenvalues, as of all errors together."""
-    largest: int = 15
-    """Vectors of a space at the most, in units of `own`."""
-    least: int = 540
-    """Coordinates up to which LAPACK finds all: a space of the largest size would hold them, in no less time."""
-
-
-SIZES = SpectrumSizes()
-
-LARGER_BLOCKS = (1, 2, 4, 8)
-"""Blocks with which slices are found, and found again, in units of the usual one."""
-
-
-@dataclass(frozen=True, eq=False)
-class AllEigenvalues:
-    """All eigenvalues of a matrix, and vectors of those that matter.
-
-    Attributes
-    ----------
-    values : ndarray of complex, shape (n,)
-        Sorted by real part, then imaginary part.
-    marked : Modes
-        Those with a positive imaginary part, those that are real and negative, and real ones that are oblique.
-    """
-
-    values: Complexes
-    marked: Modes
-
-    @classmethod
-    def of(cls, values: Complexes, vectors: Modes) -> "AllEigenvalues":
-        """Of values in any order, and modes among which both of a pair may be."""
-        kept = vectors.values.imag >= 0
-        marked = Modes(vectors.values[kept], vectors.right[:, kept], vectors.left[:, kept])
-        return cls(values[np.lexsort((values.imag, values.real))], marked)
-
-
 @dataclass(frozen=True, eq=False)
 class Disc:
     """The eigenvalues that are closer to a shift than a radius, and those that matter with vectors."""
@@ -111,15 +59,24 @@ class Disc:
     vectors: Modes
 
 
-def all_eigenvalues(matrix: csr_array, sizes: SpectrumSizes = SIZES) -> AllEigenvalues:
+def all_eigenvalues(matrix: csr_array, own: int = 36, least: int = 540) -> tuple[Complexes, Modes]:
     """All eigenvalues of a sparse matrix that is nearly symmetric.
 
     Parameters
     ----------
     matrix : scipy.sparse.csr_array, shape (n, n)
         A, such as M^(-1/2) K M^(-1/2) of the coordinates that feel a force; its pattern is symmetric.
-    sizes : SpectrumSizes
-        Sizes and tolerances.
+    own : int
+        Eigenvalues of a slice. More cost more orthogonalisation, fewer cost more factors.
+    least : int
+        Coordinates up to which LAPACK finds all: a space of the largest size would hold them, in no less time.
+
+    Returns
+    -------
+    values : ndarray of complex, shape (n,)
+        Sorted by real part, then imaginary part.
+    marked : Modes
+        Those with a positive imaginary part, those that are real and negative, and real ones that are oblique.
 
     Raises
     ------
@@ -129,23 +86,25 @@ def all_eigenvalues(matrix: csr_array, sizes: SpectrumSizes = SIZES) -> AllEigen
     count, island = connected_components(matrix, directed=False)
     values, parts = [], []
     for places in np.split(np.argsort(island, kind="stable"), np.cumsum(np.bincount(island, minlength=count))[:-1]):
-        inner = matrix[places][:, places]
-        if inner.shape[0] > sizes.least:
-            found = _in_slices(csr_array(inner), sizes)
+        inner = csr_array(matrix[places][:, places])
+        if inner.shape[0] > least:
+            found, marked = _in_slices(inner, own)
         else:
-            every, left, right = eig(inner.toarray(), left=True, right=True)
-            chosen = _matters(every, np.abs(np.sum(left.conj() * right, axis=0)), sizes)
-            found = AllEigenvalues.of(every, Modes(every[chosen], right[:, chosen], left[:, chosen]))
-        values.append(found.values)
-        parts.append(found.marked.placed(places, matrix.shape[0]))
-    return AllEigenvalues.of(np.concatenate(values), Modes.joined(parts))
+            found, left, right = eig(inner.toarray(), left=True, right=True)
+            chosen = _matters(found, np.abs(np.sum(left.conj() * right, axis=0)))
+            marked = Modes(found[chosen], right[:, chosen], left[:, chosen])
+        values.append(found)
+        parts.append(marked.placed(places, matrix.shape[0]))
+    every, marked = np.concatenate(values), Modes.joined(parts)
+    return every[np.lexsort((every.imag, every.real))], marked.chosen(marked.values.imag >= 0)
 
 
-def _matters(values: Complexes, overlap: Floats, sizes: SpectrumSizes) -> NDArray[np.bool_]:
-    return (values.imag != 0) | (values.real < 0) | (overlap < sizes.oblique)
+def _matters(values: Complexes, overlap: Floats) -> NDArray[np.bool_]:
+    """Which are complex, or negative, or so oblique that they may belong to a pair that is about to coalesce."""
+    return (values.imag != 0) | (values.real < 0) | (overlap < 0.1)
 
 
-def _in_slices(matrix: csr_array, sizes: SpectrumSizes) -> AllEigenvalues:
+def _in_slices(matrix: csr_array, own: int) -> tuple[Complexes, Modes]:
     """Of many coordinates, all of which are coupled."""
     size, symmetric = matrix.shape[0], csc_array(0.5 * (matrix + matrix.T))
     order = np.argsort(elimination_places(symmetric))
@@ -154,22 +113,22 @@ def _in_slices(matrix: csr_array, sizes: SpectrumSizes) -> AllEigenvalues:
     def below(shifts: Floats) -> list[int]:
         return [factor_shifted(symmetric, shift)[1] for shift in shifts]
 
-    places, numbers = count_places(symmetric, below, (0, size), 2 * sizes.own)
+    places, numbers = count_places(symmetric, below, (0, size), 2 * own)
     for _ in range(8):  # the ends move next to the first and to the last eigenvalue
         middle = 0.5 * (places[[0, -2]] + places[[1, -1]])
         for end, outside, count in zip((0, -1), (0, size), below(middle), strict=True):
             if count == outside and len(places) > 2:
                 places[end] = middle[end]
-    pieces = max(1, round(size / sizes.own))
+    pieces = max(1, round(size / own))
     edges = np.arange(pieces + 1) * size // pieces
     borders, spacing = places_of_numbers(places, numbers, edges), float(places[-1] - places[0]) / size
-    accuracy = max(sizes.accuracy * spacing, 4 * np.finfo(float).eps * np.abs(borders).max())
+    # the error by one of the two spaces, that by both is of the size of its square
+    accuracy = max(1e-5 * spacing, 4 * np.finfo(float).eps * np.abs(borders).max())
     trace, square = a.diagonal().sum(), (a @ a).diagonal().sum()
     discs = [Disc(float(mean), 0.0, np.zeros(0, complex), Modes.none(size)) for mean in borders[1:] + borders[:-1]]
-    first, todo = 3 * sizes.own, np.arange(pieces)
-    for larger in LARGER_BLOCKS:
-        block, again = larger * sizes.block, larger > 1
-        most = sizes.largest * max(sizes.own, block if again else 0)
+    first, todo = 3 * own, np.arange(pieces)
+    for block in (4, 8, 16, 32):  # four vectors are solved for in the time of two; larger blocks take more vectors
+        again, most = block > 4, 15 * max(own, block)
         for k in todo:
             report_progress(f"slice {k + 1} of {pieces} of the spectrum{' once more' * again}")
             low, high = borders[k : k + 2]
@@ -178,25 +137,29 @@ def _in_slices(matrix: csr_array, sizes: SpectrumSizes) -> AllEigenvalues:
             def radius(values: Complexes, low: float = low, high: float = high, shift: float = shift) -> float:
                 inside = values[(values.real >= low) & (values.real <= high)]
                 height = 1.5 * float(np.abs(inside.imag).max(initial=0.0))
-                return float(np.hypot(sizes.beyond * max(high - shift, shift - low), height))
+                return float(np.hypot(1.1 * max(high - shift, shift - low), height))
 
             try:
-                discs[k], first = eigenvalues_about(a, shift, radius, accuracy, sizes, (block, first, most))
+                discs[k], first = eigenvalues_about(a, shift, radius, accuracy, block, first, most)
             except SpectrumError:
                 continue
         ends = _ends(discs, borders)
-        inner = [(d.values.real >= low) & (d.values.real < high) for d, low, high in zip(discs, ends, ends[1:])]  # noqa: B905
-        values = np.concatenate([disc.values[own] for disc, own in zip(discs, inner, strict=True)])
+        inner = [
+            (disc.values.real >= low) & (disc.values.real < high)
+            for disc, low, high in zip(discs, ends, ends[1:], strict=False)
+        ]
+        values = np.concatenate([disc.values[here] for disc, here in zip(discs, inner, strict=True)])
         off = abs(values.sum() - trace), abs((values**2).sum() - square) / (2 * np.abs(values).max(initial=1e-300))
-        if len(values) == size and max(off) <= sizes.complete * spacing:
-            parts = []
-            for disc, low, high in zip(discs, ends[:-1], ends[1:], strict=True):
-                known, real = disc.vectors, disc.vectors.values.real
-                own = (real >= low) & (real < high)
-                parts.append(Modes(known.values[own], known.right[:, own], known.left[:, own]))
-            return AllEigenvalues.of(values, Modes.joined(parts).placed(order, size))
-        lacking = np.array([own.sum() for own in inner]) - np.diff(edges)
-        todo = np.flatnonzero(lacking < 0) if larger == 1 else np.arange(pieces)
+        if len(values) == size and max(off) <= 1e-3 * spacing:
+            known = [disc.vectors for disc in discs]
+            kept = [
+                (each.values.real >= low) & (each.values.real < high)
+                for each, low, high in zip(known, ends, ends[1:], strict=False)
+            ]
+            marked = Modes.joined([each.chosen(here) for each, here in zip(known, kept, strict=True)])
+            return values, marked.placed(order, size)
+        lacking = np.array([here.sum() for here in inner]) - np.diff(edges)
+        todo = np.flatnonzero(lacking < 0) if block == 4 else np.arange(pieces)
     found = f"{len(values)} were found" if len(values) != size else f"their sum is off the trace by {max(off):.3g}"
     raise SpectrumError(f"All eigenvalues of {size} coordinates: {found}.")
 
@@ -206,8 +169,9 @@ def eigenvalues_about(
     shift: float,
     wanted: Callable[[Complexes], float],
     accuracy: float,
-    sizes: SpectrumSizes,
-    vectors: tuple[int, int, int],
+    block: int,
+    first: int,
+    most: int,
 ) -> tuple[Disc, int]:
     """The eigenvalues about a shift.
 
@@ -220,8 +184,7 @@ def eigenvalues_about(
         The radius that a disc is to have, given the eigenvalues that are known.
     accuracy : float
         Error of an eigenvalue by one space.
-    sizes : SpectrumSizes
-    vectors : tuple of int
+    block, first, most : int
         Vectors of a block, of the spaces before their eigenvalues are looked at, and at the most.
 
     Returns
@@ -235,7 +198,7 @@ def eigenvalues_about(
     SpectrumError
         If the largest space does not hold them.
     """
-    (block, first, most), size = vectors, matrix.shape[0]
+    size = matrix.shape[0]
     factors = general_lu(csc_array(matrix - shift * eye_array(size)), ordered=True)
     random = np.random.default_rng(block)
     right, left = (
@@ -278,7 +241,7 @@ def eigenvalues_about(
     except (ValueError, np.linalg.LinAlgError) as error:  # rounding has moved one of a cluster in one of the spaces
         raise SpectrumError(f"the eigenvalues about {shift:.6g} are not set apart from others") from error
     length = np.linalg.norm(y_whole, axis=0)
-    chosen = _matters(values, np.abs(np.sum(y.conj() * x, axis=0)) / length, sizes)
+    chosen = _matters(values, np.abs(np.sum(y.conj() * x, axis=0)) / length)
     modes = Modes(values[chosen], v @ x[:, chosen], u @ (y_whole / length)[:, chosen])
     return Disc(shift, float(radius), values, modes), int(1.06 * right.used * min(1.0, needed / radius))
 

@@ -30,12 +30,6 @@ from .eigenvalues import (
 from .modes import Modes
 from .spectrum import DENSE_LARGEST, dynamical_matrix, spectrum
 
-BOUND_FACTOR = 4.0
-"""Factor from one bound that is tried to the next: each costs factors, and a loose one more eigenvalues."""
-
-FIRST_COUNT = 16
-"""Eigenvalues that are asked for at first; twice as many until the interval is covered."""
-
 
 def negative_eigenvalues(packing: HasConfiguration) -> Floats:
     """The real negative eigenvalues of a packing, beyond the uncertainty of rounding and of forces out of balance.
@@ -63,8 +57,8 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
         return spectrum(packing).negative
     bound = max(float(shifts.max()), np.finfo(float).eps ** 0.5 * float(np.abs(matrix.data).max()))
     while not _is_positive(symmetric, bound):
-        bound *= BOUND_FACTOR
-    count = FIRST_COUNT
+        bound *= 4  # each costs factors, and a loose one more eigenvalues
+    count = 16
     while True:
         count = min(count, size - 2)
         found = nearest_modes(packing, -0.5 * bound, count)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import eig
 from scipy.sparse import csr_array
 
@@ -122,6 +123,10 @@ class Modes:
         right, left = np.zeros((2, size, len(self)), dtype=np.complex128)
         right[places], left[places] = self.right, self.left
         return Modes(self.values, right, left, self.axes)
+
+    def chosen(self, which: NDArray) -> "Modes":
+        """Some of them, by a mask or by numbers."""
+        return Modes(self.values[which], self.right[:, which], self.left[:, which], self.axes, self.solves)
 
     def __len__(self) -> int:
         return len(self.values)

@@ -52,15 +52,8 @@ packings at Coulomb's bound went up to 6e5."""
 STILL_SHARE = 1e-2
 """Slip that may be left, as a share of all slip: D then changes by 2 %."""
 
-ERROR_OF_RATES = 0.03
-"""Relative error of rates by steps of `VERDICT_STEP`."""
-
 CREEP_CHUNKS = 32
 """Chunks for which creep is followed at the most; without dissipation an eighth of these."""
-
-ENERGY_OF_REST = 2.0
-"""Kinetic energy at the end over that at the beginning, up to which a motion with creep does not grow: the energy of a
-push is all kinetic at first, and half of it is later."""
 
 CREEP_LEFT = 0.1
 """Displacement by creep still to come, as a share of that so far, below which motion is not followed any longer."""
@@ -239,7 +232,7 @@ def _rate(times: Floats, energy: Floats) -> tuple[float, float]:
     half, three = len(times) // 2, 3 * len(times) // 4
     slopes = [np.polyfit(times[a:b], logs[a:b], 1)[0] for a, b in ((half, three), (three, None))]
     mean = float(np.mean(slopes))
-    return mean, float(np.hypot(abs(slopes[1] - slopes[0]) / 2, ERROR_OF_RATES * mean))
+    return mean, float(np.hypot(abs(slopes[1] - slopes[0]) / 2, 0.03 * mean))
 
 
 @dataclass(frozen=True)
@@ -310,7 +303,9 @@ def follow_creep(
         limit = float(((np.sqrt(sizes) + velocity / decay) ** 2).max()) if decay > 0 else None
         first, energy = np.min([look.first for look in seen], axis=0), np.array([look.energy for look in seen])
         gained = float(np.max(energy[-1] / energy[0]))
-        grows = True if not gained <= GROWN_ENERGY else None if gained > ENERGY_OF_REST else False
+        grows = (
+            True if not gained <= GROWN_ENERGY else None if gained > 2 else False
+        )  # the energy of a push is all kinetic at first, half of it later
         rate = _rate(np.array([look.time for look in seen]), energy)[0] if grows else 0.0
         found = Creep(
             amplification=float(sizes.max()), time=after.time, velocity=float(velocity.max()),

@@ -40,11 +40,12 @@ from scipy.linalg import cholesky, eig, eigh, expm, solve_triangular
 from scipy.sparse import csc_array, csr_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from ..arrays import Complexes, Floats, Indices
-from ..factors.sparse_lu import Factors, SingularMatrixError, general_lu, symmetric_lu
+from ..arrays import Floats, Indices
+from ..factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
 from ..progress import report_progress
 from .motion import Motion
 from .one_sided import OneSidedSystem
+from .random_state import motion_near
 
 DENSE_GAIN = 600
 """Coordinates up to which the gain is computed: two seconds."""
@@ -53,30 +54,9 @@ FREE_TIME = 500.0
 """Up to which time a bound holds of a packing with motions that no force opposes, in stable time steps: some hundred
 periods of the fastest motion, twenty of a slow one."""
 
-OCTAVES = 22
-"""Doublings of a quarter of the stable time step until the norm is to fall below one."""
-
-LARGEST_GAIN = 1e4
-"""Gain of the energy beyond which no longer time is looked at."""
-
-SYMMETRIC = 1e-12
-"""Share of the largest entry of S below which N is rounding."""
-
-CONTACTS_TOGETHER = 64
-"""Contacts whose columns are solved for together."""
-
-ANGLES, ZOOMS = 32, 4
-"""Angles of the cone that are looked at, and how often more closely about the best."""
-
-PHASES = 64
-"""Phases of a motion that grows."""
-
 OVERLAP_CHANGE = 0.1
 """Share by which an overlap of Hertz's law may change. The error of D rises in proportion: with a quarter it was up to
 2.6 % after pushes of one particle and of all in twenty disks, of LAMMPS's own motion."""
-
-SAFE = 2.0
-"""By which factor the stiffness of a contact alone may be lower in the packing, as normal forces soften it."""
 
 
 @dataclass(frozen=True)
@@ -149,14 +129,15 @@ def _radius(system: OneSidedSystem, factors: Factors) -> float:
     coupling = np.linalg.norm(0.5 * (c.closing + c.parting), axis=1) + slope
     sticks, closed = changes.sticks[:, 0], changes.overlap[:, 0].copy()
     closed[c.normal_stiffness * c.overlap > 1.01 * c.normal_force] *= OVERLAP_CHANGE
+    safe, together = 2.0, 64  # normal forces soften the stiffness of a contact alone, by less than this factor
     with np.errstate(divide="ignore", invalid="ignore"):
         alone = c.tangential_stiffness + np.nan_to_num(coupling**2 / c.normal_stiffness, nan=0.0, posinf=np.inf)
-        least = np.where(sticks, (bound - force) / np.sqrt(SAFE * alone + np.trace(lost)), np.inf)
-        least = np.minimum(least, np.where(closed > 0, closed * np.sqrt(c.normal_stiffness / SAFE), np.inf))
+        least = np.where(sticks, (bound - force) / np.sqrt(safe * alone + np.trace(lost)), np.inf)
+        least = np.minimum(least, np.where(closed > 0, closed * np.sqrt(c.normal_stiffness / safe), np.inf))
     least = np.nan_to_num(least, nan=0.0, posinf=np.inf)
     order, best = np.argsort(least, kind="stable"), np.inf
-    for begin in range(0, len(order), CONTACTS_TOGETHER):
-        here = order[begin : begin + CONTACTS_TOGETHER]
+    for begin in range(0, len(order), together):
+        here = order[begin : begin + together]
         if least[here[0]] >= best:
             break
         report_progress(f"largest push: {begin} of {len(order)} contacts looked at")
@@ -170,8 +151,8 @@ def _radius(system: OneSidedSystem, factors: Factors) -> float:
         both = product * turned * turned.transpose(1, 0, 2) + lost[:, :, here]
         reaches = np.where(sticks[here], _cone_distance(both, force[here], bound[here]), np.inf)
         best = min(best, float(opens.min(initial=np.inf)), float(reaches.min(initial=np.inf)))
-    for begin in range(3 * count, rows.shape[0], 3 * CONTACTS_TOGETHER):
-        columns = rows[begin : begin + 3 * CONTACTS_TOGETHER].toarray().T
+    for begin in range(3 * count, rows.shape[0], 3 * together):
+        columns = rows[begin : begin + 3 * together].toarray().T
         size = np.sqrt(np.sum(columns * factors.solve(columns), axis=0))
         gap = changes.gap[begin - 3 * count : begin - 3 * count + len(size), 0]
         with np.errstate(divide="ignore"):
@@ -185,14 +166,14 @@ def _cone_distance(product: Floats, force: Floats, bound: Floats) -> Floats:
     Norms are those of the products, shape (3, 3, C).
     """
     middle, half = np.zeros(len(force)), np.pi
-    for _ in range(1 + ZOOMS):
-        angle = middle[:, None] + half * np.linspace(-1, 1, ANGLES + 1)
+    for _ in range(5):  # each time more closely about the best angle
+        angle = middle[:, None] + half * np.linspace(-1, 1, 33)
         n = np.stack([np.cos(angle), np.sin(angle), -np.ones_like(angle)])
         size = np.sqrt(np.maximum(np.einsum("ica,ijc,jca->ca", n, product, n), 0.0))
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = np.nan_to_num((bound[:, None] - force[:, None] * n[0]) / size, nan=np.inf, posinf=np.inf)
         best = distance.argmin(axis=1)
-        middle, half = np.take_along_axis(angle, best[:, None], axis=1)[:, 0], 2 * half / ANGLES
+        middle, half = np.take_along_axis(angle, best[:, None], axis=1)[:, 0], half / 16
     return np.asarray(distance.min(axis=1))
 
 
@@ -200,7 +181,7 @@ def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, e
     """A bound of the gain of energy, and up to which time it holds: up to the end, if it can."""
     skew = csr_array(motion.stiffness - symmetric)  # N, and the shift of free motions
     largest = float(np.abs(symmetric.data).max(initial=0.0))
-    if float(np.abs(skew.data).max(initial=0.0)) <= SYMMETRIC * largest:
+    if float(np.abs(skew.data).max(initial=0.0)) <= 1e-12 * largest:
         return 1.0, end
     if symmetric.shape[0] > DENSE_GAIN:
 
@@ -225,12 +206,12 @@ def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, e
     time, one = 0.25 * step, expm(0.25 * step * z)
     two = one @ one
     before, after = np.exp(fastest * time), np.exp(2 * fastest * time)  # up to time, and to 2 time
-    for _ in range(OCTAVES):
+    for _ in range(22):  # doublings until the norm is to fall below one
         sizes = _norm(two), _norm(one @ two)
         before, after = after, max(after, max(sizes) * before)
         if min(sizes) <= 1:
             return float(after**2), end
-        if after**2 > LARGEST_GAIN or 4 * time >= end:
+        if after**2 > 1e4 or 4 * time >= end:
             break
         time, one, two = 2 * time, two, two @ two
     return float(after**2), min(end, 4 * time)
@@ -260,17 +241,13 @@ def change_of_growing(system: OneSidedSystem, s: complex) -> float | None:
     known that changes."""
     if system.configuration.stiffness is not None:
         return None
-    motion, identity = system.motion, eye_array(len(system.motion.active))
-    near = s * (1 + 1e-7)  # the vector of the nearest eigenvalue comes out in two steps
-    factors = general_lu(csc_array(near**2 * identity + near * motion.damping + motion.stiffness.astype(complex)))
-    shape: Complexes = np.random.default_rng(0).standard_normal(len(motion.active)).astype(complex)
-    for _ in range(3):
-        shape = factors.solve(shape)
-        shape /= np.linalg.norm(shape)
-    turns = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
+    motion = system.motion
+    start = np.random.default_rng(0).standard_normal(len(motion.active))
+    s, shape, _ = motion_near(motion.stiffness, motion.damping, s * (1 + 1e-7), start)
+    turns = np.exp(2j * np.pi * np.arange(64) / 64)
     z = np.real(shape[:, None] * turns)
     v = np.real(s * shape[:, None] * turns)
-    slid, paths = (np.zeros((matrix.shape[0], PHASES)) for matrix in (system.excess, system.rates))
+    slid, paths = (np.zeros((matrix.shape[0], 64)) for matrix in (system.excess, system.rates))
     first = system.changes.first(z, v, slid, paths)
     at = int(first.argmin())
     found = float(first[at] ** 2 * system.mean_square_displacement(z)[at])

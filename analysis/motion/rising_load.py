@@ -43,26 +43,17 @@ from ..progress import report_progress
 from .eigenvalues import operator_rounding, zero_uncertainty
 from .linear import linear_verdict
 from .motion import Motion
-from .one_sided import WORK_OF_MOTION, OneSidedSystem
+from .one_sided import PUSH_OVER_RESIDUAL, WORK_OF_MOTION, OneSidedSystem
 
 LOAD_STEP = 0.1
 """Time step of motion under a load, as a share of the largest stable one."""
 
-ERROR_OF_STEPS = 0.02
-"""Relative error of drift and vibration by these steps."""
-
 WINDOW, WINDOWS = 300, 40
 """Stable time steps of a window, some ten periods of a slow mode, and how many windows are followed at the most."""
-
-SAMPLES_OF_WINDOW = 400
-"""Velocities that a window has."""
 
 HALVES_DIFFERENCE, TREND = 0.2, 0.1
 """Relative differences of the vibrations of two halves below which a motion is steady: of the last half of the time,
 and of all of it, which then counts. In a packing whose vibration grew slowly for a third of the time it is 0.18."""
-
-VIBRATION_ERROR = 0.1
-"""Relative error of the vibration from which on a motion is not followed any longer."""
 
 FADE_WINDOWS = 4
 """Windows in which the drag fades out."""
@@ -70,40 +61,8 @@ FADE_WINDOWS = 4
 DRAG = 20.0
 """The drag at first, 1/tau in units of 1/window: it leaves exp(-DRAG FADE_WINDOWS/6) = 2e-6 of a mode's amplitude."""
 
-ONE_START = 6000
-"""Coordinates beyond which one start stands for two: each takes a minute or more."""
-
 VIBRATION_SHARE = 0.05
 """Vibration over drift above which a packing vibrates, and below which it follows the load."""
-
-VIBRATION_ROUNDING = 1e-6
-"""Vibration over drift that may be rounding: the root of a difference of squares, whose digits are 1e-13 of these."""
-
-LEAST_WINDOWS = 8
-"""Windows of a span whose halves and quarters can be compared."""
-
-ACCELERATION_POWER = 0.5
-"""Power of the time, as which the mean velocity rises, from which on a motion has no constant drift. Half of the power
-1 of particles whose dashpots alone bear a load that rises; particles that nothing bears have 2."""
-
-LARGEST_GROWTH = 1e12
-"""Growth of the vibration of a motion that has no drift."""
-
-DIAGONAL_SHIFT, REFINEMENTS = 1e-11, 3
-"""Share of the largest entry of K that is added to its diagonal, so that free motions do not divide by zero, and steps
-of refinement, each of which takes this shift out once more."""
-
-UNBORNE_SHARE = 1e-6
-"""Share of the load that may be left over where K bears the load."""
-
-WAY_CHANGES = 60
-"""How often the ways that contacts go may be changed: a few times are enough where the solution is unique."""
-
-LOAD_OVER_RESIDUAL = 10.0
-"""Displacement by the load over that by the residual forces, from which on the load counts."""
-
-TURNED_SHARE = 0.1
-"""Change of the drift by forces that have turned, from which on it is another drift."""
 
 EVENTS = "reaches Coulomb's bound", "opens", "closes", "at Coulomb's bound turns its force", "slides back"
 
@@ -263,7 +222,7 @@ def motion_under_load(
     reached = float((system.missing[counts] / slid[counts]).max(initial=0.0))
     change, event = next_change(system, velocity, slid, paths)
     drift = float(np.sqrt(system.mean_square_displacement(velocity)[0]))
-    moved = LOAD_OVER_RESIDUAL * residual / drift if drift else 0.0
+    moved = PUSH_OVER_RESIDUAL * residual / drift if drift else 0.0
     least = max(reached, moved)
     if change is not None and least >= change:
         what = "contacts that count as at Coulomb's bound reach it" if reached > moved else "residual forces count less"
@@ -280,12 +239,12 @@ def _steady_velocity(system: OneSidedSystem, load: Floats, free: int) -> Floats 
     Raises NotFollowedError if the load accelerates a motion that no force opposes.
     """
     motion, way = system.motion, np.zeros(system.rates.shape[0])
-    for _ in range(WAY_CHANGES):
+    for _ in range(60):  # a few times are enough where the solution is unique
         a = motion.stiffness
         if len(way):
             a = csr_array(a - csr_array(system.wear) @ diags_array(way) @ csr_array(system.rates))
         velocity = static_response(replace(motion, stiffness=a), load, free)
-        if np.linalg.norm(load - a @ velocity) > UNBORNE_SHARE * np.linalg.norm(load):
+        if not _bears(a, velocity, load):
             moves = f"{counted(free, 'motion')} that no" if free else "a motion that next to no"
             raise NotFollowedError(f"the load accelerates {moves} force opposes")
         before, way = way, np.sign(system.rates @ velocity)[:, 0]
@@ -293,6 +252,10 @@ def _steady_velocity(system: OneSidedSystem, load: Floats, free: int) -> Floats 
             steady = not len(way) or linear_verdict(replace(motion, stiffness=a)).stable is True
             return velocity if steady else None
     return None
+
+
+def _bears(stiffness: csr_array, moved: Floats, load: Floats) -> bool:
+    return bool(np.linalg.norm(load - stiffness @ moved) <= 1e-6 * np.linalg.norm(load))
 
 
 def static_response(motion: Motion, load: Floats, free: int = 0) -> Floats:
@@ -308,13 +271,13 @@ def static_response(motion: Motion, load: Floats, free: int = 0) -> Floats:
         Motions that no force opposes.
     """
     matrix = motion.stiffness
-    shift = DIAGONAL_SHIFT * float(np.abs(matrix.data).max(initial=0.0))
+    shift = 1e-11 * float(np.abs(matrix.data).max(initial=0.0))  # free motions do not divide by zero
     if free:
         rounding = operator_rounding(motion.configuration, matrix.data)
         shift = max(shift, 10 * zero_uncertainty(motion.configuration, rounding))
     factors = general_lu(csc_array(matrix + shift * eye_array(matrix.shape[0])))
     moved = np.zeros_like(load)
-    for _ in range(1 + REFINEMENTS):
+    for _ in range(4):  # each but the first takes the shift out once more
         moved += factors.solve(load - matrix @ moved)
     return moved
 
@@ -332,22 +295,24 @@ def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple
         windows.append(window)
         seen, now = window.drift_and_vibration(system)[1].max(), length * len(windows)
         report_progress(f"under the rising load: t = {now:.4g}, vibration {seen:.3g}")
-        if not seen < LARGEST_GROWTH * windows[0].drift_and_vibration(system).max():
-            raise NotFollowedError(f"the motion grows without end: within t = {now:.4g} by {LARGEST_GROWTH:g}")
+        if not seen < 1e12 * windows[0].drift_and_vibration(system).max():
+            raise NotFollowedError(f"the motion grows without end: within t = {now:.4g} by 1e12")
         if time is None and 2 * len(windows) >= most:
             known = (
                 each.steady
                 and each.vibration > VIBRATION_SHARE * each.drift
                 and each.vibration_error is not None
-                and each.vibration_error <= VIBRATION_ERROR * each.vibration
+                and each.vibration_error <= 0.1 * each.vibration
                 for each in _of_starts(system, windows)[1]
             )
             if all(known):
                 break
     after = windows[FADE_WINDOWS:] or windows
     quarters = _in_parts(system, after)[0, 3:, 0]
-    first, last = len(windows) - np.array([0.875, 0.125]) * len(after)  # the middles of two quarters
-    if np.all(np.diff(quarters) > 0) and quarters[-1] > (last / first) ** ACCELERATION_POWER * quarters[0]:
+    # the middles of two quarters; of particles whose dashpots alone bear the load the mean velocity rises as the time,
+    # and of particles that nothing bears as its square
+    first, last = len(windows) - np.array([0.875, 0.125]) * len(after)
+    if np.all(np.diff(quarters) > 0) and quarters[-1] > (last / first) ** 0.5 * quarters[0]:
         raise NotFollowedError(
             f"no constant drift is seen: the mean velocity over the rate rises from {quarters[0]:.3g} to "
             f"{quarters[-1]:.3g} within t = {now:.4g}, as where the load accelerates particles whose contacts slide "
@@ -373,7 +338,7 @@ def windows_under_load(system: OneSidedSystem, load: Floats, length: float) -> I
     """
     c = system.configuration
     spins = system.motion.active[:, None] >= c.dimension * len(c)
-    one = c.constraint is not None or c.coordinates > ONE_START or not spins.any()
+    one = c.constraint is not None or c.coordinates > 6000 or not spins.any()
     drag = np.ones((len(spins), 1))
     if not one:
         drag = np.hstack([drag, ~spins])
@@ -382,14 +347,15 @@ def windows_under_load(system: OneSidedSystem, load: Floats, length: float) -> I
     for number in count():
         place, way, slid = state.z.copy(), state.r.copy(), state.p.copy()
         velocities, squares = np.zeros((2, *system.displacement(place).shape))
-        for sample in range(SAMPLES_OF_WINDOW):
-            now = number + (sample + 1) / SAMPLES_OF_WINDOW
+        samples = 400
+        for sample in range(samples):
+            now = number + (sample + 1) / samples
             system.advance(state, length * now, LOAD_STEP, load)
-            state.v *= np.exp(-DRAG / SAMPLES_OF_WINDOW * max(0.0, 1 - now / FADE_WINDOWS) ** 2 * drag)
+            state.v *= np.exp(-DRAG / samples * max(0.0, 1 - now / FADE_WINDOWS) ** 2 * drag)
             velocity = system.displacement(state.v)
             velocities += velocity
             squares += velocity**2
-        share = length / SAMPLES_OF_WINDOW
+        share = length / samples
         yield Span(length, state.z - place, state.r - way, share * velocities, share * squares, state.p - slid)
 
 
@@ -403,11 +369,11 @@ def _of_starts(system: OneSidedSystem, windows: list[Span]) -> tuple[Span, list[
             alike = abs(late[1] - before[1]) <= differs * late[1] and late[1] > VIBRATION_SHARE * late[0]
             vanishes = (
                 late[1] <= VIBRATION_SHARE * late[0]
-                and late[1] <= max(2 * before[1], VIBRATION_ROUNDING * late[0])
+                and late[1] <= max(2 * before[1], 1e-6 * late[0])  # rounding of the root
                 and vibration <= 2 * VIBRATION_SHARE * drift
             )
             # of the mean of four, doubled, since quarters of a slow cycle are not independent
-            spread = np.hypot(parts[3:].std(axis=0, ddof=1), ERROR_OF_STEPS * parts[0]).tolist()
+            spread = np.hypot(parts[3:].std(axis=0, ddof=1), 0.02 * parts[0]).tolist()  # and of time steps
             errors = spread if np.all(np.isfinite(parts)) else [None, None]
             steady = bool(alike or vanishes)
             found.append(DriftAndVibration(float(drift), errors[0], float(vibration), errors[1], steady))
@@ -421,7 +387,7 @@ def _in_parts(system: OneSidedSystem, span: list[Span]) -> Floats:
     size = len(span)
     edges = [0, size // 4, size // 2, 3 * size // 4, size]
     slices = [(0, 4), (0, 2), (2, 4), *((k, k + 1) for k in range(4))]
-    if size < LEAST_WINDOWS:
+    if size < 8:  # too few to compare parts
         slices = slices[:1]
     parts = np.array([Span.joined(span[edges[a] : edges[b]]).drift_and_vibration(system) for a, b in slices])
     return np.pad(parts, ((0, 7 - len(parts)), (0, 0), (0, 0)), constant_values=np.nan).transpose(2, 0, 1)
@@ -467,9 +433,9 @@ def _change_by_turning(system: OneSidedSystem, velocity: Floats, turns: NDArray[
     load = grip @ np.where(turns[:, None], system.sideways @ velocity, 0.0) ** 2
     a = csr_array(system.motion.stiffness + grip[:, turns] @ excess[turns])
     moves = static_response(replace(system.motion, stiffness=a), load, 1)
-    if np.linalg.norm(load - a @ moves) > UNBORNE_SHARE * np.linalg.norm(load):
+    if not _bears(a, moves, load):
         raise NotFollowedError(
             "the load turns the forces of contacts at Coulomb's bound, and nothing holds the particles that slide then"
         )
     size, change = (system.mean_square_displacement(each)[0] for each in (velocity, moves))
-    return float(TURNED_SHARE * np.sqrt(size / change)) if change else np.inf
+    return float(0.1 * np.sqrt(size / change)) if change else np.inf  # from a tenth on it is another drift

@@ -56,10 +56,8 @@ from .all_eigenvalues import SpectrumError, all_eigenvalues
 from .eigenvalues import (
     SAFETY,
     Complexes,
-    Linear,
     active_coordinates,
     exceeds_rounding,
-    exponential,
     is_negative,
     is_zero,
     mass_weighted,
@@ -125,51 +123,17 @@ class Spectrum(TableDisplay):
     remark: str = ""
 
     def __repr__(self) -> str:
+        pairs, negative = counted(len(self.pairs), "complex pair"), counted(len(self.negative), "negative eigenvalue")
+        counts = f"{pairs} and {negative}" if len(self.negative) else pairs
+        grows = f", D as exp({self.growth_rate():.6g} t)" if len(self.unstable) else ""
+        verdict = {None: "eigenvalues do not decide", True: "no motion grows", False: "unstable"}[self.is_stable]
+        if doubts := "; ".join(no_verdict(self.packing.configuration)):
+            verdict = f"not known whether the packing is stable: {doubts}"
         real = self.eigenvalues.real
         span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
         numbers = f"{counted(len(real), 'eigenvalue')} of K{span}, {counted(len(self.rattlers), 'rattler')}"
         remark = f"; {self.remark}" if self.remark else ""
-        return f"<Spectrum: {self._verdict}; {numbers}{remark}>"
-
-    @property
-    def _verdict(self) -> str:
-        """What eigenvalues say, and that contacts have two derivatives, if they do."""
-        two = not self._doubts and self.packing.configuration.contacts.two_derivatives.any()
-        more = "; contacts have two derivatives, of which K has the mean (`stability` says what that leaves out)"
-        return self._growth + (more if two else "")
-
-    @property
-    def _growth(self) -> str:
-        """Growth with dissipation first, without it second; with contacts at the bound the rates of both neighbours."""
-        contacts = self.packing.configuration.contacts
-        pairs, negative = counted(len(self.pairs), "complex pair"), counted(len(self.negative), "negative eigenvalue")
-        counts = f"{pairs} and {negative}" if len(self.negative) else pairs
-        grows = len(self.pairs) + len(self.negative) > 0
-        alone = f"K alone has {counts}" + (f", D as exp({self.growth_rate():.6g} t)" if grows else "")
-        if self._doubts:
-            return f"not known whether the packing is stable: {'; '.join(self._doubts)}; {alone}"
-        if contacts.one_sided.any():
-            from .linear import linear_verdict
-
-            rates = (linear_verdict(Motion.of(self.packing, sliding=on), decides=not on) for on in (False, True))
-            stick, slide = (exponential(each.growth_rate, 4, each.at_least) for each in rates)
-            count = int(contacts.one_sided.sum())
-            slides = "slides on ahead and sticks" if count == 1 else "slide on ahead and stick"
-            return (
-                f"{counted(count, 'contact')} at Coulomb's bound {slides} on the way back: "
-                f"neither linear motion decides: {stick} if all stuck, {slide} if all "
-                f"slid (`stability` follows them); {alone}"
-            )
-        damped = self._damped
-        if damped is None:
-            return "no motion grows" if self.is_stable else f"unstable, D as exp({self.growth_rate():.6g} t): {counts}"
-        if damped.stable is None:
-            return f"not known whether the packing is stable: {'; '.join(damped.reasons)}; {alone}"
-        verdict = "every motion decays" if self.is_stable else "unstable"
-        if self.is_stable and damped.growth_rate == 0:
-            return f"no motion grows with the packing's dissipation; {alone}"
-        rate = exponential(damped.growth_rate, 6, damped.at_least)
-        return f"{verdict} with the packing's dissipation, {rate}; {alone}"
+        return f"<Spectrum: {verdict} (`stability` says more); K alone has {counts}{grows}; {numbers}{remark}>"
 
     def _rows(self) -> dict[str, str]:
         rows = {
@@ -182,7 +146,7 @@ class Spectrum(TableDisplay):
         rows |= {f"{value:.10g}": f"2 |Im \u03c9| = {growth_rate(value):.6g}, negative" for value in self.negative}
         return rows or {"complex pairs and negative eigenvalues of K": "none"}
 
-    @property
+    @cached_property
     def is_stable(self) -> bool | None:
         """Whether no motion grows beyond rounding, with the packing's dissipation.
 
@@ -194,26 +158,12 @@ class Spectrum(TableDisplay):
         :func:`~faultgouge.analysis.stability` follows their motion. None, too, where no verdict is possible, as of a
         packing that moves.
         """
-        if self._doubts or self.packing.configuration.contacts.one_sided.any():
-            return None
-        if self._damped is not None:
-            return self._damped.stable
-        return not self.pairs and not len(self.negative)
-
-    @cached_property
-    def _doubts(self) -> tuple[str, ...]:
-        return tuple(no_verdict(self.packing.configuration))
-
-    @property
-    def damped_growth_rate(self) -> float | None:
-        """Largest 2 Re s with dashpots and drag, 1 / time; None without dissipation."""
-        return None if self._damped is None else self._damped.growth_rate
-
-    @cached_property
-    def _damped(self) -> Linear | None:
         from .linear import linear_verdict
 
-        return linear_verdict(Motion.of(self.packing)) if self.packing.configuration.damped else None
+        c = self.packing.configuration
+        if any(no_verdict(c)) or c.contacts.one_sided.any():
+            return None
+        return linear_verdict(Motion.of(c)).stable if c.damped else not len(self.unstable)
 
     @property
     def least_q(self) -> float:
@@ -366,14 +316,12 @@ def _values_and_vectors(matrix: csr_array, rounding: float, alike: float) -> tup
     remark = ""
     if matrix.shape[0] > SLICED:
         try:
-            found = all_eigenvalues(matrix)
+            return *all_eigenvalues(matrix), remark
         except SpectrumError as error:
             if matrix.shape[0] > LAPACK_INSTEAD:
                 raise
             remark = f"by LAPACK, as slices were incomplete: {str(error).rstrip('.')}"
             report_progress(f"{error} LAPACK takes over, which needs {32e-9 * matrix.shape[0] ** 2:.2g} GB")
-        else:
-            return found.values, found.marked, remark
     dense = matrix.toarray()
     # vectors take three times as long as eigenvalues: a large packing under a load has complex pairs, and needs both
     alone = len(dense) <= DENSE_LARGEST or (matrix != matrix.T).nnz == 0
