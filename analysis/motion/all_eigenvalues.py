@@ -114,11 +114,6 @@ def _in_slices(matrix: csr_array, own: int) -> tuple[Complexes, Modes]:
         return [factor_shifted(symmetric, shift)[1] for shift in shifts]
 
     places, numbers = count_places(symmetric, below, (0, size), 2 * own)
-    for _ in range(8):  # the ends move next to the first and to the last eigenvalue
-        middle = 0.5 * (places[[0, -2]] + places[[1, -1]])
-        for end, outside, count in zip((0, -1), (0, size), below(middle), strict=True):
-            if count == outside and len(places) > 2:
-                places[end] = middle[end]
     pieces = max(1, round(size / own))
     edges = np.arange(pieces + 1) * size // pieces
     borders, spacing = places_of_numbers(places, numbers, edges), float(places[-1] - places[0]) / size
@@ -143,7 +138,7 @@ def _in_slices(matrix: csr_array, own: int) -> tuple[Complexes, Modes]:
                 discs[k], first = eigenvalues_about(a, shift, radius, accuracy, block, first, most)
             except SpectrumError:
                 continue
-        ends = _ends(discs, borders)
+        ends = [-np.inf, *borders[1:-1], np.inf]
         inner = [
             (disc.values.real >= low) & (disc.values.real < high)
             for disc, low, high in zip(discs, ends, ends[1:], strict=False)
@@ -244,15 +239,3 @@ def eigenvalues_about(
     chosen = _matters(values, np.abs(np.sum(y.conj() * x, axis=0)) / length)
     modes = Modes(values[chosen], v @ x[:, chosen], u @ (y_whole / length)[:, chosen])
     return Disc(shift, float(radius), values, modes), int(1.06 * right.used * min(1.0, needed / radius))
-
-
-def _ends(discs: list[Disc], borders: Floats) -> Floats:
-    """Real parts up to which each disc has its own, in the widest gap of all eigenvalues about each border."""
-    inner = []
-    for one, other, border in zip(discs[:-1], discs[1:], borders[1:-1], strict=True):
-        room = max(0.0, 0.5 * min(one.shift + one.radius - border, border - other.shift + other.radius))
-        real = np.concatenate([one.values.real, other.values.real])
-        near = np.sort(np.concatenate([real[np.abs(real - border) < room], [border - room, border + room]]))
-        k = int(np.argmax(np.diff(near)))
-        inner.append(0.5 * (near[k] + near[k + 1]))
-    return np.array([-np.inf, *inner, np.inf])

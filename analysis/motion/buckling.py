@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from ..factors.sparse_lu import DIAGONAL_PIVOT, SingularMatrixError, symmetric_lu
+from ..factors.sparse_lu import DIAGONAL_PIVOT, negative_pivots, symmetric_lu
 from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats
 from .eigenvalues import (
@@ -84,15 +84,8 @@ def surely_positive(matrix: csr_array) -> bool:
 
 def _is_positive(symmetric: csc_array, shift: Floats | float) -> bool:
     """Whether S + shift has positive pivots alone; shift is a number, or the entries of a diagonal."""
-    size = symmetric.shape[0]
-    if size == 0:
-        return True
-    try:
-        return (
-            symmetric_lu(csc_array(symmetric + diags_array(np.broadcast_to(shift, size))), symmetric=True).negative == 0
-        )
-    except SingularMatrixError:
-        return False
+    shifts = diags_array(np.broadcast_to(shift, symmetric.shape[0]))
+    return not symmetric.shape[0] or negative_pivots(csc_array(symmetric + shifts)) == 0
 
 
 def nearest_modes(packing: HasConfiguration, near: complex, count: int, tolerance: float = 0.0) -> Modes:

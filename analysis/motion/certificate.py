@@ -41,7 +41,6 @@ small space, until it does not.
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +51,9 @@ from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
 from ..arrays import Complexes, Floats, Indices
 from ..factors.lanczos import Slice, SlicedSpectrum, SliceError
-from ..factors.sparse_lu import SingularMatrixError, elimination_places, symmetric_lu
+from ..factors.sparse_lu import elimination_places, negative_pivots, symmetric_lu
 from ..progress import report_progress
+from .eigenvalues import Linear
 
 Pencil = tuple[csr_array, csr_array, csr_array, csr_array]
 """S, N, G and H, in an order of elimination."""
@@ -66,49 +66,12 @@ SURE = 1e-3
 """Error of a rate, as a share, that is small enough."""
 
 
-@dataclass(frozen=True)
-class Proof:
-    """What was proved of all motion.
-
-    Attributes
-    ----------
-    values : ndarray of complex, shape (k,)
-        s of slow motions, Im s >= 0, the slowest decay first, 1 / time; motions that no force opposes are left out.
-    errors : ndarray, shape (k,)
-        Of Re s, 1 / time.
-    frequency : float
-        w: no motion with a larger |Im s| grows, 1 / time.
-    slow : int
-        Eigenvalues of S below w^2.
-    free : int
-        Motions that no force opposes.
-    decay : float
-        Re s of all faster motions is below minus this, 1 / time.
-    how : str
-        "proved" by inertia, or "shown" by Lanczos, as factors of F do not fit in memory.
-    all_slow : bool
-        Whether all slow motions were looked at: the search ends with a slice in which motion grows.
-    largest : float
-        The largest frequency at the most, 1 / time, in whose rounding Re s is known.
-    """
-
-    values: Complexes
-    errors: Floats
-    frequency: float
-    slow: int
-    free: int
-    decay: float
-    how: str
-    all_slow: bool
-    largest: float
-
-
 class NoProofError(Exception):
     """Why there is no certificate: a clause."""
 
 
-def prove(stiffness: csr_array, damping: csr_array, zero: float) -> Proof:
-    """No fast motion grows, and what slow motions do.
+def prove(stiffness: csr_array, damping: csr_array, zero: float) -> Linear:
+    """What is proved of all motion: that no fast motion grows, and what slow motions do.
 
     Parameters
     ----------
@@ -164,7 +127,21 @@ def prove(stiffness: csr_array, damping: csr_array, zero: float) -> Proof:
         if share * slowest > decay and _is_positive((s, n, g, h), w, beta, share * slowest, factors=factors):
             decay = share * slowest
             break
-    return Proof(values, errors, w, count, free, decay, "proved" if factors else "shown", all_slow, top)
+    fast = f"no motion faster than {w:.3g} grows ({'proved' if factors else 'shown'})"
+    if not len(values):
+        return Linear(True, -2 * decay, 2 * decay, free, said=fast)
+    s_slow, error, doubt = complex(values[0]), float(errors[0]), float((values.real + errors).max())
+    rate = 2 * s_slow.real
+    if s_slow.real > error:
+        return Linear(False, rate, 2 * error, free, s_slow, at_least=not all_slow)
+    if doubt >= 0:
+        why = (
+            f"{fast}, but of {count} slow motions the slowest has 2 Re s = {rate:.3g} with an error of {2 * error:.2g}"
+        )
+        return Linear(None, rate, 2 * error, free, s_slow, searched=2 * doubt, reasons=(why,))
+    slow = f"of {count} slower ones, known one by one, the slowest decays with D as exp({rate:.6g} t)"
+    error = max(error, doubt - s_slow.real, -s_slow.real - decay, 1e-14 * top)
+    return Linear(True, rate, 2 * error, free, s_slow, f"{fast}, and {slow}")
 
 
 def _is_positive(pencil: Pencil, w: float, beta: float, decay: float, *, factors: bool = True) -> bool:
@@ -182,10 +159,7 @@ def _is_positive(pencil: Pencil, w: float, beta: float, decay: float, *, factors
         return bool(lowest[0] > np.linalg.norm(form @ vector - vector * lowest))
     pairs = np.argsort(np.concatenate([2 * np.arange(size), 2 * np.arange(size) + 1]))
     both = csc_array(block_array([[real, turning], [-turning, real]], format="csr")[pairs][:, pairs])
-    try:
-        return both.diagonal().min() > 0 and symmetric_lu(both, ordered=True, symmetric=True).negative == 0
-    except SingularMatrixError:
-        return False
+    return bool(both.diagonal().min() > 0) and negative_pivots(both, ordered=True) == 0
 
 
 def _frequency(
@@ -200,19 +174,17 @@ def _frequency(
     best, width = (top, 0.0), 0.02
     for share in (0.1, 0.2, 0.4):  # 0.2 is best in beds of spheres, by a fifth at the most
 
-        def holds(w: float, share: float = share) -> float:
+        def certain(w: float, share: float = share) -> float:
+            """beta, or zero where F is not positive."""
             beta, decay = min(share * ratio, 1 / (twisting / w + strongest)), FREE_MARGIN * 0.5 * w**2 * ratio
             return beta if gyration <= w and _is_positive(pencil, w, beta, decay) else 0.0
 
-        low, high = 1e-3 * top, best[0]
-        if high <= 2 * low or not (beta := holds((1 - width) * high)):
+        low, high = 1e-3 * top, (1 - width) * best[0]
+        if high <= 2 * low or not (beta := certain(high)):
             continue
         while high - low > width * high:
             w = 0.5 * (low + high)
-            if found := holds(w):
-                high, beta = w, found
-            else:
-                low = w
+            low, high, beta = (low, w, found) if (found := certain(w)) else (w, high, beta)
         best = high, beta
     if not best[1]:
         raise NoProofError(f"the dashpots hold growth at no frequency below that of the fastest motion, {top:.3g}")

@@ -192,8 +192,7 @@ def growing_undamped(
     zero : float or ndarray
         The uncertainty of an eigenvalue of zero, of all modes alike or of each, 1 / time^2.
     """
-    oscillates = np.array([exceeds_rounding(v, o, rounding) for v, o in zip(values, overlap, strict=True)], dtype=bool)
-    return oscillates, is_negative(values, overlap, rounding, zero)
+    return np.abs(values.imag) * overlap > SAFETY * rounding, is_negative(values, overlap, rounding, zero)
 
 
 def exponential(rate: float, digits: int, at_least: bool = False) -> str:

@@ -25,7 +25,7 @@ from scipy.sparse import block_diag, csc_array, csr_array, eye_array, vstack
 from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Complexes, Floats
-from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
+from ..factors.sparse_lu import negative_pivots
 from .certificate import NoProofError, prove
 from .eigenvalues import (
     SAFETY,
@@ -86,11 +86,8 @@ def linear_verdict(motion: Motion, *, decides: bool = True, time: float | None =
     if not motion.dissipative:
         if abs(a - a.T).max() <= SAFETY * rounding:
             shifts = (csc_array(0.5 * (a + a.T) + shift * eye_array(size)) for shift in (zero, -zero))
-            try:
-                below, above = (symmetric_lu(each, symmetric=True).negative for each in shifts)
-            except SingularMatrixError:
-                below = 1
-            if not below:
+            below, above = map(negative_pivots, shifts)
+            if below == 0 and above is not None:
                 said = "the stiffness is symmetric, and its energy positive (proved)"
                 return Linear(True, 0.0, free=above, said=said)
         why = (
@@ -100,22 +97,11 @@ def linear_verdict(motion: Motion, *, decides: bool = True, time: float | None =
         return replace(found, reasons=(why,))
     kept = opposed(motion)
     try:
-        proof = prove(csr_array(kept.T @ a @ kept), csr_array(kept.T @ g @ kept), zero)
+        found = prove(csr_array(kept.T @ a @ kept), csr_array(kept.T @ g @ kept), zero)
     except NoProofError as failure:
         why = str(failure)
         return _by_lapack(motion) if size <= LAPACK_UP_TO else follow_decay(motion, kept, why, time, found.searched)
-    free, fast = size - kept.shape[1] + proof.free, f"no motion faster than {proof.frequency:.3g} grows ({proof.how})"
-    if not len(proof.values):
-        return Linear(True, -2 * proof.decay, 2 * proof.decay, free, said=fast)
-    s, error, doubt = complex(proof.values[0]), float(proof.errors[0]), float((proof.values.real + proof.errors).max())
-    if s.real > error:
-        return Linear(False, 2 * s.real, 2 * error, free, s, at_least=not proof.all_slow)
-    if doubt >= 0:
-        why = f"of {proof.slow} slow motions the slowest has 2 Re s = {2 * s.real:.3g} with an error of {2 * error:.2g}"
-        return Linear(None, 2 * s.real, 2 * error, free, s, searched=2 * doubt, reasons=(f"{fast}, but {why}",))
-    slow = f"of {proof.slow} slower ones, known one by one, the slowest decays with D as exp({2 * s.real:.6g} t)"
-    more = max(error, doubt - s.real, -s.real - proof.decay, 1e-14 * proof.largest)
-    return Linear(True, 2 * s.real, 2 * more, free, s, f"{fast}, and {slow}")
+    return replace(found, free=found.free + size - kept.shape[1])
 
 
 def _of_groups(motion: Motion, decides: bool, time: float | None) -> Linear | None:

@@ -107,9 +107,9 @@ class OneSidedOutcome(FieldsByName):
     needed : float or None
         After which time `grows` may be known: as D gains at its rate, or as the slowest vibration decays. None where
         `grows` is known, or this time is over.
-    amplification, least_amplification : float
-        Largest D over the mean square velocity of the push along an axis, time^2: the largest and the smallest of the
-        pushes. Motion that goes on may take D further.
+    amplification : float
+        Largest D over the mean square velocity of the push along an axis, time^2. Motion that goes on may take D
+        further.
     slip_left : float or None
         How much of their slip contacts may have still to come, as a share; None if that is not known.
     slides_on : int
@@ -125,8 +125,6 @@ class OneSidedOutcome(FieldsByName):
         count as at the bound do not reach it, or the residual forces move the packing as well; above, other contacts
         reach the bound, open or close, or the force of one at the bound turns. The first is infinite if the residual
         forces alone do so.
-    first_change : tuple of float
-        The smallest and the largest of the pushes that take another contact so far.
     changes_at : float or None
         Where the motion grows: D at which the first contact changes.
     """
@@ -137,14 +135,12 @@ class OneSidedOutcome(FieldsByName):
     searched: float
     needed: float | None
     amplification: float
-    least_amplification: float
     slip_left: float | None
     slides_on: int
     wears: bool
     time: float
     pushes: int
     scales: tuple[float, float]
-    first_change: tuple[float, float]
     changes_at: float | None
 
 
@@ -177,7 +173,6 @@ def follow_pushes(
     times, energy = np.array([look.time for look in seen]), np.array([look.energy[:-2] for look in seen])
     size, first = np.array([look.size for look in seen])[:, :-2], np.array([look.first for look in seen])[:, :-2]
     (rate, error), end = _rate(times, energy), float(times[-1])
-    biggest, changed = size.max(axis=0), first.min(axis=0)
     needed, slides_on, at_growth = 0.0, 0, np.inf
     if grows is None:
         gained = float(np.log(energy[-1] / energy[0]).max())
@@ -190,22 +185,14 @@ def follow_pushes(
     elif grows:
         at_growth = min((look.first[:-2] ** 2 * look.size_at_first[:-2]).min() for look in seen[-LOOKS_PER_CHUNK:])
     return OneSidedOutcome(
-        grows=grows,
-        growth_rate=rate if grows else (sticking if grows is False else None),
-        error=error if grows else None,
-        searched=float(np.log(GROWN_ENERGY) / end) if grows is None else 0.0,
-        needed=needed if end < needed < np.inf else None,
-        amplification=float(biggest.max()),
-        least_amplification=float(biggest.min()),
-        slip_left=left if grows is False and np.isfinite(left) else None,
-        slides_on=slides_on,
-        wears=bool(len(seen[0].paths)),
-        time=end,
-        pushes=len(biggest),
-        scales=(least_scale(seen[:LOOKS_PER_CHUNK]), float(changed.min())),
-        first_change=(float(changed.min()), float(changed.max())),
+        grows=grows, growth_rate=rate if grows else (sticking if grows is False else None),
+        error=error if grows else None, searched=float(np.log(GROWN_ENERGY) / end) if grows is None else 0.0,
+        needed=needed if end < needed < np.inf else None, amplification=float(size.max()),
+        slip_left=left if grows is False and np.isfinite(left) else None, slides_on=slides_on,
+        wears=bool(len(seen[0].paths)), time=end, pushes=size.shape[1],
+        scales=(least_scale(seen[:LOOKS_PER_CHUNK]), float(first.min())),
         changes_at=float(at_growth) if np.isfinite(at_growth) else None,
-    )
+    )  # fmt: skip
 
 
 def _slip_left(seen: list[Look]) -> float:
@@ -245,9 +232,9 @@ class Creep(FieldsByName):
         Largest D of this displacement over the mean square velocity of the push along an axis, time^2.
     time : float
         How long motion was followed.
-    velocity, least_velocity : float
+    velocity : float
         Root mean square over the particles of its mean velocity in the last quarter of this time, over the root mean
-        square velocity of the push along an axis: the largest and the smallest of the pushes.
+        square velocity of the push along an axis.
     limit : float or None
         `amplification` that vibration may reach later, while the slowest motion decays; None if that is not known, as
         without dissipation.
@@ -255,18 +242,14 @@ class Creep(FieldsByName):
         Whether the motion grew, in spite of linear motion that does not; None if its energy has risen, and less.
     growth_rate : float
         Of D, 1 / time, of a motion that grows.
-    first_change : tuple of float
-        Velocities along an axis of the smallest and of the largest push that take a contact to another state.
     """
 
     amplification: float
     time: float
     velocity: float
-    least_velocity: float
     limit: float | None
     grows: bool | None
     growth_rate: float
-    first_change: tuple[float, float]
 
     @property
     def settled(self) -> bool:
@@ -301,17 +284,12 @@ def follow_creep(
         sizes = system.mean_square_displacement(late)
         velocity = np.sqrt(system.mean_square_displacement(late - early)) / (after.time - before.time)
         limit = float(((np.sqrt(sizes) + velocity / decay) ** 2).max()) if decay > 0 else None
-        first, energy = np.min([look.first for look in seen], axis=0), np.array([look.energy for look in seen])
+        times, energy = np.array([look.time for look in seen]), np.array([look.energy for look in seen])
         gained = float(np.max(energy[-1] / energy[0]))
-        grows = (
-            True if not gained <= GROWN_ENERGY else None if gained > 2 else False
-        )  # the energy of a push is all kinetic at first, half of it later
-        rate = _rate(np.array([look.time for look in seen]), energy)[0] if grows else 0.0
-        found = Creep(
-            amplification=float(sizes.max()), time=after.time, velocity=float(velocity.max()),
-            least_velocity=float(velocity.min()), limit=limit, grows=grows, growth_rate=rate,
-            first_change=(float(first.min()), float(first.max())),
-        )  # fmt: skip
+        # the energy of a push is all kinetic at first, and half of it later
+        grows = True if not gained <= GROWN_ENERGY else None if gained > 2 else False
+        rate = _rate(times, energy)[0] if grows else 0.0
+        found = Creep(float(sizes.max()), after.time, float(velocity.max()), limit, grows, rate)
         if grows or (found.settled and time is None):
             break
     return found

@@ -81,7 +81,7 @@ def follow(
     logs, needed = [float(np.log(reference**2 * (z @ z) + v @ v))], np.inf
     while len(logs) <= max(looks, 8):
         size = float(np.abs(v).max(initial=0.0)) or 1.0  # growth may be beyond all numbers
-        before, squares, scale = (z / size, v / size), [], scale + 2 * np.log(size)
+        before, squares, scale = (z / size, v / size), [], scale + 2 * float(np.log(size))
         z, v = before[0].copy(), before[1].copy()
         v -= 0.5 * step * (a @ z + g @ v)
         for k in range(1, 101):
@@ -109,7 +109,7 @@ def follow(
             report_progress(f"motion from a random state: t = {now:.4g} of {min(needed, span * looks):.4g}")
         if len(logs) > max(0.1 * looks, 8) and needed > patience * looks * span:
             break
-    return Linear(None, falls, searched=(logs[-1] - wanted) / now), now, needed
+    return Linear(None, falls, searched=float(logs[-1] - wanted) / now), now, needed
 
 
 def _of_plane(a: csr_array, g: csr_array, *states: tuple[Floats, Floats]) -> complex:

@@ -38,7 +38,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky, eig, eigh, expm, solve_triangular
 from scipy.sparse import csc_array, csr_array, eye_array
-from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.sparse.linalg import LinearOperator, eigsh, svds
 
 from ..arrays import Floats, Indices
 from ..factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
@@ -165,16 +165,12 @@ def _cone_distance(product: Floats, force: Floats, bound: Floats) -> Floats:
 
     Norms are those of the products, shape (3, 3, C).
     """
-    middle, half = np.zeros(len(force)), np.pi
-    for _ in range(5):  # each time more closely about the best angle
-        angle = middle[:, None] + half * np.linspace(-1, 1, 33)
-        n = np.stack([np.cos(angle), np.sin(angle), -np.ones_like(angle)])
-        size = np.sqrt(np.maximum(np.einsum("ica,ijc,jca->ca", n, product, n), 0.0))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            distance = np.nan_to_num((bound[:, None] - force[:, None] * n[0]) / size, nan=np.inf, posinf=np.inf)
-        best = distance.argmin(axis=1)
-        middle, half = np.take_along_axis(angle, best[:, None], axis=1)[:, 0], half / 16
-    return np.asarray(distance.min(axis=1))
+    angle = np.linspace(-np.pi, np.pi, 1025)  # a thousandth of the way from one to the next counts for 1e-5
+    n = np.stack([np.cos(angle), np.sin(angle), -np.ones_like(angle)])
+    size = np.sqrt(np.maximum(np.einsum("ia,ijc,ja->ca", n, product, n, optimize=True), 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (bound[:, None] - force[:, None] * n[0]) / size
+    return np.asarray(np.nan_to_num(distance, nan=np.inf, posinf=np.inf).min(axis=1))
 
 
 def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, end: float) -> tuple[float, float]:
@@ -207,7 +203,10 @@ def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, e
     two = one @ one
     before, after = np.exp(fastest * time), np.exp(2 * fastest * time)  # up to time, and to 2 time
     for _ in range(22):  # doublings until the norm is to fall below one
-        sizes = _norm(two), _norm(one @ two)
+        sizes = [
+            float(svds(each, 1, v0=np.ones(2 * size), tol=1e-6, return_singular_vectors=False)[0])
+            for each in (two, one @ two)
+        ]
         before, after = after, max(after, max(sizes) * before)
         if min(sizes) <= 1:
             return float(after**2), end
@@ -228,12 +227,6 @@ def _gain_of_modes(stiffness: Floats, root: Floats) -> float:
     larger = max(np.linalg.norm(outward, 2), np.linalg.norm(root @ outward / omega, 2))
     smaller = max(np.linalg.norm(inward, 2), np.linalg.norm(omega[:, None] * back, 2))
     return float((larger * smaller) ** 2)
-
-
-def _norm(matrix: Floats) -> float:
-    """The largest singular value: a Ritz value errs by the square of the tolerance."""
-    square = LinearOperator(matrix.shape, lambda x: matrix.T @ (matrix @ x), dtype=float)
-    return float(np.sqrt(eigsh(square, 1, v0=np.ones(len(matrix)), tol=1e-6, return_eigenvectors=False)[0]))
 
 
 def change_of_growing(system: OneSidedSystem, s: complex) -> float | None:

@@ -48,7 +48,7 @@ The step 2/mu of this bound is stable for certain, and shorter than the limit.
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import eigvals
+from scipy.linalg import eig
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
@@ -142,7 +142,7 @@ def stable_timestep(
     if damping is not None:
         damping = DASHPOT_WEIGHT[dashpot_velocity or ("extrapolated" if ours else "half-step")] * damping
     scale = 1.0 / np.sqrt(coordinate_mass(of))
-    found = (_of_all_eigenvalues if len(scale) <= EXACT_COORDINATES else _of_arnoldi)(scale, stiffness, damping)
+    found = _limit(scale, stiffness, damping)
     # rounding may take the limit below the bound where the two are the same
     return StableTimestep(found, found.error, min(float(found), 2.0 / _largest_mu(scale, stiffness, damping)))
 
@@ -192,19 +192,8 @@ def _largest_mu(scale: Floats, stiffness: csr_array, damping: csr_array | None) 
     return 0.5 * (sums[1] + float(np.sqrt(sums[1] ** 2 + 4 * sums[0])))
 
 
-def _of_all_eigenvalues(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> StableTimestep:
-    """2/mu by LAPACK."""
-    weight = np.outer(scale, scale)
-    a = weight * stiffness.toarray()
-    if damping is None:
-        return StableTimestep(2.0 / float(np.sqrt(np.abs(eigvals(a)).max())))
-    one = np.eye(len(scale))
-    pencil = np.block([[weight * damping.toarray(), a], [one, np.zeros_like(one)]])
-    return StableTimestep(2.0 / float(eigvals(pencil).real.max()))
-
-
-def _of_arnoldi(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> StableTimestep:
-    """2/mu by Arnoldi's iteration: mu^2 = lambda + c (mu - before) with the slope c; each step squares the error."""
+def _limit(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> StableTimestep:
+    """2/mu by the largest eigenvalue: mu^2 = lambda + c (mu - before) with the slope c; each step squares the error."""
     if damping is None:
         value, _, error = _largest_eigenvalue(scale, stiffness, TIMESTEP_TOLERANCE)
         step = 2.0 / float(np.sqrt(value))
@@ -225,6 +214,11 @@ def _of_arnoldi(scale: Floats, stiffness: csr_array, damping: csr_array | None) 
 def _largest_eigenvalue(scale: Floats, matrix: csr_array, tolerance: float) -> tuple[float, Floats, float]:
     """The largest eigenvalue of a matrix over the masses, its mode as displacements (of norm 1 by mass), its error."""
     size = len(scale)
+    if size <= EXACT_COORDINATES:
+        values, every = eig(np.outer(scale, scale) * matrix.toarray())
+        first = int(np.argmax(np.abs(values)))
+        vector = np.real(every[:, first])
+        return float(abs(values[first])), scale * vector / np.linalg.norm(vector), 0.0
 
     def product(x: Floats) -> Floats:
         return np.asarray(scale * (matrix @ (scale * x.reshape(size))))

@@ -159,12 +159,10 @@ class Stability:
         if outcome is not None:
             left = f", where {outcome.slip_left:.1%} of their slip is left" if outcome.slip_left else ""
             ends = "comes to rest" if self.growth_rate < 0 else "ends in vibration that goes on, but does not grow"
-            size = as_known(outcome.least_amplification, outcome.amplification)
             known = f"; with sticking contacts, {self.sticking.said}" if self.sticking.said else ""
-            return (
-                f"stable: each of {outcome.pushes} pushes {ends}{free}; D reaches {size} times the mean square "
-                f"velocity of the push while contacts slide (followed for t = {outcome.time:.4g}{left}){known}"
-            )
+            size = f"D reaches {outcome.amplification:.2g} times the mean square velocity of the push"
+            while_sliding = f"while contacts slide (followed for t = {outcome.time:.4g}{left})"
+            return f"stable: each of {outcome.pushes} pushes {ends}{free}; {size} {while_sliding}{known}"
         if self.sticking.said:
             return f"stable: {self.sticking.said}{free}"
         if self.dissipative and self.growth_rate < 0:
@@ -206,8 +204,7 @@ class Stability:
                 f"of the push within t = {creep.time:.4g}{later}"
             )
         elif creep is not None:
-            velocity = as_known(creep.least_velocity, creep.velocity)
-            yield f"{WORN}: D as ({velocity} t)^2 times the mean square velocity of the push"
+            yield f"{WORN}: D as ({creep.velocity:.2g} t)^2 times the mean square velocity of the push"
 
     def _range(self) -> Iterator[str]:
         """Between which pushes this holds."""
@@ -222,12 +219,10 @@ class Stability:
                     else "from which push on this growth is seen is not known: residual forces alone change a contact"
                 )
             elif self.stable and least < most:
-                last = outcome.first_change[1]
-                upto = f"{most:.1g}" + (f" to {last:.1g}" if 1.5 * most <= last < np.inf else "")
                 yield (
                     f"this is the motion after these pushes from {least:.1g} on (velocity along an axis), where "
                     "contacts that count as at the bound reach it and residual forces do not count, up to "
-                    f"{upto}, where another contact changes or one of these turns; other pushes may differ"
+                    f"{most:.1g}, where another contact changes or one of these turns; other pushes may differ"
                 )
         elif not self.stable:
             return
@@ -252,9 +247,6 @@ class Stability:
                 f"holds for every push of an energy up to {self.largest_energy:.2g}, as of one particle at {most:.2g}"
                 f"{within}: no contact opens, closes or slides{worn}{below}"
             )
-            if self.creep and np.isfinite(self.creep.first_change[1]):
-                first, last = self.creep.first_change
-                yield f"of random pushes, a contact changes from {first:.1g} to {last:.1g} on (velocity along an axis)"
 
     def _beyond(self) -> Iterator[str]:
         """Where a motion that grows ends, and under a load that rises."""
@@ -285,11 +277,6 @@ class Stability:
             found[name] = {key: value for key, value in asdict(found[name]).items() if key != "s"}
         lists = {name: list(getattr(self, name)) for name in ("reasons", "remarks")}
         return found | {"undamped": vars(self.undamped), "searched": self.searched} | lists
-
-
-def as_known(least: float, most: float) -> str:
-    """The larger of two numbers, with as many digits as these agree in."""
-    return f"{most:.{_digits(most, most - least)}g}"
 
 
 def _digits(number: float, error: float) -> int:

@@ -11,7 +11,6 @@ from faultgouge.analysis import Contacts, MindlinLaw, Packing, one_sided_motion,
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.motion import pushes as pushes_module
 from faultgouge.analysis.motion import stability as stability_module
-from faultgouge.analysis.motion.verdict import as_known
 
 
 def test_stability_of_three_disks():
@@ -124,13 +123,6 @@ def test_a_rested_packing_holds_for_every_push_below_its_energy():
     assert told.stable is True
     assert told.push_time is None
     assert "holds for every push of an energy up to" in str(told)
-
-
-@pytest.mark.parametrize(
-    ("least", "most", "says"), [(0.58, 0.99, "1"), (0.95, 0.99, "0.99"), (1.234, 1.2341, "1.2341"), (2.0, 2.0, "2")]
-)
-def test_numbers_have_as_many_digits_as_pushes_agree_in(least, most, says):
-    assert as_known(least, most) == says
 
 
 def test_the_gain_of_energy_bounds_what_motion_gains_without_loss(path):
