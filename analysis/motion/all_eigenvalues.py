@@ -26,8 +26,6 @@ not help there is an error.
 eigenvalues, more than a block has vectors. Each island has slices of its own, or is small enough for LAPACK.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -47,16 +45,6 @@ from .modes import Modes
 
 class SpectrumError(FaultgougeError):
     """Eigenvalues were not found: one sentence."""
-
-
-@dataclass(frozen=True, eq=False)
-class Disc:
-    """The eigenvalues that are closer to a shift than a radius, and those that matter with vectors."""
-
-    shift: float
-    radius: float
-    values: Complexes
-    vectors: Modes
 
 
 def all_eigenvalues(matrix: csr_array, own: int = 36, least: int = 540) -> tuple[Complexes, Modes]:
@@ -114,85 +102,61 @@ def _in_slices(matrix: csr_array, own: int) -> tuple[Complexes, Modes]:
         return [factor_shifted(symmetric, shift)[1] for shift in shifts]
 
     places, numbers = count_places(symmetric, below, (0, size), 2 * own)
-    pieces = max(1, round(size / own))
-    edges = np.arange(pieces + 1) * size // pieces
+    edges = np.linspace(0, size, max(1, round(size / own)) + 1).astype(int)
     borders, spacing = places_of_numbers(places, numbers, edges), float(places[-1] - places[0]) / size
+    apart = np.append(True, np.diff(borders) > 0.1 * spacing)  # all that are equal are in one slice
+    borders, edges = borders[apart], edges[apart]
+    pieces = len(edges) - 1
     # the error by one of the two spaces, that by both is of the size of its square
     accuracy = max(1e-5 * spacing, 4 * np.finfo(float).eps * np.abs(borders).max())
     trace, square = a.diagonal().sum(), (a @ a).diagonal().sum()
-    discs = [Disc(float(mean), 0.0, np.zeros(0, complex), Modes.none(size)) for mean in borders[1:] + borders[:-1]]
+    found = [(np.zeros(0, complex), Modes.none(size))] * pieces
     first, todo = 3 * own, np.arange(pieces)
-    for block in (4, 8, 16, 32):  # four vectors are solved for in the time of two; larger blocks take more vectors
+    for block in (4, 8, 16, 48):  # four vectors are solved for in the time of two; larger blocks take more vectors
         again, most = block > 4, 15 * max(own, block)
         for k in todo:
             report_progress(f"slice {k + 1} of {pieces} of the spectrum{' once more' * again}")
-            low, high = borders[k : k + 2]
-            shift = float(low + (0.44 if again else 0.5) * (high - low))
-
-            def radius(values: Complexes, low: float = low, high: float = high, shift: float = shift) -> float:
-                inside = values[(values.real >= low) & (values.real <= high)]
-                height = 1.5 * float(np.abs(inside.imag).max(initial=0.0))
-                return float(np.hypot(1.1 * max(high - shift, shift - low), height))
-
+            shift = float(borders[k] + (0.44 if again else 0.5) * (borders[k + 1] - borders[k]))
             try:
-                discs[k], first = eigenvalues_about(a, shift, radius, accuracy, block, first, most)
+                every, modes, first = eigenvalues_about(a, shift, borders[k : k + 2], accuracy, (block, first, most))
             except SpectrumError:
                 continue
-        ends = [-np.inf, *borders[1:-1], np.inf]
-        inner = [
-            (disc.values.real >= low) & (disc.values.real < high)
-            for disc, low, high in zip(discs, ends, ends[1:], strict=False)
-        ]
-        values = np.concatenate([disc.values[here] for disc, here in zip(discs, inner, strict=True)])
+            low, high = borders[k] if k else -np.inf, borders[k + 1] if k + 1 < pieces else np.inf
+            here = (modes.values.real >= low) & (modes.values.real < high)
+            found[k] = every[(every.real >= low) & (every.real < high)], modes.chosen(here)
+        values = np.concatenate([each for each, _ in found])
         off = abs(values.sum() - trace), abs((values**2).sum() - square) / (2 * np.abs(values).max(initial=1e-300))
         if len(values) == size and max(off) <= 1e-3 * spacing:
-            known = [disc.vectors for disc in discs]
-            kept = [
-                (each.values.real >= low) & (each.values.real < high)
-                for each, low, high in zip(known, ends, ends[1:], strict=False)
-            ]
-            marked = Modes.joined([each.chosen(here) for each, here in zip(known, kept, strict=True)])
-            return values, marked.placed(order, size)
-        lacking = np.array([here.sum() for here in inner]) - np.diff(edges)
+            return values, Modes.joined([modes for _, modes in found]).placed(order, size)
+        lacking = np.array([len(each) for each, _ in found]) - np.diff(edges)
         todo = np.flatnonzero(lacking < 0) if block == 4 else np.arange(pieces)
-    found = f"{len(values)} were found" if len(values) != size else f"their sum is off the trace by {max(off):.3g}"
-    raise SpectrumError(f"All eigenvalues of {size} coordinates: {found}.")
+    why = f"{len(values)} were found" if len(values) != size else f"their sum is off the trace by {max(off):.3g}"
+    raise SpectrumError(f"All eigenvalues of {size} coordinates: {why}.")
 
 
 def eigenvalues_about(
-    matrix: csc_array,
-    shift: float,
-    wanted: Callable[[Complexes], float],
-    accuracy: float,
-    block: int,
-    first: int,
-    most: int,
-) -> tuple[Disc, int]:
-    """The eigenvalues about a shift.
+    matrix: csc_array, shift: float, wanted: Floats, accuracy: float, vectors: tuple[int, int, int]
+) -> tuple[Complexes, Modes, int]:
+    """All eigenvalues about a shift, and those that matter with vectors; and how many vectors would have been enough.
 
     Parameters
     ----------
     matrix : scipy.sparse.csc_array, shape (n, n)
         A, its coordinates in the order of elimination.
     shift : float
-    wanted : callable
-        The radius that a disc is to have, given the eigenvalues that are known.
+    wanted : ndarray, shape (2,)
+        Real parts between which all are wanted.
     accuracy : float
         Error of an eigenvalue by one space.
-    block, first, most : int
+    vectors : tuple of int
         Vectors of a block, of the spaces before their eigenvalues are looked at, and at the most.
-
-    Returns
-    -------
-    Disc
-    int
-        Vectors that would have been enough.
 
     Raises
     ------
     SpectrumError
         If the largest space does not hold them.
     """
+    (block, first, most), (low, high) = vectors, wanted
     size = matrix.shape[0]
     factors = general_lu(csc_array(matrix - shift * eye_array(size)), ordered=True)
     random = np.random.default_rng(block)
@@ -212,7 +176,8 @@ def eigenvalues_about(
             known = values[: int(failed[0]) if len(failed) else len(values)]
             distances.append(np.abs(known - shift))
             radii.append(np.inf if len(known) == size else distances[-1].max(initial=0.0))
-        radius, needed = min(radii), wanted(known)
+        height = np.abs(known.imag[(known.real >= low) & (known.real <= high)]).max(initial=0.0)
+        radius, needed = min(radii), float(np.hypot(1.1 * max(high - shift, shift - low), 1.5 * height))
         if radius >= needed or right.full:
             break
         first = int(right.used * min(1.5, max(1.05, needed / max(radius, 1e-300))))  # the radius grows as the space
@@ -238,4 +203,4 @@ def eigenvalues_about(
     length = np.linalg.norm(y_whole, axis=0)
     chosen = _matters(values, np.abs(np.sum(y.conj() * x, axis=0)) / length)
     modes = Modes(values[chosen], v @ x[:, chosen], u @ (y_whole / length)[:, chosen])
-    return Disc(shift, float(radius), values, modes), int(1.06 * right.used * min(1.0, needed / radius))
+    return values, modes, int(1.06 * right.used * min(1.0, needed / radius))

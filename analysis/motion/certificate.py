@@ -40,7 +40,6 @@ small space, until it does not.
 """
 
 import os
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +49,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from scipy.sparse.linalg import ArpackNoConvergence, eigsh
 
 from ..arrays import Complexes, Floats, Indices
-from ..factors.lanczos import Slice, SlicedSpectrum, SliceError
+from ..factors.lanczos import Slice, SlicedSpectrum, SliceError, Solve
 from ..factors.sparse_lu import elimination_places, negative_pivots, symmetric_lu
 from ..progress import report_progress
 from .eigenvalues import Linear
@@ -61,9 +60,6 @@ Pencil = tuple[csr_array, csr_array, csr_array, csr_array]
 FREE_MARGIN = 0.02
 """Decay that fast motions are to have from the first, as a share of that at w of dashpots that are as stiffnesses: it
 costs a few slow motions more."""
-
-SURE = 1e-3
-"""Error of a rate, as a share, that is small enough."""
 
 
 class NoProofError(Exception):
@@ -93,8 +89,8 @@ def prove(stiffness: csr_array, damping: csr_array, zero: float) -> Linear:
     top, ratio = float(np.sqrt(stiffest)), float(g.diagonal().sum() / s.diagonal().sum())
     w, beta = _frequency((s, n, g, h), top, ratio, *bounds)
     while True:
-        found = symmetric_lu(csc_array(s - w**2 * identity), ordered=True, symmetric=True)
-        count, entries = found.negative, found.entries
+        factored = symmetric_lu(csc_array(s - w**2 * identity), ordered=True, symmetric=True)
+        count, entries = factored.negative, factored.entries
         if count >= min(40, size // 2):  # the slowest decay is that of a slow motion
             break
         w *= 1.5
@@ -120,8 +116,25 @@ def prove(stiffness: csr_array, damping: csr_array, zero: float) -> Linear:
         w *= 1.04
     else:
         raise NoProofError(f"no frequency was found beyond which the dashpots hold growth, up to {w:.3g} of {top:.3g}")
-    del found
-    values, errors, free, count, all_slow = _slow_motions((s, n, g, h), w, top, zero)
+    del factored
+    spectrum = SlicedSpectrum(csc_array(s))
+    count, free, best, done, low = spectrum.below(w**2), 0, -np.inf, 0, 0.0
+    every, doubts, guess = [np.zeros(0, complex)], [np.zeros(0)], w**2 * min(1.0, 60 / max(count, 1))
+    try:
+        for part, solve in spectrum.walk(0, count, -max(zero, 1e-12 * top**2), guess, 40):  # neighbours on either side
+            done += part.own.stop - part.own.start
+            high = w if done == count else float(np.sqrt(max(part.values[part.own][-1], 0.0)))
+            found, error, drifting = _of_slice((s, n, g, h), part, solve, (low, high), best, top)
+            every.append(found)
+            doubts.append(error)
+            free, low = free + drifting, high
+            best = max(best, float((found.real - error).max(initial=-np.inf)))
+            report_progress(f"slow motions: {done} of {count}, the slowest with D as exp({2 * best:.3g} t)")
+            if best > 0 and done < count:
+                break
+    except SliceError as failure:
+        raise NoProofError(str(failure)) from None
+    values, errors = np.concatenate(every), np.concatenate(doubts)
     slowest = -float(values.real.max(initial=-np.inf)) if len(values) else decay
     for share in (1.0, 0.98, 0.9, 0.5) if decay < slowest < np.inf else ():  # less than all leaves an error
         if share * slowest > decay and _is_positive((s, n, g, h), w, beta, share * slowest, factors=factors):
@@ -130,18 +143,17 @@ def prove(stiffness: csr_array, damping: csr_array, zero: float) -> Linear:
     fast = f"no motion faster than {w:.3g} grows ({'proved' if factors else 'shown'})"
     if not len(values):
         return Linear(True, -2 * decay, 2 * decay, free, said=fast)
-    s_slow, error, doubt = complex(values[0]), float(errors[0]), float((values.real + errors).max())
-    rate = 2 * s_slow.real
-    if s_slow.real > error:
-        return Linear(False, rate, 2 * error, free, s_slow, at_least=not all_slow)
+    first = int(np.argmax(values.real))
+    s_slow, bound, doubt = complex(values[first]), float(errors[first]), float((values.real + errors).max())
+    rate, slower = 2 * s_slow.real, f"of {count} slower ones, known one by one,"
+    if s_slow.real > bound:
+        return Linear(False, rate, 2 * bound, free, s_slow, at_least=done < count)
     if doubt >= 0:
-        why = (
-            f"{fast}, but of {count} slow motions the slowest has 2 Re s = {rate:.3g} with an error of {2 * error:.2g}"
-        )
-        return Linear(None, rate, 2 * error, free, s_slow, searched=2 * doubt, reasons=(why,))
-    slow = f"of {count} slower ones, known one by one, the slowest decays with D as exp({rate:.6g} t)"
-    error = max(error, doubt - s_slow.real, -s_slow.real - decay, 1e-14 * top)
-    return Linear(True, rate, 2 * error, free, s_slow, f"{fast}, and {slow}")
+        why = f"{fast}, but {slower} the slowest has 2 Re s = {rate:.3g} with an error of {2 * bound:.2g}"
+        return Linear(None, rate, 2 * bound, free, s_slow, searched=2 * doubt, reasons=(why,))
+    said = f"{fast}, and {slower} the slowest decays with D as exp({rate:.6g} t)"
+    bound = max(bound, doubt - s_slow.real, -s_slow.real - decay, 1e-14 * top)
+    return Linear(True, rate, 2 * bound, free, s_slow, said)
 
 
 def _is_positive(pencil: Pencil, w: float, beta: float, decay: float, *, factors: bool = True) -> bool:
@@ -191,39 +203,8 @@ def _frequency(
     return (1 + width) * best[0], best[1]
 
 
-def _slow_motions(pencil: Pencil, w: float, top: float, zero: float) -> tuple[Complexes, Floats, int, int, bool]:
-    """s with |Im s| < w and their errors, motions that no force opposes, eigenvalues of S, and whether all were
-    seen."""
-    spectrum = SlicedSpectrum(csc_array(pencil[0]))
-    count, free, best, done, low = spectrum.below(w**2), 0, -np.inf, 0, 0.0
-    every, errors = [np.zeros(0, complex)], [np.zeros(0)]
-    guess = w**2 * min(1.0, 60 / max(count, 1))
-    try:
-        for part, solve in spectrum.walk(0, count, -max(zero, 1e-12 * top**2), guess, 40):  # neighbours on either side
-            done += part.own.stop - part.own.start
-            high = w if done == count else float(np.sqrt(max(part.values[part.own][-1], 0.0)))
-            s, error, drifting = _of_slice(pencil, part, solve, (low, high), best, top)
-            every.append(s)
-            errors.append(error)
-            free, low = free + drifting, high
-            best = max(best, float((s.real - error).max(initial=-np.inf)))
-            report_progress(f"slow motions: {done} of {count}, the slowest with D as exp({2 * best:.3g} t)")
-            if best > 0 and done < count:
-                break
-    except SliceError as failure:
-        raise NoProofError(str(failure)) from None
-    values, error = np.concatenate(every), np.concatenate(errors)
-    order = np.argsort(-values.real, kind="stable")
-    return values[order], error[order], free, count, done == count
-
-
 def _of_slice(
-    pencil: Pencil,
-    part: Slice,
-    solve: Callable[[Floats], Floats],
-    within: tuple[float, float],
-    best: float,
-    top: float,
+    pencil: Pencil, part: Slice, solve: Solve, within: tuple[float, float], best: float, top: float
 ) -> tuple[Complexes, Floats, int]:
     """s of a slice whose Im s lies within two numbers, the errors of Re s, and how many motions no force opposes."""
     values, basis = part.values, part.vectors
@@ -258,7 +239,7 @@ def _of_slice(
 
         def doubtful(among: Indices, of: Floats) -> NDArray[np.bool_]:
             """Which of some motions may be slower than the slowest that is known, with an error that matters."""
-            return (s.real[among] + of > best) & (of > SURE * np.abs(s.real[among]))  # noqa: B023
+            return (s.real[among] + of > best) & (of > 1e-3 * np.abs(s.real[among]))  # noqa: B023
 
         # what each vector of the basis leaves outside bounds what a motion leaves
         leaves = [

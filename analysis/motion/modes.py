@@ -44,12 +44,6 @@ class Mode:
     participation: float
     rotation: float
 
-    @classmethod
-    def of(cls, eigenvalue: complex, overlap: float, right: Complexes, axes: int) -> "Mode":
-        """The mode of a right vector, shape (axes N, 1), in mass-weighted coordinates."""
-        participation, rotation = participation_ratio(right, axes)[0], rotation_share(right, axes)[0]
-        return cls(eigenvalue, overlap, float(participation), float(rotation))
-
     @property
     def condition(self) -> float:
         """kappa = 1 / |y^H x|: change of the eigenvalue per change of the operator."""
@@ -221,11 +215,11 @@ def participation_ratio(right: Complexes | Floats, axes: int = 3) -> Floats:
     -------
     ndarray, shape (k,)
     """
-    energy = (np.abs(right) ** 2).reshape(axes, -1, right.shape[1]).sum(axis=0)
+    energy = (np.abs(right) ** 2).reshape(axes, len(right) // axes, right.shape[1]).sum(axis=0)
     return energy.sum(axis=0) ** 2 / (len(energy) * (energy**2).sum(axis=0))
 
 
 def rotation_share(right: Complexes | Floats, axes: int = 3) -> Floats:
     """Share of rotation in the kinetic energy of modes, shape (k,); as of :func:`participation_ratio`."""
-    energy = (np.abs(right) ** 2).reshape(axes, -1, right.shape[1]).sum(axis=1)
+    energy = (np.abs(right) ** 2).reshape(axes, len(right) // axes, right.shape[1]).sum(axis=1)
     return energy[axes // 2 + axes % 2 :].sum(axis=0) / energy.sum(axis=0)

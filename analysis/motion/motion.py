@@ -140,12 +140,6 @@ class Motion:
         return self.active % len(self.configuration)
 
     @property
-    def translating_mass(self) -> Floats:
-        """Masses of the coordinates among these that are translations."""
-        c = self.configuration
-        return np.asarray(self.root_mass[self.active < c.dimension * len(c)] ** 2)
-
-    @property
     def dissipative(self) -> bool:
         """Whether there is dissipation."""
         return self.damping.nnz > 0

@@ -59,9 +59,6 @@ that these have."""
 WORK_OF_MOTION = 2e11
 """Multiplications with entries of the operators that one motion may take: three minutes."""
 
-DENSE_ENTRIES = 150**2
-"""Entries up to which a product with the dense matrix is as fast: ten times as fast for 60 coordinates and fewer."""
-
 PUSH_OVER_RESIDUAL = 10.0
 """Displacement by a push over that by the residual forces, from which on the push counts: D then is right to a fifth,
 and to a hundredth where the two displacements have nothing in common."""
@@ -97,9 +94,6 @@ class OneSidedSystem:
         Rates of the overlaps of contacts with two derivatives, and B.
     changes : ContactChanges
         Which motions take contacts to another state.
-    sideways : shape (B, E)
-        Forces of sliders across f_t by displacements, over the roots of twice the bounds: their squares are forces by
-        which sliders pass the bound, of second order.
     missing : ndarray, shape (B, 1)
         What contacts that count as at Coulomb's bound lack to the bound, force.
     residual_force : ndarray, shape (E, 1)
@@ -124,9 +118,8 @@ class OneSidedSystem:
         self.rates, self.wear = fast(rates[two] @ self.weight), fast(back @ forces[:, two])
         self._worn = fast(csr_array((bound[:, None] == two).astype(float)))  # shape (B, R)
         changes = ContactChanges.of(c)
-        rows, slides = csr_array(changes.rows @ self.weight), len(changes.bound) + changes.slides
-        self.sideways = fast(csr_array(rows[slides] / np.sqrt(2 * changes.bound[changes.slides])))
-        self.changes = replace(changes, rows=fast(rows), viscous=fast(changes.viscous @ self.weight))
+        rows, viscous = fast(changes.rows @ self.weight), fast(changes.viscous @ self.weight)
+        self.changes = replace(changes, rows=rows, viscous=viscous)
         bears = contacts.friction - np.linalg.norm(contacts.tangential_force, axis=1)
         self.missing = np.maximum(bears, 0.0)[bound, None]
         whole = self.weight if c.constraint is None else c.constraint @ self.weight
@@ -221,7 +214,8 @@ class OneSidedSystem:
 
 def fast(matrix: csr_array) -> Matrix:
     """A sparse matrix in the form that is faster for products with a few columns."""
-    return matrix.toarray() if np.prod(matrix.shape) <= DENSE_ENTRIES else csr_array(matrix)
+    # ten times as fast for 60 coordinates and fewer
+    return matrix.toarray() if np.prod(matrix.shape) <= 150**2 else csr_array(matrix)
 
 
 class Look(NamedTuple):

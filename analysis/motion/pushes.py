@@ -9,7 +9,7 @@ odd (:mod:`~faultgouge.analysis.motion.one_sided`). Six numbers decide:
   square of the time;
 - a motion *rests* if sticking contacts do not grow, and the sliders have come to rest: with the slips of the last three
   quarters of the time, and the ratio by which these fall, a share below `STILL_SHARE` of all slip is left to come;
-- it *has not settled* otherwise, after `CHUNKS` chunks, or `WORK_OF_MOTION` multiplications.
+- it *has not settled* otherwise, after 120 chunks, or `WORK_OF_MOTION` multiplications.
 
 Growth rate, amplification, the smallest push and the creep of laws with two derivatives are read from the same steps.
 
@@ -41,9 +41,6 @@ from .rising_load import static_response
 
 PUSHES = 2
 """Random pushes; the opposite of each is followed, too, since one-sided motion is not odd."""
-
-CHUNKS = 120
-"""Chunks that small packings are followed at the most."""
 
 GROWN_ENERGY = 1e10
 """Growth of the kinetic energy that no packing at rest was seen to reach without growing for ever: transients of
@@ -161,7 +158,7 @@ def follow_pushes(
         How many; the opposite of each is followed, too.
     """
     grows, left, long_enough = None, np.inf, 1.99 * CHUNK * system.stable_step
-    for seen in _followed(system, pushes, CHUNKS, time, beside=True):
+    for seen in _followed(system, pushes, 120, time, beside=True):
         if len(seen) < 2 * LOOKS_PER_CHUNK:
             continue
         if not np.all(seen[-1].energy[:-2] <= GROWN_ENERGY * seen[0].energy[:-2]):

@@ -24,7 +24,7 @@ and distances as above.
 **The gain.** In coordinates whose square is 2 E the motion is :math:`e^{Zt}`. Its norm at :math:`2\tau` and
 :math:`3\tau`, times its bound up to :math:`\tau`, bounds it up to :math:`4\tau`, and so on; once the norm is below one,
 for ever. Without dissipation the energies of the modes of :math:`S + N` are constant, and bound E. Of more than
-`DENSE_GAIN` coordinates :math:`\mathcal G = e` up to the time :math:`1 / |S^{-1/2} N|` (the numerical abscissa;
+600 coordinates :math:`\mathcal G = e` up to the time :math:`1 / |S^{-1/2} N|` (the numerical abscissa;
 Trefethen and Embree, *Spectra and Pseudospectra*, 2005, chapter 14).
 
 **Motions that no force opposes** have no energy of their own: :math:`S + \epsilon` with :math:`\epsilon = 1/t^2` stands
@@ -46,9 +46,6 @@ from ..progress import report_progress
 from .motion import Motion
 from .one_sided import OneSidedSystem
 from .random_state import motion_near
-
-DENSE_GAIN = 600
-"""Coordinates up to which the gain is computed: two seconds."""
 
 FREE_TIME = 500.0
 """Up to which time a bound holds of a packing with motions that no force opposes, in stable time steps: some hundred
@@ -179,7 +176,7 @@ def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, e
     largest = float(np.abs(symmetric.data).max(initial=0.0))
     if float(np.abs(skew.data).max(initial=0.0)) <= 1e-12 * largest:
         return 1.0, end
-    if symmetric.shape[0] > DENSE_GAIN:
+    if symmetric.shape[0] > 600:  # two seconds
 
         def twice(x: Floats) -> Floats:
             return np.asarray(skew.T @ factors.solve(skew @ x))

@@ -50,14 +50,12 @@ from ..has_configuration import HasConfiguration
 from ..operators.stiffness import stiffness_matrix
 from ..packing.disk_operators import Form
 from ..packing.packing import Floats, Indices
-from ..progress import report_progress
 from ..table_display import TableDisplay
-from .all_eigenvalues import SpectrumError, all_eigenvalues
+from .all_eigenvalues import all_eigenvalues
 from .eigenvalues import (
     SAFETY,
     Complexes,
     active_coordinates,
-    exceeds_rounding,
     is_negative,
     is_zero,
     mass_weighted,
@@ -65,7 +63,7 @@ from .eigenvalues import (
     zero_uncertainties,
     zero_uncertainty,
 )
-from .modes import Mode, Modes, growth_rate
+from .modes import Mode, Modes, growth_rate, participation_ratio, rotation_share
 from .motion import Motion
 from .no_verdict import no_verdict
 
@@ -75,9 +73,6 @@ SLICED = 2000
 
 DENSE_LARGEST = 900
 """Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
-
-LAPACK_INSTEAD = 20_000
-"""Coordinates up to which LAPACK takes over where slices are incomplete: two hours, and 13 GB."""
 
 LIMIT = 1e-4
 """Relative error of the largest eigenvalue of more coordinates. It bounds time steps, that are far below the bound; to
@@ -108,8 +103,6 @@ class Spectrum(TableDisplay):
         and not negative: no force opposes such a motion, which drifts.
     packing : Configuration or Packing
         Whose eigenvalues they are.
-    remark : str
-        Why LAPACK computed the eigenvalues of a large packing; empty otherwise.
     """
 
     eigenvalues: Complexes
@@ -120,7 +113,6 @@ class Spectrum(TableDisplay):
     rounding: float
     free: int
     packing: HasConfiguration
-    remark: str = ""
 
     def __repr__(self) -> str:
         pairs, negative = counted(len(self.pairs), "complex pair"), counted(len(self.negative), "negative eigenvalue")
@@ -132,8 +124,7 @@ class Spectrum(TableDisplay):
         real = self.eigenvalues.real
         span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
         numbers = f"{counted(len(real), 'eigenvalue')} of K{span}, {counted(len(self.rattlers), 'rattler')}"
-        remark = f"; {self.remark}" if self.remark else ""
-        return f"<Spectrum: {verdict} (`stability` says more); K alone has {counts}{grows}; {numbers}{remark}>"
+        return f"<Spectrum: {verdict} (`stability` says more); K alone has {counts}{grows}; {numbers}>"
 
     def _rows(self) -> dict[str, str]:
         rows = {
@@ -235,13 +226,11 @@ def eigenvalues(packing: HasConfiguration, form: Form = "consistent") -> Complex
     ndarray of complex, shape (E,)
         Sorted by real part, then imaginary part, 1 / time^2. Coordinates that feel no force are left out.
     """
-    matrix = dynamical_matrix(packing, form)[0].toarray()
-    return _sort_eigenvalues(
-        eigvals(matrix.T, overwrite_a=True, check_finite=False) if len(matrix) else np.zeros(0, complex)
-    )
+    dense = dynamical_matrix(packing, form)[0].toarray()
+    return _sort_eigenvalues(eigvals(dense.T, overwrite_a=True, check_finite=False) if len(dense) else np.zeros(0))
 
 
-def _sort_eigenvalues(values: Complexes) -> Complexes:
+def _sort_eigenvalues(values: Complexes | Floats) -> Complexes:
     return np.asarray(values[np.lexsort((values.imag, values.real))], dtype=np.complex128)
 
 
@@ -249,8 +238,7 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     """Compute every eigenvalue, and left and right vectors of those that are complex or negative.
 
     LAPACK's dense solver serves up to `SLICED` coordinates. Beyond, :mod:`~faultgouge.analysis.motion.all_eigenvalues`
-    takes one slice of the spectrum after the other. If these are found to be incomplete, LAPACK serves up to
-    `LAPACK_INSTEAD` coordinates, and the result says so in its `remark`.
+    takes one slice of the spectrum after the other.
 
     Parameters
     ----------
@@ -266,7 +254,7 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     Raises
     ------
     SpectrumError
-        If the slices are incomplete, and the packing is too large for LAPACK.
+        If the slices of a large packing are incomplete.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         matrix, active = dynamical_matrix(packing, form)
@@ -274,7 +262,7 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     if not np.isfinite(rounding):
         raise BadInputError("Stiffnesses overflow, and nothing can be said: take units in which numbers are smaller.")
     alike = zero_uncertainty(packing, rounding)
-    values, marked, remark = _values_and_vectors(matrix, SAFETY * rounding, alike)
+    values, marked = _values_and_vectors(matrix, SAFETY * rounding, alike)
     overlap, particle = marked.overlap, active % len(packing.configuration)
     zero = zero_uncertainties(packing, rounding, particle, marked.left, marked.right)
     below = is_negative(marked.values, overlap, rounding, zero)
@@ -283,54 +271,36 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     free = int(near_zero.sum() - not_free.sum())
     below &= marked.values.imag >= 0
     negative = np.sort(np.repeat(marked.values[below].real, np.where(marked.values[below].imag > 0, 2, 1)))
-    pairs: list[Mode] = []
-    noise = 0
-    for k in np.flatnonzero(marked.values.imag > 0):
-        vector = np.zeros((packing.coordinates, 1), dtype=np.complex128)
-        vector[active, 0] = marked.right[:, k]
-        pair = Mode.of(complex(marked.values[k]), float(overlap[k]), vector, packing.axes)
-        if exceeds_rounding(pair.eigenvalue, pair.overlap, rounding):
-            pairs.append(pair)
-        else:
-            noise += 1
+    noise = int(np.count_nonzero(marked.values.imag > 0))
+    grows = np.flatnonzero(marked.values.imag * overlap > SAFETY * rounding)
+    right = np.zeros((packing.coordinates, len(grows)), dtype=np.complex128)
+    right[active] = marked.right[:, grows]
+    shares = participation_ratio(right, packing.axes).tolist(), rotation_share(right, packing.axes).tolist()
+    pairs = [Mode(*each) for each in zip(marked.values[grows].tolist(), overlap[grows].tolist(), *shares, strict=True)]
     pairs.sort(key=lambda pair: -pair.growth_rate)
     return Spectrum(
-        eigenvalues=_sort_eigenvalues(values),
-        pairs=tuple(pairs),
-        negative=negative,
-        noise_pairs=noise,
-        rattlers=packing.rattlers,
-        rounding=rounding,
-        free=free,
-        packing=packing,
-        remark=remark,
-    )
+        _sort_eigenvalues(values), tuple(pairs), negative, noise_pairs=noise - len(pairs),
+        rattlers=packing.rattlers, rounding=rounding, free=free, packing=packing,
+    )  # fmt: skip
 
 
-def _values_and_vectors(matrix: csr_array, rounding: float, alike: float) -> tuple[Complexes, Modes, str]:
-    """All eigenvalues, and those with vectors; and why LAPACK took over.
+def _values_and_vectors(matrix: csr_array, rounding: float, alike: float) -> tuple[Complexes, Modes]:
+    """All eigenvalues, and those with vectors.
 
     Vectors are known at least of eigenvalues that are complex, or negative beyond rounding, and up to `SLICED`
     coordinates of those that may be zero by forces that are out of balance: up to `alike`, but not by rounding.
     """
-    remark = ""
     if matrix.shape[0] > SLICED:
-        try:
-            return *all_eigenvalues(matrix), remark
-        except SpectrumError as error:
-            if matrix.shape[0] > LAPACK_INSTEAD:
-                raise
-            remark = f"by LAPACK, as slices were incomplete: {str(error).rstrip('.')}"
-            report_progress(f"{error} LAPACK takes over, which needs {32e-9 * matrix.shape[0] ** 2:.2g} GB")
+        return all_eigenvalues(matrix)
     dense = matrix.toarray()
     # vectors take three times as long as eigenvalues: a large packing under a load has complex pairs, and needs both
     alone = len(dense) <= DENSE_LARGEST or (matrix != matrix.T).nnz == 0
     values = eigvals(dense) if len(dense) and alone else np.zeros(0, complex)
     doubtful = (values.imag != 0) | (values.real < -rounding) | ((values.real > rounding) & (values.real <= alike))
     if alone and not doubtful.any():
-        return values, Modes.none(len(dense)), remark
+        return values, Modes.none(len(dense))
     values, left, right = eig(dense, left=True, right=True)
-    return values, Modes(values, right, left), remark
+    return values, Modes(values, right, left)
 
 
 def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:
@@ -367,10 +337,9 @@ def largest_frequency(packing: HasConfiguration) -> float:
         If the iteration does not converge.
     """
     matrix, _ = dynamical_matrix(packing)
-    size = matrix.shape[0]
-    if size <= DENSE_LARGEST:
+    if matrix.shape[0] <= DENSE_LARGEST:
         return spectrum(packing).omega_max
     # always the same one, for a result that is reproducible; without the symmetry that a crystal's fastest mode lacks
-    start = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
+    start = np.random.Generator(np.random.PCG64(0)).standard_normal(matrix.shape[0])
     largest = eigs(matrix, 1, which="LM", v0=start, tol=LIMIT, return_eigenvectors=False)
     return float(np.sqrt(np.abs(largest).max()))

@@ -42,13 +42,6 @@ from .verdict import Stability, WithoutDissipation
 LARGE = 6000
 """Coordinates beyond which one push and its opposite stand for several, and K's spectrum is not computed."""
 
-SPECTRUM_UP_TO = 2000
-"""Coordinates up to which K's spectrum is computed as a remark on a packing with dissipation."""
-
-NEXT_TO_NOTHING = 1e-3
-"""Normal force over the mean one of a contact without which a verdict may be made: its stiffness is a tenth of others
-by Hertz's law."""
-
 UNSETTLED = (
     "its residual forces alone take a contact to Coulomb's bound, open or close one: bring the packing to rest more "
     "closely"
@@ -129,7 +122,7 @@ def stability(
 def _linear_motion(motion: Motion, known: Spectrum | None, time: float | None) -> tuple[WithoutDissipation, Linear]:
     """Of sticking contacts: what grows without dissipation, and with it. K's spectrum decides where there is none."""
     c, damped = motion.configuration, motion.configuration.damped
-    if known is None and c.coordinates <= (SPECTRUM_UP_TO if damped else LARGE):
+    if known is None and c.coordinates <= (2000 if damped else LARGE):
         known = spectrum(c)
     if known is None:
         alone = Motion.of(c, dissipation=False) if damped else motion
@@ -152,7 +145,8 @@ def _linear(found: Stability, system: OneSidedSystem, time: float | None) -> dic
         return {}
     told: dict[str, Any] = {}
     if (reach := reach_of(system, found.free)) is not None:
-        mass, bounded = motion.translating_mass, bool(np.isfinite(reach.energy))
+        mass = motion.root_mass[motion.active < c.dimension * len(c)] ** 2
+        bounded = bool(np.isfinite(reach.energy))
         told = {
             "largest_energy": reach.energy if bounded else None,
             "largest_push": float(np.sqrt(2 * reach.energy / mass.max())) if bounded else None,
@@ -162,7 +156,8 @@ def _linear(found: Stability, system: OneSidedSystem, time: float | None) -> dic
         if len(reach.unsettled):
             bears = np.isin(np.arange(len(c.contacts)), reach.unsettled, invert=True)
             force = c.contacts.normal_force
-            if np.any(force[~bears] > NEXT_TO_NOTHING * force.mean()):
+            # by Hertz's law the stiffness of such a contact is a tenth of that of others
+            if np.any(force[~bears] > 1e-3 * force.mean()):
                 return told | {"stable": None, "reasons": (UNSETTLED,)}
             without = Motion.of(derive_frozen(c, contacts=c.contacts.chosen(bears)))
             if linear_verdict(without, time=time).stable is not True:

@@ -134,11 +134,6 @@ class Stability:
     __repr__ = __str__
 
     @property
-    def searched(self) -> float:
-        """Growth rate of D, 1 / time, below which linear growth may not have been seen; 0 if nothing is hidden."""
-        return self.sticking.searched
-
-    @property
     def sentences(self) -> tuple[str, ...]:
         """The verdict, what holds without dissipation, what contacts at the bound do, and remarks on the origin."""
         parts = self._at_rest(), self._range(), self._beyond()
@@ -211,12 +206,10 @@ class Stability:
         least, most, outcome = PUSH_OVER_RESIDUAL * self.residual_push, self.largest_push, self.one_sided
         if outcome is not None:
             least, most = outcome.scales
-            if outcome.grows:
+            if outcome.grows and np.isfinite(least):
                 yield (
                     f"this growth is seen after pushes from {least:.1g} on (velocity along an axis): after smaller "
                     "ones contacts that count as at the bound may stay below it, or residual forces count"
-                    if np.isfinite(least)
-                    else "from which push on this growth is seen is not known: residual forces alone change a contact"
                 )
             elif self.stable and least < most:
                 yield (
@@ -227,13 +220,13 @@ class Stability:
         elif not self.stable:
             return
         elif most is None and not self.asymmetry:
-            above = (
-                f" from {least:.1g} on (velocity of one particle), below which residual forces count" if least else ""
-            )
-            yield f"holds for small pushes{above}: which one changes a contact, K by differences of forces does not say"
+            above = f" from {least:.1g} on (velocity of one particle), below which residual forces count"
+            says = "which one changes a contact, K by differences of forces does not say"
+            yield f"holds for small pushes{above if least else ''}: {says}"
+        elif most is None and not least:
+            yield "which push changes a contact is not known, since K's symmetric part is not positive"
         elif most is None:
-            if self.contacts and not self.residual_push:
-                yield "which push changes a contact is not known, since K's symmetric part is not positive"
+            return
         elif least >= most:
             yield (
                 f"holds for no push: below {least:.1g} (velocity of one particle) residual forces count, and above "
@@ -275,8 +268,8 @@ class Stability:
             found[name] = None if found[name] is None else found[name].as_dict()
         for name in ("sticking", "sliding"):
             found[name] = {key: value for key, value in asdict(found[name]).items() if key != "s"}
-        lists = {name: list(getattr(self, name)) for name in ("reasons", "remarks")}
-        return found | {"undamped": vars(self.undamped), "searched": self.searched} | lists
+        found |= {name: list(found[name]) for name in ("reasons", "remarks")}
+        return found | {"undamped": vars(self.undamped), "searched": self.sticking.searched}
 
 
 def _digits(number: float, error: float) -> int:
