@@ -162,7 +162,7 @@ def _cone_distance(product: Floats, force: Floats, bound: Floats) -> Floats:
 
     Norms are those of the products, shape (3, 3, C).
     """
-    angle = np.linspace(-np.pi, np.pi, 1025)  # a thousandth of the way from one to the next counts for 1e-5
+    angle = np.linspace(-np.pi, np.pi, 4097)  # half of the way from one to the next counts for 1e-6
     n = np.stack([np.cos(angle), np.sin(angle), -np.ones_like(angle)])
     size = np.sqrt(np.maximum(np.einsum("ia,ijc,ja->ca", n, product, n, optimize=True), 0.0))
     with np.errstate(divide="ignore", invalid="ignore"):
