@@ -267,9 +267,8 @@ def _of_slice(
             break
         if basis.shape[1] > largest:
             if best <= 0 <= float((s.real + error)[chosen[more]].max()):
-                raise NoProofError(
-                    f"dashpots couple motions at {within[0]:.3g} to {within[1]:.3g} with too many others"
-                )
+                between = f"{within[0]:.3g} to {within[1]:.3g}"
+                raise NoProofError(f"dashpots couple motions at {between} with too many others")
             break
         more = more[np.argsort(-(s.real + error)[chosen[more]])[:16]]  # eigenvalues take up to a second each time
         worst, count = places[more], len(places)

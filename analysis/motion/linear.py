@@ -118,11 +118,8 @@ def _of_groups(motion: Motion, decides: bool, time: float | None) -> Linear | No
         a, g = (csr_array(matrix[rows][:, rows]) for matrix in (motion.stiffness, motion.damping))
         part = replace(motion, active=motion.active[rows], root_mass=motion.root_mass[rows], stiffness=a, damping=g)
         found.append(linear_verdict(part, decides=decides, time=time))
-    free, moves = (
-        sum(each.free for each in found),
-        [each for each in found if each.s or each.growth_rate or not each.stable],
-    )
-    moves = moves or found  # others drift
+    free = sum(each.free for each in found)
+    moves = [each for each in found if each.s or each.growth_rate or not each.stable] or found  # others drift
     worst = max(moves, key=lambda each: (each.stable is False, each.stable is None, each.growth_rate))
     if not worst.stable:
         return replace(worst, free=free, searched=max(each.searched for each in found))

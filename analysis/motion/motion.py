@@ -70,10 +70,6 @@ class EnergyNorm:
         """Z of A and G, shape (2E, 2E), 1 / time."""
         return np.block([[np.zeros_like(self.weight), self.weight], [-stiffness @ self.unweight, -damping]])
 
-    def state(self, displacement: Floats, velocity: Floats) -> Floats:
-        """(p, v) of a mass-weighted displacement z and its rate, shape (2E,)."""
-        return np.concatenate([self.weight @ displacement, velocity])
-
 
 @dataclass(frozen=True, eq=False)
 class Motion:

@@ -201,8 +201,7 @@ def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, e
     before, after = np.exp(fastest * time), np.exp(2 * fastest * time)  # up to time, and to 2 time
     for _ in range(22):  # doublings until the norm is to fall below one
         sizes = [
-            float(svds(each, 1, v0=np.ones(2 * size), tol=1e-6, return_singular_vectors=False)[0])
-            for each in (two, one @ two)
+            svds(each, 1, v0=np.ones(2 * size), tol=1e-3, return_singular_vectors=False)[0] for each in (two, one @ two)
         ]
         before, after = after, max(after, max(sizes) * before)
         if min(sizes) <= 1:

@@ -162,11 +162,9 @@ def _linear(found: Stability, system: OneSidedSystem, time: float | None) -> dic
             without = Motion.of(derive_frozen(c, contacts=c.contacts.chosen(bears)))
             if linear_verdict(without, time=time).stable is not True:
                 return told | {"stable": None, "reasons": (UNSETTLED,)}
-            weak = counted(len(reach.unsettled), "contact")
-            told["remarks"] = (
-                *found.remarks,
-                f"the residual forces alone change {weak} of next to no force, without which the verdict is the same",
-            )
+            weak = f"{counted(len(reach.unsettled), 'contact')} of next to no force"
+            remark = f"the residual forces alone change {weak}, without which the verdict is the same"
+            told["remarks"] = (*found.remarks, remark)
     if system.remembers_nothing or c.stiffness is not None:
         return told
     pushes = 1 if c.coordinates > LARGE else PUSHES
@@ -174,10 +172,8 @@ def _linear(found: Stability, system: OneSidedSystem, time: float | None) -> dic
     if creep.grows:
         told |= {"stable": False, "growth_rate": creep.growth_rate}
     elif creep.grows is None:
-        says = (
-            f"vibration wears contacts down, and its energy has risen within t = {creep.time:.4g}; whether this goes "
-            "on was not followed"
-        )
+        rises = f"its energy has risen within t = {creep.time:.4g}; whether this goes on was not followed"
+        says = f"vibration wears contacts down, and {rises}"
         told |= {"stable": None, "reasons": (says,)}
     return told | {"creep": creep}
 

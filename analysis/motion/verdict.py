@@ -140,10 +140,8 @@ class Stability:
         return (self._verdict(), *(each for part in parts for each in part), *self.remarks)
 
     def _verdict(self) -> str:
-        outcome, free = (
-            self.one_sided,
-            f", except for {counted(self.free, 'motion')} that no force opposes" * bool(self.free),
-        )
+        outcome = self.one_sided
+        free = f", except for {counted(self.free, 'motion')} that no force opposes" if self.free else ""
         rate = exponential(self.growth_rate, _digits(self.growth_rate, self.error), self.at_least)
         if not self.contacts:
             return "no particle touches another or a wall: stability is not defined"
@@ -221,7 +219,7 @@ class Stability:
             return
         elif most is None and not self.asymmetry:
             above = f" from {least:.1g} on (velocity of one particle), below which residual forces count"
-            says = "which one changes a contact, K by differences of forces does not say"
+            says = "which push changes a contact, K by differences of forces does not say"
             yield f"holds for small pushes{above if least else ''}: {says}"
         elif most is None and not least:
             yield "which push changes a contact is not known, since K's symmetric part is not positive"

@@ -132,7 +132,7 @@ class LinearMotion:
             displacement, velocity = self.modes.apply(second, time, vector, observed)
             return displacement.real, velocity.real
         norm, rest, size = self.system.energy_norm, np.zeros_like(vector), len(observed)
-        start = norm.state(rest, vector) if forced else norm.state(vector, rest)
+        start = np.concatenate([rest, vector] if forced else [norm.weight @ vector, rest])
         rows = np.block([[observed @ norm.unweight, 0 * observed], [0 * observed, observed]])
         first = partial(driven_motion, oscillator.omega) if forced else released_motion
         (value,) = self.modes.apply(first, time, start, rows)

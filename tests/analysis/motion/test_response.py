@@ -65,7 +65,8 @@ def motion_of(matrix, force, start, time, tau=None, dt=None):
         return np.sum([modes.apply(function, time, vector) for function, vector in pairs], axis=0)
     norm = EnergyNorm.of(matrix)
     rows, rest = block_diag(norm.unweight, np.eye(size)), np.zeros(size)
-    pairs = ((partial(driven_motion, OMEGA), norm.state(rest, force)), (released_motion, norm.state(start, rest)))
+    states = np.concatenate([rest, force]), np.concatenate([norm.weight @ start, rest])
+    pairs = zip((partial(driven_motion, OMEGA), released_motion), states, strict=True)
     modes = BlockDiagonal.of(norm.first_order(matrix, np.eye(size) / tau), first_order)
     found = sum(modes.apply(function, time, vector, rows)[0] for function, vector in pairs)
     return found[:, :size], found[:, size:]
