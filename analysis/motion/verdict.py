@@ -153,7 +153,7 @@ class Stability:
             left = f", where {outcome.slip_left:.1%} of their slip is left" if outcome.slip_left else ""
             ends = "comes to rest" if self.growth_rate < 0 else "ends in vibration that goes on, but does not grow"
             known = f"; with sticking contacts, {self.sticking.said}" if self.sticking.said else ""
-            size = f"D reaches {outcome.amplification:.2g} times the mean square velocity of the push"
+            size = f"D reaches {outcome.amplification:.3g} times the mean square velocity of the push"
             while_sliding = f"while contacts slide (followed for t = {outcome.time:.4g}{left})"
             return f"stable: each of {outcome.pushes} pushes {ends}{free}; {size} {while_sliding}{known}"
         if self.sticking.said:
