@@ -157,11 +157,11 @@ CONTACTS = "id1,id2,fn,ftx,fty,ftz\n1,2,1.0,0,0.1,0\n"
 @pytest.mark.parametrize(
     ("spheres", "contacts", "material", "word"),
     [
-        ("", CONTACTS, "young=1", "is empty"),
+        ("", CONTACTS, "young=1", "is no table"),
         (SPHERES.replace("radius", "size"), CONTACTS, "young=1", "no column radius"),
-        (SPHERES.replace("0.999,0,0,0.5", "0.999,0,0,-0.5"), CONTACTS, "young=1", "radius of sphere 2 is -0.5"),
-        (SPHERES.replace("\n2,", "\n1,"), CONTACTS, "young=1", "sphere 1 twice"),
-        (SPHERES.replace("0.999", "nan"), CONTACTS, "young=1", "line 3: it has a number that is not finite"),
+        (SPHERES.replace("0.999,0,0,0.5", "0.999,0,0,-0.5"), CONTACTS, "young=1", "radius of particle 2 is -0.5"),
+        (SPHERES.replace("\n2,", "\n1,"), CONTACTS, "young=1", "particle 1 twice"),
+        (SPHERES.replace("0.999", "nan"), CONTACTS, "young=1", "line 3: 'nan' is no number"),
         (SPHERES.replace("0.999,0", "0.999"), CONTACTS, "young=1", "line 3: it has 5 columns"),
         (SPHERES.replace("0.999", "near"), CONTACTS, "young=1", "'near' is no number"),
         (SPHERES, CONTACTS.replace("id2", "other"), "young=1", "no column id2"),

@@ -292,12 +292,12 @@ def test_ase_reads_extended_xyz(tmp_path, ramp, configuration):
 LATER = "format 2 of faultgouge's files, and this version knows 1: a later version wrote it, so update faultgouge"
 
 
-@pytest.mark.parametrize("module", ["xyz", "lammps_data", "libraries", "checksummed_file", "configuration_file"])
+@pytest.mark.parametrize("module", ["xyz", "lammps_data", "libraries", "atomic_write", "configuration_file"])
 def test_a_file_of_a_later_format_is_refused(tmp_path, sheared, configuration, monkeypatch, module):
     """And one without a number, of an older version, is read."""
     suffix = {"xyz": "xyz", "lammps_data": "data", "libraries": "gsd"}.get(module, "h5")
     path = tmp_path / f"a.{suffix}"
-    place = "faultgouge.analysis.files." + (f"formats.{module}" if suffix != "h5" else "checksummed_file")
+    place = "faultgouge.analysis.files." + (f"formats.{module}" if suffix != "h5" else "atomic_write")
 
     def write():
         if module == "configuration_file":

@@ -132,7 +132,7 @@ def test_packing_json_has_masses_and_the_layer_by_number_or_by_truth(tmp_path, m
     assert found.mass.tolist() == np.broadcast_to(mass, 3).tolist()
     for change in ({"top": [True]}, {"top": [3]}, {"top": [0.5]}, {"mass": [1.0, 2.0]}, {"mass": -1.0}):
         (tmp_path / "packing.json").write_text(json.dumps(disks | change))
-        with pytest.raises(BadInputError, match=r"packing\.json(: mass of disk 1 is| is not a packing file)"):
+        with pytest.raises(BadInputError, match=r"packing\.json(: mass of particle 1 is| is not a packing file)"):
             read_disks(tmp_path / "packing.json")
 
 
@@ -258,10 +258,10 @@ BAD = {
     "same centre": ("a.csv", lambda p: "x,y,radius\n1,1,0.5\n3,1,0.5\n1.1,1,0.5\n", "disks 1 and 3 are 0.1 apart"),
     "below the floor": ("a.csv", lambda p: "x,y,radius\n1,-1,0.5\n3,1,0.5\n", "say with --floor"),
     "no number": ("a.csv", lambda p: "x,y,radius\n1,one,0.5\n", "line 2: 'one' is no number"),
-    "nan": ("a.csv", lambda p: "x,y,radius\n1,nan,0.5\n", "y of disk 1 is nan"),
+    "nan": ("a.csv", lambda p: "x,y,radius\n1,nan,0.5\n", "line 2: 'nan' is no number"),
     "short line": ("a.csv", lambda p: "x,y,radius\n1,1,0.5\n1,1\n", "line 3: it has 2 columns"),
-    "no radius": ("a.csv", lambda p: "x,y,radius\n1,1,0\n", "radius of disk 1 is 0"),
-    "one ID twice": ("a.csv", lambda p: "id,x,y,radius\n1,1,1,1\n1,9,1,1\n", "has disk 1 twice"),
+    "no radius": ("a.csv", lambda p: "x,y,radius\n1,1,0\n", "radius of particle 1 is 0"),
+    "one ID twice": ("a.csv", lambda p: "id,x,y,radius\n1,1,1,1\n1,9,1,1\n", "has particle 1 twice"),
     "empty": ("a.csv", lambda p: "", "is no table"),
     "unknown suffix": ("a.doc", lambda p: "?", "is of no format that is read: give dumps of the decks (.disks)"),
     "no data": ("a.data", lambda p: "LAMMPS\n\n3 atoms\n", "no section Atoms"),

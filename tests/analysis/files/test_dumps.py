@@ -78,7 +78,7 @@ def test_frames_are_matched_by_step_and_read_to_the_bit(dump_path, cluster):
         assert read_dump(dump_path, frame=frame) == states[state]
     assert [frame.step for frame in dump_frames(dump_path)] == [0, 10, 20]
     for frame in (3, -4):
-        with pytest.raises(PackingFileError, match=f"no snapshot {frame}"):
+        with pytest.raises(PackingFileError, match=f"no --frame {frame}"):
             read_dump(dump_path, frame=frame)
 
 
