@@ -210,7 +210,7 @@ def draw_cycle_spectrum(
     """
     from matplotlib.figure import Figure
 
-    from ..figures.drive import draw_slips
+    from ..figures.series import draw_slips
 
     figure = Figure(figsize=(5.6, 6.2), layout="constrained")
     force, pairs, growth, lowest = panels = figure.subplots(4, 1, sharex=True, height_ratios=(1.3, 1, 1.3, 1))

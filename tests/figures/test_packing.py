@@ -88,12 +88,11 @@ def test_a_sheared_box_is_full_of_images(packing):
     )
     view = View.of(sheared)
     corners = np.array([[0, 0], box[0, :2], box[1, :2], box[0, :2] + box[1, :2]])
-    assert (view.left, view.bottom) == (corners[:, 0].min(), corners[:, 1].min())
-    assert (view.right, view.ceiling) == (corners[:, 0].max(), corners[:, 1].max())
-    within = (view.place > [view.left, view.bottom]).all(axis=1) & (view.place < [view.right, view.ceiling]).all(axis=1)
+    np.testing.assert_array_equal([view.low, view.high], [corners.min(axis=0), corners.max(axis=0)])
+    within = (view.place > view.low).all(axis=1) & (view.place < view.high).all(axis=1)
     for edge in box[:2, :2]:
         shifted = view.place[within] + edge
-        inside = (shifted > [view.left, view.bottom]).all(axis=1) & (shifted < [view.right, view.ceiling]).all(axis=1)
+        inside = (shifted > view.low).all(axis=1) & (shifted < view.high).all(axis=1)
         distance = np.linalg.norm(shifted[inside][:, None] - view.place[None], axis=2).min(axis=1, initial=np.inf)
         assert distance == pytest.approx(0, abs=1e-12)
     assert len(view.edges) == 4
