@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 from ...arrays import Floats
 from ...configuration import Configuration
 from ...counted import counted
-from ...errors import BadInputError, PackingFileError
+from ...errors import BadInputError, FaultgougeError, PackingFileError
 from ...packing.packing import Packing
 from ..atomic_write import HDF5, SEAL, open_plain, open_text
-from .disks import Disks, ParticleTable, Slips, UpperLayerError, disks_of, packing_of, upper_layer
+from .disks import Disks, ParticleTable, Slips, disks_of, packing_of, upper_layer
 from .exported import (
     Frame,
     ModeVectors,
@@ -34,7 +34,7 @@ from .exported import (
 from .tables import HEAD_OF_CONTACTS
 
 __all__ = [
-    "HEAD_OF_CONTACTS", "Disks", "Frame", "ModeVectors", "Slips", "UpperLayerError", "choose_frames", "format_of",
+    "HEAD_OF_CONTACTS", "Disks", "Frame", "ModeVectors", "Slips", "choose_frames", "format_of",
     "frames_of", "is_hdf5", "packing_of", "read_disks", "upper_layer", "write_frames", "write_packing",
 ]  # fmt: skip
 
@@ -96,6 +96,12 @@ WRITERS = {
     ".data": ("lammps_data", "write_data"), ".csv": ("tables", "write_contacts"), ".pvd": ("vtp", "write_pvd"),
 }  # fmt: skip
 """Module and function by suffix; of one packing all but the last, and `FILMS` of several frames."""
+UNREADABLE = (
+    OSError, EOFError, zlib.error, ValueError, LookupError, TypeError, AttributeError, OverflowError, RecursionError,
+    RuntimeError,
+)  # fmt: skip
+"""What readers meet in files that are damaged, or of another format than their name says."""
+
 FILMS = ".xyz", ".gsd", ".pvd"
 WITHOUT_MODES = {".data": "LAMMPS data", ".csv": "a table of contacts"}
 
@@ -142,9 +148,9 @@ def format_of(path: Path) -> Format:
         return DATA if begin == "data" else DUMP
     if is_hdf5(path):
         raise PackingFileError(f"{path} is HDF5 and needs no import: packing.file, draw and spectrum take a run.h5.")
-    from .libraries import has_parser
+    from MDAnalysis import _PARSERS
 
-    if path.suffix.lower() not in ("", ".h5") and has_parser(path):  # .h5 has one once `mdanalysis` is imported
+    if path.suffix.lower() != ".h5" and path.suffix[1:].upper() in _PARSERS:  # .h5 is our own, in `mdanalysis`
         return MDANALYSIS
     names = ", ".join(f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS)
     others = f"each text also as .gz, run.h5, LAMMPS decks (.in, in.NAME), and {MDANALYSIS.words}"
@@ -173,8 +179,14 @@ def read_particles(path: Path, frame: int | None = None) -> ParticleTable:
         raise PackingFileError(f"{path} has one frame; there is no --frame {frame}.")
     if found is RESTART:
         raise PackingFileError(f"{path} is a restart: LAMMPS itself reads it, in faultgouge import.")
-    read: ParticleTable = _function(found.module, found.reader)(path, *([frame] if found.frames else []))
-    return read
+    try:
+        read: ParticleTable = _function(found.module, found.reader)(path, *([frame] if found.frames else []))
+        return read
+    except FaultgougeError:
+        raise
+    except UNREADABLE as error:
+        says = f"it lacks {error}" if isinstance(error, KeyError) else str(error).strip().partition("\n")[0].rstrip(".")
+        raise PackingFileError(f"{path} is not read as {found.words}: {says or 'it breaks off'}.") from error
 
 
 def read_disks(path: Path, frame: int | None = None) -> Disks:

@@ -2,9 +2,9 @@
 
 A reader returns columns, a `ParticleTable`, whatever their names are in the format. `sorted_columns` interprets them
 once for all formats, and refuses impossible numbers. `disks_of` makes disks: if a file lacks masses, angles, slips or
-the period, the mass is 1, angles and slips are 0, and the sides are open. `packing_of` refuses disks below the floor, or with a
-centre inside another disk. `upper_layer` selects the layer by a number of disks, a type, IDs, a group, or a region, in
-one line of text.
+the period, the mass is 1, angles and slips are 0, and the sides are open. `packing_of` refuses disks below the floor,
+or with a centre inside another disk. `upper_layer` selects the layer by a number of disks, a type, IDs, a group, or a
+region, in one line of text.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,13 +85,40 @@ class Slips:
 
 
 @dataclass(frozen=True, eq=False)
-class ParticleTable:
-    """What a reader finds in a file.
+class FileContents:
+    """What a file of another code says, besides its particles.
 
     Attributes
     ----------
     source : str
-        The file and the place in it.
+        The file and the place in it, or another origin of the particles.
+    slips : Slips or None
+        None if the file has none.
+    given : mapping
+        Law, load and inertia, as far as the file gives them: kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau,
+        fx, fy, inertia_factor; and slips_known, 0 where the file says that the slips are not known.
+    groups : mapping
+        Groups of particles by name, as booleans, sorted by ID.
+    remark : str
+        Information that the format has lost, or units that it has; empty for none.
+    length_unit : str
+        Unit of the lengths, as the file has it; empty if it names none.
+    """
+
+    source: str
+    slips: Slips | None = field(default=None, kw_only=True)
+    given: Mapping[str, float] = field(default_factory=dict, kw_only=True)
+    groups: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict, kw_only=True)
+    remark: str = field(default="", kw_only=True)
+    length_unit: str = field(default="", kw_only=True)
+
+
+@dataclass(frozen=True, eq=False)
+class ParticleTable(FileContents):
+    """What a reader finds in a file.
+
+    Attributes
+    ----------
     columns : mapping of ndarray, each of shape (N,)
         Numbers by name.
     box : ndarray, shape (3, 3), or None
@@ -103,32 +131,22 @@ class ParticleTable:
         Of each particle, where types have names.
     first_id : int
         Number of the first particle, in a code that counts from 0.
-    slips, given, groups, remark, length_unit
-        As of :class:`Disks`.
     """
 
-    source: str
     columns: Mapping[str, Floats]
     box: Floats | None = None
     origin: Floats | None = None
     periodic: Sequence[bool] | None = None
     type_names: Sequence[str] = ()
     first_id: int = 1
-    slips: Slips | None = None
-    given: Mapping[str, float] = field(default_factory=dict)
-    groups: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
-    remark: str = ""
-    length_unit: str = ""
 
 
 @dataclass(frozen=True, eq=False)
-class Disks:
+class Disks(FileContents):
     """Disks from a file, or from a loose random packing, sorted by ID.
 
     Attributes
     ----------
-    source : str
-        The file and the place in it, or another origin of the disks.
     position : ndarray, shape (N, 2)
         Centres, length.
     radius : ndarray, shape (N,)
@@ -139,22 +157,10 @@ class Disks:
         Mass, orientation, type, whether a disk belongs to the upper layer, low parts of the centres; None if absent.
     box_length : float or None
         Period along x; None if the sides are open.
-    slips : Slips or None
-        None if the file has none.
-    given : mapping
-        Law, load and inertia, as far as the file gives them: kn, kt, mu, exponent, rescaled, coulomb, cn, ct, tau,
-        fx, fy, inertia_factor; and slips_known, 0 where the file says that the slips are not known.
-    groups : mapping
-        Groups of disks by name, as booleans.
-    remark : str
-        Information that the format has lost, or units that it has; empty for none.
-    length_unit : str
-        Unit of the lengths, as the file has it; empty if it names none.
     types : mapping
         Disks of each type by its name, as booleans, where types have names.
     """
 
-    source: str
     position: Floats
     radius: Floats
     id: Indices
@@ -164,11 +170,6 @@ class Disks:
     top: NDArray[np.bool_] | None = None
     position_low: Floats | None = None
     box_length: float | None = None
-    slips: Slips | None = None
-    given: Mapping[str, float] = field(default_factory=dict)
-    groups: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
-    remark: str = ""
-    length_unit: str = ""
     types: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -182,6 +183,16 @@ class Disks:
     def slips_known(self) -> bool:
         """Whether the file gives slips that are known."""
         return self.slips is not None and bool(self.given.get("slips_known", True))
+
+
+def choose_frame(path: Path, counts: Sequence[int], frame: int | None) -> int:
+    """The number of the chosen frame, from 0; by default the last frame, if all frames have as many particles."""
+    wanted, (low, high) = -1 if frame is None else frame, (min(counts, default=0), max(counts, default=0))
+    if frame is None and low != high:
+        raise PackingFileError(f"{path} has frames with {low} and {high} particles: choose one with --frame.")
+    if not -len(counts) <= wanted < len(counts):
+        raise PackingFileError(f"{path} has {len(counts)} frames; there is no --frame {wanted}.")
+    return wanted % len(counts)
 
 
 def sorted_columns(found: ParticleTable) -> tuple[dict[str, Floats], Indices]:
@@ -247,7 +258,7 @@ def disks_of(found: ParticleTable) -> Disks:
         np.column_stack([c["x_low"], c["y_low"]]) if {"x_low", "y_low"} <= c.keys() else None,
         period,
         types={str(name): names == name for name in dict.fromkeys(names.tolist())},
-        **{name: getattr(found, name) for name in ("slips", "given", "groups", "remark", "length_unit")},
+        **{each.name: getattr(found, each.name) for each in fields(FileContents) if each.name != "source"},
     )
 
 
@@ -357,10 +368,6 @@ def _contacts(disks: Disks, law: MindlinLaw) -> Contacts:
     return near.slipped(slip)
 
 
-class UpperLayerError(BadInputError):
-    """The upper layer is not given, or its text is not understood, or names what a file does not have."""
-
-
 def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> NDArray[np.bool_]:
     """Select the disks of the upper layer.
 
@@ -382,24 +389,24 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
 
     Raises
     ------
-    UpperLayerError
+    BadInputError
         If no upper layer is given, the text is not understood, or it selects no disk.
     """
     text = "" if says is None else str(says).strip()
     if says is None and disks.top is None:
         unsaid = f"{disks.source} does not say which disks are the upper layer"
-        raise UpperLayerError(f"{unsaid}: add {key.rstrip(' =')}, {LAYER_WAYS}.")
+        raise BadInputError(f"{unsaid}: add {key.rstrip(' =')}, {LAYER_WAYS}.")
     try:
         chosen = disks.top if says is None else _layer_of(disks, text)
     except (OSError, ValueError) as error:
-        raise UpperLayerError(f"{key}{text}: {error}.") from None
+        raise BadInputError(f"{key}{text}: {error}.") from None
     if chosen is None or not chosen.any():
         y = disks.position[:, 1]
         types = list(disks.types) or ([] if disks.kind is None else np.unique(disks.kind).tolist())
         kinds = f", and their types are {', '.join(map(str, types))}" if types else ""
         holds = "its own column top" if says is None else f"the layer {text}"
         extent = f"its disks go from y = {y.min():g} to {y.max():g}{kinds}"
-        raise UpperLayerError(f"{disks.source}: {holds} holds no disk: {extent}.")
+        raise BadInputError(f"{disks.source}: {holds} holds no disk: {extent}.")
     return chosen
 
 

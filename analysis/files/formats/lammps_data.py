@@ -44,8 +44,6 @@ def read_data(path: Path) -> ParticleTable:
         first = next((k for k, word in enumerate(words) if word[0].isalpha()), len(words))
         if 0 < first < len(words):
             header[" ".join(words[first:])] = numbers_in(" ".join(words[:first]), path)
-    for name in {"atoms", "xlo xhi", "ylo yhi", "zlo zhi"} - header.keys():
-        raise PackingFileError(f"{path} is no LAMMPS data file: its header has no line with {name}.")
     rows = list(takewhile(lambda row: not row[1][0][0].isalpha(), strip_comments(lines[start + 1 :], start + 2)))
     columns = columns_of(path, rows, SPHERE_COLUMNS, f"7 are needed: {', '.join(SPHERE_COLUMNS)}")
     if len(rows) != header["atoms"][0]:

@@ -35,7 +35,7 @@ from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
 from ..atomic_write import FORMAT_KEY, check_format, open_text, read_plain_text
 from ..runfile import law_of_parameters
-from .disks import ALIASES, ParticleTable, Slips, disks_of, packing_of, standard_names
+from .disks import ALIASES, ParticleTable, Slips, choose_frame, disks_of, packing_of, standard_names
 
 TOP_TYPE = 2
 """LAMMPS atom type of the disks of the upper layer."""
@@ -109,28 +109,15 @@ def _next_frame(file: TextIO) -> DumpFrame | None:
 
 
 def _snapshot(path: Path, frame: int | None) -> DumpFrame:
-    """A snapshot by its number; by default the last one, if all are of the same particles."""
-    count, first, ids = 0, -1, list[float]()
+    """A snapshot by its number; by default the last one, if all are of as many particles."""
+    counts = list[int]()
     kept: deque[DumpFrame] = deque(maxlen=max(-(frame or -1), 1))  # of a long file no more than is needed
     for shown in dump_frames(path):
         kept.append(shown)
-        count += 1
-        if frame is None:
-            place = shown.columns.index("id") if "id" in shown.columns else None
-            here = sorted(shown.rows[:, place].tolist()) if place is not None else [0.0] * len(shown.rows)
-            if count > 1 and here != ids:
-                raise PackingFileError(
-                    f"{path} has other disks at step {shown.step} ({len(here)}) than at step {first} ({len(ids)}): "
-                    "choose a snapshot with --frame; -1 is the last."
-                )
-            ids, first = here, shown.step if count == 1 else first
-        elif count == frame + 1:
+        counts.append(len(shown.rows))
+        if len(counts) - 1 == frame:
             break
-    if not count:
-        raise PackingFileError(f"{path} is not a complete LAMMPS text dump: it is empty.")
-    wanted = -1 if frame is None else frame
-    if not -count <= wanted < count:
-        raise PackingFileError(f"{path} has {count} frames; there is no --frame {wanted}.")
+    choose_frame(path, counts, frame)
     return kept[0]
 
 

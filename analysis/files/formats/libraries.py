@@ -18,9 +18,8 @@ import numpy as np
 
 from ...errors import BadInputError, PackingFileError
 from ..atomic_write import FORMAT, FORMAT_KEY, check_format, open_plain, replace_whole
-from .disks import ParticleTable
+from .disks import ParticleTable, choose_frame
 from .exported import Exported, pick_numbers, slips_of
-from .tables import choose_frame
 
 OWN_COLUMNS = "radius", "mass", "angle", "top", "x_low", "y_low"
 OWN_QUANTITIES = "particles/faultgouge/"
@@ -29,26 +28,21 @@ SINGLE_PRECISION = "in float32, about 1e-7 of a coordinate: overlaps are lost be
 GSD_PRECISION = f"GSD keeps positions and radii {SINGLE_PRECISION}"
 
 
-def needed_library(module: str, path: Path) -> Any:
-    """A module of a dependency, or of the extra `export`. Raises BadInputError if it is not installed."""
+def _hoomd(path: Path) -> Any:
     try:
-        return import_module(module)
+        return import_module("gsd.hoomd")
     except ImportError:
-        library = module.split(".")[0]
-        says = f"{path} needs the library {library}, which is not installed: pip install 'faultgouge[export]'."
-        raise BadInputError(says) from None
+        needs = "needs the library gsd, which is not installed: pip install 'faultgouge[export]'"
+        raise BadInputError(f"{path} {needs}.") from None
 
 
 def read_gsd(path: Path, frame: int | None = None) -> ParticleTable:
     """A frame of a GSD file; the last one by default, if all are of as many disks."""
-    hoomd = needed_library("gsd.hoomd", path)
-    try:
-        open_plain(path).close()
-        with hoomd.open(str(path), "r") as file:
-            counts = [file[k].particles.N for k in range(len(file))] if frame is None else [0] * len(file)
-            shown = file[choose_frame(path, counts, frame)]
-    except (OSError, RuntimeError) as error:
-        raise PackingFileError(f"{path} is no readable GSD file: {error}.") from error
+    hoomd = _hoomd(path)
+    open_plain(path).close()
+    with hoomd.open(str(path), "r") as file:
+        counts = [file[k].particles.N for k in range(len(file))] if frame is None else [0] * len(file)
+        shown = file[choose_frame(path, counts, frame)]
     log, particles, box = shown.log, shown.particles, shown.configuration.box
     columns = {key: np.asarray(log[key], np.float64) for key in log if key.startswith(OWN_QUANTITIES)}
     columns = {key.removeprefix(OWN_QUANTITIES): column for key, column in columns.items()}
@@ -79,7 +73,7 @@ def read_gsd(path: Path, frame: int | None = None) -> ParticleTable:
 
 def write_gsd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
     """Write one frame or several, and return the contents in words."""
-    hoomd = needed_library("gsd.hoomd", path)
+    hoomd = _hoomd(path)
     with replace_whole(path) as new, hoomd.open(str(new), "w") as file:
         for number, (_, exported) in enumerate(frames):
             frame = hoomd.Frame()
@@ -123,31 +117,20 @@ def _fill(frame: Any, e: Exported) -> None:
     frame.log = {name: np.ascontiguousarray(values, dtype=np.float64) for name, values in logged.items()}
 
 
-def has_parser(path: Path) -> bool:
-    """Whether MDAnalysis is installed, and has a parser for files of this name."""
-    try:
-        return path.suffix[1:].upper() in needed_library("MDAnalysis", path)._PARSERS
-    except BadInputError:
-        return False
-
-
 def read_universe(path: Path, frame: int | None = None) -> ParticleTable:
     """Particles of a file of MDAnalysis."""
-    library = needed_library("MDAnalysis", path)
+    from MDAnalysis import Universe
+
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            universe = library.Universe(str(path))
+            universe = Universe(str(path))
             universe.trajectory[-1 if frame is None else frame]
     except Exception as error:  # its parsers raise nearly every exception there is
         raise PackingFileError(f"{path} is not read by MDAnalysis: {str(error).splitlines()[0]}") from error
     atoms, size = universe.atoms, universe.dimensions
-    if not hasattr(atoms, "radii"):
-        raise PackingFileError(f"{path} has no radii for MDAnalysis: write it with radii, as CSV or extended XYZ.")
-    columns = dict(zip("xyz", np.asarray(atoms.positions, dtype=np.float64).T, strict=True))
-    columns["radius"] = np.asarray(atoms.radii, dtype=np.float64)
-    box, remark = (
-        None if size is None else np.diag(size[:3].astype(np.float64)),
-        f"MDAnalysis has positions {SINGLE_PRECISION}",
-    )
-    return ParticleTable(str(path), columns, box, remark=remark)
+    columns = dict(zip("xyz", atoms.positions.astype(np.float64).T, strict=True))
+    if hasattr(atoms, "radii"):
+        columns["radius"] = np.asarray(atoms.radii, dtype=np.float64)
+    box = None if size is None else np.diag(size[:3].astype(np.float64))
+    return ParticleTable(str(path), columns, box, remark=f"MDAnalysis has positions {SINGLE_PRECISION}")

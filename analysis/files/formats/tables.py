@@ -23,18 +23,17 @@ import json
 import math
 import re
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...arrays import Floats
 from ...errors import BadInputError, PackingFileError
 from ..atomic_write import open_text, write_text
-from .disks import ALIASES, ParticleTable, Slips, standard_names
+from .disks import ALIASES, ParticleTable, Slips, choose_frame, standard_names
 from .exported import Exported
 from .lammps_dump import dump_frames
 
@@ -122,37 +121,16 @@ def columns_of(
     return dict(zip(found, np.array(rows).reshape(-1, len(found)).T, strict=True))
 
 
-def choose_frame(path: Path, counts: Sequence[int], frame: int | None) -> int:
-    """The number of the chosen frame, from 0; by default the last frame, if all frames have as many disks."""
-    if frame is None and len(set(counts)) > 1:
-        raise PackingFileError(
-            f"{path} has frames with {min(counts)} and {max(counts)} disks: choose one with --frame."
-        )
-    wanted = -1 if frame is None else frame
-    if not -len(counts) <= wanted < len(counts):
-        raise PackingFileError(f"{path} has {len(counts)} frames; there is no --frame {wanted}.")
-    return wanted % len(counts)
+def block_of_frame(path: Path, lines: list[str], head: int, frame: int | None) -> tuple[int, int]:
+    """First line of a frame and its number of particles, in a file of consecutive frames.
 
-
-def block_of_frame(
-    path: Path, lines: list[str], head: int, count_at: Callable[[int], int], frame: int | None
-) -> tuple[int, int]:
-    """First line of a frame and its number of disks, in a file of consecutive frames.
-
-    Parameters
-    ----------
-    head : int
-        Lines before the disks of each frame.
-    count_at : callable
-        Number of disks of the frame that begins at a line, counted from 0.
-    frame : int, optional
-        As of `choose_frame`.
+    A frame begins with its number of particles; they follow after `head` lines. `frame` is as of `choose_frame`.
     """
     end = max((number for number, line in enumerate(lines, 1) if line.strip()), default=0)
     counts: dict[int, int] = {}
     at = 0
     while at < end:
-        counts[at] = count_at(at)
+        counts[at] = int(lines[at].split()[0])
         at += head + counts[at]
     if not counts or at > len(lines):
         raise PackingFileError(f"{path} is no complete file of frames: it breaks off.")
@@ -303,36 +281,20 @@ def read_json(path: Path) -> ParticleTable:
     It has the lists x, y, radius, and may have top (indices from 0, or true and false for each disk), mass (of each
     disk, or of all) and box_length (period along x). Other keys are ignored.
     """
-    try:
-        data = json.loads("\n".join(lines_of(path)))
-        numbers = np.array([data["x"], data["y"], data["radius"]], dtype=np.float64)
-        columns, disks = dict(zip(("x", "y", "radius"), numbers, strict=True)), len(numbers[0])
-        if data.get("mass") is not None:
-            columns["mass"] = np.broadcast_to(np.asarray(data["mass"], dtype=np.float64), disks)
-        if (top := _upper_layer(data.get("top", []), disks)).any():
-            columns["top"] = top.astype(np.float64)
-        period = data.get("box_length")
-        box = None if period is None else np.diag([float(period), 1.0, 1.0])
-    except PackingFileError:
-        raise
-    except KeyError as error:
-        says = f"{path} lacks the key {error}; a packing file has x, y, radius, top, box_length."
-        raise PackingFileError(says) from error
-    except (TypeError, AttributeError, ValueError, OverflowError, RecursionError) as error:
-        says = "its brackets are nested too deeply" if isinstance(error, RecursionError) else str(error)
-        raise PackingFileError(f"{path} is not a packing file: {says}") from error
-    none = np.zeros(0, dtype=np.int64)
+    data = json.loads("\n".join(lines_of(path)))
+    numbers = np.array([data["x"], data["y"], data["radius"]], dtype=np.float64)
+    columns, disks = dict(zip(("x", "y", "radius"), numbers, strict=True)), len(data["x"])
+    if data.get("mass") is not None:
+        columns["mass"] = np.broadcast_to(np.asarray(data["mass"], dtype=np.float64), disks)
+    top, period = np.asarray(data.get("top", [])), data.get("box_length")
+    if top.dtype != np.bool_ or top.shape != (disks,):
+        if top.size and (not np.issubdtype(top.dtype, np.integer) or top.min() < 0 or top.max() >= disks):
+            raise ValueError("top must hold indices of disks, counted from 0, or true and false for each disk")
+        top = np.isin(np.arange(disks), top)
+    if top.any():
+        columns["top"] = top.astype(np.float64)
+    box, none = None if period is None else np.diag([float(period), 1.0, 1.0]), np.zeros(0, dtype=np.int64)
     return ParticleTable(str(path), columns, box, slips=Slips(none, none, np.zeros(0)))
-
-
-def _upper_layer(listed: object, disks: int) -> NDArray[np.bool_]:
-    """The upper layer from indices of disks, or from true and false for each, shape (N,)."""
-    says = np.asarray(listed)
-    if says.dtype == np.bool_ and says.shape == (disks,):
-        return says
-    if says.size and (not np.issubdtype(says.dtype, np.integer) or says.min() < 0 or says.max() >= disks):
-        raise ValueError("top must hold indices of disks, counted from 0, or true and false for each disk.")
-    return np.isin(np.arange(disks), says)
 
 
 def read_yade(path: Path) -> ParticleTable:
@@ -352,14 +314,7 @@ def read_yade(path: Path) -> ParticleTable:
 def read_mercury(path: Path, frame: int | None = None) -> ParticleTable:
     """Particles at one time, counted from 0; the last one by default, if all times have as many particles."""
     lines = lines_of(path)
-
-    def count_at(at: int) -> int:
-        words = lines[at].split()
-        if not words or not words[0].isdecimal() or len(words) not in (6, 8):
-            raise PackingFileError(f"{path}, line {at + 1}: {lines[at]!r} is no line 'N time bounds' of MercuryDPM.")
-        return int(words[0])
-
-    begin, count = block_of_frame(path, lines, 1, count_at, frame)
+    begin, count = block_of_frame(path, lines, 1, frame)
     low, high = np.array(numbers_in(lines[begin], f"{path}, line {begin + 1}")[2:]).reshape(2, -1)
     rows = [(number + 1, lines[number].split()) for number in range(begin + 1, begin + 1 + count)]
     names = MERCURY_ROWS[8 if len(low) == 2 else 14]

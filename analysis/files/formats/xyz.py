@@ -25,13 +25,7 @@ NAMES_OF_TYPES = ("species", "type", "element")
 def read_xyz(path: Path, frame: int | None = None) -> ParticleTable:
     """A frame of an extended XYZ file; the last one by default, if all are of as many disks."""
     lines = lines_of(path)
-
-    def count_at(at: int) -> int:
-        if not lines[at].strip().isdecimal():
-            raise PackingFileError(f"{path}, line {at + 1}: {lines[at].strip()!r} is no number of disks.")
-        return int(lines[at])
-
-    begin, count = block_of_frame(path, lines, 2, count_at, frame)
+    begin, count = block_of_frame(path, lines, 2, frame)
     values = {key: quoted or plain for key, quoted, plain in PAIR.findall(lines[begin + 1])}
     check_format(values.get(FORMAT_KEY), path)
     words = values.get("Properties", "").lower().split(":")
