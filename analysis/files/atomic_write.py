@@ -210,19 +210,15 @@ def check_own(path: Path, head: str = "") -> None:
         end = stream.read()
     own = begin.startswith((SEAL, OLD_DATA)) or bool(head and begin.startswith(head.encode()))
     if begin and not own and FORMAT_KEY.encode() not in begin + b"\n" + end:
-        raise OutputError(
-            f"{path} is there already, and faultgouge has not written it (or a version before its files had a number "
-            "of their format): give another name, or move the file away."
-        )
+        says = f"{path} is there already, and faultgouge has not written it (or a version without numbers of formats)"
+        raise OutputError(f"{says}: give another name, or move the file away.")
 
 
 def check_format(number: object, where: object) -> None:
     """Refuse a file of a later format with a PackingFileError; files of older versions have no number, None."""
     if number is not None and not (str(number).isdecimal() and int(str(number)) <= FORMAT):
-        raise PackingFileError(
-            f"{where} has format {number} of faultgouge's files, and this version knows {FORMAT}: a later version "
-            "wrote it, so update faultgouge."
-        )
+        says = f"{where} has format {number} of faultgouge's files, and this version knows {FORMAT}"
+        raise PackingFileError(f"{says}: a later version wrote it, so update faultgouge.")
 
 
 def write_whole(path: Path, *parts: bytes, head: str = "") -> None:
@@ -350,20 +346,16 @@ def open_sealed(path: Path, writable: bool = False) -> h5py.File:
     try:
         with open_plain(path) as stream:
             header, digest, size = stream.read(HEADER_SIZE), hashlib.sha256(), 0
-            if header.startswith(HDF5):
-                says = f"{path} is an HDF5 file, and no run of faultgouge: it lacks the lines with which these begin."
-                raise PackingFileError(says)
             if not header.startswith(SEAL):
-                convert = f"a packing of another code is converted by `faultgouge import {path} -o packing.h5`"
-                raise PackingFileError(f"{path} is not a readable HDF5 file, as it begins like none: {convert}.")
+                says = "is not a readable HDF5 file, as it begins like none"
+                says = "is an HDF5 file, and no run of faultgouge" if header.startswith(HDF5) else says
+                raise PackingFileError(f"{path} {says}; `faultgouge import` converts packings of other codes.")
             while block := stream.read(BYTES_AT_A_TIME):
                 digest.update(block)
                 size += len(block)
         if header != _header(digest.hexdigest(), size):
-            raise PackingFileError(
-                f"{path} is damaged: its {size} bytes do not have the checksum that was written with them; take a copy "
-                "of the file, or make it again."
-            )
+            says = f"{path} is damaged: its {size} bytes do not have the checksum that was written with them"
+            raise PackingFileError(f"{says}; take a copy of the file, or make it again.")
         if writable:
             image = read_plain(path)[HEADER_SIZE:]
             file = h5py.File(h5py.h5f.open_file_image(image, flags=h5py.h5f.FILE_IMAGE_OPEN_RW))

@@ -166,10 +166,10 @@ def read_contacts(
     i, j, branch, fn, ft = (each[np.sort(once)] for each in (i, j, branch, fn, ft))
     size, bound = np.linalg.norm(ft, axis=1), material.friction * np.maximum(fn, 0.0)
     for worst in np.flatnonzero(size > (1 + AT_REST) * bound):
-        raise PackingFileError(
-            f"{path}: |f_t| of {spheres.id[i[worst]]} is {size[worst] / max(fn[worst], 1e-300):.4g} f_n, beyond the "
-            f"coefficient of friction {material.friction:g}: give --material friction=."
+        says = (
+            f"|f_t| of {spheres.id[i[worst]]} is {size[worst] / max(fn[worst], 1e-300):.4g} f_n, beyond the coefficient"
         )
+        raise PackingFileError(f"{path}: {says} of friction {material.friction:g}: give --material friction=.")
     # what the digits do not tell from the bound is at the bound
     ft = ft * np.divide(bound, size, out=np.ones_like(size), where=size > (1 - 3 * HALF_A_DIGIT) * bound)[:, None]
 
@@ -184,10 +184,8 @@ def read_contacts(
         found, lacks = other, flipped
         remarks.append("tangential forces are those on the second particle: with the other sign they do not balance")
     if lacks > AT_REST:
-        raise PackingFileError(
-            f"{path}: forces are out of balance by {lacks:.2g} of the mean contact force, whatever gravity is: this is "
-            "no packing at rest, or a contact or a wall is missing."
-        )
+        says = f"forces are out of balance by {lacks:.2g} of the mean contact force, whatever gravity is"
+        raise PackingFileError(f"{path}: {says}: it does not rest, or a contact or a wall is missing.")
     remarks.append(f"forces balance to {lacks:.1g} of their mean but for gravity; a load takes what is left")
     return derive_frozen(found, remarks=tuple(remarks))
 
@@ -215,10 +213,8 @@ def _branches(
         sides = sides if spheres.periodic is not None else images.any(axis=0)
     gap = np.linalg.norm(branch, axis=1) - reach
     for k in np.flatnonzero(gap > (TOUCHING - 1) * reach):
-        raise PackingFileError(
-            f"{path}: spheres {spheres.id[i[k]]} and {spheres.id[j[k]]} have a contact and are {gap[k]:.3g} apart: "
-            "give the places of the same moment, and the box."
-        )
+        says = f"spheres {spheres.id[i[k]]} and {spheres.id[j[k]]} have a contact and are {gap[k]:.3g} apart"
+        raise PackingFileError(f"{path}: {says}: give the places of the same moment, and the box.")
     return branch, sides
 
 
@@ -237,9 +233,8 @@ def _forces(path: Path, table: Mapping[str, Floats], n: Floats) -> tuple[Floats,
         sign = -1 if np.sum(normal < 0) > 0.5 * len(normal) else 1
         return sign * normal, sign * (whole - normal[:, None] * n)
     if "fn" not in table or tangential is None:
-        raise PackingFileError(
-            f"{path} says no forces: it needs fn, ftx, fty, ftz, or fx, fy, fz (its columns: {', '.join(table)})."
-        )
+        has = ", ".join(table)
+        raise PackingFileError(f"{path} says no forces: give fn, ftx, fty, ftz, or fx, fy, fz (its columns: {has}).")
     return table["fn"], tangential - np.einsum("ca,ca->c", tangential, n)[:, None] * n
 
 

@@ -103,10 +103,8 @@ class RunFile:
         self._file = open_sealed(self.path, self._writable)
         if "snapshot" in self._file:
             self._file.close()
-            raise PackingFileError(
-                f"{self.path} holds a packing as LAMMPS left it, and no run of this program's own: the commands "
-                "spectrum, draw, movie, view and export take it."
-            )
+            says = f"{self.path} holds a packing as LAMMPS left it, and no run of this program's own"
+            raise PackingFileError(f"{says}: spectrum, draw, movie, view and export take it.")
         self._step = self._file[f"{POSITION}/step"]
 
     @classmethod

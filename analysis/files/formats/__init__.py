@@ -185,8 +185,10 @@ def read_particles(path: Path, frame: int | None = None) -> ParticleTable:
     except FaultgougeError:
         raise
     except UNREADABLE as error:
-        says = f"it lacks {error}" if isinstance(error, KeyError) else str(error).strip().partition("\n")[0].rstrip(".")
-        raise PackingFileError(f"{path} is not read as {found.words}: {says or 'it breaks off'}.") from error
+        says = str(error).strip().partition("\n")[0].rstrip(".") or "it breaks off"
+        says = "its brackets are nested too deeply" if isinstance(error, RecursionError) else says
+        lacks = "it lacks " if isinstance(error, KeyError) else ""
+        raise PackingFileError(f"{path} is not read as {found.words}: {lacks}{says}.") from error
 
 
 def read_disks(path: Path, frame: int | None = None) -> Disks:

@@ -234,11 +234,8 @@ def disks_of(found: ParticleTable) -> Disks:
     source, (c, order) = found.source, sorted_columns(found)
     z = c.get("z", np.zeros(1))
     if np.ptp(z) > FLATNESS * c["radius"].min():
-        raise PackingFileError(
-            f"{source} is of three dimensions (z goes from {z.min():g} to {z.max():g}), and what such a file has is "
-            "read as disks in a plane: give a run of dimension 2, or, for spheres, a LAMMPS deck with their contact "
-            "law, `faultgouge import DECK.in`."
-        )
+        says = f"it is of three dimensions (z goes from {z.min():g} to {z.max():g}), and is read as disks in a plane"
+        raise PackingFileError(f"{source}: {says}; for spheres give --material, or `faultgouge import DECK.in`.")
     period = None
     if found.box is not None:
         if np.count_nonzero(found.box - np.diag(np.diag(found.box))):
@@ -320,20 +317,18 @@ def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: fl
 def _check_places(disks: Disks) -> None:
     below = disks.position[:, 1] <= 0
     if below.any():
-        raise PackingFileError(
-            f"{disks.source}: the centre of disk {disks.id[below][0]} is at y = {disks.position[below][0, 1]:g}, and "
-            "the floor is y = 0: say with --floor at which y it is."
+        says = (
+            f"the centre of disk {disks.id[below][0]} is at y = {disks.position[below][0, 1]:g}, and the floor is y = 0"
         )
+        raise PackingFileError(f"{disks.source}: {says}: say with --floor at which y it is.")
     tree = neighbour_tree(disks.position, disks.box_length)
     pairs = tree.query_pairs(float(disks.radius.max()), output_type="ndarray")
     apart = nearest_image(disks.position[pairs[:, 0]] - disks.position[pairs[:, 1]], disks.box_length)
     distance = np.hypot(*apart.T)
     for k in np.flatnonzero(distance < np.maximum(*disks.radius[pairs].T)):
         a, b = disks.id[pairs[k]]
-        raise PackingFileError(
-            f"{disks.source}: disks {a} and {b} are {distance[k]:g} apart, the centre of one in the other: "
-            "the law is that of small overlaps; separate them."
-        )
+        says = f"disks {a} and {b} are {distance[k]:g} apart, the centre of one in the other: separate them"
+        raise PackingFileError(f"{disks.source}: {says}.")
 
 
 def _contacts(disks: Disks, law: MindlinLaw) -> Contacts:
@@ -359,10 +354,8 @@ def _contacts(disks: Disks, law: MindlinLaw) -> Contacts:
         second, reach = (disks.position[b], disks.radius[b]) if b >= 0 else (disks.position[a] * (1, 0), 0.0)
         gap = np.hypot(*nearest_image(disks.position[a] - second, disks.box_length)) - disks.radius[a] - reach
         other, many = disks.id[b] if b >= 0 else "the floor", "slip is" if len(lost) == 1 else "slips are"
-        raise PackingFileError(
-            f"{disks.source}: {len(lost)} {many} of disks that do not touch: {disks.id[a]} and {other} are {gap:.3g} "
-            "apart: leave such rows out, or give positions and radii with which these disks touch."
-        )
+        says = f"{len(lost)} {many} of disks that do not touch: {disks.id[a]} and {other} are {gap:.3g} apart"
+        raise PackingFileError(f"{disks.source}: {says}: leave such rows out, or give places and radii that touch.")
     slip = np.zeros(len(near))
     slip[where[where >= 0]] = listed.slip[where >= 0]
     return near.slipped(slip)

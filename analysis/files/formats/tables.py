@@ -159,9 +159,7 @@ def _table(path: Path, length: str = "") -> tuple[dict[str, Floats], str, str]:
     heads = first - 1 if first and begins_with_number else first
     body = [row for k, row in enumerate(rows) if k != heads and not comments[k]]
     if not body:
-        raise PackingFileError(
-            f"{path} is no table: it needs a line of names, such as x,y,radius, and lines of numbers."
-        )
+        raise PackingFileError(f"{path} is no table: give a line of names, as x,y,radius, and lines of numbers.")
     head = rows[heads][1].strip().lstrip("#/").strip()
     mark = next((each for each in ";,\t" if each in head), None)
     words = [(number, next(csv.reader([line], delimiter=mark)) if mark else line.split()) for number, line in body]
