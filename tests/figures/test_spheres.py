@@ -5,31 +5,12 @@ import pytest
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.quiver import Quiver
 
-from faultgouge.analysis import Configuration, LinearisedContacts, normal_modes
+from faultgouge.analysis import normal_modes
 from faultgouge.figures import draw_mode, draw_packing
 from faultgouge.figures.spheres import DOTS_ACROSS, INTO, LIGHT, flat, shade_spheres
 
 RED, BLUE = [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]
 FRAME = (-1.0, 1.0, -1.0, 1.0)
-
-
-@pytest.fixture
-def column():
-    """Two spheres, one above the other, on a plane: the lower contact carries both weights."""
-    zero, up = np.zeros(2), np.tile([0.0, 0.0, 1.0], (2, 1))
-    contacts = LinearisedContacts(
-        i=[0, 1], j=[-1, 0], normal=up, distance=[np.inf, 0.999], overlap=[0.001, 0.001],
-        slip_arm=np.full((2, 2), 0.5), lever_arm=np.full((2, 2), 0.5), lever_slope=zero, normal_force=[2.0, 1.0],
-        tangential_force=np.zeros((2, 3)), normal_stiffness=[3e3, 2e3], tangential_stiffness=[1e3, 1e3],
-        closing=np.zeros((2, 3)), parting=np.zeros((2, 3)), friction=[1.0, 0.5], sliding=[False, False],
-        normal_dashpot=zero, tangential_dashpot=zero,
-    )  # fmt: skip
-    load = np.zeros((2, 2, 3))
-    load[:, 0, 2] = -1.0
-    return Configuration(
-        dimension=3, position=[[0, 0, 0.499], [0, 0, 1.498]], radius=[0.5, 0.5], mass=[1.0, 1.0], inertia=[0.1, 0.1],
-        contacts=contacts, box=np.diag([2.0, 2.0, 4.0]), origin=[-1, -1, 0], periodic=[True, True, False], load=load,
-    )  # fmt: skip
 
 
 def test_the_nearer_sphere_hides_the_other_in_any_order():
@@ -57,7 +38,7 @@ def test_bars_are_as_wide_as_their_forces_and_end_on_the_floor(column):
     [bars] = [each for each in axes.findobj(LineCollection) if len(each.get_segments()) == 2]
     widths = np.sort(bars.get_linewidths())
     assert widths[1] == pytest.approx(2 * widths[0], rel=1e-12)
-    at_floor = flat(np.zeros(3))
+    at_floor = flat(np.array([0.5, 0.5, 0.0]))
     ends = np.concatenate([bar for bar in bars.get_segments()])
     assert np.hypot(*(ends - at_floor).T).min() < 1e-9
     assert floor.get_paths()[0].contains_point(at_floor)
