@@ -29,6 +29,7 @@ not tell.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,8 +46,8 @@ from ..elasticity.material_spheres import Material, spheres_of_material
 from ..errors import BadInputError, PackingFileError
 from ..motion.stability import Stability, stability
 from .formats import read_particles
-from .formats.disks import sorted_columns
-from .formats.tables import columns_of, contact_columns, lines_of, number_of, require_columns
+from .formats.disks import choose_frame, sorted_columns
+from .formats.tables import columns_of, contact_columns, lines_of, number_of, require_columns, strip_comments
 
 HALF_A_DIGIT = 5e-6
 """Largest relative error of a number that is rounded to six digits."""
@@ -118,16 +119,10 @@ def read_spheres(path: Path, frame: int = -1) -> Spheres:
 def _fstat(path: Path, frame: int) -> dict[str, Floats]:
     """The contacts of MercuryDPM at one time, whose lines follow a line "# time ...", and two more comments."""
     lines = lines_of(path)
-    starts = [
-        k
-        for k, line in enumerate(lines)
-        if line[:1] == "#" and line[1:].split()[:1] and line[1:].split()[0][0].isdigit()
-    ]
-    if not starts:
-        raise PackingFileError(f"{path} has no line that begins a block of MercuryDPM's.")
-    end = next((k for k in starts if k > starts[frame]), len(lines))
-    rows = [(k + 1, lines[k].split()) for k in range(starts[frame], end) if lines[k].strip() and lines[k][0] != "#"]
-    table = columns_of(path, rows, FSTAT, f"{len(FSTAT)} are needed")
+    starts = [k for k, line in enumerate(lines) if re.match(r"#\s+\d", line)]
+    begin = starts[choose_frame(path, [0] * len(starts), frame)]
+    end = next((k for k in starts if k > begin), len(lines))
+    table = columns_of(path, strip_comments(lines[begin:end], begin + 1), FSTAT, f"{len(FSTAT)} are needed")
     return table | {f"ft{axis}": table["ft"] * table[f"t{axis}"] for axis in "xyz"}
 
 

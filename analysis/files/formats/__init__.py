@@ -21,7 +21,7 @@ from ...counted import counted
 from ...errors import BadInputError, FaultgougeError, PackingFileError
 from ...packing.packing import Packing
 from ..atomic_write import HDF5, SEAL, open_plain, open_text
-from .disks import Disks, ParticleTable, Slips, disks_of, packing_of, upper_layer
+from .disks import Disks, ParticleTable, Slips, UpperLayerError, disks_of, packing_of, upper_layer
 from .exported import (
     Frame,
     ModeVectors,
@@ -34,7 +34,7 @@ from .exported import (
 from .tables import HEAD_OF_CONTACTS
 
 __all__ = [
-    "HEAD_OF_CONTACTS", "Disks", "Frame", "ModeVectors", "Slips", "choose_frames", "format_of",
+    "HEAD_OF_CONTACTS", "Disks", "Frame", "ModeVectors", "Slips", "UpperLayerError", "choose_frames", "format_of",
     "frames_of", "is_hdf5", "packing_of", "read_disks", "upper_layer", "write_frames", "write_packing",
 ]  # fmt: skip
 

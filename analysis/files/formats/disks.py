@@ -361,6 +361,10 @@ def _contacts(disks: Disks, law: MindlinLaw) -> Contacts:
     return near.slipped(slip)
 
 
+class UpperLayerError(BadInputError):
+    """The upper layer is not given, or its text is not understood, or names what a file does not have."""
+
+
 def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> NDArray[np.bool_]:
     """Select the disks of the upper layer.
 
@@ -382,24 +386,24 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
 
     Raises
     ------
-    BadInputError
+    UpperLayerError
         If no upper layer is given, the text is not understood, or it selects no disk.
     """
     text = "" if says is None else str(says).strip()
     if says is None and disks.top is None:
         unsaid = f"{disks.source} does not say which disks are the upper layer"
-        raise BadInputError(f"{unsaid}: add {key.rstrip(' =')}, {LAYER_WAYS}.")
+        raise UpperLayerError(f"{unsaid}: add {key.rstrip(' =')}, {LAYER_WAYS}.")
     try:
         chosen = disks.top if says is None else _layer_of(disks, text)
     except (OSError, ValueError) as error:
-        raise BadInputError(f"{key}{text}: {error}.") from None
+        raise UpperLayerError(f"{key}{text}: {error}.") from None
     if chosen is None or not chosen.any():
         y = disks.position[:, 1]
         types = list(disks.types) or ([] if disks.kind is None else np.unique(disks.kind).tolist())
         kinds = f", and their types are {', '.join(map(str, types))}" if types else ""
         holds = "its own column top" if says is None else f"the layer {text}"
         extent = f"its disks go from y = {y.min():g} to {y.max():g}{kinds}"
-        raise BadInputError(f"{disks.source}: {holds} holds no disk: {extent}.")
+        raise UpperLayerError(f"{disks.source}: {holds} holds no disk: {extent}.")
     return chosen
 
 

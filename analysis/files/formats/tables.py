@@ -230,7 +230,8 @@ def contact_columns(
         Names of the columns, in place of those of the file.
     """
     if next(iter(lines_of(path)), "").startswith("ITEM:"):
-        shown = list(dump_frames(path))[frame]
+        frames = list(dump_frames(path))
+        shown = frames[choose_frame(path, [0] * len(frames), frame)]
         columns = dict(zip(shown.columns, shown.rows.T, strict=True))
     else:
         columns, unit, _ = _table(path, length)
