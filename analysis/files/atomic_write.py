@@ -93,6 +93,39 @@ LARGEST_SHAPE = 1 << 45
 """Bytes that a dataset would have with all of its rows written, 35 TB."""
 
 
+UNREADABLE = (
+    OSError, EOFError, zlib.error, ValueError, LookupError, TypeError, AttributeError, OverflowError, RuntimeError,
+    StopIteration,
+)  # fmt: skip
+"""What readers meet in files that are damaged, or of another format than their name says."""
+
+
+@contextmanager
+def telling(path: object, says: str, errors: tuple[type[Exception], ...] = UNREADABLE) -> Iterator[None]:
+    """Tell in one sentence, a PackingFileError, what fails within, unless it is one already.
+
+    Parameters
+    ----------
+    path : object
+        The file, or another source.
+    says : str
+        What of it, as in "is no readable GSD file"; the reason of the error follows.
+    errors : tuple of types
+        What is told.
+    """
+    try:
+        yield
+    except PackingFileError:
+        raise
+    except errors as error:
+        reason = (
+            str(getattr(error, "strerror", None) or error).strip().partition("\n")[0].rstrip(".") or "it breaks off"
+        )
+        reason = "its brackets are nested too deeply" if isinstance(error, RecursionError) else reason
+        lacks = "it lacks " if isinstance(error, KeyError) else ""
+        raise PackingFileError(f"{path} {says}: {lacks}{reason}.") from error
+
+
 def open_plain(path: str | PathLike[str]) -> BinaryIO:
     """A plain file, opened for reading its bytes.
 
@@ -343,7 +376,7 @@ def open_sealed(path: Path, writable: bool = False) -> h5py.File:
         raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
     import h5py
 
-    try:
+    with telling(path, "cannot be read", (OSError,)):
         with open_plain(path) as stream:
             header, digest, size = stream.read(HEADER_SIZE), hashlib.sha256(), 0
             if not header.startswith(SEAL):
@@ -364,8 +397,6 @@ def open_sealed(path: Path, writable: bool = False) -> h5py.File:
                 file = h5py.File(path, "r", locking=False)
             except OSError:  # another reader in this process, such as MDAnalysis, has it open with locks
                 file = h5py.File(path, "r")
-    except OSError as error:
-        raise PackingFileError(f"{path} cannot be read: {error.strerror or error}.") from error
     try:
         check_format(file.attrs.get(FORMAT_KEY), "it")
         _refuse_what_is_not_in_it(file)

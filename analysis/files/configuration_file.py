@@ -18,8 +18,7 @@ from scipy.sparse import csr_array
 
 from ..configuration import Configuration
 from ..contacts import PER_CONTACT, LinearisedContacts
-from ..errors import PackingFileError
-from .atomic_write import SEAL, new_sealed, open_plain, open_sealed, write_sealed
+from .atomic_write import SEAL, new_sealed, open_plain, open_sealed, telling, write_sealed
 from .runfile import CHECKSUM, write_h5md
 
 SCALARS = ("dimension", "fx", "load_error", "drag_rate", "spring", "operator_error", "slips_known")
@@ -88,19 +87,15 @@ def holds_configuration(path: Path) -> bool:
 
 def read_configuration(path: Path) -> Configuration:
     """The configuration of a file. Raises PackingFileError if the file is missing, damaged, or holds none."""
-    with open_sealed(path) as file:
-        try:
-            group = file["snapshot"]
-            # what version 1 did not store has a default
-            contacts = {name: group[f"contacts/{name}"][()] for name in PER_CONTACT if f"contacts/{name}" in group}
-            given = {name: group[name][()] for name in ARRAYS if name in group}
-            given |= {name: group.attrs[name].item() for name in (*SCALARS, "proof") if name in group.attrs}
-            for name in (each for each in MATRICES if each in group):
-                parts = tuple(group[f"{name}/{each}"][()] for each in MATRIX_PARTS)
-                given[name] = csr_array(parts, shape=(len(parts[2]) - 1,) * 2)
-                given[name].check_format()
-            given["remarks"] = [str(each) for each in group.attrs.get("remarks", ())]
-            return Configuration(contacts=LinearisedContacts(**contacts), **given)
-        except Exception as error:  # h5py raises nearly every exception there is, depending on what is damaged
-            said = (str(error).strip() or type(error).__name__).rstrip(".")
-            raise PackingFileError(f"{path} holds no configuration that can be read: {said}.") from error
+    with open_sealed(path) as file, telling(path, "holds no configuration that can be read"):
+        group = file["snapshot"]
+        # what version 1 did not store has a default
+        contacts = {name: group[f"contacts/{name}"][()] for name in PER_CONTACT if f"contacts/{name}" in group}
+        given = {name: group[name][()] for name in ARRAYS if name in group}
+        given |= {name: group.attrs[name].item() for name in (*SCALARS, "proof") if name in group.attrs}
+        for name in (each for each in MATRICES if each in group):
+            parts = tuple(group[f"{name}/{each}"][()] for each in MATRIX_PARTS)
+            given[name] = csr_array(parts, shape=(len(parts[2]) - 1,) * 2)
+            given[name].check_format()
+        given["remarks"] = [str(each) for each in group.attrs.get("remarks", ())]
+        return Configuration(contacts=LinearisedContacts(**contacts), **given)

@@ -45,6 +45,7 @@ from ..counted import counted
 from ..elasticity.material_spheres import Material, spheres_of_material
 from ..errors import BadInputError, PackingFileError
 from ..motion.stability import Stability, stability
+from .atomic_write import telling
 from .formats import read_particles
 from .formats.disks import choose_frame, sorted_columns
 from .formats.tables import columns_of, contact_columns, lines_of, number_of, require_columns, strip_comments
@@ -88,10 +89,8 @@ class Spheres:
         mass = self.mass if material.density is None else None
         periodic = [False] * 3 if self.periodic is None else self.periodic
         options = {"box": self.box, "origin": self.origin, "mass": mass, "periodic": periodic} | more
-        try:
+        with telling(self.source, "describes no possible packing", (ValueError,)):
             return spheres_of_material(self.position, self.radius, material, **options)
-        except ValueError as error:
-            raise PackingFileError(f"{self.source} describes no possible packing: {error}") from error
 
 
 def material_of(text: str) -> Material:

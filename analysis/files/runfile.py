@@ -52,7 +52,7 @@ from ..errors import PackingFileError
 from ..packing.contacts import Contacts
 from ..packing.law import MindlinLaw
 from ..packing.packing import Packing
-from .atomic_write import new_sealed, open_sealed, write_sealed
+from .atomic_write import new_sealed, open_sealed, telling, write_sealed
 
 if TYPE_CHECKING:
     import h5py
@@ -337,7 +337,7 @@ class RunFile:
         rows = seen["contacts"][~np.isnan(seen["contacts"][:, 0])]
         low = self._file.get("observables/position_low")
         known = "slips_known" not in given and self.attributes.get("tangential_forces") != NONE_GIVEN
-        try:
+        with telling(self.path, "is damaged", (ValueError,)):  # numbers that no packing has
             i, j = rows[:, :2].T.astype(np.int64)
             return Packing(
                 position=self._file[f"{POSITION}/value"][frame, :, :2],
@@ -350,8 +350,6 @@ class RunFile:
                 **{name: given[name] for name in ("radius", "mass", "inertia_factor")},
                 **{name: given[name] for name in ("box_length", "drag_time", "spring") if name in given},
             )
-        except ValueError as error:  # numbers that no packing has
-            raise PackingFileError(f"{self.path} is damaged: {error}") from error
 
     def append_trajectory(self, time: ArrayLike, position: ArrayLike, position_low: ArrayLike | None = None) -> None:
         """Add frames of the undamped run that began at the last equilibrium.

@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,9 +19,9 @@ from typing import Any, NamedTuple
 from ...arrays import Floats
 from ...configuration import Configuration
 from ...counted import counted
-from ...errors import BadInputError, FaultgougeError, PackingFileError
+from ...errors import BadInputError, PackingFileError
 from ...packing.packing import Packing
-from ..atomic_write import HDF5, SEAL, open_plain, open_text
+from ..atomic_write import HDF5, SEAL, open_plain, open_text, telling
 from .disks import Disks, ParticleTable, Slips, UpperLayerError, disks_of, packing_of, upper_layer
 from .exported import (
     Frame,
@@ -96,12 +97,6 @@ WRITERS = {
     ".data": ("lammps_data", "write_data"), ".csv": ("tables", "write_contacts"), ".pvd": ("vtp", "write_pvd"),
 }  # fmt: skip
 """Module and function by suffix; of one packing all but the last, and `FILMS` of several frames."""
-UNREADABLE = (
-    OSError, EOFError, zlib.error, ValueError, LookupError, TypeError, AttributeError, OverflowError, RecursionError,
-    RuntimeError,
-)  # fmt: skip
-"""What readers meet in files that are damaged, or of another format than their name says."""
-
 FILMS = ".xyz", ".gsd", ".pvd"
 WITHOUT_MODES = {".data": "LAMMPS data", ".csv": "a table of contacts"}
 
@@ -128,11 +123,8 @@ def format_of(path: Path) -> Format:
         If the file cannot be read.
     """
     words: list[str] = []
-    try:
-        with open_text(path) as stream:
-            words = stream.readline(400).split()
-    except (OSError, UnicodeDecodeError, EOFError, zlib.error):
-        pass  # no text
+    with suppress(OSError, UnicodeDecodeError, EOFError, zlib.error), open_text(path) as stream:
+        words = stream.readline(400).split()
     if words[:1] == ["#format"]:
         return YADE
     if len(words) in (6, 8) and ".data" in path.name.lower() and all(map(WORD_OF_NUMBER.fullmatch, words)):
@@ -179,16 +171,9 @@ def read_particles(path: Path, frame: int | None = None) -> ParticleTable:
         raise PackingFileError(f"{path} has one frame; there is no --frame {frame}.")
     if found is RESTART:
         raise PackingFileError(f"{path} is a restart: LAMMPS itself reads it, in faultgouge import.")
-    try:
+    with telling(path, f"is not read as {found.words}"):
         read: ParticleTable = _function(found.module, found.reader)(path, *([frame] if found.frames else []))
-        return read
-    except FaultgougeError:
-        raise
-    except UNREADABLE as error:
-        says = str(error).strip().partition("\n")[0].rstrip(".") or "it breaks off"
-        says = "its brackets are nested too deeply" if isinstance(error, RecursionError) else says
-        lacks = "it lacks " if isinstance(error, KeyError) else ""
-        raise PackingFileError(f"{path} is not read as {found.words}: {lacks}{says}.") from error
+    return read
 
 
 def read_disks(path: Path, frame: int | None = None) -> Disks:
@@ -202,16 +187,14 @@ def _function(module: str, name: str) -> Any:
 
 def check_writer(path: Path, modes: bool = False, frames: bool = False) -> None:
     """Refuse a name that no writer takes, of several frames or of one packing with or without modes."""
-    suffix, taken, reason = path.suffix, FILMS if frames else tuple(WRITERS)[:-1], ""
-    if suffix == ".pvd" and not frames:
-        reason = "a .pvd is a list of frames; add --frames all, or export a .vtp"
-    elif suffix not in taken:
-        names = ", ".join(taken)
-        reason = f"{'several frames go into' if frames else 'exports are'} {names}; give it one of these suffixes"
-    elif modes and suffix in WITHOUT_MODES:
-        reason = f"{WITHOUT_MODES[suffix]} has no room for modes; leave --mode out, or export .vtp or .xyz"
-    if reason:
-        raise BadInputError(f"-o {path}: {reason}.")
+    taken = FILMS if frames else tuple(WRITERS)[:-1]
+    if path.suffix == ".pvd" and not frames:
+        raise BadInputError(f"-o {path}: a .pvd is a list of frames; add --frames all, or export a .vtp.")
+    if path.suffix not in taken:
+        what = "several frames go into" if frames else "exports are"
+        raise BadInputError(f"-o {path}: {what} {', '.join(taken)}; give it one of these suffixes.")
+    if modes and (flat := WITHOUT_MODES.get(path.suffix)):
+        raise BadInputError(f"-o {path}: {flat} has no room for modes; leave --mode out, or export .vtp or .xyz.")
 
 
 def write_packing(

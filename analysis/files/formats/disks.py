@@ -24,7 +24,7 @@ from ...packing.contacts import FLOOR, Contacts
 from ...packing.geometry import nearest_image, neighbour_tree, touching
 from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
-from ..atomic_write import read_plain_text
+from ..atomic_write import read_plain_text, telling
 
 FLATNESS = 1e-6
 """Spread of z up to which disks lie in a plane, in smallest radii: text with seven digits, or float32, leaves less."""
@@ -301,17 +301,13 @@ def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: fl
     PackingFileError
         If disks lie below the floor or inside one another, or form no packing.
     """
-    try:
+    with telling(disks.source, "describes no possible packing", (ValueError,)):
         _check_places(disks)
         contacts = _contacts(disks, law)
         names = ("position", "radius", "angle", "mass", "box_length", "position_low")
         fields = load | {name: getattr(disks, name) for name in names}
         known = disks.slips_known or not law.frictional or len(contacts) == 0
         return Packing(contacts=contacts, law=law, top=top, slips_known=known, **fields)
-    except PackingFileError:
-        raise
-    except ValueError as error:
-        raise PackingFileError(f"{disks.source} describes no possible packing: {error}") from error
 
 
 def _check_places(disks: Disks) -> None:
@@ -445,10 +441,8 @@ def _layer_of(disks: Disks, text: str) -> NDArray[np.bool_]:
 
 def touching_nothing(disks: Disks) -> NDArray[np.bool_]:
     """Disks that touch neither another disk nor the floor, shape (N,)."""
-    try:
+    with telling(disks.source, "describes no possible packing", (ValueError,)):
         contacts = touching(disks.position, disks.radius, disks.box_length)
-    except ValueError as error:
-        raise PackingFileError(f"{disks.source} describes no possible packing: {error}") from error
     return ~np.isin(np.arange(len(disks)), [contacts.i, contacts.j])
 
 

@@ -16,7 +16,6 @@ Of a dump custom, columns are x or xu or xs, radius or diameter, and, if present
 snapshots in a file must have the same particles; otherwise a snapshot must be chosen.
 """
 
-import zlib
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -33,7 +32,7 @@ from ...packing.compensated import exact_sum
 from ...packing.geometry import nearest_image
 from ...packing.law import MindlinLaw
 from ...packing.packing import Packing
-from ..atomic_write import FORMAT_KEY, check_format, open_text, read_plain_text
+from ..atomic_write import FORMAT_KEY, check_format, open_text, read_plain_text, telling
 from ..runfile import law_of_parameters
 from .disks import ALIASES, ParticleTable, Slips, choose_frame, disks_of, packing_of, standard_names
 
@@ -72,38 +71,30 @@ def dump_frames(path: str | PathLike[str]) -> Iterator[DumpFrame]:
     Raises PackingFileError if the file is missing, or breaks off or is malformed before the snapshot asked for is
     complete.
     """
-    try:
-        with open_text(path) as file:
-            while (frame := _next_frame(file)) is not None:
-                yield frame
-    except OSError as error:
-        raise PackingFileError(f"{path} cannot be read: {error.strerror or error}.") from error
-    except (ValueError, IndexError, StopIteration, EOFError, zlib.error) as error:
-        raise PackingFileError(f"{path} is not a complete LAMMPS text dump: {error or 'it breaks off'}.") from error
+    unread, broken = telling(path, "cannot be read", (OSError,)), telling(path, "is not a complete LAMMPS text dump")
+    with unread, open_text(path) as file, broken:
+        while (frame := _next_frame(file)) is not None:
+            yield frame
 
 
 def _next_frame(file: TextIO) -> DumpFrame | None:
-    step, count, bounds, boundary = -1, -1, np.zeros((3, 2)), tuple[str, ...]()
+    """The next snapshot: lines after an ITEM, one or, of the box, three; the rows come last."""
+    about: dict[str, list[str]] = {"BOX": ["", "0 0", "0 0", "0 0"]}
     for line in file:
         item = line.split()
         if item[:1] != ["ITEM:"]:
             raise ValueError(f"expected ITEM:, found {line.strip()!r}")
-        if item[1] == "TIMESTEP":
-            step = int(next(file))
-        elif item[1:3] == ["NUMBER", "OF"]:
-            count = int(next(file))
-        elif item[1:3] == ["BOX", "BOUNDS"]:
-            boundary = tuple(item[-3:])
-            bounds = np.array([[float(value) for value in next(file).split()] for _ in range(3)])
-        elif item[1] in ("ATOMS", "ENTRIES"):
-            lines = list(islice(file, count))
-            rows = np.array([row.split() for row in lines], dtype=np.float64).reshape(len(lines), len(item) - 2)
-            if len(lines) < count:
-                raise ValueError(f"{count} rows are announced and {len(lines)} are there")
-            return DumpFrame(step, boundary, bounds, tuple(item[2:]), rows)
-        else:
-            next(file)
-    if step >= 0:
+        if item[1] not in ("ATOMS", "ENTRIES"):
+            about[item[1]] = [line, *(next(file) for _ in range(3 if item[1] == "BOX" else 1))]
+            continue
+        count, columns = int(about["NUMBER"][1]), tuple(item[2:])
+        lines = list(islice(file, count))
+        rows = np.array([row.split() for row in lines], dtype=np.float64).reshape(len(lines), len(columns))
+        if len(lines) < count:
+            raise ValueError(f"{count} rows are announced and {len(lines)} are there")
+        bounds = np.array([each.split() for each in about["BOX"][1:]], dtype=np.float64)
+        return DumpFrame(int(about["TIMESTEP"][1]), tuple(about["BOX"][0].split()[-3:]), bounds, columns, rows)
+    if "TIMESTEP" in about:
         raise ValueError("it breaks off")
     return None
 
@@ -237,11 +228,9 @@ def _numbers_in(path: Path) -> dict[str, float]:
     """The numbers of a sidecar file; none where there is no such file."""
     if not path.is_file():
         return {}
-    try:
+    with telling(path, "must have one key and one number a line", (ValueError,)):
         lines = (line.split() for line in read_plain_text(path).splitlines() if line.strip())
         found = {key: float(value) for key, value in lines}
-    except ValueError as error:
-        raise PackingFileError(f"{path} must have one key and one number a line.") from error
     number = found.pop(FORMAT_KEY, None)
     check_format(None if number is None else f"{number:g}", path)
     return found

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import BadInputError, PackingFileError
+from ...errors import PackingFileError
 from ..atomic_write import FORMAT, FORMAT_KEY, check_format, open_plain, replace_whole
 from .disks import ParticleTable, choose_frame
 from .exported import Exported, pick_numbers, slips_of
@@ -33,7 +33,7 @@ def _hoomd(path: Path) -> Any:
         return import_module("gsd.hoomd")
     except ImportError:
         needs = "needs the library gsd, which is not installed: pip install 'faultgouge[export]'"
-        raise BadInputError(f"{path} {needs}.") from None
+        raise PackingFileError(f"{path} {needs}.") from None
 
 
 def read_gsd(path: Path, frame: int | None = None) -> ParticleTable:

@@ -22,7 +22,6 @@ import csv
 import json
 import math
 import re
-import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -32,7 +31,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import BadInputError, PackingFileError
-from ..atomic_write import open_text, write_text
+from ..atomic_write import open_text, telling, write_text
 from .disks import ALIASES, ParticleTable, Slips, choose_frame, standard_names
 from .exported import Exported
 from .lammps_dump import dump_frames
@@ -65,11 +64,8 @@ MERCURY_ROWS = {
 
 def lines_of(path: Path) -> list[str]:
     """The lines of a text file."""
-    try:
-        with open_text(path) as stream:
-            return stream.read().removeprefix("\ufeff").splitlines()
-    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
-        raise PackingFileError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}.") from error
+    with telling(path, "cannot be read"), open_text(path) as stream:
+        return stream.read().removeprefix("\ufeff").splitlines()
 
 
 def number_of(word: str, where: object) -> float:
