@@ -102,6 +102,7 @@ def write_view(
     moved = layer_displacement(disks)[:, 0].tolist() if len(disks) > 1 else []
     seen = {} if series is None else {name: series[name][series["msd"] > 0] for name in ("time", "msd")}
     images = [(_spheres if first.dimension == 3 else _disks)(packing) for packing in packings]
+    low, high = np.min([each.low for each in images], axis=0), np.max([each.high for each in images], axis=0)
     data = {
         "axis": {"name": axis.name} if legs else None,
         "legs": [leg.tolist() for leg in legs],
@@ -118,8 +119,7 @@ def write_view(
         "edge": EDGE,
         "ink": INK,
         "wall": FLOOR,
-        "extent": [np.min([each.low for each in images], axis=0).tolist(),
-                   np.max([each.high for each in images], axis=0).tolist()],
+        "extent": [low.tolist(), high.tolist()],
         "periodic": images[0].periodic,
         "walls": [wall._asdict() for wall in walls_of(first)],
         "corners": images[0].corners.tolist(),
@@ -131,8 +131,7 @@ def write_view(
         title=title,
         axis=axis if legs else None,
         count=len(packings),
-        opens=opens,
-        dissipative=data["dissipative"],
+        **{name: data[name] for name in ("opens", "dissipative")},
         grows=any(verdict.undamped.growth_rate for verdict in verdicts),
         cycle=bool(moved),
         series=series is not None,

@@ -30,12 +30,7 @@ SHIFT = 1.5
 
 @styled
 def draw_series(
-    time: ArrayLike,
-    values: ArrayLike,
-    axes: Axes | None = None,
-    *,
-    label: str | None = None,
-    color: str = "C1",
+    time: ArrayLike, values: ArrayLike, axes: Axes | None = None, *, label: str | None = None, color: str = "C1"
 ) -> Figure:
     """Draw a positive quantity over time on a logarithmic axis; values that are not positive are left out.
 
@@ -160,24 +155,17 @@ def draw_cycle(packings: Sequence[Packing], axes: Axes | None = None) -> Figure:
     fx = np.array([packing.fx for packing in packings])
     ends = [0, *turning_points(fx), len(fx) - 1]
     for number, (begin, end) in enumerate(pairwise(ends)):
-        way = slice(begin, end + 1)
-        axes.plot(
-            moved[way],
-            fx[way],
-            color=f"C{number}",
-            linestyle=("-", "--", ":", "-.")[number % 4],
-            label=rf"${fx[begin]:.4g} \to {fx[end]:.4g}$",
-        )
+        way, style = slice(begin, end + 1), ("-", "--", ":", "-.")[number % 4]
+        label_of_way = rf"${fx[begin]:.4g} \to {fx[end]:.4g}$"
+        axes.plot(moved[way], fx[way], color=f"C{number}", linestyle=style, label=label_of_way)
     axes.plot(moved[[0]], fx[[0]], "o", color="C0", markersize=3)
     axes.set(xlabel=label, ylabel="$F_x$")
     axes.margins(0.08)
     axes.legend(title="$F_x$", fontsize=7, title_fontsize=7)
     left = hysteresis(packings)
     if left is not None:
-        words = [
-            f"{name} {_format_signed(value)}" for name, value in (("remains:", left.remaining), ("work:", left.work))
-        ]
-        says = "the path closes, to rounding" if left.closes else ", ".join(words)
+        words = f"remains: {_format_signed(left.remaining)}, work: {_format_signed(left.work)}"
+        says = "the path closes, to rounding" if left.closes else words
         axes.set_title(f"back at $F_x = {left.fx:.4g}$: {says}", fontsize=7)
     return figure_of(axes)
 
@@ -208,12 +196,8 @@ def draw_drive(series: Mapping[str, Floats], slips: Sequence[Slip]) -> Figure:
     panels = figure.subplots(4, 1, sharex=True, height_ratios=(2, 1, 1, 1))
     time = series["time"]
     risen = series["thickness"] - series["thickness"][0]
-    rows = (
-        (series["force"], "force $F$", "C1"),
-        (series["displacement"], "displacement", "C0"),
-        (risen, "dilation", "C0"),
-        (series["at_bound"], "at the bound", "C0"),
-    )
+    rows = [(series["force"], "force $F$", "C1"), (series["displacement"], "displacement", "C0")]
+    rows += [(risen, "dilation", "C0"), (series["at_bound"], "at the bound", "C0")]
     draw_slips(panels, slips)
     for axes, (values, label, color) in zip(panels, rows, strict=True):
         axes.plot(time, values, color=color, linewidth=0.8)
