@@ -380,9 +380,10 @@ def open_sealed(path: Path, writable: bool = False) -> h5py.File:
         with open_plain(path) as stream:
             header, digest, size = stream.read(HEADER_SIZE), hashlib.sha256(), 0
             if not header.startswith(SEAL):
-                says = "is not a readable HDF5 file, as it begins like none"
+                convert = f"a packing of another code is converted by `faultgouge import {path} -o packing.h5`"
+                says = f"is not a readable HDF5 file, as it begins like none: {convert}"
                 says = "is an HDF5 file, and no run of faultgouge" if header.startswith(HDF5) else says
-                raise PackingFileError(f"{path} {says}; `faultgouge import` converts packings of other codes.")
+                raise PackingFileError(f"{path} {says}.")
             while block := stream.read(BYTES_AT_A_TIME):
                 digest.update(block)
                 size += len(block)

@@ -32,10 +32,9 @@ from .exported import (
     frames_of,
     motion_of_mode,
 )
-from .tables import HEAD_OF_CONTACTS
 
 __all__ = [
-    "HEAD_OF_CONTACTS", "Disks", "Frame", "ModeVectors", "Slips", "UpperLayerError", "choose_frames", "format_of",
+    "Disks", "Frame", "ModeVectors", "Slips", "UpperLayerError", "choose_frames", "format_of",
     "frames_of", "is_hdf5", "packing_of", "read_disks", "upper_layer", "write_frames", "write_packing",
 ]  # fmt: skip
 

@@ -397,9 +397,9 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
         y = disks.position[:, 1]
         types = list(disks.types) or ([] if disks.kind is None else np.unique(disks.kind).tolist())
         kinds = f", and their types are {', '.join(map(str, types))}" if types else ""
-        holds = "its own column top" if says is None else f"the layer {text}"
-        extent = f"its disks go from y = {y.min():g} to {y.max():g}{kinds}"
-        raise UpperLayerError(f"{disks.source}: {holds} holds no disk: {extent}.")
+        source = disks.source
+        layer = f"{source}: its own column top" if says is None else f"{key}{text}: this layer of {source}"
+        raise UpperLayerError(f"{layer} holds no disk: its disks go from y = {y.min():g} to {y.max():g}{kinds}.")
     return chosen
 
 
