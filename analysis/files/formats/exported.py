@@ -7,6 +7,7 @@ the floor, and low parts of compensated packings are a fourth column.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -250,15 +251,13 @@ def choose_frames(run: RunFile, says: str) -> range:
 
     Raises BadInputError if the text is neither, or selects no frame.
     """
-    undamped = "trajectory" in run.names_of_series
-    total, parts = 1 + len(run.series("trajectory")["time"]) if undamped else len(run), says.split(":")
-    try:
-        numbers = [int(part) if part else None for part in parts] if says != "all" else [None, None]
-        found = range(total)[slice(*numbers)] if len(numbers) > 1 else None
-    except (TypeError, ValueError):
-        found = None
-    if found is None:
+    total = len(run)
+    if "trajectory" in run.names_of_series:
+        total = 1 + len(run.series("trajectory")["time"])
+    if says != "all" and not re.fullmatch(r"(-?\d+)?:(-?\d+)?(:(-?[1-9]\d*)?)?", says):
         raise BadInputError(f"--frames {says}: give all, START:STOP or START:STOP:STEP, counted from 0.")
+    numbers = [int(part) if part else None for part in says.replace("all", ":").split(":")]
+    found = range(total)[slice(*numbers)]
     if not found:
         raise BadInputError(f"--frames {says}: {run.path} has {total} frames, and none of them is meant.")
     return found

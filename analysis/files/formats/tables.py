@@ -70,11 +70,10 @@ def lines_of(path: Path) -> list[str]:
 
 def number_of(word: str, where: object) -> float:
     """A word as a finite number."""
-    known = word.strip().lower()
     try:
-        value = NUMBER_WORDS[known] if known in NUMBER_WORDS else float(known)
+        value = float(word)
     except ValueError:
-        value = math.nan
+        value = NUMBER_WORDS.get(word.strip().lower(), math.nan)
     if not math.isfinite(value):
         raise PackingFileError(f"{where}: {word.strip()!r} is no number.")
     return value
