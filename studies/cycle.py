@@ -33,8 +33,15 @@ from scipy.linalg import lu_factor, lu_solve
 from ..analysis import Configuration, Packing, RunFile
 from ..analysis.arrays import Complexes, Floats, derive_frozen
 from ..analysis.counted import counted
-from ..analysis.files.atomic_write import FORMAT_KEY, check_format, check_own, make_folder, write_json
-from ..analysis.files.plain_file import read_plain, read_plain_text
+from ..analysis.files.atomic_write import (
+    FORMAT_KEY,
+    check_format,
+    check_own,
+    make_folder,
+    read_plain,
+    read_plain_text,
+    write_json,
+)
 from ..analysis.has_configuration import HasConfiguration
 from ..analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, unit_rounding, zero_uncertainties
 from ..analysis.motion.linear import all_rates, linear_verdict
@@ -196,7 +203,7 @@ def draw_cycle_spectrum(
     """
     from matplotlib.figure import Figure
 
-    from ..figures.drive import draw_slips
+    from ..figures.series import draw_slips
 
     figure = Figure(figsize=(5.6, 6.2), layout="constrained")
     force, pairs, growth, lowest = panels = figure.subplots(4, 1, sharex=True, height_ratios=(1.3, 1, 1.3, 1))

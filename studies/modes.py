@@ -342,8 +342,7 @@ def _write_plane_film(loads: Sequence[Mapping[str, Any]], path: Path) -> None:
     """The plane of frequencies along a ramp as a film, a frame for each load."""
     from matplotlib.figure import Figure
 
-    from ..figures.film import Film
-    from ..figures.writers import write_film
+    from ..figures.film import Film, write_film
 
     figure = Figure((5, 4), layout="constrained")
     axes = figure.add_subplot()

@@ -21,8 +21,15 @@ from typing import Any
 import numpy as np
 
 from ..analysis.arrays import Floats
-from ..analysis.files.atomic_write import FORMAT, FORMAT_KEY, check_format, check_own, replace_whole, write_text
-from ..analysis.files.plain_file import read_plain
+from ..analysis.files.atomic_write import (
+    FORMAT,
+    FORMAT_KEY,
+    check_format,
+    check_own,
+    read_plain,
+    replace_whole,
+    write_text,
+)
 from ..pywrap import Scene, SceneError
 
 Row = dict[str, Any]

@@ -26,8 +26,15 @@ from typing import Any
 from mpi4py import MPI
 
 from ...analysis import FaultgougeError
-from ...analysis.files.atomic_write import FORMAT, FORMAT_KEY, check_format, lock_output, make_folder, write_json
-from ...analysis.files.plain_file import read_plain_text
+from ...analysis.files.atomic_write import (
+    FORMAT,
+    FORMAT_KEY,
+    check_format,
+    lock_output,
+    make_folder,
+    read_plain_text,
+    write_json,
+)
 from ...pywrap import SceneError
 from ..result_rows import Row, append_row, check_table, read_keyed_rows, write_tables
 from ..study import Progress, Say
