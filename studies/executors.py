@@ -14,7 +14,7 @@ from typing import Any
 from mpi4py import MPI
 from mpi4py.futures import MPICommExecutor
 
-from ..analysis.windows.ranks import cores
+from ..analysis.windows.slices import cores
 from ..parent_death import end_with
 
 Say = Callable[[str], None]
