@@ -232,6 +232,15 @@ def stress(packing: HasConfiguration, volume: float | None = None) -> Floats:
     References
     ----------
     J. Christoffersen, M. M. Mehrabadi and S. Nemat-Nasser, J. Appl. Mech. 48, 339 (1981).
+
+    Examples
+    --------
+
+    A layer has no ceiling, so that its area is given, here a floor of 2.8 times a height of 1.36:
+
+    >>> start = faultgouge.settle("three_disks.toml").packing
+    >>> print(faultgouge.stress(start, volume=2.8 * 1.36).diagonal().round(3))
+    [2.29  0.735 0.   ]
     """
     configuration = packing.configuration
     _require_laws(configuration, "The stress")
@@ -260,6 +269,20 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
     ------
     BadInputError
         If the box is not periodic, or a strain drives a motion without stiffness, so that there are no moduli.
+
+    Examples
+    --------
+
+    Spheres on a simple cubic lattice, without friction: C_1111 is the stiffness of a contact over the lattice constant.
+
+    >>> from faultgouge.analysis import Material, spheres_of_material
+    >>> place = 0.99 * np.array(list(np.ndindex(3, 3, 3)))
+    >>> material = Material(kn=1e3, friction=0.0, density=1.0)
+    >>> box, periodic = 2.97 * np.eye(3), (True, True, True)
+    >>> cubic = spheres_of_material(place, np.full(27, 0.5), material, box=box, periodic=periodic)
+    >>> found = faultgouge.elastic_moduli(cubic)
+    >>> print(f"{found.tensor[0, 0, 0, 0]:.6f}, {cubic.contacts.normal_stiffness[0] / 0.99:.6f}")
+    75.757576, 75.757576
     """
     configuration = packing.configuration
     _require_laws(configuration, "The moduli")

@@ -1,13 +1,12 @@
 """Windows of loads on which motion grows, solved for and not scanned, with dissipation and without: one search."""
 
-from .edges import DoubtError
 from .find_onset import complex_windows, find_onset, find_windows, takes_all_modes
 from .motions import Motions, System, eigenvalues_near, force_bearing, full_operator
 from .onset import Edge, NoGrowthError, Onset, OnsetError, Window
 from .slices import LIMITS, Limits, Ranks
 
 __all__ = [
-    "LIMITS", "DoubtError", "Edge", "Limits", "Motions", "NoGrowthError", "Onset", "OnsetError", "Ranks", "System",
+    "LIMITS", "Edge", "Limits", "Motions", "NoGrowthError", "Onset", "OnsetError", "Ranks", "System",
     "Window", "complex_windows", "eigenvalues_near", "find_onset", "find_windows", "force_bearing", "full_operator",
     "takes_all_modes",
 ]  # fmt: skip
