@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
-from typing import Any, Concatenate, ParamSpec, TypeVar, cast
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -211,7 +211,7 @@ def stability(
         return stability_of_packing(packing, rise, time, **known)
     from .pywrap.granular.growth_followed import follow_by
 
-    followed = follow_by(cast("Packing | Configuration", packing), None if follow is True else follow)
+    followed = follow_by(packing, None if follow is True else follow)
     return stability_of_packing(packing, rise, time, follow=followed, **known)
 
 
