@@ -38,7 +38,7 @@ class SignChange(NamedTuple):
     """Where a function of the load changes its sign: a root, or a jump.
 
     The error is twice the scatter over the slope of a root, and half of the bracket of a jump. Its loads are the five
-    that give the root, or the one that is the root to within rounding, or the two on either side of the jump.
+    that give the root, or the one that is the root, or the two on either side of the jump.
     """
 
     fx: float
@@ -53,13 +53,11 @@ def sign_change(value: Callable[[float], float], below: float, above: float) -> 
     A few steps bracket the root (Ridders, IEEE Trans. Circuits Syst. 26, 979 (1979)). Five points close to it then give
     its last digits, and their number: they are as close as the noise allows, since the function should be straight and
     yet stand out of its scatter. Where it does not cross zero along a smooth line at any distance, bisection locates
-    the jump. If rounding makes the signs at both loads equal, the function is zero within rounding at one of these.
-    That load is the root, uncertain by the function over its slope.
+    the jump. The root may be one of the two loads but for rounding, which may make the signs at both equal. The five
+    points are then on its one side.
     """
     ends, span = (value(below), value(above)), above - below
-    if ends[0] * ends[1] >= 0:
-        fx = below if abs(ends[0]) <= abs(ends[1]) else above
-        return SignChange(fx, min(map(abs, ends)) / (abs(ends[1] - ends[0]) / span), [fx], smooth=True)
+    last_place = float(np.spacing(max(abs(below), abs(above))))
     values = {below: ends[0], above: ends[1]}
 
     def look_at(fx: float) -> float:
@@ -67,8 +65,9 @@ def sign_change(value: Callable[[float], float], below: float, above: float) -> 
             values[fx] = value(fx)
         return values[fx]
 
+    crosses = ends[0] * ends[1] < 0
     a, b, last, root = below, above, np.inf, np.nan
-    while np.isnan(root) and abs(b - a) > 1e-8 * span:
+    while crosses and np.isnan(root) and abs(b - a) > 1e-8 * span:
         middle = 0.5 * (a + b)
         low, half, high = look_at(a), look_at(middle), look_at(b)
         shift = 0.0 if half == 0 else float(np.sign(low - high) * half / np.sqrt(half**2 - low * high))
@@ -81,30 +80,38 @@ def sign_change(value: Callable[[float], float], below: float, above: float) -> 
             a, b = next((p, q) for p, q in pairwise(places) if look_at(p) * look_at(q) <= 0)
     root = 0.5 * (a + b) if np.isnan(root) else root
 
-    room, last_place = min(root - below, above - root), float(np.spacing(max(abs(below), abs(above))))
-    smallest, largest = sorted(map(abs, ends))
-    if room < 1000 * last_place and smallest < 1e-6 * largest:  # the root is one of the two loads, but for rounding
-        fx = below if root - below < above - root else above
-        return SignChange(fx, room + smallest / (largest + smallest) * span, [fx], smooth=True)
+    room, offsets = min(root - below, above - root), np.arange(-2.0, 3.0)
+    smaller, larger = sorted(map(abs, ends))
+    if not crosses or (room < 1000 * last_place and smaller < 1e-6 * larger):
+        lower = abs(ends[0]) <= abs(ends[1])
+        root, room, offsets = below if lower else above, span, np.arange(5.0) * (1 if lower else -1)
     distance = max(min(1e-3 * room, 1e-6 * span), 4 * last_place)
     while distance < 0.1 * room:
-        loads = [float(fx) for fx in root + distance * np.arange(-2.0, 3.0)]
-        there = [look_at(fx) for fx in loads]
-        curve, residuals, *_ = np.polynomial.polynomial.polyfit(np.arange(-2, 3), there, 2, full=True)
+        loads = [float(fx) for fx in root + distance * offsets]
+        try:
+            there = [look_at(fx) for fx in loads]
+        except DoubtError:
+            if crosses:
+                raise
+            break  # one load alone is known, and is the root
+        curve, residuals, *_ = np.polynomial.polynomial.polyfit(offsets, there, 2, full=True)
         # two degrees of freedom beside the parabola tell the scatter; a step of height 1 has slope 0.3 and scatter 0.3
         scatter = float(np.sqrt(residuals[0].sum() / 2)) if residuals[0].size else 0.0
-        found, slope, step = root, float(curve[1]), loads[3] - loads[2]
+        found, slope, step = root, float(curve[1]), abs(loads[3] - loads[2])
         if scatter <= 0.1 * abs(slope):
             shift = -float(curve[0]) / slope  # and the parabola's root, to second order
             shift *= 1 - float(curve[2]) * shift / slope if abs(shift) <= 2 else 1
-            found = loads[2] + shift * step
+            found = root + shift * step
             if abs(found - root) <= distance:
-                return SignChange(found, 2 * scatter / abs(slope) * step + last_place, loads, smooth=True)
+                known = loads if offsets[0] else [root]
+                return SignChange(found, 2 * scatter / abs(slope) * step + last_place, known, smooth=True)
         if found != root and abs(found - root) < 0.5 * room:
             root = found  # the bracket was wider than the points
         else:
             distance *= 30.0
 
+    if not crosses:
+        return SignChange(root, smaller / ((larger + smaller) / span) + last_place, [root], smooth=True)
     width = max(1e-9 * span, 4 * last_place)  # paths differ by far more at a jump
     left, right = next((a, b) for a, b in pairwise(sorted(values)) if values[a] * values[b] <= 0)
     while right - left > width:
