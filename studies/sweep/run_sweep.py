@@ -72,6 +72,17 @@ def sweep(
     ------
     SceneError
         If the request is neither path nor mapping, or describes no sweep.
+
+    Examples
+    --------
+
+    >>> layer = {"disks": 3, "radii": [0.5], "top": 1, "width": 2.8}
+    >>> scene = {"packing": layer, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+    >>> scene |= {"ramp": {"step": 0.1, "until": 2.4}}
+    >>> request = {"task": "onset", "sweep": {"law.mu": [1.0, 0.8]}, "scene": scene}
+    >>> rows = faultgouge.sweep(request, "onsets", say=lambda line: None)
+    >>> [round(row["result"]["fx_c"], 6) for row in rows]
+    [1.935965, 1.672051]
     """
     if not isinstance(request, (str, Path, Mapping)):
         raise SceneError(
