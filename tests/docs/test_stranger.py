@@ -3,6 +3,7 @@ and the help of each command show, each in an empty folder."""
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -29,13 +30,14 @@ def installed(tmp_path_factory, environment):
     names = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     for name in filter(lambda name: os.path.lexists(ROOT / name), names):
         (clone / name).parent.mkdir(parents=True, exist_ok=True)
-        (clone / name).hardlink_to(ROOT / name)
+        shutil.copy2(ROOT / name, clone / name, follow_symlinks=False)
     subprocess.run([sys.executable, "-m", "venv", fresh], check=True)
     printed = []
     for what in (".", ".[movie,export]"):
         command = [fresh / "bin" / "pip", "install", "--verbose", what]
-        done = subprocess.run(command, cwd=clone, env=environment, capture_output=True, text=True, timeout=1800)
-        assert done.returncode == 0, done.stdout[-3000:] + done.stderr
+        into = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+        done = subprocess.run(command, cwd=clone, env=environment, timeout=1800, **into)
+        assert done.returncode == 0, done.stdout[-3000:]
         printed.append(done.stdout)
     return fresh, printed
 
