@@ -350,7 +350,7 @@ def _page(result: Result) -> Result:
     row=_row,
     counts="runs",
     kept="the runs that were over",
-    example="mpiexec -n 3 faultgouge eruptions eruptions.toml -o eruptions",
+    example="faultgouge examples eruptions && mpiexec -n 3 faultgouge eruptions eruptions.toml -o eruptions",
 )
 def eruptions(scene: Scene, work: Work) -> Result:
     """Measure the size of eruptions: undamped runs from rest at each load of [eruptions], and how the growth ends.

@@ -435,7 +435,7 @@ def _in_words(lines: Sequence[Row], packings: Sequence[Row], output: Path) -> li
     gather=_gather,
     writes={"modes.json": "", "modes.csv": ",".join(COLUMNS)},
     of_run=cycle,
-    example="faultgouge modes modes.toml -o modes",
+    example="faultgouge examples modes && faultgouge modes modes.toml -o modes",
 )
 def modes(scene: Scene, start: Start) -> Row:
     """Compute the complex modes along the ramp: their number, growth rates, and the loss that would stop them.

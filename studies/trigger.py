@@ -353,7 +353,7 @@ def _check(scene: Scene) -> None:
     page=_page,
     row=_row,
     counts="bisections",
-    example="mpiexec -n 3 faultgouge trigger trigger.toml -o trigger",
+    example="faultgouge examples trigger && echo 'runs = 1' >> trigger.toml && faultgouge trigger trigger.toml",
 )
 def trigger(scene: Scene, work: Work) -> Result:
     """Compute the critical amplitude of a wave over its frequency and the distance of the layer from the onset.

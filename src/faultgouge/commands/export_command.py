@@ -11,6 +11,7 @@ from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from .pictures import modes_of
 from .terminal import (
+    RAMPED,
     Frame,
     PackingFile,
     lock_output,
@@ -22,7 +23,7 @@ from .terminal import (
 app = typer.Typer()
 
 
-@app.command(epilog="Example: faultgouge export run.h5 --mode pair -o packing.vtp")
+@app.command(epilog=f"Example: {RAMPED} && faultgouge export run.h5 --mode pair")
 def export(
     context: typer.Context,
     file: PackingFile,

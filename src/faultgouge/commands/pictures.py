@@ -12,6 +12,7 @@ import typer
 from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from .terminal import (
+    RAMPED,
     Frame,
     PackingFile,
     Time,
@@ -62,7 +63,7 @@ WhichColour = Annotated[
 ]
 
 
-@app.command(epilog="Example: faultgouge draw run.h5 --mode pair -o mode.svg")
+@app.command(epilog=f"Example: {RAMPED} && faultgouge draw run.h5 --mode pair")
 def draw(
     context: typer.Context,
     file: PackingFile,
@@ -128,7 +129,7 @@ def draw(
     print_line(f"written to {output}")
 
 
-@app.command(epilog="Example: faultgouge movie perturb.h5 -o eruption.gif")
+@app.command(epilog=f"Example: {RAMPED} && faultgouge movie run.h5 -o ramp.gif")
 def movie(
     context: typer.Context,
     file: PackingFile,
@@ -195,7 +196,7 @@ def movie(
     print_line(f"{counted(count, 'frame')} of {width} x {height} dots; written to {output}")
 
 
-@app.command(epilog="Example: faultgouge view run.h5 -o page.html")
+@app.command(epilog=f"Example: {RAMPED} && faultgouge view run.h5 -o page.html")
 def view(
     context: typer.Context,
     file: Annotated[

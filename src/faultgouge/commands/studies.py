@@ -83,7 +83,7 @@ def find_command(name: str) -> CommandInfo | None:
     return own.registered_commands[0]
 
 
-@command(app, "faultgouge explain scene.toml", reads="explain", task="settle")
+@command(app, "faultgouge examples scene && faultgouge explain scene.toml", reads="explain", task="settle")
 def explain(scene: SceneFile) -> Answer:
     """Explain what a scene includes, what it leaves out, and why.
 
