@@ -39,7 +39,7 @@ from threadpoolctl import threadpool_limits
 
 from ... import registered
 from ...analysis import FaultgougeError, NoEquilibriumError, Packing
-from ...analysis.windows.ranks import cores
+from ...analysis.windows.slices import cores
 from ...parent_death import end_with
 from ...pywrap import Equilibrium, Scene, SceneError, settle
 from ...pywrap.settling.settle import settle_bed
