@@ -260,8 +260,8 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     --------
 
     >>> start = faultgouge.settle("three_disks.toml").packing
-    >>> faultgouge.spectrum(start)
-    <Spectrum: no motion grows; 9 eigenvalues of K from 383.589 to 24057.3, 0 rattlers>
+    >>> len(faultgouge.spectrum(start).pairs)
+    0
     >>> faultgouge.spectrum(start).eigenvalues[:3].real.round(3)
     array([ 383.589, 1188.882, 1484.786])
     """
