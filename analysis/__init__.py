@@ -3,8 +3,7 @@
 Functions take a :class:`Packing`, the disks of this package's law, or a :class:`Configuration`, the particles of any
 code with their contacts to first order. The physics is in the docstrings of the modules:
 
-- `particles`, `contacts`, `assembly` and `configuration`: particles with contacts to first order, and their stability
-  operator;
+- `contacts`, `assembly` and `configuration`: particles with contacts to first order, and their stability operator;
 - `packing`: the contact law, geometry and forces of disks;
 - `operators`: stiffness and damping matrix, sliders at Coulomb's bound;
 - `factors`: factors of sparse and banded matrices;

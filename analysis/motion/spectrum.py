@@ -255,6 +255,15 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     ------
     SpectrumError
         If the slices of a large packing are incomplete.
+
+    Examples
+    --------
+
+    >>> start = faultgouge.settle("three_disks.toml").packing
+    >>> faultgouge.spectrum(start)
+    <Spectrum: no motion grows; 9 eigenvalues of K from 383.589 to 24057.3, 0 rattlers>
+    >>> faultgouge.spectrum(start).eigenvalues[:3].real.round(3)
+    array([ 383.589, 1188.882, 1484.786])
     """
     with np.errstate(over="ignore", invalid="ignore"):
         matrix, active = dynamical_matrix(packing, form)

@@ -1,4 +1,4 @@
-r"""Eigenvalues and vectors of small motion at one load: all of them, or the few nearest to a point.
+r"""Small motion at one load: the matrices A and G, their eigenvalues and vectors, all or the few nearest to a point.
 
 Without dissipation these are the eigenvalues :math:`\lambda` of A with right vectors x and left vectors y. With
 dashpots and drag small motion :math:`\propto e^{st}` has :math:`(s^2 + s G + A) x = 0` and
@@ -15,25 +15,117 @@ and G by dA and dG moves an eigenvalue by
           \mathrm ds = - \frac{y^H (\mathrm dA + s\, \mathrm dG)\, x}{y^H (2 s + G)\, x} .
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, eig, eigvals, lu_factor, lu_solve
-from scipy.sparse import csc_array, csr_array, eye_array
+from scipy.sparse import csc_array, csr_array, eye_array, issparse
 
-from ..arrays import Complexes, Floats
+from ..arrays import Complexes, Floats, Indices
 from ..factors.sparse_lu import SingularMatrixError, general_lu
-from ..motion.eigenvalues import SAFETY
-from .system import System
+from ..has_configuration import HasConfiguration
+from ..motion.eigenvalues import SAFETY, mass_weighted, unit_rounding
+from ..operators.damping import damping_matrix
+from ..operators.stiffness import stiffness_matrix
 
 DENSE = 200
 """Rows of A or Z up to which LAPACK's eigenvalues, all of them, take no longer than the few next to a point."""
 
 DENSE_FACTORS = 600
 """Coordinates up to which dense factors of A - sigma take less time than sparse ones."""
+
+AnyConfiguration = TypeVar("AnyConfiguration", bound=HasConfiguration)
+
+
+def force_bearing(packing: AnyConfiguration) -> AnyConfiguration:
+    """The packing without the contacts whose force is no more than the packing's own imbalance.
+
+    A disk that only such contacts hold comes to rest just about touching. Its overlap is rounding noise, and with the
+    overlap its stiffness, of order (residual / k_n)^(1/3): it differs from one equilibrium to the next, and would open
+    and shut windows at random. Ten times the imbalance, as a disk may rest between two contacts without force whose
+    forces cancel in part; and no more than 1e-6 of the largest force, so that a packing out of balance keeps contacts.
+    """
+    largest = packing.normal_force.max(initial=0.0)
+    return cast(AnyConfiguration, packing.loaded(min(10 * packing.residual, 1e-6 * largest)))
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Small motion at one load, on n coordinates that do not depend on the load.
+
+    Attributes
+    ----------
+    fx : float
+        The load, force per top disk.
+    stiffness : scipy.sparse.csr_array or ndarray, shape (n, n)
+        A = M^(-1/2) K M^(-1/2), 1 / time^2, with its zero rows.
+    damping : scipy.sparse.csr_array, ndarray or None, shape (n, n)
+        G, 1 / time; None without dissipation.
+    balance : float
+        Error of fx that goes with the packing's residual, force.
+    states : bytes
+        What A is smooth with: where it changes, A bends.
+    """
+
+    fx: float
+    stiffness: Any = field(repr=False)
+    damping: Any = field(default=None, repr=False)
+    balance: float = field(default=0.0, kw_only=True)
+    states: bytes = field(default=b"", repr=False, kw_only=True)
+
+    @classmethod
+    def of(cls, packing: HasConfiguration, dissipation: bool = False) -> "System":
+        """The system of a packing, without the contacts whose force is unknown."""
+        bearing = force_bearing(packing)
+        stiffness = mass_weighted(stiffness_matrix(bearing), bearing)
+        damping = mass_weighted(damping_matrix(bearing), bearing) if dissipation else None
+        return cls(packing.fx, stiffness, damping, balance=packing.load_error, states=bearing.contact_states)
+
+    @cached_property
+    def active(self) -> Indices:
+        """Coordinates that feel a force: the rows of A that are not zero."""
+        rows = np.diff(self.stiffness.indptr) if issparse(self.stiffness) else self.stiffness.any(axis=1)
+        return np.flatnonzero(rows)
+
+    @cached_property
+    def frequency(self) -> float:
+        """The root of the largest diagonal element of A, radian / time."""
+        return float(np.sqrt(np.abs(self.stiffness.diagonal()).max(initial=0.0))) or 1.0
+
+    @property
+    def inner(self) -> list[Any]:
+        """A and, with dissipation, G on the active coordinates."""
+        given = [self.stiffness] if self.damping is None else [self.stiffness, self.damping]
+        return [each[self.active][:, self.active] for each in given]
+
+    @property
+    def first_order(self) -> Floats:
+        """A or, with dissipation, Z of displacements and velocities, dense, on the active coordinates."""
+        a, *g = (each.toarray() if issparse(each) else each for each in self.inner)
+        if not g:
+            return np.asarray(a)
+        size, unit = len(a), self.frequency
+        z = np.zeros((2 * size, 2 * size))
+        z[:size, size:] = unit * np.eye(size)
+        z[size:, :size], z[size:, size:] = -a / unit, -g[0]
+        return z
+
+    @cached_property
+    def rounding(self) -> float:
+        """u |A|_F, or u |Z|_F: the uncertainty of a perfectly conditioned eigenvalue."""
+        a, *g = (each.data if issparse(each) else np.ravel(each) for each in self.inner)
+        if not g:
+            return unit_rounding(a)
+        return unit_rounding(np.concatenate([a / self.frequency, g[0], np.full(len(self.active), self.frequency)]))
+
+
+def full_operator(packing: HasConfiguration) -> csr_array:
+    """A = M^(-1/2) K M^(-1/2) of the contacts that bear a force, of all coordinates, with its zero rows; 1 / time^2."""
+    return System.of(packing).stiffness
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,37 +156,25 @@ class Motions:
     grows: NDArray[np.bool_]
     whole: bool = True
 
-    @property
-    def fx(self) -> float:
-        """The load, force per top disk."""
-        return self.system.fx
-
     @classmethod
     def of(cls, system: System) -> "Motions":
         """All motions, by LAPACK, but for coordinates that feel no force."""
-        z = system.first_order
-        values, left, right = eig(z, left=True, check_finite=False)
+        values, left, right = eig(system.first_order, left=True, check_finite=False)
         overlap = np.abs(np.sum(left.conj() * right, axis=0))
-        if system.damping is not None:
-            half = len(z) // 2
-            right, left = right[:half], left[half:]
-        return cls._kept(system, values, right, left, overlap)
+        size = len(system.active)
+        return cls._kept(system, values, right[:size], left[-size:], overlap)
 
     @classmethod
-    def none(cls, system: System) -> "Motions":
-        """No motion at all."""
-        nothing = np.zeros((system.stiffness.shape[0], 0))
-        return cls(system, np.zeros(0, complex), nothing, nothing, np.zeros(0), np.zeros(0, bool), False)
-
-    @classmethod
-    def near(cls, system: System, points: Sequence[complex], counts: Sequence[int]) -> "Motions":
+    def near(cls, system: System, points: Sequence[tuple[complex, int]]) -> "Motions":
         """The motions nearest to some points, so many about each; LinAlgError if they do not converge.
 
         Right and left vectors come from two Krylov spaces. The left ones are turned to be dual to the right ones, which
         also tells which belongs to which where two motions nearly coalesce.
         """
-        size, found = len(system.active), []
-        for point, count in zip(points, counts, strict=True):
+        size = len(system.active)
+        none = np.zeros((size if system.damping is None else 2 * size, 0))
+        found: list[tuple[Any, Any, Any]] = [(np.zeros(0, complex), none, none)]
+        for point, count in points:
             inverse = Inverse(system, point)
             values, right = inverse.eigenpairs(count)
             others, left = inverse.eigenpairs(count, adjoint=True)
@@ -103,15 +183,14 @@ class Motions:
             if common[0].sum() != common[1].sum():
                 raise LinAlgError("right and left vectors differ in number")
             values, right, left = values[common[0]], right[:, common[0]], left[:, common[1]]
-            left = left @ np.linalg.inv(left.conj().T @ right).conj().T
-            found.append((values, right, left))
+            found.append((values, right, left @ np.linalg.inv(left.conj().T @ right).conj().T))
         values, right, left = (np.concatenate(each, axis=-1) for each in zip(*found, strict=True))
         if system.damping is not None:
             right[:size] *= system.frequency  # to the vectors of Z, of displacements and velocities in one unit
             left[:size] /= system.frequency
         overlap = np.abs(np.sum(left.conj() * right, axis=0))
         overlap /= np.linalg.norm(left, axis=0) * np.linalg.norm(right, axis=0)
-        _, once = np.unique(np.round(values / np.abs(values).max(), 9), return_index=True)
+        _, once = np.unique(np.round(values / np.abs(values).max(initial=1e-300), 9), return_index=True)
         right, left = right[:size, once], left[-size:, once]
         return replace(cls._kept(system, values[once], right, left, overlap[once]), whole=False)
 
@@ -188,14 +267,14 @@ def eigenvalues_near(system: System, point: complex, count: int = 8) -> Complexe
 
 def overlap_near(system: System, value: complex) -> float:
     """|y^H x| of the motion next to a value, with dissipation |y^H (2 s + G) x| / |2 s|, by inverse iteration."""
-    inverse, size, shapes = Inverse(system, value), len(system.active), []
+    inverse, vectors = Inverse(system, value), []
     for adjoint in (False, True):
-        shape = np.random.default_rng(0).standard_normal(size)
+        vector = np.random.default_rng(0).standard_normal(len(system.active))
         for _ in range(4):
-            shape = inverse.solve(shape, adjoint)
-            shape = shape / np.linalg.norm(shape)
-        shapes.append(shape)
-    x, y = shapes
+            vector = inverse.solve(vector, adjoint)
+            vector = vector / np.linalg.norm(vector)
+        vectors.append(vector)
+    x, y = vectors
     if system.damping is None:
         return float(abs(np.vdot(y, x)))
     return float(abs(np.vdot(y, 2 * inverse.shift * x + inverse.damping @ x)) / abs(2 * inverse.shift))
@@ -205,55 +284,57 @@ class Inverse:
     """(A - sigma)^(-1) or (Z - sigma)^(-1) next to a point, from factors of A - sigma or sigma^2 + sigma G + A.
 
     Here Z is that of displacements x and velocities s x, in the scene's own units.
+
+    Attributes
+    ----------
+    shift : complex
+        sigma.
+    damping : scipy.sparse.csr_array or None
+        G on the active coordinates.
+    solve : callable
+        A vector, and whether the adjoint is wanted -> (A - sigma)^(-1) or (sigma^2 + sigma G + A)^(-1) times it.
     """
 
     def __init__(self, system: System, point: complex) -> None:
-        self.system, parts = system, 1 if system.damping is None else 2
-        unit = system.frequency ** (2 / parts)
+        unit = system.frequency**2 if system.damping is None else system.frequency
         self.shift = shift = point * (1 + 1e-9) + 1e-9 * unit  # no eigenvalue to the last digit
-        active = system.active
-        a = csr_array(system.stiffness)[active][:, active]
-        size = a.shape[0]
-        self.size = parts * size
-        if system.damping is None:
-            matrix = a - shift * eye_array(size)
-        else:
-            self.damping = csr_array(system.damping)[active][:, active]
-            matrix = a + shift * self.damping + shift**2 * eye_array(size)
-        if size <= DENSE_FACTORS:
+        self.size, one = len(system.active), eye_array(len(system.active))
+        a, self.damping = (*map(csr_array, system.inner), None)[:2]
+        matrix = a - shift * one if self.damping is None else a + shift * self.damping + shift**2 * one
+        self.solve: Callable[..., Any]
+        if self.size <= DENSE_FACTORS:
             dense = lu_factor(matrix.toarray(), overwrite_a=True, check_finite=False)
-            self._solve = lambda b, adjoint: lu_solve(dense, b, trans=2 * adjoint, check_finite=False)
-        else:
-            try:
-                sparse = general_lu(csc_array(matrix))
-            except SingularMatrixError:
-                sparse = general_lu(csc_array(matrix + 1e-15 * abs(matrix).max() * eye_array(size)))
-            self._solve = lambda b, adjoint: sparse.solve(np.asarray(b, matrix.dtype), trans="H" if adjoint else "N")
-
-    def solve(self, vector: Any, adjoint: bool = False) -> Any:
-        """(A - sigma)^(-1) or (sigma^2 + sigma G + A)^(-1), or its adjoint, times a vector."""
-        return self._solve(vector, adjoint)
-
-    def _first_order(self, state: Any, adjoint: bool) -> Any:
-        (first, second), shift = np.split(state, 2), self.shift
-        if adjoint:
-            lower = -self.solve(first + np.conj(shift) * second, True)
-            return np.concatenate([second + self.damping.T @ lower + np.conj(shift) * lower, lower])
-        upper = -self.solve(second + self.damping @ first + shift * first)
-        return np.concatenate([upper, first + shift * upper])
+            self.solve = lambda b, adjoint=False: lu_solve(dense, b, trans=2 * adjoint, check_finite=False)
+            return
+        try:
+            sparse = general_lu(csc_array(matrix))
+        except SingularMatrixError:
+            sparse = general_lu(csc_array(matrix + 1e-15 * abs(matrix).max() * one))
+        self.solve = lambda b, adjoint=False: sparse.solve(np.asarray(b, matrix.dtype), trans="H" if adjoint else "N")
 
     def eigenpairs(self, count: int, adjoint: bool = False) -> tuple[Complexes, Any]:
         """The nearest eigenvalues with right vectors, or those of the adjoint (ARPACK); LinAlgError if they do not
         converge."""
         from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
-        kind = float if self.system.damping is None else complex
-        apply = self.solve if self.system.damping is None else self._first_order
-        operator = LinearOperator((self.size,) * 2, matvec=lambda state: apply(state.ravel(), adjoint), dtype=kind)
-        start = np.random.default_rng(0).standard_normal(self.size).astype(kind)
+        solve, damping, shift = self.solve, self.damping, self.shift
+
+        def apply(state: Any) -> Any:
+            if damping is None:
+                return solve(state, adjoint)
+            first, second = np.split(state, 2)
+            if adjoint:
+                lower = -solve(first + np.conj(shift) * second, True)
+                return np.concatenate([second + damping.T @ lower + np.conj(shift) * lower, lower])
+            upper = -solve(second + damping @ first + shift * first)
+            return np.concatenate([upper, first + shift * upper])
+
+        size, kind = (self.size, float) if damping is None else (2 * self.size, complex)
+        operator = LinearOperator((size, size), matvec=lambda state: apply(state.ravel()), dtype=kind)
+        start = np.random.default_rng(0).standard_normal(size).astype(kind)
         try:
-            inverse, vectors = eigs(operator, k=min(count, self.size - 2), v0=start)
+            inverse, vectors = eigs(operator, k=min(count, size - 2), v0=start)
         except ArpackError as error:
             raise LinAlgError("the eigenvalues next to a point do not converge") from error
-        shift = np.conj(self.shift) if adjoint else self.shift
+        shift = np.conj(shift) if adjoint else shift
         return np.asarray(shift + 1 / inverse, complex), vectors
