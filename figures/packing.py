@@ -124,7 +124,7 @@ def in_words(packing: HasConfiguration) -> str:
             f"{counted(len(packing.contacts), 'contact')} "
             f"({sliding} {'slides' if sliding == 1 else 'slide'}), {counted(len(packing.rattlers), 'rattler')}"
         )
-    c = packing.configuration.contacts
+    c = packing.configuration.contacts.touching
     slide = ", which slide" if c.sliding.any() else ", which stick" if c.at_bound.any() else ""
     noun = "disk" if packing.dimension == 2 else "sphere"
     return (

@@ -98,11 +98,13 @@ def stability(
     sliding = linear_verdict(Motion.of(configuration, sliding=True), decides=False) if one_sided else sticking
     contacts, given = configuration.contacts, configuration.stiffness is not None
     # where K is given, contacts, as far as they are known, have no derivatives
-    count = max(len(contacts), len(configuration) - len(configuration.rattlers)) if given else len(contacts)
+    touching = contacts.touching
+    count = max(len(touching), len(configuration) - len(configuration.rattlers)) if given else len(touching)
     doubts = (*reasons, *no_verdict(configuration))
     found = Stability(
         stable=None if doubts or not count else sticking.stable, growth_rate=sticking.growth_rate,
-        error=sticking.error, at_least=sticking.at_least, undamped=undamped, at_bound=int(contacts.at_bound.sum()),
+        error=sticking.error, at_least=sticking.at_least, undamped=undamped, at_bound=int(touching.at_bound.sum()),
+        rolling_at_bound=int(contacts.at_bound.sum() - touching.at_bound.sum()),
         sticking=sticking, sliding=sliding, asymmetry={} if given else asymmetry(configuration),
         dissipative=configuration.damped, free=sticking.free, contacts=count,
         reasons=doubts or sticking.reasons, remarks=configuration.remarks,

@@ -57,6 +57,8 @@ class Stability:
         Without dissipation.
     at_bound : int
         Contacts at Coulomb's bound.
+    rolling_at_bound : int
+        Contacts whose rolling friction is at its bound.
     sticking, sliding : Linear
         If all contacts at the bound stuck, and if all slid on; no bounds of what they do.
     asymmetry : dict
@@ -109,6 +111,7 @@ class Stability:
     contacts: int
     one_sided: OneSidedOutcome | None = None
     creep: Creep | None = None
+    rolling_at_bound: int = 0
     largest_energy: float | None = None
     largest_push: float | None = None
     push_time: float | None = None
@@ -191,13 +194,16 @@ class Stability:
 
     @property
     def _at_the_bound(self) -> Iterator[str]:
-        if self.at_bound == 0:
+        count, rolls = self.at_bound + self.rolling_at_bound, self.rolling_at_bound
+        if count == 0:
             return
+        rolling = f", and the rolling friction of {rolls} at its own" if rolls else ""
+        how = ": each slides on ahead and sticks on the way back"
         sided = self.one_sided is not None or self.sliding != self.sticking
-        slide = "slides" if self.at_bound == 1 else "slide"
+        slide = "slides" if count == 1 else "slide"
         yield (
             f"{self.at_bound} of {counted(self.contacts, 'contact')} {'is' if self.at_bound == 1 else 'are'} at "
-            f"Coulomb's bound{': each slides on ahead and sticks on the way back' if sided else f' and {slide}'}"
+            f"Coulomb's bound{rolling}{how if sided else f' and {slide}'}"
         )
         if sided:
             on = max(self.sliding.free - self.sticking.free, 0)

@@ -86,6 +86,10 @@ class MeasuredLaw:
         Coulomb's coefficient.
     lever : float
         l': 0, or 1/2 of an arm that ends in the middle of the overlap.
+    rolling, rolling_dashpot : PowerOfOverlap
+        Stiffness and dashpot of rolling friction: a force, at the arm R, by R times the relative rotation.
+    mu_rolling : float
+        Its bound over the normal force; 0 without rolling friction.
     """
 
     stiffness: PowerOfOverlap
@@ -96,6 +100,9 @@ class MeasuredLaw:
     parting: float
     mu: float
     lever: float
+    rolling: PowerOfOverlap
+    rolling_dashpot: PowerOfOverlap
+    mu_rolling: float
 
 
 class TwoParticleLammps:
@@ -152,21 +159,30 @@ class TwoParticleLammps:
         other = self.place if self.wall else x[1, self.axis]
         return state._replace(overlap=sum(state.radii) - abs(x[0, self.axis] - other))
 
-    def move(self, closing: float = 0.0, slipping: float = 0.0) -> None:
-        """Give the first particle a velocity towards the other one, and a rotation, as the speed of its surface."""
+    def move(self, closing: float = 0.0, slipping: float = 0.0, rolling: float = 0.0, across: float = 0.0) -> None:
+        """Give the first particle a velocity towards the other one, a rotation, as the speed of its surface, one
+        without slip, as the effective radius times its rate, or a velocity across."""
         self.array("v")[:] = self.array("omega")[:] = 0.0
+        radius, rolls = self.array("radius")[0], rolling / self.reduced_radius
         self.array("v")[0, self.axis] = -self.sign * closing
-        self.array("omega")[0, self.about] = slipping / self.array("radius")[0]
+        self.array("v")[0, self.across] = self.sign * (across + radius * rolls)
+        self.array("omega")[0, self.about] = slipping / radius + rolls
 
     def rest(self) -> None:
         """Stop the particles, and compute their forces at rest."""
         self.move()
         self.run("run 0 post no")
 
-    def force(self) -> tuple[float, float]:
-        """f_n on the first particle, and the size of f_t."""
-        f = self.array("f")[0]
-        return float(self.sign * f[self.axis]), float(abs(f[self.across]))
+    @property
+    def reduced_radius(self) -> float:
+        """R_i R_j/(R_i + R_j), or R_i at a wall."""
+        r = self.array("radius")
+        return float(r[0] if self.wall else r[0] * r[1] / (r[0] + r[1]))
+
+    def force(self) -> tuple[float, float, float]:
+        """f_n on the first particle, and the sizes of f_t and, of rolling without slip, of the torque over R."""
+        f, torque = self.array("f")[0], self.array("torque")[0, self.about]
+        return float(self.sign * f[self.axis]), float(abs(f[self.across])), float(abs(torque) / self.reduced_radius)
 
 
 def _place_of_planes(words: list[str]) -> int:
@@ -204,7 +220,7 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
         ) from error
     with closing(bench.lammps):
         states, found = zip(*(_measure(bench, each) for each in wanted), strict=True)
-    names = ("stiffness", "tangential", "normal_dashpot", "tangential_dashpot")
+    names = ("stiffness", "tangential", "normal_dashpot", "tangential_dashpot", "rolling", "rolling_dashpot")
     here = found[0]
     return MeasuredLaw(
         **{
@@ -215,6 +231,7 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
         parting=quarter(here["parting"], f"tangential force of the {who}"),
         mu=here["mu"],
         lever=quarter(here["lever"], f"lever arm of the {who}"),
+        mu_rolling=here["mu_rolling"],
     )
 
 
@@ -262,14 +279,17 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
     step = 1e3 * np.sqrt(state.mass * delta / fn)
     bench.run(f"timestep {step:.17g}")
     normal_dashpot = _dashpot(bench, "closing", fn, 0.1 * delta / step)
+    rolling = _rolling(bench, wanted, fn, delta, step)
     bench.place_at(wanted)
     bench.move(slipping=1e60 * delta / step)  # far beyond Coulomb's bound, of the softest spring, too
     bench.run("run 1 post no")
     mu = bench.force()[1] / fn  # while the contact slides: dashpots bear a part of the force
     if mu == 0:
         none = dict.fromkeys(("tangential", "tangential_dashpot", "closing", "parting", "mu", "lever"), 0.0)
-        return state, {"stiffness": fn / delta, "normal_dashpot": normal_dashpot} | none
+        return state, {"stiffness": fn / delta, "normal_dashpot": normal_dashpot} | none | rolling
     ft, slip = _force_of_slip(bench, wanted, mu * fn, 1e-8 * min(mu, 1.0) * delta, step)
+    if rolling["mu_rolling"]:  # a slip without rotation, which turns the particle by friction alone
+        _push_contact(bench, wanted, across=slip / step)
     arm = abs(bench.array("torque")[0, bench.about] / bench.array("f")[0, bench.across])
     lever = float(state.radii[0] - arm) / delta
     parting, closing = _exponents(bench, ft, delta, step)
@@ -278,7 +298,33 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
     return state, {
         "stiffness": fn / delta, "tangential": ft / slip, "normal_dashpot": normal_dashpot,
         "tangential_dashpot": tangential_dashpot, "closing": closing, "parting": parting, "mu": mu, "lever": lever,
-    }  # fmt: skip
+    } | rolling  # fmt: skip
+
+
+def _rolling(bench: TwoParticleLammps, wanted: State, fn: float, delta: float, step: float) -> dict[str, float]:
+    """Stiffness, dashpot and bound of rolling friction, from rolling without slip for one step; zeros without any."""
+
+    def roll(way: float, *, rests: bool = True) -> float:
+        bench.place_at(wanted)
+        bench.move(rolling=way / step)
+        bench.run("run 1 post no")
+        if rests:
+            bench.rest()
+        return bench.force()[2]
+
+    way = 1e-8 * delta
+    force = roll(way)
+    if force <= 1e-14 * fn:
+        return dict.fromkeys(("rolling", "rolling_dashpot", "mu_rolling"), 0.0)
+    bound = roll(1e3 * way * fn / force, rests=False)  # while it rolls on: the dashpot bears a part of the force
+    for _ in range(SLIP_TRIALS):
+        if force <= 0.1 * bound:
+            break
+        way *= 0.01 * bound / force
+        force = roll(way)
+    bench.place_at(wanted)
+    dashpot = _dashpot(bench, "rolling", bound, 0.01 * bound * way / (force * step))
+    return {"rolling": force / way, "rolling_dashpot": dashpot, "mu_rolling": bound / fn}
 
 
 def _force_of_slip(
@@ -286,12 +332,12 @@ def _force_of_slip(
 ) -> tuple[float, float]:
     """A tangential force far below Coulomb's bound, and its slip: LAMMPS's classic models forget most of a slip that
     was cut at the bound."""
-    ft = _push_contact(bench, wanted, slip / step)
+    ft = _push_contact(bench, wanted, slipping=slip / step)
     for _ in range(SLIP_TRIALS):
         if ft <= 0.1 * bound:
             break
         slip *= 0.01 * bound / ft  # a stiff spring: once more, with less
-        ft = _push_contact(bench, wanted, slip / step)
+        ft = _push_contact(bench, wanted, slipping=slip / step)
     if not 0 < ft <= 0.1 * bound:
         raise NotTakenError("A contact law has friction without a tangential stiffness: use one with a history.")
     return ft, slip
@@ -312,18 +358,20 @@ def _exponents(bench: TwoParticleLammps, ft: float, delta: float, step: float) -
     return float(parting), float(closing)
 
 
-def _push_contact(bench: TwoParticleLammps, state: State, speed: float) -> float:
-    """Tangential force at rest of a fresh contact that has slipped at a speed for one step."""
+def _push_contact(bench: TwoParticleLammps, state: State, **speed: float) -> float:
+    """Tangential force at rest of a fresh contact that has moved at a speed for one step."""
     bench.place_at(state)
-    bench.move(slipping=speed)
+    bench.move(**speed)
     bench.run("run 1 post no")
     bench.rest()
     return bench.force()[1]
 
 
-def _dashpot(bench: TwoParticleLammps, direction: Literal["closing", "slipping"], scale: float, speed: float) -> float:
+def _dashpot(
+    bench: TwoParticleLammps, direction: Literal["closing", "slipping", "rolling"], scale: float, speed: float
+) -> float:
     """Force per velocity of a contact without slip: first at some speed, then where the force is a tenth of scale."""
-    component = 0 if direction == "closing" else 1
+    component = ("closing", "slipping", "rolling").index(direction)
     bench.rest()
     rest, found, force = bench.force()[component], 0.0, 0.0
     for _ in range(6):  # a speed whose force is lost in rounding, or is cut at the bound, comes nearer

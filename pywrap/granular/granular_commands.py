@@ -41,7 +41,7 @@ GIVE_LINES = (
 GIVE_LINE = "give the line that the deck has among commands"
 
 COHESIVE = ("jkr", "dmt", "mdr")
-UNSUPPORTED_SUBMODELS = {"twisting": "twisting friction", "rolling": "rolling friction", "heat": "heat conduction"}
+UNSUPPORTED_SUBMODELS = {"twisting": "twisting friction", "heat": "heat conduction"}
 TANGENTIAL = (
     "linear_history", "linear_history_classic", "mindlin", "mindlin_classic", "mindlin/force", "mindlin_rescale",
     "mindlin_rescale/force",
@@ -84,6 +84,12 @@ class Commands:
     def style(self) -> str:
         """The pair style, without the suffix of an accelerator."""
         return without_suffix(self.pair[0].split()[1])
+
+
+def rolls(line: str) -> bool:
+    """Whether the contacts of a line have rolling friction, which only the style `granular` has."""
+    words = line.split()
+    return "rolling" in words and words[words.index("rolling") + 1 :][:1] != ["none"]
 
 
 def without_suffix(style: str) -> str:

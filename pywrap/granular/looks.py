@@ -24,6 +24,7 @@ from .granular_commands import (
     check_pair,
     check_rest,
     read_commands,
+    rolls,
     without_suffix,
 )
 from .instance_queries import OpenFile, Styles, communicator, log_of, only_log, said, styles_of
@@ -80,19 +81,24 @@ def look(
     silent = _silent_walls(styles, given) if not columns else []
     walls = [name for name in plain if plain[name] in WALLS and name not in silent and not columns]
     usual = "dx dy dz force p3" if given.style == OWN else "dx dy dz force p1 p2 p3"
+    if any(map(rolls, given.pair)):
+        usual += " p5 p6 p7"
     with nullcontext() if copied else given_back(lmp):
         mine = arrays_at_rest(lmp, groups, walls, columns or usual)
     if columns:
         mine["at walls"] = _forces_of_walls(lmp, styles, given, mine)
-    forces = mine["f"]
-    setting = [name for name in plain if silent and plain[name] in SETTING]
-    for name in setting:
+    # what a wall exerts is what is missing without the wall, and without fixes that set forces
+    apart = [*silent, *(name for name in walls if name not in silent and rolls(given.fixes[name]))]
+    acts: dict[str, Floats] = {}
+    for name in [*(name for name in plain if apart and plain[name] in SETTING), *apart]:
+        before = acts or {each: mine[each] for each in ("f", "torque")}
         lmp.command(f"unfix {name}")
-    if setting:
         lmp.command("run 0 post no")
-        forces = forces_in_order(lmp, mine["id"])
-    for name in silent:
-        mine[f"wall {name}"], forces = contacts_of_plane(lmp, name, given.fixes[name], mine, forces)
+        acts = {each: forces_in_order(lmp, mine["id"], each) for each in ("f", "torque")}
+        if name in silent:
+            mine[f"wall {name}"] = contacts_of_plane(name, given.fixes[name], mine, before["f"] - acts["f"])
+        if name in apart and rolls(given.fixes[name]):
+            mine[f"torque {name}"] = before["torque"] - acts["torque"]
     every = world.allgather(mine)
     found = {}
     for name in mine:  # the array of a rank without rows may have another number of columns
@@ -173,6 +179,12 @@ def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
         raise NotLinearisedError("Bonds hold particles together: take them out.")
     check_pair(commands, lmp.available_styles("pair"))
     check_fixes(styles.fixes, commands)
+    rolling = [name for name, style in styles.fixes.items() if style == "wall/gran" and rolls(commands.fixes[name])]
+    if rolling and not can_copy(lmp):
+        raise NotTakenError(
+            f"fix {rolling[0]} wall/gran does not hand out its rolling friction, which on several ranks or with "
+            "threads is not found: take one rank and one thread."
+        )
     silent = _silent_walls(styles, commands)
     if silent and not can_copy(lmp):
         raise NotTakenError(

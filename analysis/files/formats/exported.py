@@ -170,7 +170,7 @@ def exported_configuration(
     displacement : ndarray, shape (N, 3), optional
         In space, length.
     """
-    c, n = configuration.contacts, len(configuration)
+    c, n = configuration.contacts.touching, len(configuration)
     rest = np.pad(configuration.position, ((0, 0), (0, 3 - configuration.dimension)))
     moved = np.zeros_like(rest) if displacement is None else displacement
     particles: dict[str, NDArray] = {
@@ -197,9 +197,11 @@ def exported_configuration(
         "contact_normal_force": c.normal_force,
         "contact_tangential_force": c.tangential_force,
         "contact_overlap": c.overlap,
-        "contact_mobilised": configuration.mobilised,
+        "contact_mobilised": configuration.mobilised[~configuration.contacts.couple],
     }
-    other = rest[c.i] - configuration.branch + np.where(c.wall[:, None], 0.0, moved[second])
+    other = (
+        rest[c.i] - configuration.branch[~configuration.contacts.couple] + np.where(c.wall[:, None], 0.0, moved[second])
+    )
     return Exported(
         rest + moved,
         configuration.top,
