@@ -37,7 +37,7 @@ from ...analysis.contacts import BOOLEAN, PER_CONTACT, WALL
 from ...analysis.packing.linearise import linearise_contacts
 from .balance import known_cause
 from .contact_law_measurement import MeasuredLaw, State, measure_law, remark_on
-from .granular_commands import GIVE_LINES, OWN, Commands, NotLinearisedError, NotTakenError, without_suffix
+from .granular_commands import GIVE_LINES, OWN, PLANES, Commands, NotLinearisedError, NotTakenError, without_suffix
 from .lammps_arrays import Arrays
 from .looks import box_of, members_of, particles_of
 from .mobility import mobility
@@ -112,18 +112,14 @@ def check_friction(contacts: LinearisedContacts, *, rests: bool) -> None:
 
 def _check_torques(others: Floats, commands: Commands, contacts: LinearisedContacts) -> None:
     """Refuse torques besides those of the contacts: only contacts may turn particles here."""
-    forces = (
-        FORCE_AGREEMENT * np.abs(contacts.tangential_force).max(initial=0.0),
-        OVERLAP_ROUNDING * contacts.normal_force.max(initial=0.0),
-    )
-    if np.abs(others).max() > sum(forces):
-        known = known_cause(commands, contacts)
-        reason = known or (
-            "either something else turns them, which is not linearised here, or this release of LAMMPS hands out "
-            "contacts in a way that is not known here; releases of 29 Aug 2024 to 22 Jul 2025 are"
-        )
-        raise (NotTakenError if known else NotLinearisedError)(
-            f"The torques on particles are not those of their contacts: {reason}."
+    allowed = FORCE_AGREEMENT * np.abs(contacts.tangential_force).max(initial=0.0)
+    if np.abs(others).max() > allowed + OVERLAP_ROUNDING * contacts.normal_force.max(initial=0.0):
+        says = "The torques on particles are not those of their contacts"
+        if known := known_cause(commands, contacts):
+            raise NotTakenError(f"{says}: {known}.")
+        raise NotLinearisedError(
+            f"{says}: something else turns them, or this release of LAMMPS hands out contacts in another way than "
+            "those of 29 Aug 2024 to 22 Jul 2025."
         )
 
 
@@ -145,7 +141,7 @@ def _linearised_contacts(
             parts.append(_linearise_smooth(law, contacts_of_floor(found, name, float(words[8]))))
     else:
         groups: dict[Any, OneLaw] = by_types(pairs, found["type"]) | {
-            name: contacts_of_wall(found, name) for name in walls
+            name: contacts_of_wall(found, name, commands.fixes[name]) for name in walls
         }
         for name, every in groups.items():
             # what overlaps by rounding alone, as in a lattice whose spheres just touch, is no contact
@@ -309,17 +305,19 @@ def _at_wall(found: Arrays, name: str, i: Indices, normal: Floats, overlap: Floa
     return OneLaw(f"contacts of fix {name}", geometry, forces)
 
 
-def contacts_of_wall(found: Arrays, name: str) -> OneLaw:
-    """Contacts with a wall of LAMMPS's own."""
-    rows = found[f"wall {name}"]
-    i = np.flatnonzero(rows[:, 0] > 0)
-    branch, force = found["x"][i] - rows[i, 4:7], rows[i, 1:4]
-    every, axis = np.arange(len(i)), np.argmax(np.abs(branch), axis=1)
-    distance, normal = branch[every, axis], np.zeros_like(branch)
-    normal[every, axis] = np.sign(distance)
-    along = np.einsum("ca,ca->c", force, normal)[:, None]
-    forces = np.hstack([along, force - along * normal])
-    made = _at_wall(found, name, i, normal, found["radius"][i] - np.abs(distance), forces)
+def contacts_of_wall(found: Arrays, name: str, line: str) -> OneLaw:
+    """Contacts with the planes of fix wall/gran, of which LAMMPS has the nearer act."""
+    words = line.split()
+    at = next(k for k, word in enumerate(words) if word in PLANES)
+    axis, force = PLANES.index(words[at]), found[f"wall {name}"]
+    lower, upper = (np.nan if word == "NULL" else float(word) for word in words[at + 1 : at + 3])
+    low, high = (np.nan_to_num(each, nan=np.inf) for each in (found["x"][:, axis] - lower, upper - found["x"][:, axis]))
+    overlap = found["radius"] - np.minimum(low, high)
+    i = np.flatnonzero((overlap > 0) & force.any(axis=1))
+    normal = np.zeros((len(i), 3))
+    normal[:, axis] = np.where(low < high, 1.0, -1.0)[i]
+    along = np.einsum("ca,ca->c", force[i], normal)[:, None]
+    made = _at_wall(found, name, i, normal, overlap[i], np.hstack([along, force[i] - along * normal]))
     return made._replace(rolling=found[f"torque {name}"][i] if f"torque {name}" in found else None)
 
 

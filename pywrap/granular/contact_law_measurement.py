@@ -27,7 +27,7 @@ from mpi4py import MPI
 from ...analysis.arrays import Floats
 from ..lammps.instance import start_lammps
 from .granular_commands import GIVE_LINES, PLANES, Commands, NotTakenError, without_suffix
-from .instance_queries import explain_error
+from .look_in_a_copy import explain_error
 
 EXPONENT_ERROR = 1e-6
 """Distance of a measured exponent from a multiple of 1/4: rounding of forces and overlaps leaves 1e-9 or less."""
@@ -105,34 +105,33 @@ class MeasuredLaw:
     mu_rolling: float
 
 
+X, Y, Z = range(3)
+"""The normal of the contact that is measured, the direction in which it slips, and the axis about which it rolls."""
+
+
 class TwoParticleLammps:
-    """A LAMMPS with two particles of some types, or one and the wall of a fix, and the commands of a deck."""
+    """A LAMMPS with two particles of some types, or one and the wall of a fix, and the commands of a deck.
+
+    The wall is a plane across x, wherever that of the fix is.
+    """
 
     def __init__(self, lmp: Any, commands: Commands, name: tuple[int, int] | str, size: float) -> None:
         self.lammps = start_lammps(MPI.COMM_SELF, None)
-        words = _one_plane(commands.fixes[name].split()) if isinstance(name, str) else []
-        self.wall, self.types = bool(words), (1, 1) if isinstance(name, str) else name
-        self.axis, self.sign, self.place = 0, 1.0, 0.0
-        if self.wall:
-            at = _place_of_planes(words)
-            self.axis = "xyz".index(words[at][0])
-            self.sign, plane = (1.0, words[at + 1]) if words[at + 1] != "NULL" else (-1.0, words[at + 2])
-            self.place = float(plane)
-        self.across, self.about = (self.axis + 1) % 3, (self.axis + 2) % 3
-        middle = np.zeros(3)
-        middle[self.axis] = self.place
-        edges = " ".join(f"{m - 40 * size:.17g} {m + 40 * size:.17g}" for m in middle)
-        create = f"create_atoms 1 single {' '.join(f'{m:.17g}' for m in middle)} units box"
+        wall = isinstance(name, str)
+        self.types = (1,) if isinstance(name, str) else name
         self.run(
             f"units {lmp.extract_global('units')}", "atom_style sphere", "atom_modify map yes sort 0 0",
             "boundary f f f", "newton on", "comm_modify vel yes", f"neighbor {size:.17g} bin",
-            "neigh_modify every 1 delay 0 check no", f"region box block {edges} units box",
+            "neigh_modify every 1 delay 0 check no",
+            f"region box block {f' {-40 * size:.17g} {40 * size:.17g}' * 3} units box",
             f"create_box {lmp.extract_setting('ntypes')} box", "thermo_modify lost ignore norm no",
-            *[create] * (1 if self.wall else 2), f"set group all diameter {2 * size:.17g}", "set group all density 1",
-            "run_style verlet", "group one id 1", *commands.pair,
+            *["create_atoms 1 single 0 0 0 units box"] * (1 if wall else 2),
+            f"set group all diameter {2 * size:.17g} density 1", "run_style verlet", "group one id 1", *commands.pair,
         )  # fmt: skip
-        if self.wall:
-            self.run(" ".join([*words[:2], "all", *words[3:]]))
+        if isinstance(name, str):
+            words = commands.fixes[name].split()
+            at = next(k for k, word in enumerate(words) if word in PLANES)
+            self.run(" ".join([*words[:2], "all", *words[3:at], "xplane 0 NULL", *words[at + 3 :]]))
         self.run("timestep 1")
 
     def run(self, *lines: str) -> None:
@@ -142,58 +141,36 @@ class TwoParticleLammps:
 
     def array(self, name: str) -> Floats:
         """An array of the particles, as LAMMPS has it."""
-        return np.asarray(self.lammps.numpy.extract_atom(name))[: 1 if self.wall else 2]
+        return np.asarray(self.lammps.numpy.extract_atom(name))[: len(self.types)]
 
     def place_at(self, state: State) -> State:
         """Put the particles into a fresh contact, at rest; the state with the overlap to the last digit."""
-        count = 1 if self.wall else 2
+        count = len(self.types)
         for away in (True, False):
             self.array("radius")[:], self.array("rmass")[:] = state.radii[:count], state.masses[:count]
-            self.array("type")[:] = self.types[:count]
-            x = self.array("x")
-            x[:] = 0.0
-            x[:, self.axis] = self.place
-            x[0, self.axis] += self.sign * (sum(state.radii) - state.overlap + away * state.radii[0])
+            self.array("type")[:], self.array("x")[:] = self.types, 0.0
+            self.array("x")[0, X] = sum(state.radii) - state.overlap + away * state.radii[0]
+            self.radius = state.radius
             self.rest()
-        x = self.array("x")
-        other = self.place if self.wall else x[1, self.axis]
-        return state._replace(overlap=sum(state.radii) - abs(x[0, self.axis] - other))
+        return state._replace(overlap=sum(state.radii) - self.array("x")[0, X])
 
     def move(self, closing: float = 0.0, slipping: float = 0.0, rolling: float = 0.0, across: float = 0.0) -> None:
         """Give the first particle a velocity towards the other one, a rotation, as the speed of its surface, one
         without slip, as the effective radius times its rate, or a velocity across."""
         self.array("v")[:] = self.array("omega")[:] = 0.0
-        radius, rolls = self.array("radius")[0], rolling / self.reduced_radius
-        self.array("v")[0, self.axis] = -self.sign * closing
-        self.array("v")[0, self.across] = self.sign * (across + radius * rolls)
-        self.array("omega")[0, self.about] = slipping / radius + rolls
+        radius, rolls = self.array("radius")[0], rolling / self.radius
+        self.array("v")[0] = -closing, across + radius * rolls, 0.0
+        self.array("omega")[0, Z] = slipping / radius + rolls
 
     def rest(self) -> None:
         """Stop the particles, and compute their forces at rest."""
         self.move()
         self.run("run 0 post no")
 
-    @property
-    def reduced_radius(self) -> float:
-        """R_i R_j/(R_i + R_j), or R_i at a wall."""
-        r = self.array("radius")
-        return float(r[0] if self.wall else r[0] * r[1] / (r[0] + r[1]))
-
     def force(self) -> tuple[float, float, float]:
         """f_n on the first particle, and the sizes of f_t and, of rolling without slip, of the torque over R."""
-        f, torque = self.array("f")[0], self.array("torque")[0, self.about]
-        return float(self.sign * f[self.axis]), float(abs(f[self.across])), float(abs(torque) / self.reduced_radius)
-
-
-def _place_of_planes(words: list[str]) -> int:
-    """Which word of a wall is xplane, yplane or zplane; its lower and its upper plane follow."""
-    return next(k for k, word in enumerate(words) if word in PLANES)
-
-
-def _one_plane(words: list[str]) -> list[str]:
-    """A wall with the lower one of its two planes: in a narrow slot a particle would touch the other one, too."""
-    upper = _place_of_planes(words) + 2
-    return words if words[upper - 1] == "NULL" else [*words[:upper], "NULL", *words[upper + 1 :]]
+        f, torque = self.array("f")[0], self.array("torque")[0, Z]
+        return float(f[X]), float(abs(f[Y])), float(abs(torque) / self.radius)
 
 
 def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state: State, who: str) -> MeasuredLaw:
@@ -220,19 +197,12 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
         ) from error
     with closing(bench.lammps):
         states, found = zip(*(_measure(bench, each) for each in wanted), strict=True)
-    names = ("stiffness", "tangential", "normal_dashpot", "tangential_dashpot", "rolling", "rolling_dashpot")
-    here = found[0]
-    return MeasuredLaw(
-        **{
-            name: _power(f"{name.replace('_', ' ')} of the {who}", states, [each[name] for each in found])
-            for name in names
-        },
-        closing=quarter(here["closing"], f"tangential force of the {who}"),
-        parting=quarter(here["parting"], f"tangential force of the {who}"),
-        mu=here["mu"],
-        lever=quarter(here["lever"], f"lever arm of the {who}"),
-        mu_rolling=here["mu_rolling"],
-    )
+    law: dict[str, Any] = {name: found[0][name] for name in ("mu", "mu_rolling")}
+    for name in ("stiffness", "tangential", "normal_dashpot", "tangential_dashpot", "rolling", "rolling_dashpot"):
+        law[name] = _power(f"{name.replace('_', ' ')} of the {who}", states, [each[name] for each in found])
+    for name in ("closing", "parting", "lever"):
+        law[name] = quarter(found[0][name], f"{'lever arm' if name == 'lever' else 'tangential force'} of the {who}")
+    return MeasuredLaw(**law)
 
 
 def _power(what: str, states: Sequence[State], values: Sequence[float]) -> PowerOfOverlap:
@@ -290,7 +260,7 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
     ft, slip = _force_of_slip(bench, wanted, mu * fn, 1e-8 * min(mu, 1.0) * delta, step)
     if rolling["mu_rolling"]:  # a slip without rotation, which turns the particle by friction alone
         _push_contact(bench, wanted, across=slip / step)
-    arm = abs(bench.array("torque")[0, bench.about] / bench.array("f")[0, bench.across])
+    arm = abs(bench.array("torque")[0, Z] / bench.array("f")[0, Y])
     lever = float(state.radii[0] - arm) / delta
     parting, closing = _exponents(bench, ft, delta, step)
     bench.place_at(wanted)
@@ -347,13 +317,11 @@ def _exponents(bench: TwoParticleLammps, ft: float, delta: float, step: float) -
     """d ln f_t / d ln delta at constant slip while the contact parts and closes, in steps of a tenth of the overlap."""
     forces, overlaps = [ft], [delta]
     for direction in (-1.0, 1.0):
-        x = bench.array("x")[0, bench.axis]
-        velocity = ["0", "0", "0"]
-        velocity[bench.axis] = f"{-bench.sign * direction * 0.1 * delta / step:.17g}"
-        bench.run(f"fix go one move linear {' '.join(velocity)} units box", "run 1 post no", "unfix go")
+        x, velocity = bench.array("x")[0, X], -direction * 0.1 * delta / step
+        bench.run(f"fix go one move linear {velocity:.17g} 0 0 units box", "run 1 post no", "unfix go")
         bench.rest()
         forces.append(bench.force()[1])
-        overlaps.append(overlaps[-1] + bench.sign * (x - bench.array("x")[0, bench.axis]))
+        overlaps.append(overlaps[-1] + x - bench.array("x")[0, X])
     parting, closing = np.log(np.array(forces[1:]) / forces[:-1]) / np.log(np.array(overlaps[1:]) / overlaps[:-1])
     return float(parting), float(closing)
 
@@ -400,16 +368,13 @@ def remark_on(law: MeasuredLaw, commands: Commands, name: tuple[int, int] | str,
         return None
     size = (state.radius * state.overlap) ** (0.5 if style.startswith("hertz") else 0.0)
     kn, kt, mu = float(words[1]), 2 / 7 * float(words[1]) if words[2] == "NULL" else float(words[2]), float(words[5])
-    radius, overlap = np.array(state.radius), np.array(state.overlap)
-    found = [
-        ("a normal stiffness", kn * size, law.stiffness.at(radius, overlap)),
-        ("a friction coefficient", mu, law.mu),
-    ]
+    here = np.array(state.radius), np.array(state.overlap)
+    found = {"a normal stiffness": (law.stiffness.at(*here), kn * size), "a friction coefficient": (law.mu, mu)}
     if law.mu:  # without friction there is no tangential force
-        found.append(("a tangential stiffness", kt * size, float(law.tangential.at(radius, overlap))))
+        found["a tangential stiffness"] = law.tangential.at(*here), kt * size
     says = [
         f"{what} {measured / said:.3g} times that of the line"
-        for what, said, measured in found
+        for what, (measured, said) in found.items()
         if said > 0 and abs(measured / said - 1) > LAW_DIFFERENCE
     ]
     who = f"fix {name}" if isinstance(name, str) else f"Contacts of types {name[0]} and {name[1]}"
