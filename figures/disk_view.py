@@ -107,7 +107,7 @@ class View:
         start = images[:, contacts.i]
         ends = np.stack([start, start - branch])
         within = (ends.max(axis=0) > near_low - margin) & (ends.min(axis=0) < near_high + margin)
-        bar, contact = np.nonzero(within.all(axis=2))
+        bar, contact = np.nonzero(within.all(axis=2) & ~contacts.couple)
         (left, bottom), (right, ceiling) = low.tolist(), high.tolist()
         place, begin = images[image, disk], start[bar, contact]
         edges = _edges(cell, origin, periodic, low, high, walls)

@@ -161,6 +161,7 @@ def known_cause(commands: Commands, contacts: LinearisedContacts, residual: Floa
 
     Histories may be lost where friction can bear the residual force on the particle that has most, shape (N,).
     """
+    contacts = contacts.touching
     if says := restless_fix(commands):
         return f"{says}, and run on"
     if says := creeping_law(commands):

@@ -271,7 +271,11 @@ def write_packing(
     words = write(path, exported if path.suffix == ".vtp" else [(0.0, exported)])
     if alone and path.suffix != ".vtp":
         return str(words)
-    what = {"disk" if alone else "particle": len(packing), "contact": len(packing.contacts), "mode": len(modes)}
+    what = {
+        "disk" if alone else "particle": len(packing),
+        "contact": len(packing.configuration.contacts.touching),
+        "mode": len(modes),
+    }
     return ", ".join(counted(number, noun) for noun, number in what.items())
 
 

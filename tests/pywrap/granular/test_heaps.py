@@ -94,6 +94,7 @@ def test_k_and_c_are_those_of_forces(heap):
 
     lmp = heap("mindlin/force", 0.1, True, 1, 30)
     laws, differences = (from_lammps(lmp, differences=each) for each in (False, True))
+    assert len(laws.contact_columns()["mobilised"]) == len(differences.contacts) + laws.contacts.touching.wall.sum()
     assert not len(differences.one_sided_particles)
     for matrix in (stiffness_matrix, damping_matrix):
         one, other = matrix(laws), matrix(differences)
