@@ -146,49 +146,33 @@ def _acting(lmp: Any) -> list[Indices]:
     return [pairs if acts is None else pairs[acts[: len(pairs)]]]
 
 
-class Colours:
-    """Which bodies are displaced together: no particle feels two of them.
+def _owners(c: Configuration, constraint: csr_array, pairs: Pairs, near: float, reach: int = 1) -> list[Indices]:
+    """Which bodies are displaced together, a colour each: the body that each particle feels, by the particle that leads
+    it, -1 if it feels none; shape (N,). No particle feels two bodies of a colour.
 
     A particle feels its neighbours; with a `reach` of 2, their neighbours, too.
-
-    Attributes
-    ----------
-    members : list of ndarray of int
-        Bodies of each colour, by the particle that leads each.
-    owner : list of ndarray of int, shape (N,)
-        The body that each particle feels, -1 if it feels none.
     """
-
-    def __init__(self, c: Configuration, constraint: csr_array, pairs: Pairs, near: float, reach: int = 1) -> None:
-        count, moved = len(c), constraint.tocoo()
-        leads: list[set[int]] = [set() for _ in range(count)]
-        for particle, leader in zip(moved.row % count, moved.col % count, strict=True):
-            leads[leader].add(int(particle))
-        free = np.zeros(count, np.bool_)
-        free[moved.row % count] = True
-        touch = pairs.gap < near
-        one, other = np.concatenate([pairs.i[touch], pairs.j[touch]]), np.concatenate([pairs.j[touch], pairs.i[touch]])
-        neighbours = csr_array((np.ones(len(one)), (one, other)), shape=(count, count)) + eye_array(count, format="csr")
-        reached = neighbours
-        for _ in range(reach - 1):
-            reached = reached @ neighbours
-        feels = [set(row[free[row]].tolist()) for row in np.split(reached.indices, reached.indptr[1:-1])]
-        taken: list[set[int]] = [set() for _ in range(count)]
-        self.members: list[list[int]] = []
-        self.owner: list[Indices] = []
-        for leader in range(count):
-            around = sorted(set().union(*(feels[each] for each in leads[leader])))
-            if not around:
-                continue
-            used = set().union(*(taken[each] for each in around))
-            colour = next(k for k in count_from(0) if k not in used)
-            if colour == len(self.members):
-                self.members.append([])
-                self.owner.append(np.full(count, -1))
-            self.members[colour].append(leader)
-            self.owner[colour][around] = leader
-            for each in around:
-                taken[each].add(colour)
+    count, moved, touch = len(c), constraint.tocoo(), pairs.gap < near
+    particle, leader, shape = moved.row % count, moved.col % count, (count, count)
+    i, j = pairs.i[touch], pairs.j[touch]
+    ends = np.concatenate([i, j]), np.concatenate([j, i])
+    neighbours = csr_array((np.ones(len(ends[0])), ends), shape=shape) + eye_array(count, format="csr")
+    feels = csr_array((np.ones(len(leader)), (leader, particle)), shape=shape)
+    for _ in range(reach):
+        feels = feels @ neighbours
+    free = np.bincount(particle, minlength=count) > 0
+    rows = [row[free[row]] for row in np.split(feels.indices, feels.indptr[1:-1])]
+    taken: list[set[int]] = [set() for _ in range(count)]
+    owners: list[Indices] = []
+    for body in np.flatnonzero([len(row) for row in rows]):
+        used = set().union(*(taken[each] for each in rows[body]))
+        colour = next(k for k in count_from(0) if k not in used)
+        if colour == len(owners):
+            owners.append(np.full(count, -1))
+        owners[colour][rows[body]] = body
+        for each in rows[body]:
+            taken[each].add(colour)
+    return owners
 
 
 def _measure(
@@ -213,13 +197,13 @@ def _measure(
     usual = float(np.median(overlaps)) if len(overlaps) else 0.0
     step = _displacement(c, pairs, usual, LEAST_OF_COORDINATE * largest)
     lengths = _sizes(step, max(SHORTEST_OF_COORDINATE * largest, SHORTEST_OF_OVERLAP * usual))
-    colours = Colours(c, constraint, pairs, 4 * step)
-    stiffness = _derivative(by_place, colours, lengths)
+    owners = _owners(c, constraint, pairs, 4 * step)
+    stiffness = _derivative(by_place, owners, lengths)
     if stiffness.unexplained > LEAST_JUMP:
-        farther = Colours(c, constraint, pairs, 4 * step, reach=2)
+        farther = _owners(c, constraint, pairs, 4 * step, reach=2)
         other = _derivative(replace(by_place, settles=True), farther, lengths)
         if other.unexplained < 0.5 * stiffness.unexplained:
-            colours, stiffness = farther, other
+            owners, stiffness = farther, other
     if force is None:
         force = step * float(np.abs(stiffness.matrix.data).max(initial=0.0)) / SHARE_OF_OVERLAP
     by_velocity = replace(by_place, duration=None, sizes=(1.0,))
@@ -227,7 +211,7 @@ def _measure(
     if speed == 0.0:
         damping = stiffness._replace(matrix=csr_array(stiffness.matrix.shape))
     else:
-        damping = _derivative(by_velocity, colours, _sizes(speed, SHORTEST_VELOCITY * speed))
+        damping = _derivative(by_velocity, owners, _sizes(speed, SHORTEST_VELOCITY * speed))
     jump, error = np.maximum(stiffness.jump, damping.jump), np.maximum(stiffness.error, damping.error)
     unexplained = np.where(jump > 0, 0.0, error)
     worst = int(np.argmax(unexplained))
@@ -396,14 +380,13 @@ def _random(c: Configuration, seed: int) -> Floats:
     return np.asarray(c.coordinate_free * np.random.Generator(np.random.PCG64(seed)).uniform(-1, 1, c.coordinates))
 
 
-def _derivative(probe: Probe, colours: Colours, sizes: list[float]) -> _Derivative:
+def _derivative(probe: Probe, of_colours: list[Indices], sizes: list[float]) -> _Derivative:
     """-dF/dQ by steps of the first size, and by shorter ones where the forces of the first are not linear."""
     c, count = probe.configuration, len(probe.configuration)
-    owners = [owner for owner in colours.owner for _ in range(c.axes)]
+    owners = [owner for owner in of_colours for _ in range(c.axes)]
     directions = np.zeros((len(owners), c.axes * count))
-    for k, members in enumerate(colours.members):
-        for axis in range(c.axes):
-            directions[c.axes * k + axis, axis * count + np.array(members)] = 1.0
+    for k, owner in enumerate(owners):
+        directions[k, k % c.axes * count + np.unique(owner[owner >= 0])] = 1.0
     random = _random(c, 0)
     found = [probe.slope(q, sizes[0]) for q in directions]
     checks = [probe.slope(random, size) for size in (sizes[0], sizes[-1])]

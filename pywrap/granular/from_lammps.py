@@ -175,11 +175,9 @@ def _remarks(
     return (*held, *motion_remarks(configuration, velocity), *of_fixes)
 
 
-def _proved(lmp: Any, configuration: Configuration, commands: Commands, fixes: dict[str, str]) -> Configuration:
+def _proved(lmp: Any, made: Configuration, commands: Commands, fixes: dict[str, str]) -> Configuration:
     """A Configuration with its proof."""
-    return derive_frozen(
-        configuration, proof=prove_motion(lmp, configuration, fixes, extrapolates=commands.style == OWN)
-    )
+    return derive_frozen(made, proof=prove_motion(lmp, made, fixes, extrapolates=commands.style == OWN))
 
 
 def _by_differences(lmp: Any, given: Commands | None, *, balance: float, prove: bool) -> Configuration:

@@ -118,16 +118,8 @@ def log_file(lmp: Any, files: dict[int, OpenFile]) -> OpenFile | None:
     A copy of the process asks with the open files of the process itself.
     """
     lmp.command("log none")  # a log of the command `log` does not begin as others do
-    closed = [file for descriptor, file in files.items() if not _is_open(descriptor)]
+    closed = [file for descriptor, file in files.items() if not Path(f"/proc/self/fd/{descriptor}").exists()]
     return closed[0] if len(closed) == 1 else None
-
-
-def _is_open(descriptor: int) -> bool:
-    try:
-        os.fstat(descriptor)
-    except OSError:
-        return False
-    return True
 
 
 def log_of(lmp: Any, files: dict[int, OpenFile]) -> list[str] | None:
@@ -138,8 +130,12 @@ def log_of(lmp: Any, files: dict[int, OpenFile]) -> list[str] | None:
 
 def only_log() -> list[str] | None:
     """The lines of the only open log of this process; None if there is none, or there are several."""
-    found = [file for file in open_files().values() if _begins_as_log(file.path)]
-    return _lines_of(found[0]) if len({file.path for file in found}) == 1 else None
+    found = {}
+    for file in open_files().values():
+        with suppress(OSError), open(file.path, "rb") as stream:
+            if stream.read(8) == b"LAMMPS (":
+                found[file.path] = file
+    return _lines_of(*found.values()) if len(found) == 1 else None
 
 
 def _lines_of(log: OpenFile) -> list[str]:
@@ -151,14 +147,6 @@ def _lines_of(log: OpenFile) -> list[str]:
             f"lines as from_lammps(lmp, commands=[...])."
         )
     return text.splitlines()
-
-
-def _begins_as_log(path: str) -> bool:
-    try:
-        with open(path, "rb") as stream:
-            return stream.read(8) == b"LAMMPS ("
-    except OSError:
-        return False
 
 
 Found = TypeVar("Found")

@@ -273,28 +273,22 @@ def _store(state: Path, keep: Path, lines: list[str]) -> tuple[Path | None, str]
     stem, number = re.sub(r"[^\w.+-]", "_", keep.stem, flags=re.ASCII), 0  # LAMMPS reads the name in a line
     while True:
         file = keep.with_name(f"{stem}.{number}.restart" if number else f"{stem}.restart")
-        beside = file.with_name(f"{file.name}.in")
+        deck = os.fsencode("\n".join(lines).replace(RESTART, file.name) + "\n")
         number += 1
-        if file.exists() or beside.exists():
-            continue
         made: list[Path] = []
         try:
-            for path, fill in (
-                (file, state.read_bytes()),
-                (beside, os.fsencode("\n".join([lines[0], *lines[1:]]).replace(RESTART, file.name) + "\n")),
-            ):
+            for path, fill in ((file, state.read_bytes()), (Path(f"{file}.in"), deck)):
                 with path.open("xb") as stream:
                     made.append(path)
                     stream.write(fill)
                     stream.flush()
                     os.fsync(stream.fileno())
             return file, ""
-        except FileExistsError:
-            pass  # another process was faster
         except OSError as error:
             for path in made:
                 path.unlink(missing_ok=True)
-            return None, f"{error.filename or file}: {error.strerror}"
+            if not isinstance(error, FileExistsError):
+                return None, f"{error.filename or file}: {error.strerror}"
 
 
 def deck_lines(carried_out: list[list[str]], fixes: dict[str, str]) -> list[str]:
