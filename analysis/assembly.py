@@ -22,7 +22,8 @@ code that projects the history onto the new tangent plane. A twist about n chang
 torque l are both the radius in LAMMPS's gran/* styles; its style `granular` uses the radius for the slip and :math:`R -
 \delta/2` for the torque, so that K is not symmetric even without b. A wall is a partner without coordinates, with
 :math:`1/r = 0`. The three columns of a particle's rotation about its only contact vanish together: such motions have
-the eigenvalue zero.
+the eigenvalue zero. In an entry of rolling friction (`couple`) :math:`\mathbf u` is in d delta and d n alone, and
+:math:`\mathbf F = 0`.
 
 Dashpots follow from the same formulas with velocities in place of displacements,
 :math:`f_n' \to c_n`, :math:`k_t' \to c_t`, and without forces. (Bonfanti et al., arXiv:1909.05070, have K of a smooth
@@ -63,13 +64,14 @@ def contact_derivatives(c: LinearisedContacts, parting: ArrayLike = 0.5) -> Cont
     plane = np.eye(3)[:, :, None] - nn
     # d f_t, with the resistance k_t' S of the slip u + n x w
     in_plane = along - dot(along, n) * n
-    ft_by_u = stiff * (_outer(along, in_plane) - plane)
+    acts = ~c.couple  # on translations, and by these
+    ft_by_u = acts * stiff * (_outer(along, in_plane) - plane)
     ft_by_u -= _outer(b, n) + _outer(n, curvature * (ft - dot(ft, n) * n))
     ft_by_w = -stiff * (_cross_matrix(n) + _outer(along, cross(n, along)))
-    force_by_u = ft_by_u + (c.normal_force * curvature) * plane - c.normal_stiffness * nn
+    force_by_u = acts * (ft_by_u + (c.normal_force * curvature) * plane - c.normal_stiffness * nn)
     tilted = curvature * (_cross_matrix(ft) + _outer(cross(n, ft), n))
     return ContactDerivatives(
-        force_by_u, ft_by_w, cross(n, ft_by_u) - tilted, cross(n, ft_by_w), -_outer(cross(n, ft), n)
+        force_by_u, acts * ft_by_w, cross(n, ft_by_u) - tilted, cross(n, ft_by_w), -_outer(cross(n, ft), n)
     )
 
 

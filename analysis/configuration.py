@@ -237,8 +237,8 @@ class Configuration:
 
     def __repr__(self) -> str:
         what = counted(len(self), "disk" if self.dimension == 2 else "sphere")
-        count, walls = len(self.contacts), int(self.contacts.wall.sum())
-        bound = int(self.contacts.at_bound.sum())
+        touching = self.contacts.touching
+        count, walls, bound = len(touching), int(touching.wall.sum()), int(touching.at_bound.sum())
         one_sided = ", sticking in K" if self.contacts.one_sided.any() else ""
         in_k = ", sliding in K" if self.contacts.sliding.any() else one_sided
         state = f"{walls} with walls, {bound} at Coulomb's bound{in_k}"
@@ -368,12 +368,12 @@ class Configuration:
             the normal force; f_t_x, f_t_y, f_t_z, the tangential force on the first; f_t, its size; overlap, length;
             mobilised, |f_t|/(mu f_n).
         """
-        c, axes = self.contacts, "xyz"
+        c, axes = self.contacts.touching, "xyz"
         columns = {"id1": self.ids[c.i], "id2": np.where(c.wall, 0, self.ids[np.maximum(c.j, 0)])}
         columns |= {f"n_{axis}": c.normal[:, k] for k, axis in enumerate(axes)}
         columns |= {"f_n": c.normal_force, "f_t": np.linalg.norm(c.tangential_force, axis=1)}
         columns |= {f"f_t_{axis}": c.tangential_force[:, k] for k, axis in enumerate(axes)}
-        return columns | {"overlap": c.overlap, "mobilised": self.mobilised}
+        return columns | {"overlap": c.overlap, "mobilised": self.mobilised[~self.contacts.couple]}
 
     def to_pandas(self) -> "DataFrame":
         """The contacts as a table of pandas, with the columns of `contact_columns`; an ImportError without pandas."""
@@ -457,7 +457,7 @@ class Configuration:
     def contact_force(self) -> Floats:
         """Force and torque of its contacts on each particle, shape (N, 2, 3)."""
         c, total = self.contacts, np.zeros((len(self), 2, 3))
-        force = c.normal_force[:, None] * c.normal + c.tangential_force
+        force = ~c.couple[:, None] * (c.normal_force[:, None] * c.normal + c.tangential_force)
         turn, pair = -np.cross(c.normal, c.tangential_force), ~c.wall
         np.add.at(total, c.i, np.stack([force, c.lever_arm[:, :1] * turn], axis=1))
         np.add.at(total, c.j[pair], np.stack([-force, c.lever_arm[:, 1:] * turn], axis=1)[pair])

@@ -4,6 +4,12 @@ r"""The contacts of a packing to first order: forces and derivatives, whatever t
 \delta` differs between a growing and a falling overlap; every operator takes the weight of opening contacts
 (:mod:`~faultgouge.analysis.packing.law`). A contact at Coulomb's bound sticks if the motion reverses, and slides if the
 motion continues: `sliding` chooses.
+
+**Rolling friction** of two particles is a second entry, a `couple`: a spring with a slider like the tangential one,
+which feels the rotations of both particles alone, and acts on these alone. With the arms :math:`R, -R` of the effective
+radius R its displacement is :math:`R\, \mathbf n \times (\mathrm d\boldsymbol\theta_i - \mathrm
+d\boldsymbol\theta_j)`. Normal force, normal stiffness and overlap are those of the contact, and say how its bound
+changes.
 """
 
 from dataclasses import dataclass
@@ -30,11 +36,11 @@ PER_CONTACT = {
     "i": (), "j": (), "normal": (3,), "distance": (), "overlap": (), "slip_arm": (2,), "lever_arm": (2,),
     "lever_slope": (), "normal_force": (), "tangential_force": (3,), "normal_stiffness": (), "tangential_stiffness": (),
     "closing": (3,), "parting": (3,), "friction": (), "sliding": (), "normal_dashpot": (), "tangential_dashpot": (),
-    "slider": (), "viscous_slider": (),
+    "slider": (), "viscous_slider": (), "couple": (),
 }  # fmt: skip
 """Fields of `LinearisedContacts`, with the shape of each for one contact."""
 
-BOOLEAN = {"sliding": False, "slider": True, "viscous_slider": True}
+BOOLEAN = {"sliding": False, "slider": True, "viscous_slider": True, "couple": False}
 """Fields that are true or false, with the values of contacts that do not say."""
 
 
@@ -81,6 +87,8 @@ class LinearisedContacts:
         Contacts whose slip at Coulomb's bound yields to the elastic and the viscous force together, with the bound mu
         times the normal force of spring and dashpot: LAMMPS's slider, and the default. The slip of other contacts
         yields to the elastic force alone, and the sum of both forces is cut at mu times the elastic normal force.
+    couple : array_like of bool, shape (C,)
+        Entries of rolling friction, which act on rotations alone; their arms have two signs. None by default.
 
     Raises
     ------
@@ -110,6 +118,7 @@ class LinearisedContacts:
     tangential_dashpot: Floats
     slider: NDArray[np.bool_]
     viscous_slider: NDArray[np.bool_]
+    couple: NDArray[np.bool_]
 
     def __init__(self, **given: ArrayLike) -> None:
         given = {name: np.full(np.shape(given.get("i", ())), value) for name, value in BOOLEAN.items()} | given
@@ -129,7 +138,8 @@ class LinearisedContacts:
         set_frozen(self, **{name: values[name] for name in PER_CONTACT})
 
     def __repr__(self) -> str:
-        return f"<LinearisedContacts: {len(self)}, {int(self.wall.sum())} of them with walls>"
+        c = self.touching
+        return f"<LinearisedContacts: {len(c)}, {int(c.wall.sum())} of them with walls>"
 
     def __len__(self) -> int:
         return len(self.i)
@@ -140,6 +150,11 @@ class LinearisedContacts:
 
     def __hash__(self) -> int:
         return hash((len(self), self.overlap.tobytes()))
+
+    @property
+    def touching(self) -> "LinearisedContacts":
+        """The contacts alone, without entries of rolling friction."""
+        return self.chosen(~self.couple) if self.couple.any() else self
 
     @property
     def wall(self) -> NDArray[np.bool_]:
@@ -190,7 +205,8 @@ def _check_contacts(values: dict[str, NDArray]) -> None:
     refuse_first(values["distance"] <= 0, "the distance {} is not positive", values["distance"])
     refuse_first(values["friction"] < 0, "friction = {} is negative", values["friction"])
     for name in ("slip_arm", "lever_arm"):
-        refuse_first(np.any(values[name] < 0, axis=1), f"{name} = {{}} is negative", values[name])
+        negative = np.any(values[name] < 0, axis=1) & ~values["couple"]
+        refuse_first(negative, f"{name} = {{}} is negative", values[name])
 
 
 def refuse_first(wrong: NDArray[np.bool_], says: str, values: NDArray) -> None:

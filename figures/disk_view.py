@@ -112,7 +112,7 @@ class View(NamedTuple):
         start = images[:, contacts.i]
         ends = np.stack([start, start - branch])
         within = (ends.max(axis=0) > near_low - margin) & (ends.min(axis=0) < near_high + margin)
-        bar, contact = np.nonzero(within.all(axis=2))
+        bar, contact = np.nonzero(within.all(axis=2) & ~contacts.couple)
         place, begin = images[image, disk], start[bar, contact]
         edges = corners[[[0, 1], [1, 3], [3, 2], [2, 0]]] if all(periodic) else _edges(periodic, low, high, walls)
         return cls(low, high, disk, place, contact, begin, begin - branch[contact], walls, edges)

@@ -243,7 +243,7 @@ def draw_packing(
 
 def in_words(packing: HasConfiguration) -> str:
     """Load, contacts, rattlers, and how many contacts slide."""
-    c, rattlers = packing.configuration.contacts, counted(len(packing.rattlers), "rattler")
+    c, rattlers = packing.configuration.contacts.touching, counted(len(packing.rattlers), "rattler")
     contacts = counted(len(c), "contact")
     if isinstance(packing, Packing):
         sliding = int(np.count_nonzero(slip_share(packing) >= 1))

@@ -139,6 +139,7 @@ def draw_spheres(
     end = start - configuration.branch
     depth = 0.5 * (start + end) @ INTO
     order = np.argsort(-depth)
+    order = order[~c.couple[order]]  # rolling friction has no bar of its own
     near = (depth.max() - depth) / (np.ptp(depth) or 1.0) if len(c) else depth
     force = c.normal_force / (c.normal_force.max(initial=0.0) or 1.0)
     if "array" in style:

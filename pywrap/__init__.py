@@ -15,11 +15,11 @@ from .lammps.two_mpi_libraries import load_own_mpi
 if TYPE_CHECKING:  # each is imported when it is used
     from ..analysis import NoEquilibriumError
     from .equilibria.quasistatic import Equilibrium, equilibrate
-    from .granular.compare_motion import MotionComparison, compare_motion
     from .granular.from_lammps import from_lammps
     from .granular.granular_commands import NotTakenError
     from .granular.lammps_path import lammps_path
     from .granular.look_in_a_copy import in_a_copy
+    from .granular.motion_proof import MotionComparison, compare_motion
     from .granular.relax import relax
     from .lammps.dynamics import Dynamics
     from .lammps.engine import Engine

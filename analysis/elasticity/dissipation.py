@@ -95,7 +95,7 @@ def lost_energy(packing: HasConfiguration, time: Floats, displacement: Floats, v
         excess = np.where(size > bound, size - np.where(np.isfinite(bound), bound, size), 0.0)
         slid = np.divide(excess, stiff[:, 0], out=np.zeros_like(excess), where=stiff[:, 0] > 0)
         force *= np.divide(size - excess, size, out=np.ones_like(size), where=size > 0)[:, None]
-        power = np.array([c.normal_dashpot * growth**2,
+        power = np.array([~c.couple * c.normal_dashpot * growth**2,
                           c.tangential_dashpot * np.einsum("ca,ca->c", sliding, sliding) * (slid == 0)])  # fmt: skip
         powers.append(power)
         if k:
@@ -120,7 +120,7 @@ def _rates(configuration: Configuration, moved: Floats) -> tuple[Floats, Floats]
     rolls = np.where(c.wall[:, None], 0.0, (c.slip_arm[:, 1] / radius[second])[:, None] * turn[second])
     w = (c.slip_arm[:, 0] / radius[c.i])[:, None] * turn[c.i] + rolls
     along = np.einsum("ca,ca->c", c.normal, u)
-    return -along, u - along[:, None] * c.normal + np.cross(c.normal, w)
+    return -along, ~c.couple[:, None] * (u - along[:, None] * c.normal) + np.cross(c.normal, w)
 
 
 def lost_by_modes(packing: HasConfiguration, velocity: Floats) -> tuple[Floats, Floats]:

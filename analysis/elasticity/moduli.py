@@ -245,7 +245,7 @@ def stress(packing: HasConfiguration, volume: float | None = None) -> Floats:
     configuration = packing.configuration
     _require_laws(configuration, "The stress")
     c = configuration.contacts
-    force = c.normal_force[:, None] * c.normal + c.tangential_force
+    force = ~c.couple[:, None] * (c.normal_force[:, None] * c.normal + c.tangential_force)
     return np.asarray(force.T @ configuration.branch / volume_of(configuration, volume)[0])
 
 

@@ -101,11 +101,13 @@ def stability(
     sided = bool(contacts.one_sided.any())
     sliding = linear_verdict(Motion.of(c, sliding=True), decides=False) if sided else sticking
     # where K is given, contacts, as far as they are known, have no derivatives
-    count = max(len(contacts), len(c) - len(c.rattlers)) if given else len(contacts)
+    touching = contacts.touching
+    count = max(len(touching), len(c) - len(c.rattlers)) if given else len(touching)
     doubts = (*reasons, *no_verdict(c))
     found = Stability(
         stable=None if doubts or not count else sticking.stable, growth_rate=sticking.growth_rate,
-        error=sticking.error, at_least=sticking.at_least, undamped=undamped, at_bound=int(contacts.at_bound.sum()),
+        error=sticking.error, at_least=sticking.at_least, undamped=undamped, at_bound=int(touching.at_bound.sum()),
+        rolling_at_bound=int(contacts.at_bound.sum() - touching.at_bound.sum()),
         sticking=sticking, sliding=sliding, asymmetry={} if given else asymmetry(c), dissipative=c.damped,
         free=sticking.free, contacts=count, reasons=doubts or sticking.reasons, remarks=c.remarks,
     )  # fmt: skip

@@ -164,7 +164,7 @@ def rayleigh_timestep(configuration: Configuration) -> float | None:
     float or None
         Time; None of disks, and of contacts that are not Hertz's.
     """
-    c = configuration.contacts
+    c = configuration.contacts.touching
     if configuration.dimension == 2 or not len(c) or np.any(c.normal_force <= 0):
         return None
     if np.any(np.abs(c.normal_stiffness * c.overlap / c.normal_force - 1.5) > 1e-3):  # Hertz's force has 3/2

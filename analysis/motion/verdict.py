@@ -59,6 +59,8 @@ class Stability:
         Without dissipation.
     at_bound : int
         Contacts at Coulomb's bound.
+    rolling_at_bound : int
+        Contacts whose rolling friction is at its bound.
     sticking, sliding : Linear
         If all contacts at the bound stuck, and if all slid on; no bounds of what they do.
     asymmetry : dict
@@ -111,6 +113,7 @@ class Stability:
     contacts: int
     one_sided: OneSidedOutcome | None = None
     creep: Creep | None = None
+    rolling_at_bound: int = 0
     largest_energy: float | None = None
     largest_push: float | None = None
     push_time: float | None = None
@@ -171,11 +174,12 @@ class Stability:
             counts = {"complex pair": u.pairs, "negative eigenvalue": u.negative}
             what = " and ".join(counted(count, name) for name, count in counts.items() if count)
             yield f"without dissipation: {what or 'small motion grows'}, {exponential(u.growth_rate, 6, u.at_least)}"
-        if self.at_bound:
-            lone = self.at_bound == 1
+        if self.at_bound + self.rolling_at_bound:
+            lone, rolls = self.at_bound == 1, self.rolling_at_bound
+            rolling = f", and the rolling friction of {rolls} at its own" if rolls else ""
             slide = ": each slides on ahead and sticks on the way back" if sided else f" and slide{'s' * lone}"
             count = f"{self.at_bound} of {counted(self.contacts, 'contact')} {'is' if lone else 'are'}"
-            yield f"{count} at Coulomb's bound{slide}"
+            yield f"{count} at Coulomb's bound{rolling}{slide}"
             if sided:
                 on = max(self.sliding.free - self.sticking.free, 0)
                 ever = f"{counted(on, 'motion')} would go on for ever, and " if on else ""

@@ -36,7 +36,9 @@ def unit_forces(configuration: Configuration, force: Floats) -> csr_array:
     c = configuration.contacts
     turn = np.cross(c.normal, force)
     rows = [
-        np.hstack([sign * force, -(c.lever_arm[:, p] / configuration.radius[partner])[:, None] * turn])
+        np.hstack(
+            [sign * ~c.couple[:, None] * force, -(c.lever_arm[:, p] / configuration.radius[partner])[:, None] * turn]
+        )
         for p, (partner, sign) in enumerate(((c.i, 1.0), (c.j, -1.0)))
     ]
     on_particles = _rows_of_particles(configuration, (c.i, c.j), np.array(rows))
@@ -57,7 +59,7 @@ def tangential_rows(configuration: Configuration, along: Floats, tangential: Flo
     """
     c = configuration.contacts
     across = np.cross(along, c.normal)
-    shift = -tangential[:, None] * along - normal[:, None] * c.normal
+    shift = -(tangential * ~c.couple)[:, None] * along - normal[:, None] * c.normal
     rows = [
         np.hstack([sign * shift, -(tangential * c.slip_arm[:, p] / configuration.radius[partner])[:, None] * across])
         for p, (partner, sign) in enumerate(((c.i, 1.0), (c.j, -1.0)))

@@ -2,18 +2,17 @@
 
 - `granular_commands`: the commands of a deck that concern contacts; `contact_law_measurement`: the laws of these
   contacts, measured in a second LAMMPS, and where both disagree
-- `instance_queries`, `lammps_arrays`: an instance in numbers; `looks`: all numbers of one look; `look_in_a_copy`: looks
-  that leave the instance as it was
-- `configuration_by_laws`: a Configuration with the measured laws
-- `configuration_by_differences`: a Configuration with K and C by differences of LAMMPS's forces (`force_differences`),
-  by displacements of the particles of one of the `colours` along the coordinates that `mobility` finds to move, bodies
-  among them (`translating_bodies`)
+- `look_in_a_copy`: looks that leave the instance as it was, its styles and its log; `lammps_arrays`: an instance in
+  numbers; `looks`: all numbers of one look
+- `mobility`: which coordinates move, bodies among them
+- `configuration_by_laws`: a Configuration with the measured laws; `configuration_by_differences`: one with K and C by
+  differences of LAMMPS's forces
 - `balance`: whether a packing rests, and its walls do
-- `motion_proof`: a few of LAMMPS's own steps beside those of the Configuration; `acting_fixes`: what explains a
-  difference
-- `from_lammps`: the choice among all of these; `compare_motion`: a longer motion beside LAMMPS's
-- `relax`: an instance brought to rest; `lammps_path`: its loading path; `run_deck`: the deck of a user, carried out by
-  LAMMPS; `kept_state`: the last state of a deck that cannot be taken
+- `motion_proof`: a few of LAMMPS's own steps beside those of the Configuration, and what explains a difference; a
+  longer motion, `compare_motion`
+- `from_lammps`: the choice among all of these
+- `relax`: an instance brought to rest; `lammps_path`: its loading path; `growth_followed`: where a motion that grows
+  ends; `run_deck`: the deck of a user, carried out by LAMMPS, and the last state of one that cannot be taken
 
 May import: `lammps`, `load_path`.
 """

@@ -31,7 +31,7 @@ def force_scale(configuration: Configuration) -> float:
     """The mean normal force of contacts, and of walls whose contacts are not known, by particle; where nothing is
     known, the force of an overlap of 1e-4 of a radius."""
     at_walls = configuration.wall_force
-    forces = np.concatenate([np.abs(configuration.contacts.normal_force), at_walls[at_walls > 0]])
+    forces = np.concatenate([np.abs(configuration.contacts.touching.normal_force), at_walls[at_walls > 0]])
     if len(forces):
         return float(forces.mean())
     if configuration.stiffness is None:
@@ -81,27 +81,16 @@ def held_remarks(configuration: Configuration, velocity: Floats, rotation: Float
 
 def motion_remarks(configuration: Configuration, velocity: Floats) -> tuple[str, ...]:
     """A sentence on velocities, shape (N, 3), of particles that move, if these are more than what forces out of balance
-    make: v (k m)^(1/2) is a force, with the largest stiffness k at a particle and its mass m. Rotations do not count,
+    make: v (k m)^(1/2) is a force, with the largest entry k of K at a particle and its mass m. Rotations do not count,
     as spheres may spin on a plane."""
     c, speed = configuration, np.linalg.norm(velocity, axis=1)
-    moves = c.free & (speed * np.sqrt(_largest_stiffness(c) * c.mass) > BALANCE * force_scale(c))
+    stiffest = abs(c.assembled_stiffness()).max(axis=1).toarray().ravel()
+    stiffest = (stiffest if c.constraint is None else (c.constraint != 0) @ stiffest).reshape(c.axes, -1).max(axis=0)
+    moves = c.free & (speed * np.sqrt(stiffest * c.mass) > BALANCE * force_scale(c))
     moves[c.rattlers] = False
     if not moves.any():
         return ()
     return (f"particles move by up to {speed[moves].max():.3g} (length / time): this is said of them at rest",)
-
-
-def _largest_stiffness(configuration: Configuration) -> Floats:
-    """The largest normal stiffness of a contact of each particle, or the largest entry of K, shape (N,)."""
-    c, found = configuration.contacts, np.zeros(len(configuration))
-    if configuration.stiffness is not None:
-        rows = abs(configuration.stiffness).max(axis=1).toarray().ravel()
-        if configuration.constraint is not None:
-            rows = (configuration.constraint != 0) @ rows
-        return np.asarray(rows.reshape(configuration.axes, -1).max(axis=0))
-    for partner, touches in ((c.i, np.ones(len(c), bool)), (c.j, ~c.wall)):
-        np.maximum.at(found, partner[touches], c.normal_stiffness[touches])
-    return found
 
 
 LOST = (
@@ -149,22 +138,22 @@ def creeping_law(commands: Commands) -> str:
     )
 
 
+LOSES = {
+    "rerun": "puts the positions of a dump, which has no tangential histories: leave it out",
+    "write_restart": "stands after the last run, where LAMMPS forgets tangential histories if its lists of neighbours "
+    "have changed since: have the run itself write the restart, by `restart N FILE` before it",
+} | dict.fromkeys(
+    ("delete_atoms", "reset_atoms"),
+    "after the last run gives particles other IDs, by which LAMMPS knows the tangential histories: leave reset_atoms "
+    "out, write `compress no` behind delete_atoms, and run on until the packing rests",
+)
+"""Commands after the last run that take tangential histories away, and what is said of them."""
+
+
 def lost_histories(commands: Commands) -> str:
     """What is said of a command after the last run that takes tangential histories away; empty if there is none."""
-    after = commands.after_run
-    if after.startswith("rerun"):
-        return f"{after!r} puts the positions of a dump, which has no tangential histories: leave it out"
-    if after.startswith(("delete_atoms", "reset_atoms")):
-        return (
-            f"{after!r} after the last run gives particles other IDs, by which LAMMPS knows the tangential histories: "
-            "leave reset_atoms out, write `compress no` behind delete_atoms, and run on until the packing rests"
-        )
-    if after and commands.style != OWN:
-        return (
-            f"{after!r} stands after the last run, where LAMMPS forgets tangential histories if its lists of "
-            "neighbours have changed since: have the run itself write the restart, by `restart N FILE` before it"
-        )
-    return ""
+    name = commands.after_run.partition(" ")[0]
+    return f"{commands.after_run!r} {LOSES[name]}" if name and (name, commands.style) != ("write_restart", OWN) else ""
 
 
 def known_cause(commands: Commands, contacts: LinearisedContacts, residual: Floats | None = None) -> str:
@@ -172,6 +161,7 @@ def known_cause(commands: Commands, contacts: LinearisedContacts, residual: Floa
 
     Histories may be lost where friction can bear the residual force on the particle that has most, shape (N,).
     """
+    contacts = contacts.touching
     if says := restless_fix(commands):
         return f"{says}, and run on"
     if says := creeping_law(commands):

@@ -37,7 +37,7 @@ from ...analysis.contacts import BOOLEAN, PER_CONTACT, WALL
 from ...analysis.packing.linearise import linearise_contacts
 from .balance import known_cause
 from .contact_law_measurement import MeasuredLaw, State, measure_law, remark_on
-from .granular_commands import GIVE_LINES, OWN, Commands, NotLinearisedError, NotTakenError, without_suffix
+from .granular_commands import GIVE_LINES, OWN, PLANES, Commands, NotLinearisedError, NotTakenError, without_suffix
 from .lammps_arrays import Arrays
 from .looks import box_of, members_of, particles_of
 from .mobility import mobility
@@ -54,16 +54,20 @@ class OneLaw(NamedTuple):
     """Contacts that have one law, as LAMMPS says them: between particles of two types, or with one wall.
 
     `geometry` has the fields of LinearisedContacts that no law enters. `forces` has f_n and the vector f_t of LAMMPS's
-    own styles, shape (C, 4), or f_n and the slip of ours, shape (C, 2).
+    own styles, shape (C, 4), or f_n and the slip of ours, shape (C, 2). `rolling` has what LAMMPS says of rolling
+    friction, shape (C, 3): the force at the arm R of contacts between particles, and the whole torque of a wall.
     """
 
     who: str
     geometry: dict[str, Any]
     forces: Floats
+    rolling: Floats | None = None
 
     def chosen(self, which: NDArray[np.bool_]) -> "OneLaw":
         """Some of the contacts."""
-        return OneLaw(self.who, {name: values[which] for name, values in self.geometry.items()}, self.forces[which])
+        geometry = {name: values[which] for name, values in self.geometry.items()}
+        rolling = None if self.rolling is None else self.rolling[which]
+        return OneLaw(self.who, geometry, self.forces[which], rolling)
 
 
 KnownLaws = dict[tuple[Any, ...], MeasuredLaw]
@@ -108,18 +112,14 @@ def check_friction(contacts: LinearisedContacts, *, rests: bool) -> None:
 
 def _check_torques(others: Floats, commands: Commands, contacts: LinearisedContacts) -> None:
     """Refuse torques besides those of the contacts: only contacts may turn particles here."""
-    forces = (
-        FORCE_AGREEMENT * np.abs(contacts.tangential_force).max(initial=0.0),
-        OVERLAP_ROUNDING * contacts.normal_force.max(initial=0.0),
-    )
-    if np.abs(others).max() > sum(forces):
-        known = known_cause(commands, contacts)
-        reason = known or (
-            "either something else turns them, which is not linearised here, or this release of LAMMPS hands out "
-            "contacts in a way that is not known here; releases of 29 Aug 2024 to 22 Jul 2025 are"
-        )
-        raise (NotTakenError if known else NotLinearisedError)(
-            f"The torques on particles are not those of their contacts: {reason}."
+    allowed = FORCE_AGREEMENT * np.abs(contacts.tangential_force).max(initial=0.0)
+    if np.abs(others).max() > allowed + OVERLAP_ROUNDING * contacts.normal_force.max(initial=0.0):
+        says = "The torques on particles are not those of their contacts"
+        if known := known_cause(commands, contacts):
+            raise NotTakenError(f"{says}: {known}.")
+        raise NotLinearisedError(
+            f"{says}: something else turns them, or this release of LAMMPS hands out contacts in another way than "
+            "those of 29 Aug 2024 to 22 Jul 2025."
         )
 
 
@@ -132,7 +132,7 @@ def _linearised_contacts(
         contacts_of_pairs(found, box),
         [name.removeprefix("wall ") for name in found if name.startswith("wall ")],
     )
-    parts, remarks = [], []
+    parts, couples, remarks = [], [], []
     if commands.style == OWN:
         parts.append(_linearise_smooth(_smooth_law(commands.pair[0].split()[2:]), pairs))
         for name in walls:
@@ -141,7 +141,7 @@ def _linearised_contacts(
             parts.append(_linearise_smooth(law, contacts_of_floor(found, name, float(words[8]))))
     else:
         groups: dict[Any, OneLaw] = by_types(pairs, found["type"]) | {
-            name: contacts_of_wall(found, name) for name in walls
+            name: contacts_of_wall(found, name, commands.fixes[name]) for name in walls
         }
         for name, every in groups.items():
             # what overlaps by rounding alone, as in a lattice whose spheres just touch, is no contact
@@ -155,6 +155,9 @@ def _linearised_contacts(
                 laws[key] = measure_law(lmp, commands, name, state, group.who)
             remarks.append(remark_on(laws[key], commands, name, state))
             parts.append(_linearise_measured(laws[key], group, found, mass))
+            if laws[key].mu_rolling:
+                couples.append(_linearise_rolling(laws[key], group, parts[-1], found, mass))
+    parts += couples
     values = {name: [getattr(each, name) for each in parts] for name in PER_CONTACT}
     if not parts:
         values = {
@@ -189,15 +192,10 @@ def _linearise_smooth(law: MindlinLaw, contacts: OneLaw) -> LinearisedContacts:
 
 def _linearise_measured(law: MeasuredLaw, contacts: OneLaw, found: Arrays, mass: Floats) -> LinearisedContacts:
     """Contacts of a law that has been measured; `mass` as above."""
-    i, j, overlap, arms = (contacts.geometry[name] for name in ("i", "j", "overlap", "slip_arm"))
+    i, overlap, arms = (contacts.geometry[name] for name in ("i", "overlap", "slip_arm"))
     normal_force, tangential_force = contacts.forces[:, 0], contacts.forces[:, 1:]
-    wall, radius = j == WALL, found["radius"]
     stiffness = (1 + law.stiffness.overlap) * normal_force / overlap
-    reduced_radius = np.where(wall, radius[i], radius[i] * radius[j] / (radius[i] + radius[j]))
-    # frozen particles weigh infinitely much in LAMMPS's dashpots, but not at walls; two frozen ones matter to nobody
-    inverse = 1 / mass[i] + 1 / mass[j]
-    reduced_mass = np.divide(1.0, inverse, out=np.zeros(len(i)), where=inverse > 0)
-    reduced_mass = np.where(wall, np.where(np.isinf(mass), found["rmass"], mass)[i], reduced_mass)
+    reduced_radius, reduced_mass = _reduced(contacts, found, mass)
     _agree(law.stiffness.at(reduced_radius, overlap) * overlap, stiffness, contacts)
     per_overlap = tangential_force / overlap[:, None]
     return LinearisedContacts(
@@ -215,6 +213,38 @@ def _linearise_measured(law: MeasuredLaw, contacts: OneLaw, found: Arrays, mass:
         normal_dashpot=law.normal_dashpot.at(reduced_radius, overlap, reduced_mass),
         tangential_dashpot=law.tangential_dashpot.at(reduced_radius, overlap, reduced_mass),
     )
+
+
+def _reduced(contacts: OneLaw, found: Arrays, mass: Floats) -> tuple[Floats, Floats]:
+    """Effective radii and masses of contacts."""
+    i, j, radius = contacts.geometry["i"], contacts.geometry["j"], found["radius"]
+    wall = j == WALL
+    reduced_radius = np.where(wall, radius[i], radius[i] * radius[j] / (radius[i] + radius[j]))
+    # frozen particles weigh infinitely much in LAMMPS's dashpots, but not at walls; two frozen ones matter to nobody
+    inverse = 1 / mass[i] + 1 / mass[j]
+    reduced_mass = np.divide(1.0, inverse, out=np.zeros(len(i)), where=inverse > 0)
+    return reduced_radius, np.where(wall, np.where(np.isinf(mass), found["rmass"], mass)[i], reduced_mass)
+
+
+def _linearise_rolling(
+    law: MeasuredLaw, contacts: OneLaw, sticks: LinearisedContacts, found: Arrays, mass: Floats
+) -> LinearisedContacts:
+    """The rolling friction of contacts, whose torque on the first partner is R n x f of LAMMPS's rolling force f."""
+    assert contacts.rolling is not None
+    normal, overlap, wall = (contacts.geometry[name] for name in ("normal", "overlap", "j"))
+    radius, reduced_mass = _reduced(contacts, found, mass)
+    none, across = np.zeros((len(radius), 3)), np.cross(normal, sticks.tangential_force)
+    # of a wall the whole torque is known; a frozen particle has none
+    by_wall = np.cross(normal, contacts.rolling + sticks.lever_arm[:, :1] * across) / radius[:, None]
+    by_wall[~np.any(contacts.rolling, axis=1)] = 0.0
+    force = np.where((wall == WALL)[:, None], by_wall, -contacts.rolling)
+    arm = np.column_stack([radius, np.where(wall == WALL, 0.0, -radius)])
+    return derive_frozen(
+        sticks, couple=np.ones(len(radius), bool), tangential_force=force, slip_arm=arm, lever_arm=arm,
+        lever_slope=np.zeros(len(radius)), closing=none, parting=none, friction=law.mu_rolling * sticks.normal_force,
+        tangential_stiffness=law.rolling.at(radius, overlap),
+        tangential_dashpot=law.rolling_dashpot.at(radius, overlap, reduced_mass),
+    )  # fmt: skip
 
 
 def _agree(computed: Floats, stiffness: Floats, contacts: OneLaw) -> None:
@@ -237,7 +267,7 @@ def contacts_of_pairs(found: Arrays, box: Floats) -> OneLaw:
     """All contacts between particles, of whatever types."""
     rows, partners = found["contacts"], found["partners"]
     if not len(rows):
-        rows, partners = np.zeros((0, 7)), np.zeros((0, 2))
+        rows, partners = np.zeros((0, 10)), np.zeros((0, 2))
     i, j = np.searchsorted(found["id"], partners).T
     if np.any(i == j):
         raise NotTakenError(
@@ -247,7 +277,8 @@ def contacts_of_pairs(found: Arrays, box: Floats) -> OneLaw:
     distance = np.linalg.norm(branch, axis=1)
     overlap = found["radius"][i] + found["radius"][j] - distance
     geometry = _geometry(found, i, j, branch / distance[:, None], distance, overlap)
-    return OneLaw("contacts of mindlin/smooth", geometry, rows[:, 3:])
+    rolling = rows[:, 7:10] if rows.shape[1] > 7 else None
+    return OneLaw("contacts of mindlin/smooth", geometry, rows[:, 3:7], rolling)
 
 
 def _towards_first(branch: Floats, between: Floats, box: Floats) -> Floats:
@@ -274,17 +305,20 @@ def _at_wall(found: Arrays, name: str, i: Indices, normal: Floats, overlap: Floa
     return OneLaw(f"contacts of fix {name}", geometry, forces)
 
 
-def contacts_of_wall(found: Arrays, name: str) -> OneLaw:
-    """Contacts with a wall of LAMMPS's own."""
-    rows = found[f"wall {name}"]
-    i = np.flatnonzero(rows[:, 0] > 0)
-    branch, force = found["x"][i] - rows[i, 4:7], rows[i, 1:4]
-    every, axis = np.arange(len(i)), np.argmax(np.abs(branch), axis=1)
-    distance, normal = branch[every, axis], np.zeros_like(branch)
-    normal[every, axis] = np.sign(distance)
-    along = np.einsum("ca,ca->c", force, normal)[:, None]
-    forces = np.hstack([along, force - along * normal])
-    return _at_wall(found, name, i, normal, found["radius"][i] - np.abs(distance), forces)
+def contacts_of_wall(found: Arrays, name: str, line: str) -> OneLaw:
+    """Contacts with the planes of fix wall/gran, of which LAMMPS has the nearer act."""
+    words = line.split()
+    at = next(k for k, word in enumerate(words) if word in PLANES)
+    axis, force = PLANES.index(words[at]), found[f"wall {name}"]
+    lower, upper = (np.nan if word == "NULL" else float(word) for word in words[at + 1 : at + 3])
+    low, high = (np.nan_to_num(each, nan=np.inf) for each in (found["x"][:, axis] - lower, upper - found["x"][:, axis]))
+    overlap = found["radius"] - np.minimum(low, high)
+    i = np.flatnonzero((overlap > 0) & force.any(axis=1))
+    normal = np.zeros((len(i), 3))
+    normal[:, axis] = np.where(low < high, 1.0, -1.0)[i]
+    along = np.einsum("ca,ca->c", force[i], normal)[:, None]
+    made = _at_wall(found, name, i, normal, overlap[i], np.hstack([along, force[i] - along * normal]))
+    return made._replace(rolling=found[f"torque {name}"][i] if f"torque {name}" in found else None)
 
 
 def contacts_of_floor(found: Arrays, name: str, height: float) -> OneLaw:

@@ -27,7 +27,7 @@ from mpi4py import MPI
 from ...analysis.arrays import Floats
 from ..lammps.instance import start_lammps
 from .granular_commands import GIVE_LINES, PLANES, Commands, NotTakenError, without_suffix
-from .instance_queries import explain_error
+from .look_in_a_copy import explain_error
 
 EXPONENT_ERROR = 1e-6
 """Distance of a measured exponent from a multiple of 1/4: rounding of forces and overlaps leaves 1e-9 or less."""
@@ -86,6 +86,10 @@ class MeasuredLaw:
         Coulomb's coefficient.
     lever : float
         l': 0, or 1/2 of an arm that ends in the middle of the overlap.
+    rolling, rolling_dashpot : PowerOfOverlap
+        Stiffness and dashpot of rolling friction: a force, at the arm R, by R times the relative rotation.
+    mu_rolling : float
+        Its bound over the normal force; 0 without rolling friction.
     """
 
     stiffness: PowerOfOverlap
@@ -96,36 +100,38 @@ class MeasuredLaw:
     parting: float
     mu: float
     lever: float
+    rolling: PowerOfOverlap
+    rolling_dashpot: PowerOfOverlap
+    mu_rolling: float
+
+
+X, Y, Z = range(3)
+"""The normal of the contact that is measured, the direction in which it slips, and the axis about which it rolls."""
 
 
 class TwoParticleLammps:
-    """A LAMMPS with two particles of some types, or one and the wall of a fix, and the commands of a deck."""
+    """A LAMMPS with two particles of some types, or one and the wall of a fix, and the commands of a deck.
+
+    The wall is a plane across x, wherever that of the fix is.
+    """
 
     def __init__(self, lmp: Any, commands: Commands, name: tuple[int, int] | str, size: float) -> None:
         self.lammps = start_lammps(MPI.COMM_SELF, None)
-        words = _one_plane(commands.fixes[name].split()) if isinstance(name, str) else []
-        self.wall, self.types = bool(words), (1, 1) if isinstance(name, str) else name
-        self.axis, self.sign, self.place = 0, 1.0, 0.0
-        if self.wall:
-            at = _place_of_planes(words)
-            self.axis = "xyz".index(words[at][0])
-            self.sign, plane = (1.0, words[at + 1]) if words[at + 1] != "NULL" else (-1.0, words[at + 2])
-            self.place = float(plane)
-        self.across, self.about = (self.axis + 1) % 3, (self.axis + 2) % 3
-        middle = np.zeros(3)
-        middle[self.axis] = self.place
-        edges = " ".join(f"{m - 40 * size:.17g} {m + 40 * size:.17g}" for m in middle)
-        create = f"create_atoms 1 single {' '.join(f'{m:.17g}' for m in middle)} units box"
+        wall = isinstance(name, str)
+        self.types = (1,) if isinstance(name, str) else name
         self.run(
             f"units {lmp.extract_global('units')}", "atom_style sphere", "atom_modify map yes sort 0 0",
             "boundary f f f", "newton on", "comm_modify vel yes", f"neighbor {size:.17g} bin",
-            "neigh_modify every 1 delay 0 check no", f"region box block {edges} units box",
+            "neigh_modify every 1 delay 0 check no",
+            f"region box block {f' {-40 * size:.17g} {40 * size:.17g}' * 3} units box",
             f"create_box {lmp.extract_setting('ntypes')} box", "thermo_modify lost ignore norm no",
-            *[create] * (1 if self.wall else 2), f"set group all diameter {2 * size:.17g}", "set group all density 1",
-            "run_style verlet", "group one id 1", *commands.pair,
+            *["create_atoms 1 single 0 0 0 units box"] * (1 if wall else 2),
+            f"set group all diameter {2 * size:.17g} density 1", "run_style verlet", "group one id 1", *commands.pair,
         )  # fmt: skip
-        if self.wall:
-            self.run(" ".join([*words[:2], "all", *words[3:]]))
+        if isinstance(name, str):
+            words = commands.fixes[name].split()
+            at = next(k for k, word in enumerate(words) if word in PLANES)
+            self.run(" ".join([*words[:2], "all", *words[3:at], "xplane 0 NULL", *words[at + 3 :]]))
         self.run("timestep 1")
 
     def run(self, *lines: str) -> None:
@@ -135,49 +141,36 @@ class TwoParticleLammps:
 
     def array(self, name: str) -> Floats:
         """An array of the particles, as LAMMPS has it."""
-        return np.asarray(self.lammps.numpy.extract_atom(name))[: 1 if self.wall else 2]
+        return np.asarray(self.lammps.numpy.extract_atom(name))[: len(self.types)]
 
     def place_at(self, state: State) -> State:
         """Put the particles into a fresh contact, at rest; the state with the overlap to the last digit."""
-        count = 1 if self.wall else 2
+        count = len(self.types)
         for away in (True, False):
             self.array("radius")[:], self.array("rmass")[:] = state.radii[:count], state.masses[:count]
-            self.array("type")[:] = self.types[:count]
-            x = self.array("x")
-            x[:] = 0.0
-            x[:, self.axis] = self.place
-            x[0, self.axis] += self.sign * (sum(state.radii) - state.overlap + away * state.radii[0])
+            self.array("type")[:], self.array("x")[:] = self.types, 0.0
+            self.array("x")[0, X] = sum(state.radii) - state.overlap + away * state.radii[0]
+            self.radius = state.radius
             self.rest()
-        x = self.array("x")
-        other = self.place if self.wall else x[1, self.axis]
-        return state._replace(overlap=sum(state.radii) - abs(x[0, self.axis] - other))
+        return state._replace(overlap=sum(state.radii) - self.array("x")[0, X])
 
-    def move(self, closing: float = 0.0, slipping: float = 0.0) -> None:
-        """Give the first particle a velocity towards the other one, and a rotation, as the speed of its surface."""
+    def move(self, closing: float = 0.0, slipping: float = 0.0, rolling: float = 0.0, across: float = 0.0) -> None:
+        """Give the first particle a velocity towards the other one, a rotation, as the speed of its surface, one
+        without slip, as the effective radius times its rate, or a velocity across."""
         self.array("v")[:] = self.array("omega")[:] = 0.0
-        self.array("v")[0, self.axis] = -self.sign * closing
-        self.array("omega")[0, self.about] = slipping / self.array("radius")[0]
+        radius, rolls = self.array("radius")[0], rolling / self.radius
+        self.array("v")[0] = -closing, across + radius * rolls, 0.0
+        self.array("omega")[0, Z] = slipping / radius + rolls
 
     def rest(self) -> None:
         """Stop the particles, and compute their forces at rest."""
         self.move()
         self.run("run 0 post no")
 
-    def force(self) -> tuple[float, float]:
-        """f_n on the first particle, and the size of f_t."""
-        f = self.array("f")[0]
-        return float(self.sign * f[self.axis]), float(abs(f[self.across]))
-
-
-def _place_of_planes(words: list[str]) -> int:
-    """Which word of a wall is xplane, yplane or zplane; its lower and its upper plane follow."""
-    return next(k for k, word in enumerate(words) if word in PLANES)
-
-
-def _one_plane(words: list[str]) -> list[str]:
-    """A wall with the lower one of its two planes: in a narrow slot a particle would touch the other one, too."""
-    upper = _place_of_planes(words) + 2
-    return words if words[upper - 1] == "NULL" else [*words[:upper], "NULL", *words[upper + 1 :]]
+    def force(self) -> tuple[float, float, float]:
+        """f_n on the first particle, and the sizes of f_t and, of rolling without slip, of the torque over R."""
+        f, torque = self.array("f")[0], self.array("torque")[0, Z]
+        return float(f[X]), float(abs(f[Y])), float(abs(torque) / self.radius)
 
 
 def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state: State, who: str) -> MeasuredLaw:
@@ -204,18 +197,12 @@ def measure_law(lmp: Any, commands: Commands, name: tuple[int, int] | str, state
         ) from error
     with closing(bench.lammps):
         states, found = zip(*(_measure(bench, each) for each in wanted), strict=True)
-    names = ("stiffness", "tangential", "normal_dashpot", "tangential_dashpot")
-    here = found[0]
-    return MeasuredLaw(
-        **{
-            name: _power(f"{name.replace('_', ' ')} of the {who}", states, [each[name] for each in found])
-            for name in names
-        },
-        closing=quarter(here["closing"], f"tangential force of the {who}"),
-        parting=quarter(here["parting"], f"tangential force of the {who}"),
-        mu=here["mu"],
-        lever=quarter(here["lever"], f"lever arm of the {who}"),
-    )
+    law: dict[str, Any] = {name: found[0][name] for name in ("mu", "mu_rolling")}
+    for name in ("stiffness", "tangential", "normal_dashpot", "tangential_dashpot", "rolling", "rolling_dashpot"):
+        law[name] = _power(f"{name.replace('_', ' ')} of the {who}", states, [each[name] for each in found])
+    for name in ("closing", "parting", "lever"):
+        law[name] = quarter(found[0][name], f"{'lever arm' if name == 'lever' else 'tangential force'} of the {who}")
+    return MeasuredLaw(**law)
 
 
 def _power(what: str, states: Sequence[State], values: Sequence[float]) -> PowerOfOverlap:
@@ -262,15 +249,18 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
     step = 1e3 * np.sqrt(state.mass * delta / fn)
     bench.run(f"timestep {step:.17g}")
     normal_dashpot = _dashpot(bench, "closing", fn, 0.1 * delta / step)
+    rolling = _rolling(bench, wanted, fn, delta, step)
     bench.place_at(wanted)
     bench.move(slipping=1e60 * delta / step)  # far beyond Coulomb's bound, of the softest spring, too
     bench.run("run 1 post no")
     mu = bench.force()[1] / fn  # while the contact slides: dashpots bear a part of the force
     if mu == 0:
         none = dict.fromkeys(("tangential", "tangential_dashpot", "closing", "parting", "mu", "lever"), 0.0)
-        return state, {"stiffness": fn / delta, "normal_dashpot": normal_dashpot} | none
+        return state, {"stiffness": fn / delta, "normal_dashpot": normal_dashpot} | none | rolling
     ft, slip = _force_of_slip(bench, wanted, mu * fn, 1e-8 * min(mu, 1.0) * delta, step)
-    arm = abs(bench.array("torque")[0, bench.about] / bench.array("f")[0, bench.across])
+    if rolling["mu_rolling"]:  # a slip without rotation, which turns the particle by friction alone
+        _push_contact(bench, wanted, across=slip / step)
+    arm = abs(bench.array("torque")[0, Z] / bench.array("f")[0, Y])
     lever = float(state.radii[0] - arm) / delta
     parting, closing = _exponents(bench, ft, delta, step)
     bench.place_at(wanted)
@@ -278,7 +268,33 @@ def _measure(bench: TwoParticleLammps, wanted: State) -> tuple[State, dict[str, 
     return state, {
         "stiffness": fn / delta, "tangential": ft / slip, "normal_dashpot": normal_dashpot,
         "tangential_dashpot": tangential_dashpot, "closing": closing, "parting": parting, "mu": mu, "lever": lever,
-    }  # fmt: skip
+    } | rolling  # fmt: skip
+
+
+def _rolling(bench: TwoParticleLammps, wanted: State, fn: float, delta: float, step: float) -> dict[str, float]:
+    """Stiffness, dashpot and bound of rolling friction, from rolling without slip for one step; zeros without any."""
+
+    def roll(way: float, *, rests: bool = True) -> float:
+        bench.place_at(wanted)
+        bench.move(rolling=way / step)
+        bench.run("run 1 post no")
+        if rests:
+            bench.rest()
+        return bench.force()[2]
+
+    way = 1e-8 * delta
+    force = roll(way)
+    if force <= 1e-14 * fn:
+        return dict.fromkeys(("rolling", "rolling_dashpot", "mu_rolling"), 0.0)
+    bound = roll(1e3 * way * fn / force, rests=False)  # while it rolls on: the dashpot bears a part of the force
+    for _ in range(SLIP_TRIALS):
+        if force <= 0.1 * bound:
+            break
+        way *= 0.01 * bound / force
+        force = roll(way)
+    bench.place_at(wanted)
+    dashpot = _dashpot(bench, "rolling", bound, 0.01 * bound * way / (force * step))
+    return {"rolling": force / way, "rolling_dashpot": dashpot, "mu_rolling": bound / fn}
 
 
 def _force_of_slip(
@@ -286,12 +302,12 @@ def _force_of_slip(
 ) -> tuple[float, float]:
     """A tangential force far below Coulomb's bound, and its slip: LAMMPS's classic models forget most of a slip that
     was cut at the bound."""
-    ft = _push_contact(bench, wanted, slip / step)
+    ft = _push_contact(bench, wanted, slipping=slip / step)
     for _ in range(SLIP_TRIALS):
         if ft <= 0.1 * bound:
             break
         slip *= 0.01 * bound / ft  # a stiff spring: once more, with less
-        ft = _push_contact(bench, wanted, slip / step)
+        ft = _push_contact(bench, wanted, slipping=slip / step)
     if not 0 < ft <= 0.1 * bound:
         raise NotTakenError("A contact law has friction without a tangential stiffness: use one with a history.")
     return ft, slip
@@ -301,29 +317,29 @@ def _exponents(bench: TwoParticleLammps, ft: float, delta: float, step: float) -
     """d ln f_t / d ln delta at constant slip while the contact parts and closes, in steps of a tenth of the overlap."""
     forces, overlaps = [ft], [delta]
     for direction in (-1.0, 1.0):
-        x = bench.array("x")[0, bench.axis]
-        velocity = ["0", "0", "0"]
-        velocity[bench.axis] = f"{-bench.sign * direction * 0.1 * delta / step:.17g}"
-        bench.run(f"fix go one move linear {' '.join(velocity)} units box", "run 1 post no", "unfix go")
+        x, velocity = bench.array("x")[0, X], -direction * 0.1 * delta / step
+        bench.run(f"fix go one move linear {velocity:.17g} 0 0 units box", "run 1 post no", "unfix go")
         bench.rest()
         forces.append(bench.force()[1])
-        overlaps.append(overlaps[-1] + bench.sign * (x - bench.array("x")[0, bench.axis]))
+        overlaps.append(overlaps[-1] + x - bench.array("x")[0, X])
     parting, closing = np.log(np.array(forces[1:]) / forces[:-1]) / np.log(np.array(overlaps[1:]) / overlaps[:-1])
     return float(parting), float(closing)
 
 
-def _push_contact(bench: TwoParticleLammps, state: State, speed: float) -> float:
-    """Tangential force at rest of a fresh contact that has slipped at a speed for one step."""
+def _push_contact(bench: TwoParticleLammps, state: State, **speed: float) -> float:
+    """Tangential force at rest of a fresh contact that has moved at a speed for one step."""
     bench.place_at(state)
-    bench.move(slipping=speed)
+    bench.move(**speed)
     bench.run("run 1 post no")
     bench.rest()
     return bench.force()[1]
 
 
-def _dashpot(bench: TwoParticleLammps, direction: Literal["closing", "slipping"], scale: float, speed: float) -> float:
+def _dashpot(
+    bench: TwoParticleLammps, direction: Literal["closing", "slipping", "rolling"], scale: float, speed: float
+) -> float:
     """Force per velocity of a contact without slip: first at some speed, then where the force is a tenth of scale."""
-    component = 0 if direction == "closing" else 1
+    component = ("closing", "slipping", "rolling").index(direction)
     bench.rest()
     rest, found, force = bench.force()[component], 0.0, 0.0
     for _ in range(6):  # a speed whose force is lost in rounding, or is cut at the bound, comes nearer
@@ -352,16 +368,13 @@ def remark_on(law: MeasuredLaw, commands: Commands, name: tuple[int, int] | str,
         return None
     size = (state.radius * state.overlap) ** (0.5 if style.startswith("hertz") else 0.0)
     kn, kt, mu = float(words[1]), 2 / 7 * float(words[1]) if words[2] == "NULL" else float(words[2]), float(words[5])
-    radius, overlap = np.array(state.radius), np.array(state.overlap)
-    found = [
-        ("a normal stiffness", kn * size, law.stiffness.at(radius, overlap)),
-        ("a friction coefficient", mu, law.mu),
-    ]
+    here = np.array(state.radius), np.array(state.overlap)
+    found = {"a normal stiffness": (law.stiffness.at(*here), kn * size), "a friction coefficient": (law.mu, mu)}
     if law.mu:  # without friction there is no tangential force
-        found.append(("a tangential stiffness", kt * size, float(law.tangential.at(radius, overlap))))
+        found["a tangential stiffness"] = law.tangential.at(*here), kt * size
     says = [
         f"{what} {measured / said:.3g} times that of the line"
-        for what, said, measured in found
+        for what, (measured, said) in found.items()
         if said > 0 and abs(measured / said - 1) > LAW_DIFFERENCE
     ]
     who = f"fix {name}" if isinstance(name, str) else f"Contacts of types {name[0]} and {name[1]}"

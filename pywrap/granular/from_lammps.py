@@ -13,15 +13,20 @@ from typing import Any
 
 from ...analysis import Configuration
 from ...analysis.arrays import Floats, derive_frozen
-from .acting_fixes import check_holding, drag_remarks
 from .balance import BALANCE, check_balance, force_scale, held_remarks, lost_histories, motion_remarks, refuse_motion
 from .configuration_by_differences import configuration_by_differences, still_particles
 from .configuration_by_laws import KnownLaws, check_friction, configuration_by_laws
-from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError, read_commands, with_one_rank
-from .instance_queries import open_files, require_instance
-from .look_in_a_copy import can_copy, in_a_copy
+from .granular_commands import OWN, Commands, NotLinearisedError, NotTakenError, read_commands, without_suffix
+from .look_in_a_copy import DRAG_STYLES, can_copy, in_a_copy, open_files, require_instance
 from .looks import look
-from .motion_proof import LARGEST_DIFFERENCE, SMALL_DIFFERENCE, NotProvedError, OtherStiffnessError, push_remark
+from .motion_proof import (
+    LARGEST_DIFFERENCE,
+    SMALL_DIFFERENCE,
+    NotProvedError,
+    OtherStiffnessError,
+    check_holding,
+    push_remark,
+)
 from .motion_proof import prove as prove_motion
 
 
@@ -116,7 +121,9 @@ def _instead_of_laws(
     """A Configuration by differences, with the reason among its remarks; or the reason, where it is not proved."""
     why = str(reason).rstrip(".")
     if not can_copy(lmp):
-        raise NotLinearisedError(with_one_rank(reason)) from reason
+        raise NotLinearisedError(
+            f"{why}; or take one rank and one thread, where K is found by differences of forces."
+        ) from reason
     if slides:
         raise NotTakenError(
             f"{why}; so K is found by differences of forces, which have no choice between sticking and sliding "
@@ -167,19 +174,19 @@ def _remarks(
 ) -> tuple[str, ...]:
     """Sentences on what moves, which a packing at rest leaves out; velocities have the shape (N, 3)."""
     held = held_remarks(configuration, velocity, rotation, float(lmp.extract_global("dt")))
-    adapts = (
-        f"fix {name} (adapt) may change sizes or laws as LAMMPS runs on: this is said of those that hold now"
-        for name, style in fixes.items()
-        if style.startswith("adapt")
-    )
-    return (*held, *motion_remarks(configuration, velocity), *adapts, *drag_remarks(fixes))
+    of_fixes = []
+    for name, style in fixes.items():
+        if style.startswith("adapt"):
+            says = "may change sizes or laws as LAMMPS runs on: this is said of those that hold now"
+            of_fixes.append(f"fix {name} (adapt) {says}")
+        elif without_suffix(style).startswith(DRAG_STYLES):
+            of_fixes.append(f"drag of fix {name} ({style}) is left out")
+    return (*held, *motion_remarks(configuration, velocity), *of_fixes)
 
 
-def _proved(lmp: Any, configuration: Configuration, commands: Commands, fixes: dict[str, str]) -> Configuration:
+def _proved(lmp: Any, made: Configuration, commands: Commands, fixes: dict[str, str]) -> Configuration:
     """A Configuration with its proof."""
-    return derive_frozen(
-        configuration, proof=prove_motion(lmp, configuration, fixes, extrapolates=commands.style == OWN)
-    )
+    return derive_frozen(made, proof=prove_motion(lmp, made, fixes, extrapolates=commands.style == OWN))
 
 
 def _by_differences(lmp: Any, given: Commands | None, *, balance: float, prove: bool) -> Configuration:

@@ -23,7 +23,7 @@ INTEGRATORS = ("nve/sphere", "nve/disc", "overdamped/disc")
 """Fixes that move particles and turn them."""
 
 BODIES = ("rigid", "rigid/nve")
-"""Fixes whose bodies may be kept from rotating (:mod:`~faultgouge.pywrap.granular.translating_bodies`)."""
+"""Fixes whose bodies may be kept from rotating (:mod:`~faultgouge.pywrap.granular.mobility`)."""
 
 AFTER_RUN = ("write_restart", "rerun", "delete_atoms", "reset_atoms")
 """Commands that take tangential histories away from particles."""
@@ -33,6 +33,12 @@ MOBILE = (
 )  # fmt: skip
 """Fixes that move or hold coordinates as is known here."""
 
+MOVES = ("nve", "rigid", "move", "overdamped", "nvt", "nph", "npt")
+"""Fixes that move particles, by the beginnings of their styles."""
+
+HOLDS = ("freeze", "setforce", "aveforce", "lineforce", "planeforce", "momentum", "recenter", "temp/")
+"""Fixes that change forces or velocities of coordinates that are held, or that move as one."""
+
 GIVE_LINES = (
     "give the lines pair_style, pair_coeff, fix wall/gran and fix nve/sphere of the deck as "
     "from_lammps(lmp, commands=[...])"
@@ -41,7 +47,6 @@ GIVE_LINES = (
 GIVE_LINE = "give the line that the deck has among commands"
 
 COHESIVE = ("jkr", "dmt", "mdr")
-UNSUPPORTED_SUBMODELS = {"twisting": "twisting friction", "rolling": "rolling friction", "heat": "heat conduction"}
 TANGENTIAL = (
     "linear_history", "linear_history_classic", "mindlin", "mindlin_classic", "mindlin/force", "mindlin_rescale",
     "mindlin_rescale/force",
@@ -65,11 +70,6 @@ class NotLinearisedError(NotTakenError):
     """Contacts cannot be linearised by their laws: K and C by differences of forces may serve."""
 
 
-def with_one_rank(reason: NotLinearisedError) -> str:
-    """The sentence where differences of forces cannot serve, which need copies of the process."""
-    return f"{str(reason).rstrip('.')}; or take one rank and one thread, where K is found by differences of forces."
-
-
 @dataclass(frozen=True)
 class Commands:
     """What a deck says of contacts and of motion: pair_style with the pair_coeff that hold, fixes and regions by their
@@ -84,6 +84,12 @@ class Commands:
     def style(self) -> str:
         """The pair style, without the suffix of an accelerator."""
         return without_suffix(self.pair[0].split()[1])
+
+
+def rolls(line: str) -> bool:
+    """Whether the contacts of a line have rolling friction, which only the style `granular` has."""
+    words = line.split()
+    return "rolling" in words and words[words.index("rolling") + 1 :][:1] != ["none"]
 
 
 def without_suffix(style: str) -> str:
@@ -178,77 +184,63 @@ def check_pair(commands: Commands, styles: Iterable[str]) -> None:
         if "overlay" in words[1] and len(used) > 1:
             raise NotLinearisedError(f"pair_style {words[1]} adds several forces at a contact: use one granular style.")
     for style in used:
-        if style == "gran/hooke":
-            raise NotLinearisedError("pair_style gran/hooke has no tangential history: use gran/hooke/history.")
         if style not in HISTORY and (style != OWN or len(used) > 1):
-            raise NotLinearisedError(
-                f"pair_style {style} is none of {', '.join(HISTORY)} and {OWN}: only these have contacts to linearise."
-            )
-    if "granular" in used:
-        for line in commands.pair[1:]:
-            _check_model(line.split("granular", 1)[-1].split() if "granular" in line else line.split()[3:], line)
+            raise NotLinearisedError(f"pair_style {style} is none of {', '.join(HISTORY)} and {OWN}: use one of these.")
+    for line in commands.pair[1:] if "granular" in used else ():
+        _check_model(line.split("granular", 1)[-1].split() if "granular" in line else line.split()[3:], line)
 
 
 def _check_model(words: list[str], line: str) -> None:
-    """Refuse what a model of `granular` has beside normal and tangential forces."""
+    """Refuse what a model of `granular` has beside normal, tangential and rolling forces."""
     if not words or words[0] in HISTORY[:2]:
         return
-    for word in words:
-        if word in COHESIVE:
-            raise NotLinearisedError(f"{line!r}: {word} is cohesive; use hooke, hertz or hertz/material.")
-    for keyword, name in UNSUPPORTED_SUBMODELS.items():
-        if keyword in words and words[words.index(keyword) + 1 :][:1] != ["none"]:
-            raise NotLinearisedError(f"{line!r} has {name}, which is not linearised here: leave {keyword} out.")
-    model = (words[words.index("tangential") + 1 :] if "tangential" in words else ["none"])[:1]
-    if model[0] not in TANGENTIAL:
-        raise NotLinearisedError(f"{line!r}: tangential {model[0]} keeps no history; use {', '.join(TANGENTIAL)}.")
+    given = {word: words[k + 1] if k + 1 < len(words) else "" for k, word in enumerate(words)}
+    tangential = given.get("tangential", "none")
+    says = [f"{word} is cohesive; use hooke, hertz or hertz/material" for word in words if word in COHESIVE]
+    says += [f"{word} is not linearised here" for word in ("twisting", "heat") if given.get(word, "none") != "none"]
+    if tangential not in TANGENTIAL:
+        says.append(f"tangential {tangential} keeps no history; use {', '.join(TANGENTIAL)}")
+    if says:
+        raise NotLinearisedError(f"{line!r}: {says[0]}.")
 
 
+COMES_TO_REST = ", and let the packing come to rest"
 MOVING = {
     "poems": "holds particles together in bodies, whose rotation is not linearised here: use single particles",
-    "move": "moves particles: unfix it, and let the packing come to rest",
-    "deform": "moves the box: unfix it, and let the packing come to rest",
-    "press/berendsen": "moves the box: unfix it, and let the packing come to rest",
-    "nph": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
-    "npt": "moves the box: use fix nve/sphere in its place, and let the packing come to rest",
-    "nvt": "has a thermostat: use fix nve/sphere in its place, and let the packing come to rest",
+    "move": "moves particles: unfix it" + COMES_TO_REST,
+    "deform": "moves the box: unfix it" + COMES_TO_REST,
+    "press/berendsen": "moves the box: unfix it" + COMES_TO_REST,
+    **dict.fromkeys(("nph", "npt"), "moves the box: use fix nve/sphere in its place" + COMES_TO_REST),
+    "nvt": "has a thermostat: use fix nve/sphere in its place" + COMES_TO_REST,
     "propel/self": "pushes particles along their velocities as soon as they move: unfix it",
 }
 """Fixes, by the beginnings of their styles, with which no packing of particles rests."""
 
-
-def check_rest(styles: dict[str, str], commands: Commands) -> None:
-    """Refuse fixes, by ID and style, with which no packing rests, however K is found."""
-    for name, style in styles.items():
-        plain = without_suffix(style)
-        for begin, says in MOVING.items():
-            if plain.startswith(begin):
-                raise NotTakenError(f"fix {name} {style} {says}.")
-        for word in ("wiggle", "shear"):
-            if plain == "wall/gran" and word in commands.fixes.get(name, "").split()[4:]:
-                raise NotTakenError(f"The wall of fix {name} moves: let it rest without {word}.")
+PLANES = ("xplane", "yplane", "zplane")
 
 
 def check_fixes(styles: dict[str, str], commands: Commands) -> None:
-    """Refuse fixes, by ID and style, that hold or move particles or walls otherwise than contacts do."""
-    for name, style in styles.items():
-        plain = without_suffix(style)
-        if plain.startswith("wall/") and plain not in WALLS:
-            raise NotLinearisedError(f"fix {name} {style} is no wall of contacts: use planes of fix wall/gran.")
-        if plain.startswith("nve") and plain not in MOBILE:
+    """Refuse fixes, by ID and style, with which no packing rests, however K is found; and those that hold or move
+    particles or walls otherwise than contacts do."""
+    plain = {name: without_suffix(style) for name, style in styles.items()}
+    for name, style in plain.items():
+        for begin, says in MOVING.items():
+            if style.startswith(begin):
+                raise NotTakenError(f"fix {name} {styles[name]} {says}.")
+        for word in {"wiggle", "shear"} & set(commands.fixes.get(name, "").split()[4:] if style == "wall/gran" else ()):
+            raise NotTakenError(f"The wall of fix {name} moves: let it rest without {word}.")
+    for name, style in plain.items():
+        if style.startswith(("wall/", "nve")) and style not in (*WALLS, *MOBILE):
             raise NotLinearisedError(
-                f"fix {name} {style} does not turn particles by their contacts: use fix nve/sphere."
+                f"fix {name} {styles[name]} is not linearised here: use fix nve/sphere, and planes of fix wall/gran."
             )
-        if plain not in (*WALLS, *MOBILE):
+        if style not in (*WALLS, *MOBILE):
             continue
         line = commands.fixes.get(name)
-        if line is None or without_suffix(line.split()[3]) != plain:
-            raise NotTakenError(f"The commands have no line of fix {name} {style}: {GIVE_LINE}.")
-        if plain == "wall/gran":
+        if line is None or without_suffix(line.split()[3]) != style:
+            raise NotTakenError(f"The commands have no line of fix {name} {styles[name]}: {GIVE_LINE}.")
+        if style == "wall/gran":
             _check_wall(name, line)
-
-
-PLANES = ("xplane", "yplane", "zplane")
 
 
 def _check_wall(name: str, line: str) -> None:
@@ -256,13 +248,8 @@ def _check_wall(name: str, line: str) -> None:
     at = [k for k, word in enumerate(words) if word in (*PLANES, "zcylinder", "region")]
     if not at or len(words) < at[0] + (3 if words[at[0]] in PLANES else 2):
         raise NotTakenError(f"The line of fix {name} wall/gran does not say where the wall is: give all of it.")
-    for word, says in {
-        "region": "is a region: use a plane, xplane, yplane or zplane",
-        "zcylinder": "is a cylinder: use a plane, xplane, yplane or zplane",
-        "temperature": "conducts heat, which is not linearised here: leave temperature out",
-    }.items():
-        if word in words[4:]:
-            raise NotLinearisedError(f"The wall of fix {name} {says}.")
+    if words[at[0]] not in PLANES or "temperature" in words:
+        raise NotLinearisedError(f"The wall of fix {name} is no plane without heat: use {', '.join(PLANES)}.")
     if words[4] == "hooke":
         raise NotLinearisedError(f"fix {name} wall/gran hooke has no tangential history: use hooke/history.")
     if words[4] == "granular":

@@ -8,15 +8,13 @@ at in windows in which linear motion grows by `FOLDS_OF_WINDOW` e-folds:
 - it *creeps* if D rises on, window by window, in a vibration that carries the packing along.
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ...analysis import Configuration, Packing, Stability, stable_timestep
-from ...analysis.arrays import Floats
 from ...analysis.motion.pushes import random_pushes
 from ...analysis.progress import report_progress
 from .lammps_arrays import owned_array, rows_of, set_velocity
@@ -52,8 +50,6 @@ NO_LAMMPS = (
 )
 """Where a file holds particles and contacts alone."""
 
-Advance = Callable[[int], Floats]
-
 
 def follow_by(packing: Packing | Configuration, lmp: Any = None) -> Callable[[Stability], Stability]:
     """What adds to a verdict where the motion that grows ends: `Stability.follow`.
@@ -67,86 +63,53 @@ def follow_by(packing: Packing | Configuration, lmp: Any = None) -> Callable[[St
     """
 
     def follow(told: Stability) -> Stability:
-        configuration = packing.configuration
+        c = packing.configuration
+        if lmp is not None and not can_copy(lmp):
+            why = "LAMMPS goes on in a copy of the process, which takes one rank and one thread"
+            return replace(told, remarks=(*told.remarks, why))
         if lmp is not None:
-            if not can_copy(lmp):
-                why = "LAMMPS goes on in a copy of the process, which takes one rank and one thread"
-                return replace(told, remarks=(*told.remarks, why))
-            ends = in_a_copy(lambda: _ends(told, configuration, *_live(lmp, configuration)))
-        elif isinstance(packing, Packing):
-            with _plugin(packing) as moving:
-                ends = _ends(told, configuration, *moving)
-        else:
+            return replace(told, follow=in_a_copy(lambda: _ends_in_a_copy(told, c, lmp)))
+        if not isinstance(packing, Packing):
             return replace(told, remarks=(*told.remarks, NO_LAMMPS))
-        return replace(told, follow=ends)
+        from mpi4py import MPI
+
+        from ..lammps.engine import Engine
+
+        step = STEP_SHARE * float(stable_timestep(packing))
+        with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(step):
+            return replace(told, follow=_ends(told, c, engine.lammps, step))
 
     return follow
 
 
-def _live(lmp: Any, c: Configuration) -> tuple[Any, Advance, float]:
-    """The instance in a copy, what makes it go on and says the displacements, shape (N, d), and its time step."""
+def _ends_in_a_copy(told: Stability, c: Configuration, lmp: Any) -> dict[str, Any]:
     lmp.command("log none")
     quieten(lmp, drag=True)
     step = STEP_SHARE * float(stable_timestep(c))
     lmp.command(f"timestep {step:.17g}")
+    return _ends(told, c, lmp, step)
+
+
+def _ends(told: Stability, c: Configuration, lmp: Any, step: float) -> dict[str, Any]:
+    """Where the motion of an instance ends, and how: `Stability.follow`."""
+    diameter, rate, d = 2 * float(c.radius.mean()), told.growth_rate, c.dimension
     low, high, *_ = lmp.extract_box()
-    width = np.where(c.periodic, np.subtract(high, low), np.inf)[: c.dimension]
-    last = owned_array(lmp, "x")[rows_of(lmp, c), : c.dimension].copy()
-    moved = np.zeros_like(last)
-
-    def advance(count: int) -> Floats:
-        nonlocal last
-        lmp.command(f"run {count} post no")
-        now = owned_array(lmp, "x")[rows_of(lmp, c), : c.dimension].copy()
-        change = now - last
-        change -= np.where(np.isfinite(width), width, 0.0) * np.round(change / width)
-        moved[:] += change
-        last = now
-        return moved
-
-    return lmp, advance, step
-
-
-@contextmanager
-def _plugin(packing: Packing) -> Iterator[tuple[Any, Advance, float]]:
-    """The same of a packing that the plugin moves."""
-    from mpi4py import MPI
-
-    from ...analysis import nearest_image
-    from ..lammps.engine import Engine
-
-    step, last = STEP_SHARE * float(stable_timestep(packing)), packing.position
-    moved = np.zeros_like(last)
-    with Engine(packing, MPI.COMM_SELF) as engine, engine.undamped(step) as dynamics:
-
-        def advance(count: int) -> Floats:
-            nonlocal last
-            now = dynamics.advance(count).position.copy()
-            moved[:] += nearest_image(now - last, packing.box_length)
-            last = now
-            return moved
-
-        yield engine.lammps, advance, step
-
-
-def _ends(told: Stability, c: Configuration, lmp: Any, advance: Advance, step: float) -> dict[str, Any]:
-    """Where the motion ends, and how."""
-    diameter, rate = 2 * float(c.radius.mean()), told.growth_rate
+    width = np.where(c.periodic, np.subtract(high, low), np.inf)[:d]
+    last = owned_array(lmp, "x")[rows_of(lmp, c), :d].copy()
+    moved, moves = np.zeros_like(last), ~np.isin(np.arange(len(c)), c.rattlers)
     changes = told.first_change or (1e-3 * float(c.contacts.overlap.max(initial=diameter))) ** 2
-    push = random_pushes(c, 1)[:, 0].reshape(c.axes, len(c))
-    push[:, c.rattlers] = 0.0
+    push = random_pushes(c, 1)[:, 0].reshape(c.axes, len(c)) * moves
     # a push v displaces by v over a frequency, a tenth of the largest
     set_velocity(lmp, c, (PUSH_OVER_CHANGE * np.sqrt(changes) * 0.1 * 2 * STEP_SHARE / step * push).ravel())
     window = max(FOLDS_OF_WINDOW / rate, LEAST_WINDOW * step / STEP_SHARE)
-    count, largest, moves = (
-        max(round(window / step / LOOKS_OF_WINDOW), 1),
-        list[float](),
-        ~np.isin(np.arange(len(c)), c.rattlers),
-    )
+    count, largest = max(round(window / step / LOOKS_OF_WINDOW), 1), list[float]()
     for _ in range(max(MOST_STEPS_OF_END // (count * LOOKS_OF_WINDOW), 3 * SAME_WINDOWS)):
         seen = []
         for _ in range(LOOKS_OF_WINDOW):
-            moved = advance(count)
+            lmp.command(f"run {count} post no")
+            now = owned_array(lmp, "x")[rows_of(lmp, c), :d].copy()
+            moved += now - last - np.where(np.isfinite(width), width, 0.0) * np.round((now - last) / width)
+            last = now
             seen.append(float(np.sum(moved[moves] ** 2) / len(c)))
             if not seen[-1] < (FLOWS_FROM * diameter) ** 2:
                 return {"displacement": float(np.sqrt(seen[-1])), "ends": "flows"}

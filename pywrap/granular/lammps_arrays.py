@@ -14,8 +14,8 @@ import numpy as np
 from ...analysis import Configuration
 from ...analysis.arrays import Floats, Indices
 from ..lammps.instance import load_plugin
-from .granular_commands import BODIES, PLANES, NotLinearisedError, NotTakenError
-from .instance_queries import communicator, styles_of
+from .granular_commands import BODIES, NotTakenError
+from .look_in_a_copy import communicator, styles_of
 
 Arrays = dict[str, Any]
 
@@ -84,8 +84,8 @@ def has_bodies(lmp: Any) -> bool:
 
 
 def arrays_at_rest(lmp: Any, groups: dict[str, str], walls: list[str], columns: str) -> Arrays:
-    """Particles, forces and contacts of this rank after zero steps at rest; who is in the groups of some fixes, and
-    contacts with the walls of others. `v` and `omega` are the velocities before."""
+    """Particles, forces and contacts of this rank after zero steps at rest; who is in the groups of some fixes, and the
+    columns that walls hand out. `v` and `omega` are the velocities before."""
     moves = {name: np.array(owned_array(lmp, name)) for name in ("v", "omega")}
     for name in moves:
         owned_array(lmp, name)[:] = 0.0
@@ -112,49 +112,10 @@ def arrays_at_rest(lmp: Any, groups: dict[str, str], walls: list[str], columns: 
             lmp.command(f"uncompute {name}")
 
 
-def forces_in_order(lmp: Any, ids: Indices) -> Floats:
-    """Forces on the particles of these IDs, all that there are on this rank."""
+def forces_in_order(lmp: Any, ids: Indices, name: str = "f") -> Floats:
+    """Forces, or torques, on the particles of these IDs, all that there are on this rank."""
     order = np.argsort(owned_array(lmp, "id"))[np.argsort(np.argsort(ids))]
-    return np.array(owned_array(lmp, "f")[order])
-
-
-def contacts_of_plane(lmp: Any, fix: str, line: str, found: Arrays, before: Floats) -> tuple[Floats, Floats]:
-    """The columns of `fix wall/gran ... contacts` for each particle, of planes without the word contacts; in a copy.
-
-    The wall's force on a particle is the force that is missing without the wall.
-
-    Parameters
-    ----------
-    lmp : lammps.lammps
-        The copy, which loses the wall.
-    fix, line : str
-        The ID, and the command.
-    found : dict of arrays
-        Of :func:`arrays_at_rest`.
-    before : ndarray, shape (N, 3)
-        Forces on the particles with the wall.
-
-    Returns
-    -------
-    rows : ndarray, shape (N, 8)
-        Whether it touches, the wall's force, the point of contact and the radius.
-    without : ndarray, shape (N, 3)
-        Forces on the particles without the wall.
-    """
-    words = line.split()
-    at = next(k for k, word in enumerate(words) if word in PLANES)
-    axis, planes = PLANES.index(words[at]), [float(word) for word in words[at + 1 : at + 3] if word != "NULL"]
-    lmp.command(f"unfix {fix}")
-    lmp.command("run 0 post no")
-    without, x, radius = forces_in_order(lmp, found["id"]), found["x"], found["radius"]
-    force = before - without
-    rows = np.hstack([np.zeros((len(x), 1)), force, x, radius[:, None]])
-    for plane in planes:
-        touch = (np.abs(x[:, axis] - plane) < radius) & np.any(force != 0, axis=1)
-        if np.any(rows[touch, 0]):
-            raise NotLinearisedError(f"A particle touches both planes of fix {fix}, which hands out no contacts.")
-        rows[touch, 0], rows[touch, 4 + axis] = 1.0, plane
-    return rows, without
+    return np.array(owned_array(lmp, name)[order])
 
 
 def _run_zero_steps(lmp: Any) -> None:

@@ -36,9 +36,19 @@ from .balance import check_balance
 from .configuration_by_laws import KnownLaws
 from .from_lammps import take_configuration
 from .granular_commands import NotTakenError
-from .instance_queries import OpenFile, explain_error, log_file, open_files, require_instance
 from .lammps_arrays import owned_array
-from .look_in_a_copy import can_copy, in_a_copy, interrupts_wait, quieten, silent_copy
+from .look_in_a_copy import (
+    OpenFile,
+    can_copy,
+    explain_error,
+    in_a_copy,
+    interrupts_wait,
+    log_file,
+    open_files,
+    quieten,
+    require_instance,
+    silent_copy,
+)
 from .relax import DRAG_RATE, REST_SHARE, bring_to_rest
 
 MOST_COPIES = 48
@@ -287,13 +297,7 @@ class _Relaxation:
         # a proof may have shown at the first load that laws do not serve
         differences = self.found is not None and self.found.operators == "differences"
         return take_configuration(
-            self.lmp,
-            self.commands,
-            self.laws,
-            slides=self.slides,
-            balance=np.inf,
-            prove=prove,
-            differences=differences,
+            self.lmp, self.commands, self.laws, slides=self.slides, balance=np.inf, prove=prove, differences=differences
         )
 
     def force_change(self, value: float) -> float:

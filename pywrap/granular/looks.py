@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from ...analysis.arrays import Floats
 from .balance import moving_region
-from .force_differences import HOLDS, MOVES
 from .granular_commands import (
     BODIES,
     GIVE_LINE,
     GIVE_LINES,
+    HOLDS,
     MOBILE,
+    MOVES,
     OWN,
     WALLS,
     Commands,
@@ -22,14 +23,13 @@ from .granular_commands import (
     NotTakenError,
     check_fixes,
     check_pair,
-    check_rest,
     read_commands,
+    rolls,
     without_suffix,
 )
-from .instance_queries import OpenFile, Styles, communicator, log_of, only_log, said, styles_of
-from .lammps_arrays import Arrays, arrays_at_rest, contacts_of_plane, forces_in_order, given_back
-from .look_in_a_copy import can_copy, quieten
-from .translating_bodies import translating_bodies
+from .lammps_arrays import Arrays, arrays_at_rest, forces_in_order, given_back
+from .look_in_a_copy import OpenFile, Styles, can_copy, communicator, log_of, only_log, quieten, said, styles_of
+from .mobility import translating_bodies
 
 BY_CONTACT = ("contacts", "partners")
 """Arrays with a row for each contact; all others have one for each particle."""
@@ -77,22 +77,30 @@ def look(
         quieten(lmp, drag=True)
     else:
         _refuse_changes(lmp, styles, given)
-    silent = _silent_walls(styles, given) if not columns else []
-    walls = [name for name in plain if plain[name] in WALLS and name not in silent and not columns]
+    walls = [name for name, style in plain.items() if (style.startswith("wall/gran") if columns else style in WALLS)]
+    silent = _silent_walls(walls, given)
     usual = "dx dy dz force p3" if given.style == OWN else "dx dy dz force p1 p2 p3"
+    if any(map(rolls, given.pair)):
+        usual += " p5 p6 p7"
     with nullcontext() if copied else given_back(lmp):
-        mine = arrays_at_rest(lmp, groups, walls, columns or usual)
-    if columns:
-        mine["at walls"] = _forces_of_walls(lmp, styles, given, mine)
-    forces = mine["f"]
-    setting = [name for name in plain if silent and plain[name] in SETTING]
-    for name in setting:
+        mine = arrays_at_rest(lmp, groups, [name for name in walls if name not in silent], columns or usual)
+    for name in walls:
+        if name not in silent and plain[name].startswith("wall/gran"):
+            mine[f"wall {name}"] = mine[f"wall {name}"][:, 1:4]
+    # what a wall exerts is what is missing without the wall, and without fixes that set forces
+    apart = [name for name in walls if name in silent or (not columns and rolls(given.fixes[name]))]
+    acts = {each: mine[each] for each in ("f", "torque")}
+    for name in [*(name for name in plain if apart and plain[name] in SETTING), *apart]:
         lmp.command(f"unfix {name}")
-    if setting:
         lmp.command("run 0 post no")
-        forces = forces_in_order(lmp, mine["id"])
-    for name in silent:
-        mine[f"wall {name}"], forces = contacts_of_plane(lmp, name, given.fixes[name], mine, forces)
+        now = {each: forces_in_order(lmp, mine["id"], each) for each in acts}
+        if name in apart:
+            mine[f"wall {name}"] = acts["f"] - now["f"] if name in silent else mine[f"wall {name}"]
+            mine[f"torque {name}"] = acts["torque"] - now["torque"]
+        acts = now
+    if columns:
+        forces = [mine.pop(f"wall {name}") for name in walls]
+        mine["at walls"] = np.linalg.norm(sum(forces, np.zeros_like(mine["f"])), axis=1)
     every = world.allgather(mine)
     found = {}
     for name in mine:  # the array of a rank without rows may have another number of columns
@@ -139,21 +147,6 @@ def _refuse_changes(lmp: Any, styles: Styles, commands: Commands) -> None:
         )
 
 
-def _forces_of_walls(lmp: Any, styles: Styles, commands: Commands, found: Arrays) -> Floats:
-    """Sizes of the forces of all walls on each particle, shape (N,), in a copy, which loses walls."""
-    walls = {name for name, style in styles.fixes.items() if style.startswith("wall/gran")}
-    says = {name for name in walls if "contacts" in commands.fixes.get(name, "").split()}
-    total = np.zeros((len(found["id"]), 3))
-    for name in says:
-        total += np.array(lmp.numpy.extract_fix(name, 1, 2))[: len(total), 1:4]
-    for name in walls - says:  # no compute of the deck needs them
-        lmp.command(f"unfix {name}")
-    if walls - says:
-        lmp.command("run 0 post no")
-        total += found["f"] - forces_in_order(lmp, found["id"])
-    return np.asarray(np.linalg.norm(total, axis=1))
-
-
 def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
     """Refuse styles of an instance that are not linearised here."""
     if without_suffix(styles.pair) != commands.style:
@@ -165,26 +158,28 @@ def check_instance(lmp: Any, styles: Styles, commands: Commands) -> None:
     if lmp.extract_global("ftm2v") != 1.0:
         units = lmp.extract_global("units")
         raise NotTakenError(f"In units {units} force is not mass times acceleration: use lj, si, cgs, micro or nano.")
-    check_rest(styles.fixes, commands)
     for name, style in styles.fixes.items():
         if style.startswith("rigid") and name in commands.fixes:
             translating_bodies(commands.fixes[name], lmp.extract_setting("dimension"))
+    check_fixes(styles.fixes, commands)
     if lmp.extract_setting("molecule_flag") and lmp.extract_global("nbonds"):
         raise NotLinearisedError("Bonds hold particles together: take them out.")
     check_pair(commands, lmp.available_styles("pair"))
-    check_fixes(styles.fixes, commands)
-    silent = _silent_walls(styles, commands)
-    if silent and not can_copy(lmp):
+    walls = [name for name, style in styles.fixes.items() if without_suffix(style) == "wall/gran"]
+    silent = _silent_walls(walls, commands)
+    rolling = [name for name in walls if rolls(commands.fixes[name])]
+    if (silent or rolling) and not can_copy(lmp):
+        what = "its contacts: write contacts at its end" if silent else "its rolling friction"
         raise NotTakenError(
-            f"fix {silent[0]} wall/gran does not hand out its contacts, and on several ranks or with threads they are "
-            "not found without it: write contacts at its end."
+            f"fix {(silent or rolling)[0]} wall/gran does not hand out {what}; or take one rank and one thread, where "
+            "it is found without the wall."
         )
 
 
-def _silent_walls(styles: Styles, commands: Commands) -> list[str]:
+def _silent_walls(walls: list[str], commands: Commands) -> list[str]:
     """IDs of walls that hand out no contacts."""
-    walls = [name for name, style in styles.fixes.items() if without_suffix(style) == "wall/gran"]
-    return [name for name in walls if "contacts" not in commands.fixes[name].split()]
+    lines = {name: commands.fixes.get(name, "") for name in walls}
+    return [name for name, line in lines.items() if OWN not in line and "contacts" not in line.split()]
 
 
 def box_of(lmp: Any) -> tuple[Floats, Floats, NDArray[np.bool_]]:

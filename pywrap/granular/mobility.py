@@ -3,8 +3,9 @@ r"""Which coordinates of the particles move, and which of them move as one, by t
 The particles of a lid that `fix aveforce` moves have common translations: q = P Q, with the lid's coordinates at its
 first particle. `fix aveforce` gives each particle the same force, so that
 :math:`m_i \ddot x_i = \frac1n \sum_k F_k`, and :math:`x_i = (m_1/m_i) X`: particles of different mass move by different
-amounts. The particles of a body of fix rigid that does not rotate have one displacement. A component that `fix
-setforce` sets to zero, and whatever no fix moves, is held: its row of P is empty.
+amounts. The particles of a body of fix rigid that does not rotate have one displacement, and the force on the body is
+the sum of theirs. A component that `fix setforce` sets to zero, and whatever no fix moves, is held: its row of P is
+empty.
 """
 
 from itertools import combinations
@@ -17,13 +18,65 @@ from scipy.sparse import csr_array, diags_array
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
 from .granular_commands import BODIES, NotTakenError, without_suffix
-from .translating_bodies import translating_bodies
 
 TURNS = ("nve/sphere", "nve/disc", "overdamped/disc")
 """Fixes that move particles and turn them."""
 
 INTEGRATES = ("nve", "nve/limit", *TURNS, *BODIES)
 """Fixes that move particles."""
+
+
+HELD = "force * off off off torque * off off off"
+"""Words by which a body keeps its velocity, whatever its particles feel. The fix stays where forces are measured, as
+dashpots feel the mass of the body, which takes its velocity from its particles where a run begins."""
+
+
+class Body(NamedTuple):
+    """A group of particles that translate as one, along some of the axes."""
+
+    group: str
+    axes: tuple[bool, bool, bool]
+
+
+def translating_bodies(line: str, dimension: int) -> list[Body]:
+    """The bodies of a command fix rigid.
+
+    Raises
+    ------
+    NotTakenError
+        If they may rotate, or the command has what is not known here.
+    """
+    words = line.split()
+    name, style, kind = words[1], words[3], words[4]
+    groups = [words[2]] if kind == "single" else words[6 : 6 + int(words[5])] if kind == "group" else []
+    if without_suffix(style) not in BODIES or not groups:
+        raise NotTakenError(f"fix {name} {style} {kind} {WAY_OUT}.")
+    axes, turns = ([[True] * 3 for _ in groups] for _ in range(2))
+    at = 5 if kind == "single" else 6 + len(groups)
+    while at < len(words):
+        if words[at] == "reinit" and words[at + 1] in YES:
+            at += 2
+            continue
+        if words[at] not in ("force", "torque"):
+            raise NotTakenError(
+                f"fix {name} {style} has {' '.join(words[at : at + 2])}, which is not known here: leave it out."
+            )
+        low, star, high = words[at + 1].partition("*")
+        which = range(int(low or 1) - 1, int(high or len(groups)) if star else int(low))
+        for k in which:
+            (axes if words[at] == "force" else turns)[k] = [word in YES for word in words[at + 2 : at + 5]]
+        at += 5
+    if any(any(each if dimension == 3 else each[2:]) for each in turns):
+        raise NotTakenError(f"fix {name} {style} {kind} {WAY_OUT}.")
+    return [Body(group, (x, y, z)) for group, (x, y, z) in zip(groups, axes, strict=True)]
+
+
+WAY_OUT = (
+    "holds particles together in bodies that may rotate, and rotations of bodies are not linearised here: for lids "
+    "that do not rotate use fix rigid single, or group, with `torque * off off off` at the end of its line"
+)
+
+YES = ("on", "yes", "true")
 
 
 class Mobility(NamedTuple):

@@ -8,7 +8,6 @@ no force.
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -17,14 +16,13 @@ import numpy as np
 from ...analysis import BadInputError, Configuration, NoEquilibriumError, stable_timestep
 from ...analysis.arrays import Floats
 from ...analysis.counted import counted
-from .acting_fixes import acting_fixes
 from .balance import check_balance, creeping_law, force_scale, held_remarks, restless_fix
 from .configuration_by_differences import still_particles
 from .from_lammps import take_configuration
 from .granular_commands import Commands, NotTakenError, read_commands
-from .instance_queries import explain_error, require_instance
 from .lammps_arrays import owned_array, rows_of, set_up_run, set_velocity
-from .look_in_a_copy import can_copy
+from .look_in_a_copy import can_copy, explain_error, require_instance
+from .motion_proof import acting_fixes
 
 REST_SHARE = 1e-8
 """Residual over the mean contact force at rest: far below the couplings of 1e-3 that make complex pairs, and far above
@@ -167,8 +165,12 @@ def bring_to_rest(
     rate : float
         Of the drag at the end.
     """
-    drag, changes = _Drag.of(lmp, start, rate), True
-    dt, diameter = float(lmp.extract_global("dt")), 2 * float(start.radius.mean())
+    dt, diameter, mass = float(lmp.extract_global("dt")), 2 * float(start.radius.mean()), start.mass[start.free]
+    fastest = FASTEST * float(mass.min() / mass.mean())
+    slowest, drags = min(SLOWEST, fastest), [("faultgouge_drag", "viscous")]
+    if lmp.has_style("fix", "viscous/sphere"):  # else dashpots alone stop rotations
+        drags.append(("faultgouge_spin", "viscous/sphere"))
+    rate, changes = float(np.clip(rate, slowest, fastest)), True
     way, residual, force, rounding = 0.0, np.inf, force_scale(start), 0.0
     try:
         for done in range(0, steps, STEPS_BETWEEN_LOOKS):
@@ -176,83 +178,43 @@ def bring_to_rest(
                 found = look()
                 _refuse_long_steps(found, dt, where)
                 rounding = _rounding(found)
-            if changes:
-                drag.exert()
+            viscous = rate * float(mass.mean()) / dt
+            strengths = viscous, viscous * float(np.min(start.radius**2)) * (len(drags) > 1)
+            for (name, style), strength in zip(drags if changes else (), strengths, strict=False):
+                lmp.command(f"fix {name} all {style} {strength:.17g}")
             _run(lmp, len(start), where, set_up=changes)
-            forces, drag_forces = _on_bodies(lmp, start, ("f", "torque"), (1.0, 1.0)), drag.forces()
+            forces = _on_bodies(lmp, start, ("f", "torque"), (1.0, 1.0))
+            drag_forces = _on_bodies(lmp, start, ("v", "omega"), strengths)
             residual = float(np.linalg.norm(np.vstack([forces, drag_forces]), axis=0).max())
             speed = np.linalg.norm(owned_array(lmp, "v")[rows_of(lmp, start)][start.free], axis=1)
             way += STEPS_BETWEEN_LOOKS * dt * float(speed.mean())
             if watch:
                 share = f", {residual / force:.2g} of the mean contact force out of balance" if force else ""
                 watch(f"coming to rest: step {done + STEPS_BETWEEN_LOOKS}{share}")
+            pulls, drawn = np.linalg.norm(forces), np.linalg.norm(drag_forces)
             if force == 0.0 or residual <= max(balance * force, rounding):
                 found = look()
                 force = force_scale(found)
                 # particles without contacts have no residual; without a load, LAMMPS's forces are those of the drag
-                falls = force == 0.0 and np.linalg.norm(forces + drag_forces) > 0.5 * np.linalg.norm(drag_forces)
+                falls = force == 0.0 and np.linalg.norm(forces + drag_forces) > 0.5 * drawn
                 if found.residual <= max(balance * force, rounding) and not falls:
                     set_velocity(lmp, found, np.zeros(found.coordinates))
-                    return found, drag.rate
+                    return found, rate
             if way > far * diameter:
                 moved = f"{far:g} diameters" if far > 1 else "a diameter"
                 raise NoEquilibriumError(f"The packing flows{where}: its particles have moved by {moved}.")
-            changes = drag.follow(np.linalg.norm(forces) / max(np.linalg.norm(drag_forces), np.finfo(float).tiny))
+            ratio, before = pulls / max(drawn, np.finfo(float).tiny), rate
+            rate = float(np.clip(rate * (2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0), slowest, fastest))
+            changes = rate != before
     finally:
-        drag.remove()
+        for name, _ in drags:
+            if name in lmp.available_ids("fix"):
+                lmp.command(f"unfix {name}")
     raise NoEquilibriumError(
         f"The packing does not come to rest{where} in {steps} steps: {residual / (force or 1.0):.2g} of the mean "
         f"contact force is out of balance, and its particles have moved by {way / diameter:.2g} diameters; give more "
         "steps, or the packing creeps or flows."
     )
-
-
-@dataclass
-class _Drag:
-    """The drag on all particles of an instance; its rate, per time step on the mean mass, follows the motion."""
-
-    lmp: Any
-    start: Configuration
-    styles: dict[str, str]
-    rates: tuple[float, float]
-    rate: float
-
-    @classmethod
-    def of(cls, lmp: Any, start: Configuration, rate: float) -> "_Drag":
-        """By fix viscous, and by fix viscous/sphere where this LAMMPS has one; else dashpots alone stop rotations."""
-        styles = {"faultgouge_drag": "viscous"}
-        if lmp.has_style("fix", "viscous/sphere"):
-            styles["faultgouge_spin"] = "viscous/sphere"
-        fastest = FASTEST * float(start.mass[start.free].min() / start.mass[start.free].mean())
-        rates = min(SLOWEST, fastest), fastest
-        return cls(lmp, start, styles, rates, float(np.clip(rate, *rates)))
-
-    @property
-    def strengths(self) -> tuple[float, float]:
-        """Of both fixes: force time / length, and torque time."""
-        drag = self.rate * float(self.start.mass[self.start.free].mean()) / float(self.lmp.extract_global("dt"))
-        return drag, drag * float(np.min(self.start.radius**2)) if len(self.styles) > 1 else 0.0
-
-    def exert(self) -> None:
-        """Give LAMMPS the fixes, in the place of those that it has."""
-        for (name, style), strength in zip(self.styles.items(), self.strengths, strict=False):
-            self.lmp.command(f"fix {name} all {style} {strength:.17g}")
-
-    def forces(self) -> Floats:
-        """Sizes of its forces (F, T/R) on what moves, shape (axes, N)."""
-        return _on_bodies(self.lmp, self.start, ("v", "omega"), self.strengths)
-
-    def follow(self, ratio: float) -> bool:
-        """Change the rate by the ratio of the forces to those of the drag; whether it has changed."""
-        before, factor = self.rate, 2.0 if ratio > 2 else 0.5 if ratio < 0.25 else 1.0
-        self.rate = float(np.clip(factor * before, *self.rates))
-        return self.rate != before
-
-    def remove(self) -> None:
-        """Take the fixes away."""
-        for name in self.styles:
-            if name in self.lmp.available_ids("fix"):
-                self.lmp.command(f"unfix {name}")
 
 
 def _rounding(found: Configuration) -> float:

@@ -9,16 +9,8 @@ from ...analysis.files.formats.lammps_data import box_lines
 def data_file(packing: Packing) -> str:
     """A LAMMPS data file of the disks, type 2 the upper layer; lengths to the bit, masses left to the decks."""
     x, y = packing.position.T
-    lines = [
-        "faultgouge packing",
-        "",
-        f"{len(packing)} atoms",
-        "2 atom types",
-        *box_lines(packing),
-        "",
-        "Atoms # sphere",
-        "",
-    ]
+    lines = ["faultgouge packing", "", f"{len(packing)} atoms", "2 atom types", *box_lines(packing)]
+    lines += ["", "Atoms # sphere", ""]
     columns = zip(packing.top.tolist(), (2 * packing.radius).tolist(), x.tolist(), y.tolist(), strict=True)
     lines += [f"{n} {1 + top} {d!r} 1.0 {a!r} {b!r} 0.0" for n, (top, d, a, b) in enumerate(columns, 1)]
     return "\n".join(lines) + "\n"

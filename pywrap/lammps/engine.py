@@ -339,21 +339,11 @@ class Engine:
                 data.write_text(data_file(packing))
             self.communicator.barrier()
             self._decks.variables(
-                decks=decks_folder(),
-                data=data,
-                sides="f" if packing.box_length is None else "p",
-                kn=law.kn,
-                kt=law.kt,
-                mu=law.mu,
-                exponent=law.exponent,
-                history=law.history,
-                fx=packing.fx,
-                fy=packing.fy,
-                inertia=packing.inertia_factor,
-                mass=float(packing.mass.min()),
-                diameter=2 * float(packing.radius.min()),
-                precision="compensated" if packing.compensated else "double",
-            )
+                decks=decks_folder(), data=data, sides="f" if packing.box_length is None else "p", kn=law.kn, kt=law.kt,
+                mu=law.mu, exponent=law.exponent, history=law.history, fx=packing.fx, fy=packing.fy,
+                inertia=packing.inertia_factor, mass=float(packing.mass.min()),
+                diameter=2 * float(packing.radius.min()), precision="compensated" if packing.compensated else "double",
+            )  # fmt: skip
             if law.damped:
                 self._decks.variables(cn=law.cn, ct=law.ct)
             self._decks.include("system.in")

@@ -38,13 +38,8 @@ LAMMPS_DOUBLE = 1
 LOW_COLUMNS, STATE_COLUMNS = 5, 10
 """Columns of fix ``low``, and of fix displace/disc."""
 
-GIVEN_COLUMN, POSITION_COLUMNS, ANGLE_COLUMN, VELOCITY_COLUMNS, FORCE_COLUMNS = (
-    0,
-    slice(1, 3),
-    3,
-    slice(4, 7),
-    slice(7, 10),
-)
+GIVEN_COLUMN, ANGLE_COLUMN = 0, 3
+POSITION_COLUMNS, VELOCITY_COLUMNS, FORCE_COLUMNS = slice(1, 3), slice(4, 7), slice(7, 10)
 """Columns of fix displace/disc."""
 
 FLOOR_SLIP, FLOOR_OVERLAP, FLOOR_SLIP_LOW = 2, 6, 7

@@ -236,7 +236,8 @@ def write_packing(
     words: str = _function(*WRITERS[path.suffix])(path, [(0.0, exported)])
     if path.suffix in WITHOUT_MODES or (alone and path.suffix != ".vtp"):
         return words
-    what = {"disk" if alone else "particle": len(packing), "contact": len(packing.contacts), "mode": len(modes)}
+    touching = packing.configuration.contacts.touching
+    what = {"disk" if alone else "particle": len(packing), "contact": len(touching), "mode": len(modes)}
     return ", ".join(counted(number, noun) for noun, number in what.items())
 
 

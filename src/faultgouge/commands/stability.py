@@ -39,6 +39,7 @@ def stability(
         typer.Option("--time", metavar="T", help="How long motion is followed; until it has settled by default."),
     ] = None,
     follow: Follow = False,
+    relax: Annotated[bool, typer.Option("--relax", help="Bring the last state of a deck to rest first.")] = False,
     frame: Frame = -1,
     output: Annotated[Path, typer.Option("-o", "--output", hidden=True)] = Path("stability"),
     quick: Annotated[bool, typer.Option("--quick", hidden=True)] = False,
@@ -55,7 +56,9 @@ def stability(
     if followed is not None and not 0 < followed < inf:
         raise typer.BadParameter(f"--time {followed:g}: the time that motion is followed is a positive number")
     if file.suffix == ".in" or file.name.startswith("in."):
-        return _of_deck(file, rise, followed, follow)
+        return _of_deck(file, rise, followed, follow, relax)
+    if relax:
+        raise typer.BadParameter(f"--relax: {file} is no deck; a deck's last state may move")
     packing = stored_packing(refuse_scene(file), frame)
     if rise and not packing.configuration.top.any():
         raise typer.BadParameter(f"--rise: {file} has no upper layer that a load could push; leave it out")
@@ -77,7 +80,7 @@ def first_sentence(packing: HasConfiguration) -> str:
     return "\n".join([told.sentences[0], *told.remarks])
 
 
-def _of_deck(file: Path, rise: str | None, time: float | None, follow: bool) -> Answer | None:
+def _of_deck(file: Path, rise: str | None, time: float | None, follow: bool, relax: bool) -> Answer | None:
     """Run a deck, and say whether its last state is stable; to follow its motion, while LAMMPS is there."""
     from faultgouge.pywrap.granular.run_deck import run_deck
 
@@ -87,8 +90,8 @@ def _of_deck(file: Path, rise: str | None, time: float | None, follow: bool) -> 
         if is_root():
             found.append(_answer(verdict_of(packing, rise, time, follow=lmp)))
 
-    with status(f"{file}: LAMMPS runs"):
-        packing = run_deck(file, use=use) if follow else run_deck(file)
+    with status(f"{file}: LAMMPS runs") as show:
+        packing = run_deck(file, relaxes=relax, show=show, use=use if follow else None)
     if not follow and is_root():
         found.append(_answer(verdict_of(packing, rise, time)))
     return found[0] if found else None

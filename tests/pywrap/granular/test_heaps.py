@@ -1,0 +1,101 @@
+"""Heaps of spheres with rolling friction (`rolling sds`) beside LAMMPS's own motion: they rest, roll on, or grow.
+
+Spheres fall into a cylinder on a plane, and the cylinder is taken away. Rolling friction keeps a heap from flowing
+apart. Its torque R n x f has a spring and a dashpot of the relative rotation, and a bound mu_r f_n with a slider.
+"""
+
+import numpy as np
+import pytest
+from granular_packings import command
+from pushes import in_steps, pushed
+
+from faultgouge.analysis import damping_matrix, stability, stable_timestep, stiffness_matrix
+from faultgouge.analysis.motion.pushes import random_pushes
+
+DAMPED, UNDAMPED = ("0.6", "1e-3", "coeff_restitution limit_damping"), ("1e-12", "0.0", "velocity")
+MODEL = "hertz/material 1e7 {} 0.3 tangential {law} NULL 1.0 0.5 rolling sds 2e2 {} {mu} damping {}"
+
+
+@pytest.fixture
+def heap(lammps_with):
+    """Makes a heap at rest: tangential law, bound of rolling friction, whether there are dashpots, and the seed."""
+    from faultgouge.pywrap import relax
+
+    def make(law: str, mu: float, damped: bool, seed: int, count: int):
+        model, wall = (MODEL.format(*each, law=law, mu=mu) for each in (DAMPED, DAMPED if damped else UNDAMPED))
+        lmp = lammps_with(f"""
+units si
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+region box block -0.03 0.03 -0.03 0.03 -0.001 0.06 units box
+create_box 1 box
+region tube cylinder z 0 0 0.008 0.0025 0.05 units box
+create_atoms 1 random {count} {seed} tube overlap 0.0035 maxtry 4000
+set group all diameter 0.004 density 2500
+pair_style granular
+pair_coeff * * {model}
+region side cylinder z 0 0 0.012 -0.001 0.06 units box side in
+fix floor all wall/gran granular {wall} zplane 0.0 NULL contacts
+fix side all wall/gran/region granular {model} region side
+fix load all gravity 9.81 vector 0 0 -1
+fix move all nve/sphere
+timestep 1e-5
+thermo_modify lost ignore
+run 15000 post no
+unfix side
+run 20000 post no
+""")
+        relax(lmp)
+        if not damped:
+            command(lmp, f"pair_coeff * * {wall}")
+            relax(lmp)
+        return lmp
+
+    return make
+
+
+HEAPS = {
+    "rests": ("mindlin_rescale/force", 0.1, True, 1, 40),
+    "rolls at the bound": ("mindlin_rescale/force", 0.02, True, 1, 30),
+    "rests without dashpots": ("mindlin_rescale/force", 0.1, False, 2, 40),
+    "grows": ("mindlin_rescale", 0.1, False, 5, 50),
+}
+
+
+@pytest.mark.parametrize("which", HEAPS)
+def test_a_heap_after_pushes(heap, which):
+    """D after opposite pushes, in LAMMPS's own steps. What grows does so by a factor of 1000."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = heap(*HEAPS[which])
+    here = from_lammps(lmp)
+    assert here.operators == "laws"
+    assert here.proof < 1e-4
+    assert here.contacts.couple.sum() == len(here.contacts.touching)
+    told = stability(here)
+    assert told.stable is (which != "grows")
+    assert (told.rolling_at_bound > 0) is (which == "rolls at the bound")
+    assert told.at_bound == 0
+    assert ("and the rolling friction of 2 at its own: each slides" in str(told)) is (which == "rolls at the bound")
+    times, size = ([0.05, 0.1, 0.2, 0.4], 1e-10) if which == "grows" else ([0.02, 0.05, 0.1, 0.2], 1e-8)
+    push = random_pushes(here, 1)
+    timestep = 0.1 * float(stable_timestep(here))
+    found = pushed(lmp, here, push, times, timestep, size)
+    expected = [in_steps(here, each[:, None], times, timestep) for each in push.T]
+    np.testing.assert_allclose(np.transpose(expected), found, rtol=0.01)
+    assert (which == "grows") == bool(found[-1].min() > 1000 * found[0].max())
+
+
+def test_k_and_c_are_those_of_forces(heap):
+    """K and C by laws beside differences of LAMMPS's forces, which know nothing of rolling."""
+    from faultgouge.pywrap import from_lammps
+
+    lmp = heap("mindlin/force", 0.1, True, 1, 30)
+    laws, differences = (from_lammps(lmp, differences=each) for each in (False, True))
+    assert len(laws.contact_columns()["mobilised"]) == len(differences.contacts) + laws.contacts.touching.wall.sum()
+    assert not len(differences.one_sided_particles)
+    for matrix in (stiffness_matrix, damping_matrix):
+        one, other = matrix(laws), matrix(differences)
+        assert abs(one - other).max() < 1e-6 * abs(other).max()
