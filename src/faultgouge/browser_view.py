@@ -55,6 +55,13 @@ def view(
         If the page is no .html.
     PackingFileError
         If the file is missing or damaged.
+
+    Examples
+    --------
+
+    >>> page = faultgouge.view("run.h5", "page.html", say=lambda line: None)
+    >>> page.read_text()[:15]
+    '<!doctype html>'
     """
     path, output = path_of(file, "view"), Path(output)
     if output.suffix.lower() != ".html":

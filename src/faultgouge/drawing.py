@@ -46,6 +46,15 @@ def draw(
     ------
     BadInputError
         If `ax` is no axes, or the packing has no such mode.
+
+    Examples
+    --------
+
+    >>> start = faultgouge.settle("three_disks.toml").packing
+    >>> faultgouge.draw(start).savefig("packing.png")
+    >>> print(faultgouge.draw(start, mode=0).axes[0].get_title())
+    mode 0: $\\lambda = 383.589$
+    participation ratio 0.99, rotation 28 % of the kinetic energy
     """
     from .figures import draw_mode, draw_packing
 

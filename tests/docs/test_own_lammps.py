@@ -25,7 +25,7 @@ def test_script_of_the_page(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "40 spheres" in done.stdout
     assert "LAMMPS moves as K and C say: True True" in done.stdout
-    assert "<Spectrum: every motion decays with the packing's dissipation, D as exp(-0.05" in done.stdout
+    assert "<Spectrum: no motion grows" in done.stdout
     assert "stable: every motion decays, the slowest with D as exp(-0.0523" in done.stdout
     assert "without dissipation: 42 complex pairs, D as exp(0.318" in done.stdout
     assert "K alone has 42 complex pairs, D as exp(0.318" in done.stdout

@@ -1,5 +1,6 @@
 """`examples`: a shelf of decks, scenes and a script, each of which runs in seconds."""
 
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -19,23 +20,24 @@ def examples(
     """List ten examples that run in seconds each, or copy one into this folder."""
     from importlib.resources import files
 
-    shelf = {
-        Path(each.name).stem: each for each in (files("faultgouge") / "scenes" / "examples").iterdir() if each.is_file()
-    }
+    scenes = files("faultgouge") / "scenes"
+    shelf = {Path(each.name).stem: each for each in (scenes / "examples").iterdir() if each.is_file()}
     if name is None:
         for each in sorted(shelf):
             what, command = _head(shelf[each].read_text())
             print_line(f"{each:9} {what}\n{'':9} {command}")
         print_line("\nfaultgouge examples NAME copies one into this folder.")
         return
-    if (chosen := shelf.get(name.rsplit(".", 1)[0])) is None:
+    # scenes of studies that take minutes are copied, too, with the packing that they name, but not listed
+    name = name.rsplit(".", 1)[0]
+    if not (chosen := shelf.get(name, scenes / f"{name}.toml")).is_file():
         raise typer.BadParameter(f"there is no example {name}: take one of {', '.join(sorted(shelf))}")
-    copy = Path(chosen.name)
-    if copy.exists():
-        raise typer.BadParameter(f"{copy} exists in this folder: move it away, or use another folder")
-    copy.write_bytes(chosen.read_bytes())
-    what, command = _head(chosen.read_text())
-    print_line(f"{copy}: {what}\nnext: {command}")
+    what, command = _head(text := chosen.read_text())
+    for each in [chosen, *(scenes / named for named in re.findall(r'^file = "(.+)"', text, re.MULTILINE))]:
+        if Path(each.name).exists():
+            raise typer.BadParameter(f"{each.name} exists in this folder: move it away, or use another folder")
+        Path(each.name).write_bytes(each.read_bytes())
+    print_line(f"{chosen.name}: {what}\nnext: {command}")
 
 
 def _head(text: str) -> tuple[str, str]:

@@ -11,6 +11,7 @@ from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from .pictures import modes_of
 from .terminal import (
+    RAMPED,
     Frame,
     PackingFile,
     lock_output,
@@ -22,7 +23,7 @@ from .terminal import (
 app = typer.Typer()
 
 
-@app.command(epilog="Example: faultgouge export run.h5 --mode pair -o packing.vtp")
+@app.command(epilog=f"Example: {RAMPED} && faultgouge export run.h5 --mode pair")
 def export(
     context: typer.Context,
     file: PackingFile,
@@ -53,7 +54,8 @@ def export(
     displacements; a .pvd for ParaView comes with a folder of .vtp.
     """
     from faultgouge.analysis import Configuration
-    from faultgouge.analysis.files.formats import HEAD_OF_CONTACTS, ModeVectors, check_writer, write_packing
+    from faultgouge.analysis.files.formats import ModeVectors, check_writer, write_packing
+    from faultgouge.analysis.files.formats.tables import HEAD_OF_CONTACTS
 
     lock_output(context, output, file, head=HEAD_OF_CONTACTS if output.suffix == ".csv" else "")
     if frames is not None:

@@ -54,7 +54,7 @@ SlipsFile = Annotated[
     Path | None,
     typer.Option(
         help="A table of contacts: slips (CSV with id1, id2, 0 being the floor, slip; or a LAMMPS dump local); with "
-        "--material forces, of YADE, MercuryDPM (.fstat), LIGGGHTS or LAMMPS."
+        "--material forces, of YADE, MercuryDPM (.fstat), LIGGGHTS or LAMMPS, or measured ones (RigidLibrary)."
     ),
 ]
 
@@ -167,9 +167,18 @@ def _import_spheres(
         read_spheres,
         verdict_within_digits,
     )
+    from faultgouge.analysis.files.measured_forces import is_measured, measured_forces
     from faultgouge.analysis.progress import show_progress
 
-    law, spheres = material_of(material), read_spheres(file, frame)
+    law = material_of(material)
+    if contacts is not None and is_measured(contacts):
+        with status("draws of the forces") as show, show_progress(show):
+            found, counts = measured_forces(file, contacts, law, frame)
+        if is_root():
+            write_configuration(output, found, {"deck": ""})
+            print_line("\n".join([f"written to {output}", *counts]))
+        return
+    spheres = read_spheres(file, frame)
     if contacts is None:
         found = spheres.of_material(law)
     else:

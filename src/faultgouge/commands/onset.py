@@ -42,7 +42,7 @@ Slices = Annotated[
 ]
 
 
-@app.command(epilog="Example: faultgouge onset scene.toml --json")
+@app.command(epilog="Example: faultgouge examples scene && faultgouge onset scene.toml --json")
 def onset(
     context: typer.Context,
     scene: ScenePath,

@@ -12,6 +12,7 @@ import typer
 from ..mpi_rank import is_root
 from ..signal_guard import keeps
 from .terminal import (
+    LAYER,
     Answer,
     Out,
     SceneFile,
@@ -57,7 +58,7 @@ def init(
         print_line(f"written to {output}; next: faultgouge onset {output}")
 
 
-@command(app, "faultgouge settle scene.toml -o run.h5", reads="settle", task="settle", records=True, as_json=False)
+@command(app, f"{LAYER} && faultgouge settle scene.toml", reads="settle", task="settle", records=True, as_json=False)
 def settle(scene: SceneFile, output: Out = Path("run.h5")) -> Answer:
     """Settle the packing of a scene under its load, at F_x = 0."""
     from faultgouge.pywrap import Record
@@ -70,7 +71,7 @@ def settle(scene: SceneFile, output: Out = Path("run.h5")) -> Answer:
     return Answer([f"{last}; written to {output}"])
 
 
-@command(app, "mpiexec -n 2 faultgouge ramp scene.toml -o run.h5", reads="ramp", task="ramp", records=True)
+@command(app, f"{LAYER} && mpiexec -n 2 faultgouge ramp scene.toml", reads="ramp", task="ramp", records=True)
 def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Answer | None:
     """Raise F_x from equilibrium to equilibrium, and store each equilibrium.
 
@@ -113,7 +114,13 @@ def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Answer | None:
     return Answer(says, result)
 
 
-@command(app, "faultgouge perturb scene.toml -o run.h5", reads="perturb", task="perturb", records=True)
+@command(
+    app,
+    "faultgouge examples eruption && faultgouge perturb eruption.toml",
+    reads="perturb",
+    task="perturb",
+    records=True,
+)
 def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Answer | None:
     """Run the dynamics from the equilibrium at perturb.fx, and record D(t).
 

@@ -10,6 +10,7 @@ from ..analysis.counted import counted
 from ..mpi_rank import is_root
 from .stability import Follow, verdict_of
 from .terminal import (
+    RAMPED,
     AsJson,
     Frame,
     PackingFile,
@@ -34,7 +35,7 @@ VERDICT_FIRST = 2000
 """Coordinates beyond which the eigenvalues take longer than the verdict, which does not need them."""
 
 
-@app.command(epilog="Example: faultgouge spectrum run.h5 --json")
+@app.command(epilog=f"Example: {RAMPED} && faultgouge spectrum run.h5 --json")
 def spectrum(
     file: PackingFile,
     frame: Frame = -1,

@@ -98,7 +98,12 @@ def _tell(sweep: Sweep, rows: list[dict[str, Any]], output: Path, task: str | No
     require_result(rows)
 
 
-@command(app, "faultgouge merge shard1 shard2 shard3 -o whole", as_json=False)
+@command(
+    app,
+    "faultgouge examples sweep && "
+    "for k in 1 2; do faultgouge sweep sweep.toml -o $k --shard $k/2; done && faultgouge merge 1 2",
+    as_json=False,
+)
 def merge(
     parts: Annotated[list[Path], typer.Argument(metavar="DIR...", help="Folders of `sweep --shard`.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="The folder to write.")] = Path("merged"),

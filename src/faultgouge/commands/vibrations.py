@@ -34,7 +34,7 @@ MaterialOf = Annotated[
 ]
 
 
-@command(app, "faultgouge settle scene.toml -o run.h5 && faultgouge timestep run.h5")
+@command(app, "faultgouge examples disks && faultgouge timestep disks.csv --material young=1e9,density=1100")
 def timestep(file: AnyPacking, material: MaterialOf = None, frame: Frame = -1) -> Answer:
     """Compute the largest stable time step of a packing, beside the rules that users have.
 
@@ -67,7 +67,7 @@ def timestep(file: AnyPacking, material: MaterialOf = None, frame: Frame = -1) -
     return Answer(says, {key: None if value == float("inf") else value for key, value in document.items()})
 
 
-@app.command(epilog="Example: faultgouge vibrations packing.h5 -o vibrations")
+@app.command(epilog="Example: faultgouge examples fcc && faultgouge vibrations fcc.in -o vibrations")
 def vibrations(
     file: AnyPacking,
     output: NewFolder = Path("vibrations"),
@@ -164,8 +164,8 @@ def _write(
 
 def _draw(folder: Path, found: Vibrations, plane: list[PlaneWave], moduli: ElasticModuli | None) -> None:
     from faultgouge.figures import save
+    from faultgouge.figures.series import draw_vibrations, draw_waves
     from faultgouge.figures.style import report_failure
-    from faultgouge.figures.vibrations import draw_vibrations, draw_waves
 
     with report_failure("density", say):
         save(draw_vibrations(found), folder / "density")
