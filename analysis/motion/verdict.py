@@ -174,12 +174,12 @@ class Stability:
             counts = {"complex pair": u.pairs, "negative eigenvalue": u.negative}
             what = " and ".join(counted(count, name) for name, count in counts.items() if count)
             yield f"without dissipation: {what or 'small motion grows'}, {exponential(u.growth_rate, 6, u.at_least)}"
-        if self.at_bound + self.rolling_at_bound:
-            lone, rolls = self.at_bound == 1, self.rolling_at_bound
-            rolling = f", and the rolling friction of {rolls} at its own" if rolls else ""
+        if self.at_bound or self.rolling_at_bound:
+            lone = self.at_bound + self.rolling_at_bound == 1
+            rolls = f", and the rolling friction of {self.rolling_at_bound} at its own" if self.rolling_at_bound else ""
             slide = ": each slides on ahead and sticks on the way back" if sided else f" and slide{'s' * lone}"
-            count = f"{self.at_bound} of {counted(self.contacts, 'contact')} {'is' if lone else 'are'}"
-            yield f"{count} at Coulomb's bound{rolling}{slide}"
+            count = f"{self.at_bound} of {counted(self.contacts, 'contact')} {'is' if self.at_bound == 1 else 'are'}"
+            yield f"{count} at Coulomb's bound{rolls}{slide}"
             if sided:
                 on = max(self.sliding.free - self.sticking.free, 0)
                 ever = f"{counted(on, 'motion')} would go on for ever, and " if on else ""

@@ -160,7 +160,7 @@ def exported_configuration(
         In space, length.
     """
     own, c, n = configuration, configuration.contacts.touching, len(configuration)
-    bare = ~own.contacts.couple
+    touches = ~own.contacts.couple
     rest = np.pad(own.position, ((0, 0), (0, 3 - own.dimension)))
     moved = np.broadcast_to(displacement, rest.shape)
     particles: dict[str, NDArray] = {"radius": own.radius, "mass": own.mass, "id": own.ids, "type": own.kind}
@@ -176,8 +176,8 @@ def exported_configuration(
     contacts: dict[str, NDArray] = {"contact_i": own.ids[c.i], "contact_j": np.where(c.wall, 0, own.ids[second])}
     contacts["contact_force"] = c.normal_force[:, None] * c.normal + c.tangential_force
     contacts |= {f"contact_{name}": getattr(c, name) for name in ("normal_force", "tangential_force", "overlap")}
-    contacts["contact_mobilised"] = own.mobilised[bare]
-    other = rest[c.i] - own.branch[bare] + np.where(c.wall[:, None], 0.0, moved[second])
+    contacts["contact_mobilised"] = own.mobilised[touches]
+    other = rest[c.i] - own.branch[touches] + np.where(c.wall[:, None], 0.0, moved[second])
     ends = np.stack([rest[c.i] + moved[c.i], other], axis=1)
     box, sides = own.box, tuple(map(bool, own.periodic))
     return Exported(own, rest + moved, particles, contacts, ends, _eigenvalues(modes), box, sides, own.origin)

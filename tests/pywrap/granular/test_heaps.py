@@ -99,3 +99,28 @@ def test_k_and_c_are_those_of_forces(heap):
     for matrix in (stiffness_matrix, damping_matrix):
         one, other = matrix(laws), matrix(differences)
         assert abs(one - other).max() < 1e-6 * abs(other).max()
+
+
+@pytest.mark.parametrize("mu", [0.5, 0.0])
+def test_the_law_of_two_spheres_and_a_wall(two, tmp_path, mu):
+    """`rolling sds` has a stiffness, a dashpot and a bound that no overlap, radius or mass changes; a file keeps it."""
+    from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
+    from faultgouge.pywrap import from_lammps
+
+    law = f"hertz 1e5 1 tangential mindlin 3e4 1.0 {mu} rolling sds 7e2 0.3 0.02"
+    wall = f"fix w all wall/gran granular {law} zplane 0 NULL"
+    lmp, told = two("granular", f"* * {law}", f"{wall}\nfix move all nve/sphere")
+    lmp.numpy.extract_atom("omega")[:] = [0.2, 0.1, 0.0]
+    command(lmp, "timestep 1e-6\nrun 3 post no")
+    found = from_lammps(lmp, told, balance=np.inf, prove=False)
+    touching, rolls = found.contacts.touching, found.contacts.chosen(found.contacts.couple)
+    assert len(touching) == len(rolls) == 2
+    for name in ("i", "j", "normal", "overlap", "normal_force", "normal_stiffness"):
+        assert np.array_equal(getattr(touching, name), getattr(rolls, name))
+    assert rolls.tangential_stiffness == pytest.approx(7e2, rel=1e-9)
+    assert rolls.tangential_dashpot == pytest.approx(0.3, rel=1e-6)
+    assert rolls.friction == pytest.approx(0.02 * rolls.normal_force, rel=1e-9)
+    assert rolls.slip_arm == pytest.approx(np.where(rolls.wall[:, None], [0.5, 0.0], [0.25, -0.25]), rel=1e-12)
+    assert touching.lever_slope == pytest.approx(np.where(touching.wall, 0.0, 0.5) * (mu > 0))
+    write_configuration(tmp_path / "rolls.h5", found)
+    assert read_configuration(tmp_path / "rolls.h5") == found
