@@ -21,13 +21,12 @@ ROOT = Path(faultgouge.__file__).parent
 
 FLOORS = {
     "faultgouge": (
-        ("lammps_inputs", "parent_death", "plugin", "mpi_rank", "registered"),
+        ("lammps_inputs", "parent_death", "plugin", "registered"),
         ("analysis",),
         ("figures", "pywrap"),
         ("assessment", "studies"),
-        ("signal_guard", "notebook", "stored_files"),
-        ("browser_view", "drawing", "merging_pair"),
-        ("commands", "exit_status"),
+        ("signal_guard", "notebook", "door"),
+        ("commands",),
         ("cli",),
         ("__main__",),
     ),

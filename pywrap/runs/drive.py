@@ -28,7 +28,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from warnings import warn
 
 import numpy as np
@@ -573,6 +573,12 @@ def drive_of(file: RunFile) -> Drive | None:
     if file.attributes.get("task") != "drive":
         return None
     return Drive.model_validate(json.loads(file.attributes["scene"])["drive"])
+
+
+def series_and_slips(file: RunFile) -> tuple[dict[str, NDArray[Any]], list[Slip]] | None:
+    """The series of a drive.h5 and its slips that have ended; None of another file, or where the run has not begun."""
+    begun = drive_of(file) is not None and SERIES in file.names_of_series
+    return (file.series(SERIES), slips_in(file)) if begun else None
 
 
 def slips_in(file: RunFile) -> list[Slip]:

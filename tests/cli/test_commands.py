@@ -178,7 +178,7 @@ def test_a_packing_of_another_code_is_converted_before_a_command_reads_it(refusa
 
 @pytest.mark.slow
 def test_a_lack_of_memory_is_no_fault_of_the_program(capsys):
-    from faultgouge.exit_status import fail
+    from faultgouge.cli import fail
 
     with pytest.raises(MemoryError) as lack:
         np.empty(1 << 55)
@@ -205,7 +205,7 @@ def test_the_overview_has_the_whole_first_sentence_of_each_command(faultgouge_he
     _, table = faultgouge_here("--help").stdout.split("Commands:")
     text = " ".join(table.split())
     assert "ramp Raise F_x from equilibrium to equilibrium, and store each equilibrium. perturb Run" in text
-    assert "merge Join the shards of a sweep; the table is that of an undivided sweep. examples" in text
+    assert "merge Join the shards of a sweep; the table is that of an undivided sweep. eruptions" in text
     commands = program().commands
     hidden = {name for name in commands if commands[name].hidden}
     assert hidden == set()
