@@ -54,9 +54,9 @@ from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Dynamics
 from ..lammps.engine import Engine
 from ..lammps.instance import EngineError
-from ..scenes.drive_section import Drive
 from ..scenes.packing_section import GeneratedPacking
 from ..scenes.scene import Scene
+from ..scenes.sections import Drive
 from ..scenes.validation import SceneError, require_section
 from ..settling.settle import law_of, settle, settle_bed
 from .run_iterator import run_of_scene

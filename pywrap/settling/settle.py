@@ -21,8 +21,8 @@ from ..equilibria.quasistatic import Equilibrium, equilibrate, idle_disks
 from ..equilibria.rattlers import clear_rattlers
 from ..lammps.engine import Engine
 from ..scenes.packing_section import GeneratedPacking
-from ..scenes.quantities import DIGITS
 from ..scenes.scene import Scene, scene_of
+from ..scenes.units import DIGITS
 from ..scenes.validation import SceneError
 from .change_load import change_load
 from .minimize_energy import settle_loose

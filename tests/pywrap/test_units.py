@@ -10,9 +10,8 @@ from faultgouge.analysis import MindlinLaw
 from faultgouge.analysis.files.formats import write_packing
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.scenes.command_sections import study_models
-from faultgouge.pywrap.scenes.quantities import dimensions_of
 from faultgouge.pywrap.scenes.scene import SECTIONS
-from faultgouge.pywrap.scenes.units import dashpot, quality_factor, real_units, restitution
+from faultgouge.pywrap.scenes.units import dashpot, dimensions_of, quality_factor, real_units, restitution
 
 QUARTZ = {
     "grain_diameter": "0.1 mm",
