@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -153,9 +154,15 @@ def onset_run(
             forces = np.array([each.fx for each in path.equilibria])
         flows = len(forces) < len(wanted)
         at = path if damping is None else lambda fx: with_dashpots(path(fx))
-        given = {"dissipation": dissipation, "modes": modes, "first": first, "known": known, "folder": folder}
+        given: dict[str, Any] = {
+            "dissipation": dissipation,
+            "modes": modes,
+            "first": first,
+            "known": known,
+            "folder": folder,
+        }
         try:
-            found = find_onset(at, forces, ranks=search_ranks(), **given)
+            found = find_onset(at, forces, dissipation=dissipation, ranks=search_ranks(), **given)
         except TurningPointError:
             raise
         except (OnsetError, NoEquilibriumError) as error:

@@ -463,12 +463,9 @@ class DriveRecord(Record):
     spring.
     """
 
-    def __init__(
-        self, path: Path, scene: Scene, saved: Callable[[str, Path], object] = lambda words, path: None
-    ) -> None:
-        super().__init__(path, scene, task="drive", saved=saved)
-        self._others: Mapping[Path, Scene] = {}
-        self._step, self._decided = 0, 1
+    TASK = "drive"
+    _others: Mapping[Path, Scene] = {}  # replaced, and never changed
+    _step, _decided = 0, 1
 
     def _stored_equilibrium(self, file: RunFile) -> Equilibrium:
         return Equilibrium.of(file.packing(0))
