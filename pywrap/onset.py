@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -154,15 +154,9 @@ def onset_run(
             forces = np.array([each.fx for each in path.equilibria])
         flows = len(forces) < len(wanted)
         at = path if damping is None else lambda fx: with_dashpots(path(fx))
-        given: dict[str, Any] = {
-            "dissipation": dissipation,
-            "modes": modes,
-            "first": first,
-            "known": known,
-            "folder": folder,
-        }
+        search = partial(find_onset, dissipation=dissipation, modes=modes, first=first, known=known, folder=folder)
         try:
-            found = find_onset(at, forces, dissipation=dissipation, ranks=search_ranks(), **given)
+            found = search(at, forces, ranks=search_ranks())
         except TurningPointError:
             raise
         except (OnsetError, NoEquilibriumError) as error:
