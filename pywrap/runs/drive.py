@@ -59,7 +59,7 @@ from ..scenes.scene import Scene
 from ..scenes.sections import Drive
 from ..scenes.validation import SceneError, require_section
 from ..settling.settle import law_of, settle, settle_bed
-from .run_iterator import run_of_scene
+from .ramp import run_of_scene
 from .run_recorder import Record, raise_on_all_ranks
 from .undamped import Checkpoint
 

@@ -20,8 +20,7 @@ from ..lammps.engine import Engine
 from ..scenes.scene import Scene
 from ..scenes.sections import Friction, Perturb
 from ..scenes.validation import SceneError, require_section
-from .ramp import reach
-from .run_iterator import run_of_scene
+from .ramp import reach, run_of_scene
 
 ACCURATE_SHARE = 0.05
 """Time step of undamped runs in units of the stability limit, 2/omega_max without dashpots: the fastest mode is then

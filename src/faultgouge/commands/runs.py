@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from importlib.resources import files
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -34,6 +33,8 @@ def init(
     output: Annotated[Path, typer.Option("-o", "--output", help="The scene to write.")] = Path("scene.toml"),
 ) -> Results:
     """Write a scene with every section and key, commented."""
+    from importlib.resources import files
+
     from faultgouge.analysis.files.atomic_write import write_text
 
     write_text(output, (files("faultgouge") / "scenes" / "commented.toml").read_text())
@@ -45,6 +46,8 @@ def examples(
     name: Annotated[str | None, typer.Argument(help="Which one is copied into this folder.")] = None,
 ) -> Results:
     """List ten examples that run in seconds each, or copy one into this folder."""
+    from importlib.resources import files
+
     shelf = {
         Path(each.name).stem: each for each in (files("faultgouge") / "scenes" / "examples").iterdir() if each.is_file()
     }
