@@ -3,8 +3,7 @@
 Functions take a :class:`Packing`, the disks of this package's law, or a :class:`Configuration`, the particles of any
 code with their contacts to first order. The physics is in the docstrings of the modules:
 
-- `particles`, `contacts`, `assembly` and `configuration`: particles with contacts to first order, and their stability
-  operator;
+- `contacts`, `assembly` and `configuration`: particles with contacts to first order, and their stability operator;
 - `packing`: the contact law, geometry and forces of disks;
 - `operators`: stiffness and damping matrix, sliders at Coulomb's bound;
 - `factors`: factors of sparse and banded matrices;
@@ -33,10 +32,11 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .files.runfile import RunFile
     from .motion.buckling import nearest_modes, negative_eigenvalues
     from .motion.eigenvalues import Linear, mass_weighted
-    from .motion.growing import fastest_growing
     from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_modes
     from .motion.motion import Motion
-    from .motion.pushes import OneSidedMotion, OneSidedOutcome, one_sided_motion
+    from .motion.one_sided import OneSidedMotion, one_sided_motion
+    from .motion.pushes import OneSidedOutcome
+    from .motion.random_state import fastest_growing
     from .motion.rising_load import RisingMotion
     from .motion.spectrum import (
         Spectrum,

@@ -2,12 +2,20 @@ r"""A packing of another code, in two or three dimensions, with its contacts to 
 
 Any contact law enters the operators through a few numbers at each contact: the normal, the distance and the lever arms;
 the normal and the tangential force; and the derivatives of both forces.
-:class:`~faultgouge.analysis.contacts.LinearisedContacts` has these numbers, :mod:`~faultgouge.analysis.particles` has
-the particles, and :mod:`~faultgouge.analysis.assembly` makes the operators.
+:class:`~faultgouge.analysis.contacts.LinearisedContacts` has these numbers, and
+:mod:`~faultgouge.analysis.assembly` makes the operators.
 
 **Operators that are given.** If `stiffness` is given, K and C are differences of another code's forces. The contacts
 then have only their places and forces, as far as the other code tells them. Their derivatives are zero and Coulomb's
 bound is infinite, since neither is known.
+
+**Coordinates** are translations and rotations as lengths, :math:`R\theta`, axis by axis:
+(x.., y.., R theta..) of disks and (x.., y.., z.., R theta_x.., R theta_y.., R theta_z..) of spheres. Vectors always
+have three components; those of disks lie in the plane, and disks turn about z.
+
+**Bodies.** Coordinates that move as one, such as the particles of a rigid lid, are q = P Q with the `constraint` P.
+The operators are those of Q: P_1^T K P, and C likewise, where P_1 is 1 where P is not 0. Column k of P has the
+coordinates that Q_k moves, and the coordinate k itself by 1. The mass of Q_k is the sum of masses times P.
 """
 
 from collections.abc import Iterable
@@ -22,10 +30,13 @@ from scipy.sparse import csr_array, diags_array
 from .arrays import (
     Floats,
     Indices,
+    booleans,
     derive_frozen,
     floats,
     frozen,
+    integers,
     number,
+    positive_each,
     same_bits,
     set_frozen,
     square,
@@ -33,7 +44,6 @@ from .arrays import (
 from .assembly import ContactBlocks, as_springs, spring_of_layer
 from .contacts import UNIT_ERROR, LinearisedContacts, refuse_first
 from .counted import counted
-from .particles import Particles
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -46,7 +56,7 @@ UNKNOWN_SLIPS = (
 
 
 @dataclass(frozen=True, init=False, eq=False)
-class Configuration(Particles):
+class Configuration:
     """Particles of a packing in two or three dimensions, with their linearised contacts.
 
     Parameters
@@ -110,12 +120,29 @@ class Configuration(Particles):
         the plane of disks, or two particles have one ID.
     """
 
+    dimension: int
+    position: Floats
+    radius: Floats
+    mass: Floats
+    inertia: Floats
     contacts: LinearisedContacts
+    box: Floats
+    origin: Floats
+    periodic: NDArray[np.bool_]
+    load: Floats
+    free: NDArray[np.bool_]
+    ids: Indices
+    kind: Indices
+    fx: float
+    load_error: float
+    top: NDArray[np.bool_]
+    drag_rate: float
     stiffness: csr_array | None
     damping: csr_array | None
     operator_error: float
     jump: Floats
     wall_force: Floats
+    constraint: csr_array | None
     spring: float
     slips_known: bool
     proof: float | None = field(compare=False)
@@ -152,31 +179,54 @@ class Configuration(Particles):
         proof: float | None = None,
         remarks: Iterable[str] = (),
     ) -> None:
+        n = len(np.atleast_1d(np.asarray(radius)))
+        if dimension not in (2, 3) or n == 0:
+            raise ValueError(f"A configuration has particles in two or three dimensions, not {n} in {dimension}.")
         if (stiffness is None) != (damping is None):
             raise ValueError("stiffness and damping are given together.")
-        super().__init__(
-            dimension=dimension, position=position, radius=radius, mass=mass, inertia=inertia, box=box, origin=origin,
-            periodic=periodic, load=load, free=free, ids=ids, kind=kind, fx=fx, load_error=load_error, top=top,
-            drag_rate=drag_rate, constraint=constraint,
-        )  # fmt: skip
-        n, size = len(self), self.coordinates
-        matrices = {"stiffness": stiffness, "damping": damping}
+        given = {"radius": radius, "mass": mass, "inertia": inertia}
+        values: dict[str, object] = {k: positive_each(k, floats(k, each, (n,))) for k, each in given.items()}
+        none = np.zeros(n)
+        arrays = (
+            ("position", position, (n, dimension)),
+            ("box", box, (3, 3)),
+            ("origin", origin, (3,)),
+            ("load", load, (n, 2, 3)),
+            ("jump", none if jump is None else jump, (n,)),
+            ("wall_force", none if wall_force is None else wall_force, (n,)),
+        )
+        values |= {name: floats(name, each, shape) for name, each, shape in arrays}
+        scalars = {"fx": fx, "load_error": load_error, "drag_rate": drag_rate, "operator_error": operator_error}
+        values |= {name: number(name, each) for name, each in (scalars | {"spring": spring}).items()}
         set_frozen(
             self,
+            **values,
+            dimension=int(dimension),
             contacts=contacts,
-            **{name: None if each is None else square(name, each, size) for name, each in matrices.items()},
-            operator_error=number("operator_error", operator_error),
-            jump=floats("jump", np.zeros(n) if jump is None else jump, (n,)),
-            wall_force=floats("wall_force", np.zeros(n) if wall_force is None else wall_force, (n,)),
-            spring=number("spring", spring),
+            periodic=booleans("periodic", periodic, 3),
+            free=booleans("free", np.ones(n, bool) if free is None else free, n),
+            top=booleans("top", np.zeros(n, bool) if top is None else top, n),
+            ids=integers("ids", np.arange(1, n + 1) if ids is None else ids),
+            kind=integers("kind", np.ones(n, int) if kind is None else kind),
             slips_known=bool(slips_known),
             proof=None if proof is None else number("proof", proof),
             remarks=tuple(remarks),
         )
+        for name, matrix in {"constraint": constraint, "stiffness": stiffness, "damping": damping}.items():
+            set_frozen(self, **{name: None if matrix is None else square(name, matrix, self.coordinates)})
+        if len(self.ids) != n or len(self.kind) != n:
+            raise ValueError(f"ids and kind must be lists of {n} integers, one for each particle.")
+        unique, count = np.unique(self.ids, return_counts=True)
+        if len(unique) < n:
+            raise ValueError(f"Two particles have the ID {unique[count > 1][0]}: give each its own.")
         if len(contacts) and max(contacts.i.max(), contacts.j.max()) >= n:
             raise ValueError(f"A contact names a particle beyond the last one, {n - 1}.")
-        if self.dimension == 2:
-            _refuse_forces_across(contacts)
+        if dimension == 2:
+            scale = np.abs(contacts.normal_force) + np.linalg.norm(contacts.tangential_force, axis=1)
+            across = np.abs(contacts.normal[:, 2]) > UNIT_ERROR
+            refuse_first(across, "the normal {} of disks is not in the plane", contacts.normal)
+            outside = np.abs(contacts.tangential_force[:, 2]) > UNIT_ERROR * scale
+            refuse_first(outside, "the tangential force {} on a disk is not in the plane", contacts.tangential_force)
 
     def __eq__(self, other: object) -> bool:
         """Whether every array and number is the same to the bit."""
@@ -202,6 +252,65 @@ class Configuration(Particles):
             f"{counted(len(self.rattlers), 'rattler')}, residual {self.residual:.3g}, "
             f"{'not proved' if self.proof is None else f'proof {self.proof:.1g}'}>"
         )
+
+    def __len__(self) -> int:
+        return len(self.radius)
+
+    @property
+    def axes(self) -> int:
+        """Coordinates of each particle: 3 of a disk, 6 of a sphere."""
+        return 3 if self.dimension == 2 else 6
+
+    @property
+    def coordinates(self) -> int:
+        """Number of all coordinates."""
+        return self.axes * len(self)
+
+    @property
+    def coordinate_mass(self) -> Floats:
+        """Masses of the coordinates, m of translations and I/R^2 of rotations, shape (axes N,)."""
+        turning = self.inertia / self.radius**2
+        mass = np.concatenate([self.mass] * self.dimension + [turning] * (self.axes - self.dimension))
+        if self.constraint is None:
+            return mass
+        moved = self.constraint.T @ mass
+        return np.where(moved > 0, moved, mass)  # a coordinate that leads no other has no rows
+
+    @property
+    def coordinate_free(self) -> NDArray[np.bool_]:
+        """Which coordinates move, and lead where several move as one, shape (axes N,)."""
+        free = np.tile(self.free, self.axes)
+        return free if self.constraint is None else np.asarray(abs(self.constraint).sum(axis=0) > 0)
+
+    @property
+    def joined(self) -> Indices:
+        """Indices of the particles that move as one with others."""
+        if self.constraint is None:
+            return np.zeros(0, dtype=np.intp)
+        moved = self.constraint.tocoo()
+        shared = np.bincount(moved.col, minlength=moved.shape[1])[moved.col] > 1
+        return np.unique(moved.row[shared] % len(self))
+
+    def project(self, matrix: csr_array) -> csr_array:
+        """P_1^T A P of a matrix of the particles' own coordinates."""
+        if self.constraint is None:
+            return matrix
+        return csr_array((self.constraint != 0).astype(np.float64).T @ matrix @ self.constraint)
+
+    def vectors(self, coordinates: NDArray) -> tuple[NDArray, NDArray]:
+        """Translations and rotations R theta, shape (N, 3) each, of values of the coordinates, shape (axes N,)."""
+        return self._apart(coordinates if self.constraint is None else self.constraint @ coordinates)
+
+    def _apart(self, coordinates: NDArray) -> tuple[NDArray, NDArray]:
+        d, parts = self.dimension, coordinates.reshape(self.axes, -1)
+        translation, rotation = np.zeros((2, len(self), 3), dtype=parts.dtype)
+        translation[:, :d], rotation[:, d - self.axes :] = parts[:d].T, parts[d:].T
+        return translation, rotation
+
+    def join_vectors(self, translation: NDArray, rotation: NDArray) -> NDArray:
+        """The reverse of `vectors`; of coordinates that move as one the leading one counts."""
+        d = self.dimension
+        return np.concatenate([translation[:, :d].T.ravel(), rotation[:, d - self.axes :].T.ravel()])
 
     @property
     def operators(self) -> Literal["laws", "differences"]:
@@ -389,14 +498,6 @@ class Configuration(Particles):
             if np.all(kept) or self.stiffness is not None
             else derive_frozen(self, contacts=self.contacts.chosen(kept))
         )
-
-
-def _refuse_forces_across(c: LinearisedContacts) -> None:
-    """Refuse contacts of disks that leave the plane."""
-    scale = np.abs(c.normal_force) + np.linalg.norm(c.tangential_force, axis=1)
-    refuse_first(np.abs(c.normal[:, 2]) > UNIT_ERROR, "the normal {} of disks is not in the plane", c.normal)
-    outside = np.abs(c.tangential_force[:, 2]) > UNIT_ERROR * scale
-    refuse_first(outside, "the tangential force {} on a disk is not in the plane", c.tangential_force)
 
 
 Snapshot = Configuration

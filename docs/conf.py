@@ -11,7 +11,7 @@ from pathlib import Path
 
 from docutils import nodes
 
-sys.path.insert(0, str(Path(__file__).parent))  # gallery_figures
+sys.path.insert(0, str(Path(__file__).parent))  # gallery
 
 project = "faultgouge"
 author = "The faultgouge developers"
@@ -30,25 +30,15 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx-mathjax-offline",
     "sphinx_design",
-    "sphinx_gallery.gen_gallery",
 ]
 source_suffix = {".md": "myst-nb", ".rst": "restructuredtext", ".ipynb": "myst-nb"}
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300  # seconds for one cell
 nb_merge_streams = True
-exclude_patterns = ["_build", "README.md", "gallery", "**sg_execution_times.rst", "auto_gallery/*.ipynb"]
+exclude_patterns = ["_build", "README.md"]
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
-
-sphinx_gallery_conf = {
-    "examples_dirs": "gallery",
-    "gallery_dirs": "auto_gallery",
-    "image_scrapers": ("gallery_figures.scraper",),
-    "within_subsection_order": "FileNameSortKey",
-    "show_signature": False,
-    "abort_on_example_error": True,
-}
 
 smartquotes = False  # --json is no dash
 html_theme = "furo"
@@ -127,6 +117,13 @@ def find_documented(app, pagename, templatename, context, doctree):
         context["body"] = re.sub(r'(class="viewcode-back" href=")([^"#]+)#([^"]+)', to_object, context["body"])
 
 
+def make_gallery(app):
+    """The ten examples, run."""
+    import gallery
+
+    gallery.make(Path(__file__).parent / "auto_gallery")
+
+
 def make_live_pages(app, exception):
     """The pages of `faultgouge view`: of a scene that ships with the package, and of three disks of the tutorial."""
     if exception is not None or app.builder.format != "html":
@@ -146,6 +143,7 @@ def make_live_pages(app, exception):
 
 
 def setup(app):
+    app.connect("builder-inited", make_gallery)
     app.connect("source-read", add_address)
     app.connect("build-finished", make_live_pages)
     app.connect("doctree-read", keep_numbers_whole)

@@ -67,6 +67,17 @@ def onset(scene: Scene | str | Path, mu: float | None = None, *, every: bool = F
         If the ramp shows no onset.
     NoEquilibriumError
         If the packing does not settle, or flows at the first load.
+
+    Examples
+    --------
+
+    >>> found = faultgouge.onset("three_disks.toml")
+    >>> print(f"{found.fx_c:.9f}, {found.windows[0].kind}, lambda = {found.windows[0].eigenvalue:.6f}")
+    1.935965487, coalescence, lambda = 1536.577122
+    >>> found.error < 1e-10
+    True
+    >>> print(f"{faultgouge.onset('three_disks.toml', mu=0.8).fx_c:.9f}")
+    1.672050885
     """
     scene = scene_of(scene, "onset")
     friction = scene.law.mus[0] if mu is None else mu

@@ -1,8 +1,10 @@
 """What `import faultgouge` offers."""
 
 import ast
+import doctest
 import importlib
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -239,3 +241,32 @@ def test_the_frames_of_a_file_are_a_sequence(cluster_file):
     assert found[:1] == [faultgouge.load(cluster_file, 0)]
     with pytest.raises(IndexError):
         _ = found[len(found)]
+
+
+@pytest.fixture(scope="module")
+def stored_ramp(tmp_path_factory):
+    """A folder with the files that the examples of the docstrings read: scenes of the package, and a stored ramp."""
+    folder = tmp_path_factory.mktemp("examples")
+    scenes = Path(faultgouge.__file__).parent / "scenes"
+    for each in ("three_disks.toml", "examples/disks.csv", "examples/fcc.in"):
+        shutil.copy(scenes / each, folder)
+    scene = faultgouge.Scene.from_toml(folder / "three_disks.toml")
+    scene = scene.model_copy(update={"ramp": scene.ramp.model_copy(update={"step": 0.1})})
+    path = faultgouge.ramp(scene)
+    first = next(path)
+    with RunFile.create(folder / "run.h5", first.packing) as file:
+        for each in (first, *path):
+            file.append(each.packing)
+        file.complete = True
+    return folder
+
+
+@pytest.mark.parametrize("name", sorted(set(faultgouge.__all__) - {"__version__"}))
+def test_the_examples_of_docstrings_print_what_they_say(stored_ramp, monkeypatch, name):
+    monkeypatch.chdir(stored_ramp)
+    names = {"faultgouge": faultgouge, "np": np}
+    [example] = doctest.DocTestFinder(recurse=False).find(getattr(faultgouge, name), name, module=False, globs=names)
+    says = []
+    found = doctest.DocTestRunner().run(example, out=says.append)
+    assert found.attempted >= 2
+    assert found.failed == 0, "".join(says)

@@ -44,7 +44,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import csc_array, csr_array, diags_array
 
 from ..arrays import Complexes, Floats
-from ..assembly import as_springs, contact_derivatives
+from ..assembly import ContactDerivatives, as_springs, contact_derivatives
 from ..configuration import Configuration
 from ..contacts import LinearisedContacts
 from ..counted import counted
@@ -232,6 +232,15 @@ def stress(packing: HasConfiguration, volume: float | None = None) -> Floats:
     References
     ----------
     J. Christoffersen, M. M. Mehrabadi and S. Nemat-Nasser, J. Appl. Mech. 48, 339 (1981).
+
+    Examples
+    --------
+
+    A layer has no ceiling, so that its area is given, here a floor of 2.8 times a height of 1.36:
+
+    >>> start = faultgouge.settle("three_disks.toml").packing
+    >>> print(faultgouge.stress(start, volume=2.8 * 1.36).diagonal().round(3))
+    [2.29  0.735 0.   ]
     """
     configuration = packing.configuration
     _require_laws(configuration, "The stress")
@@ -260,6 +269,20 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
     ------
     BadInputError
         If the box is not periodic, or a strain drives a motion without stiffness, so that there are no moduli.
+
+    Examples
+    --------
+
+    Spheres on a simple cubic lattice, without friction: C_1111 is the stiffness of a contact over the lattice constant.
+
+    >>> from faultgouge.analysis import Material, spheres_of_material
+    >>> place = 0.99 * np.array(list(np.ndindex(3, 3, 3)))
+    >>> material = Material(kn=1e3, friction=0.0, density=1.0)
+    >>> box, periodic = 2.97 * np.eye(3), (True, True, True)
+    >>> cubic = spheres_of_material(place, np.full(27, 0.5), material, box=box, periodic=periodic)
+    >>> found = faultgouge.elastic_moduli(cubic)
+    >>> print(f"{found.tensor[0, 0, 0, 0]:.6f}, {cubic.contacts.normal_stiffness[0] / 0.99:.6f}")
+    75.757576, 75.757576
     """
     configuration = packing.configuration
     _require_laws(configuration, "The moduli")
@@ -270,26 +293,30 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
             "stress(packing) has the mean stress between walls."
         )
     volume, box = volume_of(configuration)
-    branch = configuration.branch
+    branch, size = configuration.branch, configuration.coordinates
     parts: list[tuple[complex, LinearisedContacts]] = [(1.0, c)]
     if frequency is not None and configuration.damped:
         parts.append((1j * frequency, as_springs(c)))
-    force = sum(w * _affine_forces(each, branch) for w, each in parts)
-    affine = -np.einsum("aklc,cb->abkl", force, branch) / volume
-    right = sum(w * _unbalanced(configuration, each, branch) for w, each in parts)
-    size = configuration.coordinates
-    response, loads = QuietResponse(configuration, frequency), np.asarray(right).reshape(size, 9)
+    by_motion = [(w, each, contact_derivatives(each)) for w, each in parts]
+    force = sum(w * each.force_by_u[:, :, None] * branch.T for w, _, each in by_motion)
+    loads = sum(w * _unbalanced(configuration, each, of_each, branch) for w, each, of_each in by_motion)
+    response, loads = QuietResponse(configuration, frequency), np.asarray(loads).reshape(size, 9)
     moved = response.solve(loads)
-    if (lacks := response.lacks(loads, moved)) > UNSOLVED:
+    lacks = float(np.linalg.norm(loads - response.matrix @ moved) / (np.linalg.norm(loads) or 1.0))
+    if lacks > UNSOLVED:
         raise BadInputError(
             f"The packing has no elastic moduli: under a strain {lacks:.1g} of the forces stay unbalanced, as they "
             "drive a motion without stiffness."
         )
     moved = moved.reshape(size, 3, 3)
-    work = affine.copy()
+    affine = -np.einsum("aklc,cb->abkl", force, branch) / volume
+    work, arms = affine.copy(), c.slip_arm / configuration.radius[np.column_stack([c.i, c.j])]
     for k, m in np.ndindex(d, d):
-        answer = sum(w * _forces_by_motion(configuration, each, moved[:, k, m]) for w, each in parts)
-        work[:, :, k, m] -= np.einsum("ac,cb->ab", answer, branch) / volume
+        shift, turn = configuration.vectors(moved[:, k, m])
+        u, w = shift[c.i] - shift[c.j], arms[:, :1] * turn[c.i] + arms[:, 1:] * turn[c.j]
+        for share, _, each in by_motion:
+            answer = np.einsum("abc,cb->ac", each.force_by_u, u) + np.einsum("abc,cb->ac", each.force_by_w, w)
+            work[:, :, k, m] -= share * np.einsum("ac,cb->ab", answer, branch) / volume
     sigma, one = -stress(configuration), np.diag(np.arange(3) < d).astype(float)
     turned = np.einsum("al,bk->abkl", sigma, one) - np.einsum("ab,kl->abkl", sigma, one)
     by_gradient, affine = work + turned, affine + turned
@@ -309,14 +336,9 @@ def _require_laws(configuration: Configuration, what: str) -> None:
         )
 
 
-def _affine_forces(c: LinearisedContacts, branch: Floats) -> Floats:
-    """Derivatives of the force on i by the displacement gradient, shape (3, 3, 3, C): axes a, k, l."""
-    return np.asarray(contact_derivatives(c).force_by_u[:, :, None] * branch.T[None, None])
-
-
-def _unbalanced(configuration: Configuration, c: LinearisedContacts, branch: Floats) -> Floats:
+def _unbalanced(configuration: Configuration, c: LinearisedContacts, d: ContactDerivatives, branch: Floats) -> Floats:
     """b: forces (F, T/R) on the coordinates by the displacement gradient, shape (coordinates, 3, 3)."""
-    d, n = contact_derivatives(c), len(configuration)
+    n = len(configuration)
     total = np.zeros((6, 3, 3, n))
     for p, (partner, sign) in enumerate(((c.i, 1.0), (c.j, -1.0))):
         radius = configuration.radius[partner]
@@ -328,16 +350,6 @@ def _unbalanced(configuration: Configuration, c: LinearisedContacts, branch: Flo
     flat = np.arange(3) < configuration.dimension
     total = total[rows] * flat[:, None, None] * flat[:, None]  # a gradient along z is none of disks
     return np.asarray(total.transpose(0, 3, 1, 2).reshape(-1, 3, 3))
-
-
-def _forces_by_motion(configuration: Configuration, c: LinearisedContacts, moved: Complexes) -> Complexes:
-    """Change of the force on i of each contact by displacements of the coordinates, shape (3, C)."""
-    d = contact_derivatives(c)
-    shift, turn = configuration.vectors(moved)
-    arms = c.slip_arm / configuration.radius[np.column_stack([c.i, c.j])]
-    rolling = arms[:, :1] * turn[c.i] + arms[:, 1:] * turn[c.j]
-    by_shift = np.einsum("abc,cb->ac", d.force_by_u, shift[c.i] - shift[c.j])
-    return np.asarray(by_shift + np.einsum("abc,cb->ac", d.force_by_w, rolling))
 
 
 class QuietResponse:
@@ -365,7 +377,3 @@ class QuietResponse:
         for _ in range(refinements):
             moved += self.factors.solve(np.asarray(force - self.matrix @ moved))
         return np.asarray(moved)
-
-    def lacks(self, force: Complexes, moved: Complexes) -> float:
-        """Share of the forces that stays unbalanced, as they drive a motion without stiffness."""
-        return float(np.linalg.norm(force - self.matrix @ moved) / (np.linalg.norm(force) or 1.0))

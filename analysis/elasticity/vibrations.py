@@ -118,6 +118,13 @@ def vibrations(packing: HasConfiguration, moments: int | None = None, vectors: i
     ------
     BadInputError
         If nothing vibrates, or if one of many motions has a negative eigenvalue.
+
+    Examples
+    --------
+
+    >>> start = faultgouge.settle("three_disks.toml").packing
+    >>> faultgouge.vibrations(start).modes["frequency"].round(3)[:4]
+    array([19.585, 34.48 , 38.533, 57.444])
     """
     configuration = packing.configuration
     scale = 1.0 / np.sqrt(configuration.coordinate_mass)

@@ -218,7 +218,7 @@ class MindlinLaw:
     @property
     def rescales(self) -> bool:
         """Whether slips fall while overlaps grow, so that b depends on whether a contact closes or opens."""
-        return self.history != "total" and self.exponent > 1
+        return (self.rescaled or self.coulomb) and self.exponent > 1
 
     @property
     def damped(self) -> bool:
@@ -269,11 +269,11 @@ class MindlinLaw:
     def normal_force(self, overlap: ArrayLike) -> Floats:
         """Repulsion f_n = kn overlap^p, force."""
         overlap = _closed_overlap(overlap)
-        return self.kn * overlap * self._powers(overlap)[0]
+        return self.kn * overlap * self.growth(overlap)
 
     def normal_stiffness(self, overlap: ArrayLike) -> Floats:
         """d f_n / d overlap = p kn overlap^(p-1), force / length."""
-        return self.exponent * self.kn * self._powers(_closed_overlap(overlap))[0]
+        return self.exponent * self.kn * self.growth(_closed_overlap(overlap))
 
     def normal_curvature(self, overlap: ArrayLike, order: int = 2) -> Floats:
         """Derivative of f_n of some order, 2 by default: force / length^order, of positive overlaps."""
@@ -305,21 +305,11 @@ class MindlinLaw:
         """
         overlap = _closed_overlap(overlap)
         slip = self.clamped(overlap, slip)
-        spring = -self.kt * self._powers(overlap)[0]
+        spring = -self.kt * self.growth(overlap)
         if self.coulomb:
             return spring * slip
         x = _ratio(np.abs(slip), self.slip_limit(overlap))
         return spring * (1 + x - x * x) * slip
-
-    def _overlap_factor(self, x: Floats, parting: ArrayLike) -> Floats:
-        """-b in units of kt s overlap^(p-2)."""
-        # (p-1) f_t/overlap and the term of d x/d overlap = -x/overlap, joined
-        p = self.exponent
-        falling = (p - 1) + x * ((3 - p) * x - (2 - p))
-        if not self.rescaled:
-            return falling
-        growing = p * x * (2 * x - 1)
-        return growing + np.asarray(parting, dtype=np.float64) * (falling - growing)
 
     def derivatives(
         self, overlap: Floats, slip: Floats, parting: ArrayLike = 0.5, sliding: ArrayLike = False
@@ -338,7 +328,8 @@ class MindlinLaw:
             by default it sticks.
         """
         overlap, p = np.maximum(overlap, 0.0), self.exponent
-        root, rest_power = self._powers(overlap)
+        root = self.growth(overlap)
+        rest_power = root if p == 1.5 else np.power(overlap, 2 - p)
         normal_force, normal_stiffness = self.kn * overlap * root, p * self.kn * root
         if not self.frictional:
             zero = np.zeros_like(root)
@@ -354,13 +345,13 @@ class MindlinLaw:
             slides = np.logical_and(sliding, x >= AT_THE_BOUND)
             b = np.where(slides, p, (p - 1) * np.asarray(parting, dtype=np.float64)) * (-self.kt * steep)
             return Derivatives(normal_force, soft * slip, normal_stiffness, soft * ~slides, b)
-        return Derivatives(
-            normal_force,
-            soft * (1 + x * rest) * slip,
-            normal_stiffness,
-            soft * (rest * (1 + triple)),  # vanishes at the bound to the last bit
-            self._overlap_factor(x, parting) * (-self.kt * steep),
-        )
+        # (p-1) f_t/overlap and the term of d x/d overlap = -x/overlap, joined
+        factor = (p - 1) + x * ((3 - p) * x - (2 - p))
+        if self.rescaled:
+            growing = p * x * (2 * x - 1)
+            factor = growing + np.asarray(parting, dtype=np.float64) * (factor - growing)
+        a = soft * (rest * (1 + triple))  # vanishes at the bound to the last bit
+        return Derivatives(normal_force, soft * (1 + x * rest) * slip, normal_stiffness, a, factor * (-self.kt * steep))
 
     def dashpots(self, overlap: ArrayLike, slip: ArrayLike, sliding: ArrayLike = False) -> tuple[Floats, Floats]:
         """Coefficients of the dashpots for small velocities, force time / length.
@@ -379,7 +370,7 @@ class MindlinLaw:
             at Coulomb's bound, unless Coulomb's slider sticks there.
         """
         overlap = _closed_overlap(overlap)
-        power = self._powers(overlap)[0]
+        power = self.growth(overlap)
         slides = self.at_bound(overlap, slip)
         if self.coulomb:
             slides &= np.asarray(sliding, dtype=np.bool_)
@@ -392,13 +383,6 @@ class MindlinLaw:
         if self.exponent == 1:
             return np.asarray(overlap != 0, dtype=overlap.dtype)
         return np.power(overlap, self.exponent - 1)
-
-    def _powers(self, overlap: Floats) -> tuple[Floats, Floats]:
-        """overlap^(p-1) and overlap^(2-p) of overlaps that are not negative."""
-        growth = self.growth(overlap)
-        if self.exponent == 1.5:
-            return growth, growth
-        return growth, overlap if self.exponent == 1 else np.power(overlap, 2 - self.exponent)
 
 
 def known_exponents() -> str:

@@ -14,11 +14,10 @@ import numpy as np
 
 from ..configuration import Configuration
 from ..errors import BadInputError
-from ..has_configuration import HasConfiguration
 from .packing import Packing
 
 
-def solid_fraction(packing: HasConfiguration) -> float:
+def solid_fraction(packing: Packing | Configuration) -> float:
     """Volume fraction phi of a layer, up to the mean height of the centres of its upper layer, or of a periodic box.
 
     Parameters

@@ -1,7 +1,8 @@
-r"""Windows of loads on which a motion grows, and their edges: where the growth goes through zero, or jumps.
+r"""Edges of windows: one motion is followed between two loads, and its growth goes through zero, or jumps.
 
-At an edge the growth of a motion (:mod:`~faultgouge.analysis.windows.search`) changes its sign. The growth goes through
-zero along a straight line, at distances far below the increment, at
+Each motion is followed by its eigenvalues alone: they are those next to where they should be. At an edge the growth of
+a motion (:mod:`~faultgouge.analysis.windows.search`) changes its sign. The growth goes through zero along a straight
+line, at distances far below the increment, at
 
 - a *coalescence*: without dissipation, where the discriminant D of two modes changes its sign and
   :math:`|y^H x| \to 0`;
@@ -13,151 +14,31 @@ locates the jump. A mere crossing of two levels touches D = 0 without a change o
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import LinAlgError
 
-from ..arrays import Floats
-from ..errors import FaultgougeError
-from .states import Motions
-from .system import System
-
-Kind = Literal["coalescence", "hopf", "steady", "contact change", "start"]
-
-
-class LostPairError(FaultgougeError):
-    """A motion cannot be followed to another load; the text is one sentence."""
+from ..arrays import Complexes
+from ..errors import NoEquilibriumError
+from .motions import Motions, System, eigenvalues_near, overlap_near
+from .onset import Edge, Kind
 
 
-@dataclass(frozen=True)
-class Edge:
-    """A load at which a motion begins or ceases to grow.
+class DoubtError(Exception):
+    """The search cannot decide what happens on an increment; `fx` is a load inside at which to look, or None."""
 
-    Attributes
-    ----------
-    fx : float
-        The load, force per top disk.
-    error : float
-        Uncertainty of the load: of a root twice the scatter over the slope, of a jump half of its bracket; plus the
-        `load_error` of the equilibria. 0 at a "start".
-    eigenvalue : float or complex
-        Without dissipation the double eigenvalue (the real part of the pair if it does not coalesce there),
-        1 / time^2; with it s, complex, 1 / time.
-    overlap : float
-        Smallest |y^H x| met at the edge; at an exceptional point it is the root of the rounding error.
-    kind : {"coalescence", "hopf", "steady", "contact change", "start"}
-        Two real eigenvalues that meet; Re s that goes through zero, with Im s or without; a jump of the equilibrium; or
-        nothing, as the motion grows at the smallest load.
-    """
-
-    fx: float
-    error: float
-    eigenvalue: float | complex
-    overlap: float
-    kind: Kind
-
-    @classmethod
-    def start(cls, state: Motions, k: int) -> "Edge":
-        """The edge of a motion that grows at the smallest load."""
-        return cls(state.fx, 0.0, _value(state.system, state.values[k]), float(state.overlap[k]), "start")
-
-    @classmethod
-    def between(cls, loads: tuple[float, float], system: System, value: complex, overlap: float) -> "Edge":
-        """The edge half way between two loads, where the equilibrium jumps or a motion is not recognised."""
-        below, above = loads
-        error = 0.5 * (above - below) + system.balance
-        return cls(0.5 * (below + above), error, _value(system, value), float(overlap), "contact change")
-
-
-def _value(system: System, value: complex) -> float | complex:
-    return complex(value) if system.dissipative else float(value.real)
-
-
-@dataclass(frozen=True)
-class Window:
-    """An interval of loads on which one motion grows.
-
-    Attributes
-    ----------
-    onset : Edge
-        Where the motion begins to grow.
-    end : Edge or None
-        Where the motion ceases to grow; None if it grows at the largest load that was looked at.
-    path_error : float or None
-        Part of the onset's error that comes from the increments of the path of equilibria, force. None until the path
-        has been taken once more, with other increments.
-    """
-
-    onset: Edge
-    end: Edge | None
-    path_error: float | None = None
-
-    @property
-    def fx_onset(self) -> float:
-        """Load at which the motion begins to grow, force per top disk."""
-        return self.onset.fx
-
-    @property
-    def fx_end(self) -> float | None:
-        """Load at which the motion ceases to grow."""
-        return None if self.end is None else self.end.fx
-
-    @property
-    def rounding_error(self) -> float:
-        """Part of the onset's error that comes from rounding and from equilibria out of balance, force."""
-        return self.onset.error
-
-    @property
-    def error(self) -> float:
-        """Uncertainty of fx_onset: from rounding and, where known, from the path."""
-        return self.onset.error + (self.path_error or 0.0)
-
-    @property
-    def kind(self) -> Kind:
-        """Kind of the edge at which the window begins."""
-        return self.onset.kind
-
-    @property
-    def dissipative(self) -> bool:
-        """Whether the motion has dissipation."""
-        return isinstance(self.onset.eigenvalue, complex)
-
-    @property
-    def eigenvalue(self) -> float:
-        """The double eigenvalue at the onset, 1 / time^2; with dissipation Re(-s^2)."""
-        value = self.onset.eigenvalue
-        return -((value**2).real) if isinstance(value, complex) else value
-
-    @property
-    def frequency(self) -> float:
-        """Im s at the onset, radian / time; without dissipation the root of the eigenvalue."""
-        value = self.onset.eigenvalue
-        return value.imag if isinstance(value, complex) else float(np.sqrt(max(0.0, value)))
-
-    @property
-    def overlap(self) -> float:
-        """Smallest |y^H x| met at the onset."""
-        return self.onset.overlap
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON: fx_onset, fx_end, error, error_of_path, kind, and lambda, or frequency with dissipation."""
-        own = {"frequency": self.frequency} if self.dissipative else {"lambda": self.eigenvalue}
-        return {
-            "fx_onset": self.fx_onset,
-            "fx_end": self.fx_end,
-            "error": self.error,
-            "kind": self.kind,
-            "error_of_path": self.path_error,
-        } | own
+    def __init__(self, fx: float | None = None) -> None:
+        super().__init__("an increment is in doubt")
+        self.fx = fx
 
 
 class SignChange(NamedTuple):
     """Where a function of the load changes its sign: a root, or a jump.
 
     The error is twice the scatter over the slope of a root, and half of the bracket of a jump. Its loads are the five
-    that give the root, or the one that is the root to within rounding, or the two on either side of the jump.
+    that give the root, or the one that is the root, or the two on either side of the jump.
     """
 
     fx: float
@@ -169,17 +50,14 @@ class SignChange(NamedTuple):
 def sign_change(value: Callable[[float], float], below: float, above: float) -> SignChange:
     """Where a function of the load goes through zero, or jumps, between two loads at which it has opposite signs.
 
-    A few steps bracket the root. Five points close to it then give its last digits, and their number: they are as
-    close as the noise allows, since the function should be straight and yet stand out of its scatter. Where it does not
-    cross zero along a smooth line at any distance, bisection locates the jump. If rounding makes the signs at both
-    loads equal, the function is zero within rounding at one of these. That load is the root, uncertain by the function
-    over its slope.
+    A few steps bracket the root (Ridders, IEEE Trans. Circuits Syst. 26, 979 (1979)). Five points close to it then give
+    its last digits, and their number: they are as close as the noise allows, since the function should be straight and
+    yet stand out of its scatter. Where it does not cross zero along a smooth line at any distance, bisection locates
+    the jump. The root may be one of the two loads but for rounding, which may make the signs at both equal. The five
+    points are then on its one side.
     """
-    ends = value(below), value(above)
-    span = above - below
-    if ends[0] * ends[1] >= 0:
-        fx = below if abs(ends[0]) <= abs(ends[1]) else above
-        return SignChange(fx, min(map(abs, ends)) / (abs(ends[1] - ends[0]) / span), [fx], smooth=True)
+    ends, span = (value(below), value(above)), above - below
+    last_place = float(np.spacing(max(abs(below), abs(above))))
     values = {below: ends[0], above: ends[1]}
 
     def look_at(fx: float) -> float:
@@ -187,19 +65,54 @@ def sign_change(value: Callable[[float], float], below: float, above: float) -> 
             values[fx] = value(fx)
         return values[fx]
 
-    root = _bracketed(look_at, below, above, 1e-8 * span)
-    room = min(root - below, above - root)
-    distance = min(1e-3 * room, 1e-6 * span)
-    while 0 < distance < 0.1 * room:
-        loads = [float(fx) for fx in root + distance * np.arange(-2.0, 3.0)]
-        found = _root_of_five(loads, np.array([look_at(fx) for fx in loads]))
-        if found is not None and abs(found[0] - root) <= distance:
-            return SignChange(*found, loads, smooth=True)
-        if found is not None and abs(found[0] - root) < 0.5 * room:
-            root = found[0]  # the bracket was wider than the points
+    crosses = ends[0] * ends[1] < 0
+    a, b, last, root = below, above, np.inf, np.nan
+    while crosses and np.isnan(root) and abs(b - a) > 1e-8 * span:
+        middle = 0.5 * (a + b)
+        low, half, high = look_at(a), look_at(middle), look_at(b)
+        shift = 0.0 if half == 0 else float(np.sign(low - high) * half / np.sqrt(half**2 - low * high))
+        fx = middle + (middle - a) * shift
+        steady, last = abs(fx - last) <= 1e-8 * span, fx
+        if look_at(fx) == 0 or (steady and min(abs(fx - a), abs(b - fx)) > 0.01 * abs(b - a)):
+            root = fx
+        else:
+            places = sorted([a, b, middle, fx])
+            a, b = next((p, q) for p, q in pairwise(places) if look_at(p) * look_at(q) <= 0)
+    root = 0.5 * (a + b) if np.isnan(root) else root
+
+    room, offsets = min(root - below, above - root), np.arange(-2.0, 3.0)
+    smaller, larger = sorted(map(abs, ends))
+    if not crosses or (room < 1000 * last_place and smaller < 1e-6 * larger):
+        lower = abs(ends[0]) <= abs(ends[1])
+        root, room, offsets = below if lower else above, span, np.arange(5.0) * (1 if lower else -1)
+    distance = max(min(1e-3 * room, 1e-6 * span), 4 * last_place)
+    while distance < 0.1 * room:
+        loads = [float(fx) for fx in root + distance * offsets]
+        try:
+            there = [look_at(fx) for fx in loads]
+        except DoubtError:
+            if crosses:
+                raise
+            break  # one load alone is known, and is the root
+        curve, residuals, *_ = np.polynomial.polynomial.polyfit(offsets, there, 2, full=True)
+        # two degrees of freedom beside the parabola tell the scatter; a step of height 1 has slope 0.3 and scatter 0.3
+        scatter = float(np.sqrt(residuals[0].sum() / 2)) if residuals[0].size else 0.0
+        found, slope, step = root, float(curve[1]), abs(loads[3] - loads[2])
+        if scatter <= 0.1 * abs(slope):
+            shift = -float(curve[0]) / slope  # and the parabola's root, to second order
+            shift *= 1 - float(curve[2]) * shift / slope if abs(shift) <= 2 else 1
+            found = root + shift * step
+            if abs(found - root) <= distance:
+                known = loads if offsets[0] else [root]
+                return SignChange(found, 2 * scatter / abs(slope) * step + last_place, known, smooth=True)
+        if found != root and abs(found - root) < 0.5 * room:
+            root = found  # the bracket was wider than the points
         else:
             distance *= 30.0
-    width = max(1e-9 * span, 4 * float(np.spacing(max(abs(below), abs(above)))))  # paths differ by far more at a jump
+
+    if not crosses:
+        return SignChange(root, smaller / ((larger + smaller) / span) + last_place, [root], smooth=True)
+    width = max(1e-9 * span, 4 * last_place)  # paths differ by far more at a jump
     left, right = next((a, b) for a, b in pairwise(sorted(values)) if values[a] * values[b] <= 0)
     while right - left > width:
         middle = 0.5 * (left + right)
@@ -207,36 +120,104 @@ def sign_change(value: Callable[[float], float], below: float, above: float) -> 
     return SignChange(0.5 * (left + right), 0.5 * (right - left), [left, right], smooth=False)
 
 
-def _bracketed(value: Callable[[float], float], a: float, b: float, tolerance: float) -> float:
-    """The root between a and b to a tolerance, by Ridders's method (IEEE Trans. Circuits Syst. 26, 979 (1979))."""
-    last = np.inf
-    while abs(b - a) > tolerance:
-        middle = 0.5 * (a + b)
-        low, half, high = value(a), value(middle), value(b)
-        if half == 0:
-            return middle
-        fx = middle + (middle - a) * float(np.sign(low - high) * half / np.sqrt(half**2 - low * high))
-        steady, last = abs(fx - last) <= tolerance, fx
-        if value(fx) == 0 or (steady and min(abs(fx - a), abs(b - fx)) > 0.01 * abs(b - a)):
-            return float(fx)
-        places = sorted([a, b, middle, float(fx)])
-        a, b = next((p, q) for p, q in pairwise(places) if value(p) * value(q) <= 0)
-    return 0.5 * (a + b)
+def growth_of(numbers: Complexes) -> float:
+    """-D of the mean and D of a pair, or Re s: positive where the motion grows; of slopes its slope."""
+    return float(-numbers[1].real if len(numbers) == 2 else numbers[0].real)
 
 
-def _root_of_five(loads: list[float], values: Floats) -> tuple[float, float] | None:
-    """Root and error of a parabola through five equidistant points: two degrees of freedom tell the scatter."""
-    middle, distance = loads[2], loads[3] - loads[2]
-    curve, residuals, *_ = np.polynomial.polynomial.polyfit(np.arange(-2, 3), values, 2, full=True)
-    scatter = float(np.sqrt(residuals[0].sum() / 2)) if residuals[0].size else 0.0
-    value, slope = float(curve[0]), float(curve[1])
-    # a step of height 1 has slope 0.3 and scatter 0.3
-    if scatter > 0.1 * abs(slope):
-        return None
-    shift = -value / slope  # and the parabola's root, to second order
-    shift *= 1 - float(curve[2]) * shift / slope if abs(shift) <= 2 else 1
-    return middle + shift * distance, 2 * scatter / abs(slope) * distance + float(np.spacing(abs(middle)))
+class TrackPoint(NamedTuple):
+    """A motion at one load: the mean and D of two eigenvalues without dissipation, or s; and their slopes."""
+
+    fx: float
+    numbers: Complexes
+    slopes: Complexes
+
+    @classmethod
+    def of(cls, state: Motions, drift: Complexes, *members: int) -> "TrackPoint":
+        """One motion with dissipation; without it two real eigenvalues of a state, or one of a complex pair."""
+        values, slopes = state.values[list(members)], drift[list(members)]
+        if state.system.damping is not None:
+            return cls(state.system.fx, values, slopes)
+        if len(members) == 1:
+            values, slopes = (np.array([each[0], each[0].conj()]) for each in (values, slopes))
+        gap = values[0] - values[1]
+        numbers = np.array([values.mean(), gap**2])
+        return cls(state.system.fx, numbers, np.array([slopes.mean(), 2 * gap * (slopes[0] - slopes[1])]))
 
 
-Increments = tuple[tuple[float, float], ...]
-"""From load to load."""
+class Track:
+    """A motion between two loads at which it is known.
+
+    Parameters
+    ----------
+    at : callable
+        Load -> System.
+    below, above : TrackPoint
+        The motion at the ends.
+    """
+
+    def __init__(self, at: Callable[[float], System], below: TrackPoint, above: TrackPoint) -> None:
+        self.at, self.points = at, (below, above)
+        self.ends = below.fx, above.fx
+        self.known = {each.fx: each.numbers for each in self.points}
+        # slopes are values close by
+        step = 1e-4 * (above.fx - below.fx)
+        self._beside = {
+            each.fx + move: each.numbers + move * each.slopes
+            for each, move in zip(self.points, (step, -step), strict=True)
+        }
+        self.pairs = len(below.numbers) == 2
+
+    def numbers(self, fx: float) -> Complexes:
+        """Its numbers at a load; a DoubtError if there is no equilibrium, or if the motion is not recognised."""
+        known = {**self.known, **self._beside}
+        if fx in known:
+            return known[fx]
+        # by the polynomial through the nearest four loads
+        near: list[float] = []
+        for load in sorted(known, key=lambda load: abs(load - fx)):
+            if len(near) < 4 and all(
+                abs(load - other) > 0.3 * abs(load - fx) for other in near
+            ):  # close ones are noise
+                near.append(load)
+        weights = [np.prod([(fx - m) / (n - m) for m in near if m != n]) for n in near]
+        expected = sum(weight * known[load] for weight, load in zip(weights, near, strict=True))
+        try:
+            values = eigenvalues_near(self.at(fx), expected[0].real if self.pairs else expected[0])
+        except (NoEquilibriumError, LinAlgError):
+            raise DoubtError from None
+        found = nearest_pair(values, expected)[0] if self.pairs else values[[np.argmin(np.abs(values - expected[0]))]]
+        self.known[fx] = found
+        return found
+
+    def growth(self, fx: float) -> float:
+        """Positive where the motion grows: -D, or Re s."""
+        return growth_of(self.numbers(fx))
+
+    def edge(self, change: SignChange) -> Edge:
+        """The edge where the growth changes its sign."""
+        middle = self.at(change.loads[len(change.loads) // 2])
+        mean = np.mean([self.numbers(fx)[0] for fx in change.loads])
+        value = float(mean.real) if self.pairs else complex(mean)
+        kind: Kind = "contact change"
+        if change.smooth:
+            steady = 1e-9 * middle.frequency  # |Im s| that counts as zero
+            kind = "coalescence" if self.pairs else "steady" if mean.imag <= steady else "hopf"
+        return Edge(change.fx, change.error + middle.balance, value, overlap_near(middle, value), kind)
+
+
+def nearest_pair(values: Complexes, expected: Complexes) -> tuple[Complexes, list[int]]:
+    """Mean and D of the one of some complex pairs and twos of real levels whose numbers are as expected, and its
+    members; a DoubtError if there is none, or if another one is nearly so."""
+    pairs, real = np.flatnonzero(values.imag > 0), np.flatnonzero(values.imag == 0)
+    i, j = (real[each] for each in np.triu_indices(len(real), 1))
+    means = np.concatenate([values[pairs].real, 0.5 * (values[i] + values[j]).real])
+    gaps = np.concatenate([-4 * values[pairs].imag ** 2, (values[i] - values[j]).real ** 2])
+    apart = np.sqrt(np.abs(gaps)) - np.sqrt(np.abs(expected[1].real))
+    cost = np.abs(means - expected[0].real) + 0.5 * np.abs(apart)
+    order = np.argsort(cost)
+    if not len(order) or (len(order) > 1 and cost[order[0]] > 0.5 * cost[order[1]]):
+        raise DoubtError
+    k = int(order[0])
+    members = [int(pairs[k])] if k < len(pairs) else [int(i[k - len(pairs)]), int(j[k - len(pairs)])]
+    return np.array([means[k], gaps[k]], complex), members

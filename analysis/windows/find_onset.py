@@ -1,32 +1,132 @@
-"""The search for the onset of a packing along a ramp: with dissipation or without, all windows or the first."""
+"""The search for the onset along a ramp, and for windows: with dissipation or without, all windows or the first."""
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
-from ..arrays import Floats
+from ..arrays import Floats, Matrix
+from ..counted import counted
 from ..errors import NoEquilibriumError, TurningPointError
 from ..has_configuration import HasConfiguration
 from ..motion.buckling import negative_eigenvalues, surely_positive
 from ..motion.spectrum import Spectrum, spectrum
 from ..packing.packing import Packing
 from ..progress import Watch, report_progress, show_progress
-from .edges import Edge, Increments, Window
-from .find_windows import WindowsSoFar, check_increasing, find_windows, windows_up_to
-from .limits import LIMITS, Limits
-from .onset import RAISE_LOAD, NoGrowthError, Onset, OnsetError
-from .ranks import ALONE, Ranks
-from .search import Look, SystemOfLoad
-from .states import Motions
-from .system import System, force_bearing, full_operator
+from .motions import Motions, System, force_bearing
+from .onset import Edge, Increments, NoGrowthError, Onset, OnsetError, Window
+from .quiet import Quiet
+from .search import Look, Search, SystemOfLoad
+from .slices import ALONE, LIMITS, Limits, Ranks
 
 LAPACK_COORDINATES = 5000
 """Coordinates up to which all eigenvalues at the first load are asked for: half a minute, and as their cube."""
+
+FEW_COORDINATES = 60
+"""Coordinates up to which all motions take as long as to know which may grow."""
+
+WindowsSoFar = Callable[[tuple[Window, ...], float], None]
+"""Takes the windows so far, and the load up to which these are complete."""
+
+
+def check_increasing(forces: ArrayLike) -> Floats:
+    """Loads as an array; ValueError if they are not at least two finite, increasing numbers."""
+    loads = np.array(forces, dtype=np.float64)
+    if loads.ndim != 1 or len(loads) < 2 or not np.all(np.isfinite(loads)) or np.any(np.diff(loads) <= 0):
+        raise ValueError("The loads of a ramp must be at least two finite, increasing numbers.")
+    return loads
+
+
+def windows_up_to(
+    system: SystemOfLoad,
+    forces: ArrayLike,
+    *,
+    narrowest: float | None = None,
+    look: Look = lambda below, above: (),
+    first: bool = False,
+    decompose: Callable[[System], Motions] = Motions.of,
+) -> Iterator[tuple[float, tuple[Window, ...]]]:
+    """Yield each load but the smallest, with all windows up to this load; the windows are those of `find_windows`."""
+    loads = check_increasing(forces)
+    # the pair of a narrower window would grow more slowly than any run can show
+    narrowest = 1e-7 * float(np.abs(loads).max()) if narrowest is None else narrowest
+    start = system(float(loads[0]))
+    few = Quiet(decompose) if start.damping is not None and len(start.active) > FEW_COORDINATES else None
+    for fx, windows in Search(system, narrowest, few, first, decompose).along(loads, look):
+        so_far = (
+            f"; {counted(len(windows), 'window')} so far, the first from {windows[0].fx_onset:.8g}" if windows else ""
+        )
+        report_progress(f"motion that grows up to F_x = {fx:.6g} of {loads[-1]:.6g}{so_far}")
+        yield fx, windows
+
+
+def find_windows(
+    system: SystemOfLoad, forces: ArrayLike, *, known: WindowsSoFar = lambda windows, fx: None, **how: Any
+) -> tuple[Window, ...]:
+    """Find all windows of a one-parameter family of systems.
+
+    Parameters
+    ----------
+    system : callable
+        fx -> System, in coordinates that do not depend on the load.
+    forces : array_like, shape (S,)
+        The increasing loads.
+    known : callable, optional
+        Called after each increment with all windows so far, and with the load up to which these are complete.
+    narrowest : float, optional
+        Windows narrower than this are not looked for, force; by default 1e-7 of the largest load.
+    look : callable, optional
+        Two neighbouring loads -> further loads between them at which to look; these may have no equilibrium.
+    first : bool
+        Go no farther than the increment in which the first window begins.
+    decompose : callable, optional
+        System -> all of its motions.
+
+    Returns
+    -------
+    tuple of Window
+        By increasing onset; may be empty.
+
+    Raises
+    ------
+    ValueError
+        If the loads are not at least two increasing numbers.
+    """
+    windows: tuple[Window, ...] = ()
+    for fx, windows in windows_up_to(system, forces, **how):
+        known(windows, fx)
+    return windows
+
+
+def complex_windows(
+    operator: Callable[[float], Matrix], forces: ArrayLike, *, narrowest: float | None = None
+) -> tuple[Window, ...]:
+    """Find all windows of complex eigenvalues of a one-parameter family of matrices.
+
+    Parameters
+    ----------
+    operator : callable
+        fx -> ndarray or sparse array, shape (n, n), in coordinates that do not depend on fx. Zero rows are left out.
+    forces : array_like, shape (S,)
+        The increasing loads.
+    narrowest : float, optional
+        Windows narrower than this are not looked for, force; by default 1e-7 of the largest load.
+
+    Returns
+    -------
+    tuple of Window
+        By increasing onset; may be empty.
+
+    Raises
+    ------
+    ValueError
+        If the loads are not at least two increasing numbers.
+    """
+    return find_windows(lambda fx: System(fx, csr_array(operator(fx))), forces, narrowest=narrowest)
 
 
 def takes_all_modes(packing: HasConfiguration, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
@@ -106,226 +206,151 @@ def find_onset(
     start = equilibrium(float(loads[0]))
     if dissipation and not start.damped:
         raise ValueError("The packing has no dissipation: call find_onset without dissipation=True.")
-    search = _OnsetSearch(equilibrium, start, loads, modes, first, ranks, folder, limits, _kept_undamped())
-    with show_progress(watch):
-        if not dissipation:
-            return search.undamped_onset()
-        return search.damped_onset(known) if search.takes_all else search.damped_onset_in_slices(known)
-
-
-@dataclass(frozen=True, eq=False)
-class _OnsetSearch:
-    """A search: the parameters of `find_onset`, and the packing at the smallest load."""
-
-    equilibrium: Callable[[float], HasConfiguration]
-    start: HasConfiguration
-    loads: Floats
-    modes: tuple[int, int] | None
-    first: bool
-    ranks: Ranks
-    folder: Path | None
-    limits: Limits
-    decompose: Callable[[System], Motions]
-
-    @property
-    def takes_all(self) -> bool:
-        """Whether all modes are searched, and all windows can be found."""
-        return takes_all_modes(self.start, self.modes, self.limits)
-
-    def undamped(self, fx: float) -> System:
-        """The system at a load, without dissipation."""
-        return System.of(self.equilibrium(fx))
-
-    def damped(self, fx: float) -> System:
-        """The system at a load, with dissipation."""
-        packing = self.start if fx == self.loads[0] else self.equilibrium(fx)
-        return System.of(packing, True)
-
-    def windows_of(
-        self, system: SystemOfLoad, look: Look = lambda below, above: (), known: WindowsSoFar = lambda windows, fx: None
-    ) -> tuple[tuple[Window, ...], Increments]:
-        """The windows of a family of systems, and increments in doubt."""
-        if self.takes_all:
-            found = find_windows(
-                system,
-                self.loads,
-                look=look,
-                first=self.first,
-                known=known,
-                decompose=self.decompose,
-            )
-            return found[:1] if self.first else found, ()
-        from .sliced_search import SlicedSearch  # with libraries that nothing else needs
-
-        search = SlicedSearch(system, self.modes, self.ranks, self.folder, self.limits)
-        one, doubtful = search.first_window(self.loads)
-        return (one,) if one else (), doubtful
-
-    def undamped_onset(self) -> Onset:
-        """The onset without dissipation."""
-        windows, doubtful, at_start, ends = self._undamped_windows()
-        if not windows:
-            raise OnsetError.among(self.modes, float(self.loads[-1]), doubtful)
-        opens = windows[0].kind == "start"
-        if opens and at_start is None and self.modes is None:
-            at_start = spectrum(force_bearing(self.start)) if self.takes_all else _complex_at_start(self.start)
-            if at_start is not None and at_start.pairs and not self.takes_all and windows[0].eigenvalue >= 0:
-                windows = (_fastest(self.start, at_start),)
-        complete = self.takes_all and not self.first and not windows[0].eigenvalue < 0
-        return Onset(windows, complete, doubtful, self.modes, at_start if opens else None, ends)
-
-    def undamped_onset_or_none(self) -> Onset | None:
-        """The onset without dissipation, beside a search with dissipation; None if there is no such onset."""
-        with suppress(OnsetError, NoEquilibriumError):
-            return self.undamped_onset()
-        return None
-
-    def damped_onset(self, known: Callable[[Onset, float], None]) -> Onset:
-        """The onset with dissipation among all modes: growth is looked for inside of the undamped windows, too."""
-        report_progress(f"pairs that become complex without dissipation, up to F_x = {self.loads[-1]:.6g}")
-        undamped = self.undamped_onset_or_none()
-        inside = _Inside(self.undamped, self.loads, undamped)
-
-        def known_windows(windows: tuple[Window, ...], fx: float) -> None:
-            if windows and not self.first:
-                known(Onset(windows, undamped=undamped), fx)
-
-        windows, doubtful = self.windows_of(self.damped, inside.look, known_windows)
-        self._check_growth(windows, undamped)
-        return Onset(windows, not self.first, doubtful, self.modes, undamped=undamped)
-
-    def damped_onset_in_slices(self, known: Callable[[Onset, float], None]) -> Onset:
-        """The first onset with dissipation of a large packing."""
-        with show_progress(what="with dissipation, "):
-            windows, doubtful = self.windows_of(self.damped)
-        if windows:
-            known(Onset(windows, False, doubtful), windows[0].fx_onset)
-        with show_progress(what="without dissipation, "):
-            undamped = self.undamped_onset_or_none()
-        self._check_growth(windows, undamped)
-        return Onset(windows, False, doubtful, self.modes, undamped=undamped)
-
-    def _check_growth(self, windows: tuple[Window, ...], undamped: Onset | None) -> None:
-        if not windows:
-            finding = f"No motion grows up to F_x = {self.loads[-1]:.10g}"
-            raise NoGrowthError(finding, RAISE_LOAD, undamped=undamped)
-
-    def _undamped_windows(self) -> tuple[tuple[Window, ...], Increments, Spectrum | None, float | None]:
-        """Windows without dissipation, increments in doubt, the spectrum at the smallest load if that is known, and the
-        load before which the branch of equilibria ends."""
-        start = self.start
-        negative = negative_eigenvalues(force_bearing(start))
-        if len(negative):
-            return (_at_start(start, float(negative[0]), 1.0),), (), None, start.fx
-        branch = _Branch(self.equilibrium, start, self.loads)
-        # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
-        if self.modes is None and (self.first or not self.takes_all) and not isinstance(start, Packing):
-            found = _complex_at_start(start)
-            if found is not None:
-                return (_fastest(start, found),), (), found, None
-        try:
-            return *self.windows_of(branch), None, branch.ends
-        except NoEquilibriumError:  # beyond the first increment, which the search asks for in any case
-            found = _complex_at_start(start) if self.modes is None else None
-            if found is None:
-                raise
-            return (_fastest(start, found),), (), found, branch.ends
-
-
-def _kept_undamped() -> Callable[[System], Motions]:
-    """All motions of a system; those without dissipation are kept for the search with it, which begins with them."""
-    known: dict[float, Motions] = {}
+    takes_all = takes_all_modes(start, modes, limits)
+    kept: dict[float, Motions] = {}
+    ends: list[float] = []
 
     def decompose(system: System) -> Motions:
-        found = known.get(system.fx)
-        if system.dissipative or found is None:
-            found = Motions.of(system)
-            if not system.dissipative and 16 * found.right.size * (len(known) + 1) < 2e8:  # bytes
-                known[system.fx] = found
+        """All motions; those without dissipation are kept for the search with it, which begins with them."""
+        if system.damping is None and system.fx in kept:
+            return kept[system.fx]
+        found = Motions.of(system)
+        if system.damping is None and 16 * found.right.size * (len(kept) + 1) < 2e8:  # bytes
+            kept[system.fx] = found
         return found
 
-    return decompose
+    def windows_of(system: SystemOfLoad, **how: Any) -> tuple[tuple[Window, ...], Increments]:
+        """The windows of a family of systems, and increments in doubt."""
+        if takes_all:
+            found = find_windows(system, loads, first=first, decompose=decompose, **how)
+            return found[:1] if first else found, ()
+        from .sliced_search import SlicedSearch  # with libraries that nothing else needs
+
+        window, doubtful = SlicedSearch(system, modes, ranks, folder, limits).first_window(loads)
+        return (window,) if window else (), doubtful
+
+    def damped(fx: float) -> System:
+        return System.of(start if fx == loads[0] else equilibrium(fx), True)
+
+    def negative_of(packing: HasConfiguration, system: System) -> Floats:
+        """The negative eigenvalues; a positive symmetric part shows that there are none."""
+        return np.zeros(0) if surely_positive(system.stiffness) else negative_eigenvalues(force_bearing(packing))
+
+    def undamped(fx: float) -> System:
+        """The branch of stable equilibria: it ends where one at a given load has a negative eigenvalue."""
+        packing = start if fx == loads[0] else equilibrium(fx)
+        system = System.of(packing)
+        if fx in loads[1:] and len(negative_of(packing, system)):
+            ends.append(fx)
+            raise TurningPointError(
+                f"no pair of eigenvalues becomes complex before F_x = {fx:.10g}, where one is negative: the branch "
+                "of stable equilibria ends before, at a turning point, and the packing leaves it without oscillation"
+            )
+        return system
+
+    def opened(eigenvalue: float, overlap: float) -> tuple[Window, ...]:
+        """A window that is open at the smallest load."""
+        return (Window(Edge(start.fx, 0.0, float(eigenvalue), overlap, "start"), None),)
+
+    def undamped_onset() -> Onset:
+        windows: tuple[Window, ...] = ()
+        doubtful: Increments = ()
+        at_start: Spectrum | None = None
+        negative = negative_of(start, System.of(start))
+        if len(negative):
+            ends.append(start.fx)
+            windows = opened(negative[0], 1.0)
+        # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
+        elif modes is None and (first or not takes_all) and not isinstance(start, Packing):
+            at_start = _complex_at_start(start)
+        if not windows and at_start is None:
+            try:
+                windows, doubtful = windows_of(undamped)
+            except NoEquilibriumError:  # beyond the first increment, which the search asks for in any case
+                at_start = _complex_at_start(start) if modes is None else None
+                if at_start is None:
+                    raise
+        if at_start is None and modes is None and windows and windows[0].kind == "start":
+            at_start = spectrum(force_bearing(start)) if takes_all else _complex_at_start(start)
+        if at_start is not None and not (takes_all and windows) and not len(negative):
+            fastest = max(at_start.pairs, key=lambda each: each.growth_rate)
+            windows = opened(fastest.eigenvalue.real, fastest.overlap)
+        if not windows:
+            raise OnsetError.among(modes, float(loads[-1]), doubtful)
+        complete = takes_all and not first and not windows[0].eigenvalue < 0
+        return Onset(windows, complete, doubtful, modes, at_start, min(ends, default=None))
+
+    def undamped_onset_or_none() -> Onset | None:
+        with suppress(OnsetError, NoEquilibriumError):
+            return undamped_onset()
+        return None
+
+    def told(windows: tuple[Window, ...], fx: float) -> None:
+        if windows and not first:
+            known(Onset(windows, undamped=beside), fx)
+
+    with show_progress(watch):
+        if not dissipation:
+            return undamped_onset()
+        if takes_all:
+            report_progress(f"pairs that become complex without dissipation, up to F_x = {loads[-1]:.6g}")
+            beside = undamped_onset_or_none()
+            windows, doubtful = windows_of(
+                damped, look=_inside(lambda fx: System.of(equilibrium(fx)), loads, beside), known=told
+            )
+        else:
+            with show_progress(what="with dissipation, "):
+                windows, doubtful = windows_of(damped)
+            if windows:
+                known(Onset(windows, False, doubtful), windows[0].fx_onset)
+            with show_progress(what="without dissipation, "):
+                beside = undamped_onset_or_none()
+        if not windows:
+            finding = f"No motion grows up to F_x = {loads[-1]:.10g}"
+            raise NoGrowthError(finding, "raise the largest load", undamped=beside)
+        return Onset(windows, takes_all and not first, doubtful, modes, undamped=beside)
 
 
-class _Inside:
+def _inside(undamped: SystemOfLoad, loads: Floats, known: Onset | None) -> Look:
     """Loads inside the undamped windows of a ramp: growth without dissipation is largest there.
 
     Where the first window alone is known, the others are sought as far as the ramp is walked.
     """
+    windows: tuple[Window, ...] = () if known is None else known.windows
+    reached = np.inf
+    walk: Iterator[tuple[float, tuple[Window, ...]]] = iter(())
+    if known is not None and not known.complete:
+        begin = max(0, int(np.searchsorted(loads, known.fx_c, side="right")) - 1)
+        if begin < len(loads) - 1:
+            reached, walk = float(loads[begin]), windows_up_to(undamped, loads[begin:])
 
-    def __init__(self, undamped: SystemOfLoad, loads: Floats, known: Onset | None) -> None:
-        self._windows: tuple[Window, ...] = () if known is None else known.windows
-        self._reached = np.inf
-        self._along: Iterator[tuple[float, tuple[Window, ...]]] = iter(())
-        if known is not None and not known.complete:
-            begin = max(0, int(np.searchsorted(loads, known.fx_c, side="right")) - 1)
-            if begin < len(loads) - 1:
-                self._reached = float(loads[begin])
-                self._along = windows_up_to(undamped, loads[begin:])
-
-    def look(self, below: float, above: float) -> list[float]:
-        """Loads between two loads at which to look: the onsets, and the middles of the windows that end in between."""
-        if not self._windows or above <= self._windows[0].fx_onset:
+    def look(below: float, above: float) -> list[float]:
+        """The onsets between two loads, and the middles of the windows that end in between."""
+        nonlocal reached, windows
+        if not windows or above <= windows[0].fx_onset:
             return []
-        while self._reached < above:
+        while reached < above:
             try:
-                self._reached, self._windows = next(self._along)
+                reached, windows = next(walk)
             except (StopIteration, NoEquilibriumError):
-                self._reached = np.inf
-        onsets = [each.fx_onset for each in self._windows if below < each.fx_onset < above]
-        ends = [(each.fx_onset, each.fx_end) for each in self._windows if each.fx_end is not None]
+                reached = np.inf
+        onsets = [each.fx_onset for each in windows if below < each.fx_onset < above]
+        ends = [(each.fx_onset, each.fx_end) for each in windows if each.fx_end is not None]
         return onsets + [0.5 * (max(begin, below) + end) for begin, end in ends if below < end < above]
 
-
-class _Branch:
-    """The systems of a branch of stable equilibria; it ends where one at a given load has a negative eigenvalue."""
-
-    def __init__(
-        self, equilibrium: Callable[[float], HasConfiguration], start: HasConfiguration, loads: Floats
-    ) -> None:
-        self._equilibrium, self._start = equilibrium, start
-        self._first, self._given = float(loads[0]), set(loads[1:].tolist())
-        self.ends: float | None = None
-
-    def __call__(self, fx: float) -> System:
-        packing = self._start if fx == self._first else self._equilibrium(fx)
-        system = System.of(packing)
-        if fx in self._given and self._buckles(packing, system):
-            self.ends = fx if self.ends is None else min(self.ends, fx)
-            raise TurningPointError(
-                f"no pair of eigenvalues becomes complex before F_x = {fx:.10g}, where one is negative: the branch of "
-                "stable equilibria ends before, at a turning point, and the packing leaves it without oscillation"
-            )
-        return system
-
-    def _buckles(self, packing: HasConfiguration, system: System) -> bool:
-        """Whether an eigenvalue is negative."""
-        return not surely_positive(system.stiffness) and bool(len(negative_eigenvalues(force_bearing(packing))))
+    return look
 
 
 def _complex_at_start(start: HasConfiguration) -> Spectrum | None:
     """The spectrum of a packing at the smallest load, if it has a complex pair.
 
     None if it has none, or if the packing is too large for all eigenvalues to be asked for. Of a symmetric operator,
-    as without tangential forces, nothing is computed.
+    as without tangential forces, nothing is computed: it is its transpose but for the rounding of sums over contacts.
     """
-    if start.coordinates > LAPACK_COORDINATES or _symmetric(full_operator(start)):
+    if start.coordinates > LAPACK_COORDINATES:
+        return None
+    matrix = System.of(start).stiffness
+    if abs(matrix - matrix.T).max() <= 1e-14 * abs(matrix).max():
         return None
     found = spectrum(force_bearing(start))
     return found if found.pairs else None
-
-
-def _symmetric(matrix: csr_array) -> bool:
-    """Whether an operator is its transpose, but for the rounding of its entries, which are sums over contacts."""
-    return bool(abs(matrix - matrix.T).max() <= 1e-14 * abs(matrix).max())
-
-
-def _fastest(start: HasConfiguration, found: Spectrum) -> Window:
-    """The window of the complex pair that grows fastest at the smallest load."""
-    pair = max(found.pairs, key=lambda each: each.growth_rate)
-    return _at_start(start, pair.eigenvalue.real, pair.overlap)
-
-
-def _at_start(start: HasConfiguration, eigenvalue: float, overlap: float) -> Window:
-    """A window that is open at the smallest load."""
-    return Window(Edge(start.fx, 0.0, float(eigenvalue), overlap, "start"), None)

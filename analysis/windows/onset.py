@@ -1,8 +1,7 @@
-"""The onset along a ramp, as a result: its windows, its error, and both in words."""
+"""The windows of loads on which a motion grows, and the onset along a ramp, as results."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -12,9 +11,112 @@ from ..motion.spectrum import Spectrum
 from ..packing.packing import Packing
 from ..table_display import TableDisplay
 from ..uncertain_digits import with_uncertainty
-from .edges import Increments, Window
 
-RAISE_LOAD = "raise the largest load"
+Kind = Literal["coalescence", "hopf", "steady", "contact change", "start"]
+
+Increments = tuple[tuple[float, float], ...]
+"""From load to load."""
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A load at which a motion begins or ceases to grow.
+
+    Attributes
+    ----------
+    fx : float
+        The load, force per top disk.
+    error : float
+        Uncertainty of the load: of a root twice the scatter over the slope, of a jump half of its bracket; plus the
+        `load_error` of the equilibria. 0 at a "start".
+    eigenvalue : float or complex
+        Without dissipation the double eigenvalue (the real part of the pair if it does not coalesce there),
+        1 / time^2; with it s, complex, 1 / time.
+    overlap : float
+        Smallest |y^H x| met at the edge; at an exceptional point it is the root of the rounding error.
+    kind : {"coalescence", "hopf", "steady", "contact change", "start"}
+        Two real eigenvalues that meet; Re s that goes through zero, with Im s or without; a jump of the equilibrium; or
+        nothing, as the motion grows at the smallest load.
+    """
+
+    fx: float
+    error: float
+    eigenvalue: float | complex
+    overlap: float
+    kind: Kind
+
+
+@dataclass(frozen=True)
+class Window:
+    """An interval of loads on which one motion grows.
+
+    Attributes
+    ----------
+    onset : Edge
+        Where the motion begins to grow.
+    end : Edge or None
+        Where the motion ceases to grow; None if it grows at the largest load that was looked at.
+    path_error : float or None
+        Part of the onset's error that comes from the increments of the path of equilibria, force. None until the path
+        has been taken once more, with other increments.
+    """
+
+    onset: Edge
+    end: Edge | None
+    path_error: float | None = None
+
+    @property
+    def fx_onset(self) -> float:
+        """Load at which the motion begins to grow, force per top disk."""
+        return self.onset.fx
+
+    @property
+    def fx_end(self) -> float | None:
+        """Load at which the motion ceases to grow."""
+        return None if self.end is None else self.end.fx
+
+    @property
+    def rounding_error(self) -> float:
+        """Part of the onset's error that comes from rounding and from equilibria out of balance, force."""
+        return self.onset.error
+
+    @property
+    def error(self) -> float:
+        """Uncertainty of fx_onset: from rounding and, where known, from the path."""
+        return self.onset.error + (self.path_error or 0.0)
+
+    @property
+    def kind(self) -> Kind:
+        """Kind of the edge at which the window begins."""
+        return self.onset.kind
+
+    @property
+    def dissipative(self) -> bool:
+        """Whether the motion has dissipation."""
+        return isinstance(self.onset.eigenvalue, complex)
+
+    @property
+    def eigenvalue(self) -> float:
+        """The double eigenvalue at the onset, 1 / time^2; with dissipation Re(-s^2)."""
+        value = self.onset.eigenvalue
+        return -((value**2).real) if isinstance(value, complex) else value
+
+    @property
+    def frequency(self) -> float:
+        """Im s at the onset, radian / time; without dissipation the root of the eigenvalue."""
+        value = self.onset.eigenvalue
+        return value.imag if isinstance(value, complex) else float(np.sqrt(max(0.0, value)))
+
+    @property
+    def overlap(self) -> float:
+        """Smallest |y^H x| met at the onset."""
+        return self.onset.overlap
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: fx_onset, fx_end, error, error_of_path, kind, and lambda, or frequency with dissipation."""
+        known = {"fx_onset": self.fx_onset, "fx_end": self.fx_end, "error": self.error}
+        own = {"frequency": self.frequency} if self.dissipative else {"lambda": self.eigenvalue}
+        return known | {"error_of_path": self.path_error, "kind": self.kind} | own
 
 
 class OnsetError(FaultgougeError):
@@ -35,24 +137,18 @@ class OnsetError(FaultgougeError):
         self.finding, self.larger, self.finer = finding, larger, finer
 
     def __str__(self) -> str:
-        advice = ", or ".join(
-            (["take smaller increments"] if self.finer else []) + ([self.larger] if self.larger else [])
-        )
+        advice = ", or ".join(each for each in ("take smaller increments" * self.finer, self.larger) if each)
         return f"{self.finding}: {advice}." if advice else self.finding
 
     @classmethod
     def among(cls, modes: tuple[int, int] | None, last: float, doubtful: Increments) -> "OnsetError":
         """The error of a search among some modes, or all, up to the last load."""
-        which = "" if modes is None else f" among the modes {modes[0]}:{modes[1]}"
+        none = "No pair of eigenvalues" + ("" if modes is None else f" among the modes {modes[0]}:{modes[1]}")
         if not doubtful:
-            return cls(f"No pair of eigenvalues{which} is complex up to F_x = {last:.10g}", RAISE_LOAD)
-        below, above = doubtful[0]
-        return cls(
-            f"No pair of eigenvalues{which} was found to become complex up to F_x = {last:.10g}, but one was expected "
-            f"between {below:.10g} and {above:.10g}",
-            RAISE_LOAD,
-            finer=True,
-        )
+            return cls(f"{none} is complex up to F_x = {last:.10g}", "raise the largest load")
+        between = "between {:.10g} and {:.10g}".format(*doubtful[0])
+        finding = f"{none} was found to become complex up to F_x = {last:.10g}, but one was expected {between}"
+        return cls(finding, "raise the largest load", finer=True)
 
 
 class NoGrowthError(OnsetError):
@@ -69,24 +165,6 @@ class NoGrowthError(OnsetError):
     def __init__(self, finding: str, larger: str = "", finer: bool = False, undamped: "Onset | None" = None) -> None:
         super().__init__(finding, larger, finer)
         self.undamped = undamped
-
-
-def windows_rows(windows: Sequence[Window]) -> dict[str, str]:
-    """Windows of complex eigenvalues in words: where each begins, and what it is."""
-    rows = {}
-    for each in windows:
-        end = "the end" if each.fx_end is None else f"{each.fx_end:.8g}"
-        begin = f"from {with_uncertainty(each.fx_onset, each.error)}"
-        what = f"frequency = {each.frequency:.6g}" if each.dissipative else f"lambda = {each.eigenvalue:.6g}"
-        rows[begin] = f"to {end}, {what}, {each.kind}"
-    return rows
-
-
-def instability_in_words(found: Spectrum) -> str:
-    """How many complex pairs and negative eigenvalues a spectrum has, and how fast D grows."""
-    counts = [(len(found.pairs), "complex pair"), (len(found.negative), "negative eigenvalue")]
-    parts = [counted(count, what) for count, what in counts if count]
-    return f"{' and '.join(parts)}; in the fastest motion D grows as exp({found.growth_rate():.6g} t)"
 
 
 @dataclass(frozen=True)
@@ -134,35 +212,6 @@ class Onset(TableDisplay):
     between: dict[float, Packing] = field(default_factory=dict)
     flows_beyond: float | None = None
 
-    def __repr__(self) -> str:
-        parts = [self.describe(), f"windows: {self.window_count}"]
-        if self.equilibria:
-            reached = counted(len(self.equilibria), "equilibrium", "equilibria")
-            parts = [f"mu = {self.mu:g}", *parts, f"{reached} up to F_x = {self.equilibria[-1].fx:g}"]
-        return f"<Onset: {', '.join(parts)}>"
-
-    def __str__(self) -> str:
-        return self.describe()
-
-    def describe(self) -> str:
-        """F_x^c with its error, in words; or that, and why, the packing is unstable at the smallest load."""
-        first = self.windows[0]
-        if first.kind != "start" or first.dissipative:
-            return f"F_x^c = {with_uncertainty(self.fx_c, self.error)}"
-        negative = f"an eigenvalue is {first.eigenvalue:.6g}"
-        known = negative if first.eigenvalue < 0 else f"a pair of eigenvalues is complex about {first.eigenvalue:.6g}"
-        shear = "before any shear is added" if self.fx_c == 0 else "the smallest load"
-        known = known if self.at_start is None else instability_in_words(self.at_start)
-        return f"unstable at F_x = {self.fx_c:g}, {shear}: {known}"
-
-    def _rows(self) -> dict[str, str]:
-        return windows_rows(self.windows)
-
-    @property
-    def window_count(self) -> str:
-        """The number of windows in words, as far as they were counted."""
-        return str(len(self.windows)) if self.complete else "not counted, as the search ended with the first"
-
     @property
     def fx_c(self) -> float:
         """F_x^c, the first onset, force per top disk."""
@@ -173,27 +222,56 @@ class Onset(TableDisplay):
         """Uncertainty of fx_c."""
         return self.windows[0].error
 
+    @property
+    def window_count(self) -> str:
+        """The number of windows in words, as far as they were counted."""
+        return str(len(self.windows)) if self.complete else "not counted, as the search ended with the first"
+
+    def describe(self) -> str:
+        """F_x^c with its error, in words; or that, and why, the packing is unstable at the smallest load."""
+        first, found = self.windows[0], self.at_start
+        if first.kind != "start" or first.dissipative:
+            return f"F_x^c = {with_uncertainty(self.fx_c, self.error)}"
+        if found is None:
+            pair = f"a pair of eigenvalues is complex about {first.eigenvalue:.6g}"
+            known = f"an eigenvalue is {first.eigenvalue:.6g}" if first.eigenvalue < 0 else pair
+        else:
+            counts = [(len(found.pairs), "complex pair"), (len(found.negative), "negative eigenvalue")]
+            known = " and ".join(counted(count, what) for count, what in counts if count)
+            known += f"; in the fastest motion D grows as exp({found.growth_rate():.6g} t)"
+        shear = "before any shear is added" if self.fx_c == 0 else "the smallest load"
+        return f"unstable at F_x = {self.fx_c:g}, {shear}: {known}"
+
+    def __str__(self) -> str:
+        return self.describe()
+
+    def __repr__(self) -> str:
+        parts = [self.describe(), f"windows: {self.window_count}"]
+        if self.equilibria:
+            reached = counted(len(self.equilibria), "equilibrium", "equilibria")
+            parts = [f"mu = {self.mu:g}", *parts, f"{reached} up to F_x = {self.equilibria[-1].fx:g}"]
+        return f"<Onset: {', '.join(parts)}>"
+
+    def _rows(self) -> dict[str, str]:
+        rows = {}
+        for each in self.windows:
+            end = "the end" if each.fx_end is None else f"{each.fx_end:.8g}"
+            what = f"frequency = {each.frequency:.6g}" if each.dissipative else f"lambda = {each.eigenvalue:.6g}"
+            rows[f"from {with_uncertainty(each.fx_onset, each.error)}"] = f"to {end}, {what}, {each.kind}"
+        return rows
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON: fx_c, error, error_of_path, windows, doubtful, and more with dissipation or without."""
-        undamped, start = self.undamped, self.at_start
-        known: dict[str, Any] = {
-            "fx_c": self.fx_c,
-            "error": self.error,
-            "error_of_path": self.windows[0].path_error,
-            "windows": [window.as_dict() for window in self.windows],
-        }
-        if self.windows[0].dissipative:
-            return known | {
-                "undamped": None if undamped is None else {"fx_c": undamped.fx_c, "error": undamped.error},
-                "doubtful": [list(increment) for increment in self.doubtful],
-                "flows_beyond": self.flows_beyond,
-            }
-        return known | {
-            "complete": self.complete,
-            "doubtful": [list(increment) for increment in self.doubtful],
-            "modes": None if self.modes is None else list(self.modes),
-            "unstable_at_start": None
-            if start is None
-            else {"pairs": len(start.pairs), "negative": len(start.negative), "growth_rate": start.growth_rate()},
-            "branch_ends": self.ends,
-        }
+        undamped, start, first = self.undamped, self.at_start, self.windows[0]
+        doubtful = [list(increment) for increment in self.doubtful]
+        known: dict[str, Any] = {"fx_c": self.fx_c, "error": self.error, "error_of_path": first.path_error}
+        known |= {"windows": [window.as_dict() for window in self.windows]}
+        if first.dissipative:
+            by_itself = None if undamped is None else {"fx_c": undamped.fx_c, "error": undamped.error}
+            return known | {"undamped": by_itself, "doubtful": doubtful, "flows_beyond": self.flows_beyond}
+        unstable: dict[str, float] | None = None
+        if start is not None:
+            unstable = {"pairs": len(start.pairs), "negative": len(start.negative), "growth_rate": start.growth_rate()}
+        known |= {"complete": self.complete, "doubtful": doubtful}
+        known |= {"modes": None if self.modes is None else list(self.modes)}
+        return known | {"unstable_at_start": unstable, "branch_ends": self.ends}

@@ -11,8 +11,7 @@ from scipy.linalg import LinAlgError
 from ..arrays import Complexes, Floats
 from ..packing.packing import Packing
 from ..responses.normal_form import NormalForm
-from .states import DENSE, Motions
-from .system import System
+from .motions import DENSE, Motions, System
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +167,7 @@ def _modes_near(system: System, value: float) -> Motions:
     """The modes next to an eigenvalue, or all."""
     if len(system.active) > DENSE:
         try:
-            return Motions.near(system, [value], [12])
+            return Motions.near(system, [(value, 12)])
         except LinAlgError:
             pass
     return Motions.of(system)

@@ -19,10 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
 
-from ..arrays import Complexes, Floats
+from ..arrays import Complexes
+from .motions import Motions, System
 from .search import lowest
-from .states import Motions
-from .system import System
 
 MIXING = 0.2
 """Mixing of two motions up to which the second order is trusted: it leaves out a relative order of its square."""
@@ -54,22 +53,29 @@ class Quiet:
             return None
         (a, doubt_a, below), (b, doubt_b, above) = self._suspects(here), self._suspects(there)
         self._known = {there.fx: self._known[there.fx]}
-        doubt = doubt_a | doubt_b | self._approach(below, above, a, b)
-        places = np.flatnonzero(doubt)
-        if not len(places):
-            return Motions.none(here), Motions.none(there)
-        groups = [each for each in np.split(places, np.flatnonzero(np.diff(places) > 3) + 1)]
+        # levels that may come as close to a neighbour between the loads as half of their distance there
+        ends, span = [], there.fx - here.fx
+        for state, other in ((below, there), (above, here)):
+            drift = span * state.slopes(other)
+            levels, drifts = (np.concatenate([each, each[state.grows]]).real for each in (state.values, drift))
+            order = np.argsort(levels, kind="stable")
+            ends.append((np.diff(levels[order]), np.diff(drifts[order])))
+        (g0, v0), (g1, v1) = ends
+        least = 0.25 * np.minimum(g0, g1) ** 2
+        close = lowest(g0**2 - least, 2 * g0 * v0, g1**2 - least, 2 * g1 * v1)[0] > 0
+        places = np.flatnonzero(doubt_a | doubt_b | np.append(close, False) | np.insert(close, 0, False))
+        groups = np.split(places, np.flatnonzero(np.diff(places) > 3) + 1) if len(places) else []
         counts = [int(each[-1] - each[0]) + 4 for each in groups]
         if sum(counts) > MOST:
             return None
         try:
-            below, above = (
-                Motions.near(system, [1j * np.sqrt(np.mean(values[each[[0, -1]]].real)) for each in groups], counts)
-                for system, values in ((here, a), (there, b))
+            near = (
+                [(1j * np.sqrt(np.mean(values[each[[0, -1]]].real)), n) for each, n in zip(groups, counts, strict=True)]
+                for values in (a, b)
             )
+            return Motions.near(here, next(near)), Motions.near(there, next(near))
         except LinAlgError:
             return None
-        return below, above
 
     def _suspects(self, system: System) -> tuple[Complexes, NDArray[np.bool_], Motions]:
         """lambda of all motions without dissipation, by real part, and which of them may grow."""
@@ -92,20 +98,3 @@ class Quiet:
             quiet = trusted & (-2 * s.real > SPARE * np.abs(own)) & (values.imag == 0) & (values.real > 0)
         self._known[system.fx] = values, ~quiet, state
         return self._known[system.fx]
-
-    def _approach(self, below: Motions, above: Motions, a: Complexes, b: Complexes) -> NDArray[np.bool_]:
-        """Which levels may come as close to a neighbour between two loads as half of their distance there."""
-        span, near = above.fx - below.fx, np.zeros(len(a), bool)
-        ends = []
-        for state, other in ((below, above), (above, below)):
-            drift = span * state.slopes(other.system)
-            pairs = state.grows
-            levels, drifts = (np.concatenate([each, each[pairs]]).real for each in (state.values, drift))
-            order = np.argsort(levels, kind="stable")
-            ends.append((np.diff(levels[order]), np.diff(drifts[order])))
-        (g0, v0), (g1, v1) = ends
-        least: Floats = 0.25 * np.minimum(g0, g1) ** 2
-        close = lowest(g0**2 - least, 2 * g0 * v0, g1**2 - least, 2 * g1 * v1)[0] > 0
-        near[:-1] |= close
-        near[1:] |= close
-        return near

@@ -23,18 +23,17 @@ these is a jump of the equilibrium. Where contacts change the levels bend, so th
 about each such change.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Complexes, Floats, Indices
 from ..errors import NoEquilibriumError, TurningPointError
-from .edges import Edge, Window, sign_change
-from .states import Motions
-from .system import System
-from .tracks import DoubtError, Track, TrackPoint, nearest_pair
+from .edges import DoubtError, Track, TrackPoint, growth_of, nearest_pair, sign_change
+from .motions import Motions, System
+from .onset import Edge, Window
 
 SystemOfLoad = Callable[[float], System]
 """Load -> the system there."""
@@ -44,6 +43,10 @@ Look = Callable[[float, float], Iterable[float]]
 
 Few = Callable[[System, System], tuple[Motions, Motions] | None]
 """The motions that may change between two loads, at both; None if all motions have to be looked at."""
+
+Changes = tuple[list[tuple[int, int]], dict[int, Edge], dict[int, Edge]]
+"""What happens between two loads: motions that go on growing, those that begin to grow, and those that cease to, with
+the edge. Motions are numbers in the states at the lower and at the upper load."""
 
 BEND = 0.05
 """Curvature that two values and slopes do not show, as a share of the smaller value: more than enough for loads
@@ -60,17 +63,6 @@ LOOKS = 12
 
 PLACES = np.linspace(0, 1, 41)[1:-1]
 """Where in an increment the cubics are looked at."""
-
-
-class Changes(NamedTuple):
-    """What happens between two loads: motions that go on growing, those that begin to grow, and those that cease to.
-
-    Motions are numbers in the states at the lower and at the upper load.
-    """
-
-    same: list[tuple[int, int]]
-    begun: list[tuple[int, Edge]]
-    ended: list[tuple[int, Edge]]
 
 
 class Search:
@@ -105,19 +97,8 @@ class Search:
         self._known: dict[float, Motions] = {}
         self._before: System | None = None
 
-    @property
-    def windows(self) -> tuple[Window, ...]:
-        """All windows up to the load reached so far, by increasing onset."""
-        still = [Window(onset, None) for _, onset in self.growing or []]
-        return tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
-
-    @property
-    def finished(self) -> bool:
-        """Whether the first window has been found, and is all that is sought."""
-        return self.first and bool(self.growing or self.closed)
-
     def along(self, loads: Floats, look: Look = lambda below, above: ()) -> Iterator[tuple[float, tuple[Window, ...]]]:
-        """Yield each load but the smallest, with all windows up to this load.
+        """Yield each load but the smallest, with all windows up to this load, by increasing onset.
 
         If an eigenvalue is negative at a load, the branch of equilibria has ended before this load. The walk then ends
         if there is a window, and otherwise raises the TurningPointError.
@@ -128,36 +109,38 @@ class Search:
                 try:
                     there = self.at(load)
                 except TurningPointError:
-                    if not self.windows:
+                    if not (self.growing or self.closed):
                         raise
                     return
                 except NoEquilibriumError:
                     if load == above:
                         raise
                     continue
-                for step in self._steps(here, there):
-                    self._advance(here, step)
-                    here = step
-                    if self.finished:
-                        break
-                yield here.fx, self.windows
-                if self.finished:
+                # where contacts change on the way, a short step about each change
+                for place in [*self._bends(here, there, BEND_LENGTH * (there.fx - here.fx)), there]:
+                    if place.fx > here.fx and not self._finished:
+                        self._advance(here, place)
+                        here = place
+                still = [Window(onset, None) for _, onset in self.growing or []]
+                yield here.fx, tuple(sorted(self.closed + still, key=lambda window: window.fx_onset))
+                if self._finished:
                     return
 
-    def _steps(self, here: System, there: System) -> list[System]:
-        """The steps that lead to a load; where contacts change on the way, a short step about each change."""
-        shortest = BEND_LENGTH * (there.fx - here.fx)
+    @property
+    def _finished(self) -> bool:
+        """Whether the first window has been found, and is all that is sought."""
+        return self.first and bool(self.growing or self.closed)
 
-        def divide(below: System, above: System) -> list[System]:
-            if above.fx - below.fx <= shortest or below.states == above.states:
-                return [above]
+    def _bends(self, below: System, above: System, shortest: float) -> list[System]:
+        """The ends of short steps in which contacts change."""
+        if below.states == above.states:
+            return []
+        middle = None
+        if above.fx - below.fx > shortest:
             middle = self._between(below.fx, 0.5 * (below.fx + above.fx), above.fx)
-            return [*divide(below, middle), *divide(middle, above)] if middle else [above]
-
-        places = [here, *divide(here, there)]
-        same = [one.states == other.states for one, other in pairwise(places)]
-        smooth = [before and after for before, after in pairwise(same)]
-        return [place for place, inside in zip(places[1:], [*smooth, False], strict=True) if not inside]
+        if middle is None:
+            return [below, above]
+        return [*self._bends(below, middle, shortest), *self._bends(middle, above, shortest)]
 
     def _between(self, below: float, middle: float, above: float) -> System | None:
         """The system at the middle load, or at a load beside it; None if none of these has an equilibrium."""
@@ -168,122 +151,91 @@ class Search:
                 continue
         return None
 
-    def state(self, system: System) -> Motions:
-        """All motions of a system, kept as long as its load is not passed."""
-        found = self._known.get(system.fx)
-        if found is None:
-            found = self._known[system.fx] = self._decompose(system)
-        return found
+    def _motions(self, *systems: System) -> list[Motions]:
+        """All motions of systems, kept as long as their loads are not passed."""
+        for each in systems:
+            if each.fx not in self._known:
+                self._known[each.fx] = self._decompose(each)
+        return [self._known[each.fx] for each in systems]
 
     def _advance(self, here: System, there: System) -> None:
         """Carry the windows over an increment, divided while it is in doubt."""
-        middle = None
+        span = there.fx - here.fx
         try:
             few = self.few(here, there) if self.few else None
-            below, above = few or (self.state(here), self.state(there))
+            below, above = few or self._motions(here, there)
             if self.growing is None:
-                self.growing = [(below.values[k], Edge.start(below, int(k))) for k in np.flatnonzero(below.grows)]
+                begun = np.flatnonzero(below.grows).tolist()
+                self.growing = [(below.values[k], _edge_at(below, k, here.fx, 0.0)) for k in begun]
             if few and len(self.growing) != below.grows.sum():
-                few, below, above = None, self.state(here), self.state(there)
-            changes = self._changes(below, above)
+                below, above = self._motions(here, there)
+            same, begins, ends = self._changes(below, above)
         except DoubtError as doubt:
-            if there.fx - here.fx > self.narrowest:
-                fx = doubt.fx if doubt.fx is not None else here.fx + 0.47 * (there.fx - here.fx)
-                margin = 0.02 * (there.fx - here.fx)
-                middle = self._between(here.fx, float(np.clip(fx, here.fx + margin, there.fx - margin)), there.fx)
-            if middle is not None:
-                self._advance(here, middle)
-                if not self.finished:
-                    self._advance(middle, there)
-                return
-            below, above = self.state(here), self.state(there)
-            changes = self._undivided(below, above)
+            if span > self.narrowest:
+                fx = doubt.fx if doubt.fx is not None else here.fx + 0.47 * span
+                fx = float(np.clip(fx, here.fx + 0.02 * span, there.fx - 0.02 * span))
+                inside = self._between(here.fx, fx, there.fx)
+                if inside is not None:
+                    self._advance(here, inside)
+                    if not self._finished:
+                        self._advance(inside, there)
+                    return
+            # an increment that is not divided: an unsolved edge is uncertain by half of it
+            below, above = self._motions(here, there)
+            same, begun, ended = recognised(below, above, -1.0)
+            middle, half = 0.5 * (here.fx + there.fx), 0.5 * span
+            begins = {k: _edge_at(above, k, middle, half + there.balance) for k in begun}
+            ends = {k: _edge_at(below, k, middle, half + here.balance) for k in ended}
         left = list(self.growing or [])
 
         def onset_of(k: int) -> Edge:
             nearest = min(range(len(left)), key=lambda j: abs(left[j][0] - below.values[k]))
             return left.pop(nearest)[1]
 
-        ended = [Window(onset_of(k), edge) for k, edge in changes.ended]
-        self.growing = [(above.values[j], onset_of(i)) for i, j in changes.same]
-        self.growing += [(above.values[j], edge) for j, edge in changes.begun]
-        self.closed += ended
+        self.closed += [Window(onset_of(k), edge) for k, edge in ends.items()]
+        self.growing = [(above.values[j], onset_of(i)) for i, j in same]
+        self.growing += [(above.values[k], edge) for k, edge in begins.items()]
         self._before = here
         self._known = {fx: each for fx, each in self._known.items() if fx >= there.fx}
 
-    def _undivided(self, below: Motions, above: Motions) -> Changes:
-        """What changes on an increment that is not divided: an unsolved edge is uncertain by half of it."""
-        rows, columns = np.flatnonzero(below.grows), np.flatnonzero(above.grows)
-        same = [(int(rows[i]), int(columns[j])) for i, j in assign(below.alike(above, rows, columns) + 1e-300)]
-        begun = [int(j) for j in columns if j not in {j for _, j in same}]
-        ended = [int(i) for i in rows if i not in {i for i, _ in same}]
-        loads = below.fx, above.fx
-        return Changes(
-            same,
-            [(k, Edge.between(loads, above.system, above.values[k], above.overlap[k])) for k in begun],
-            [(k, Edge.between(loads, below.system, below.values[k], below.overlap[k])) for k in ended],
-        )
-
     def _changes(self, below: Motions, above: Motions) -> Changes:
         """What happens between two loads; a DoubtError if that is not sure."""
-        kind = self._changes_of_motions if below.system.dissipative else self._changes_of_pairs
-        return kind(below, above, below.slopes(above.system), above.slopes(below.system))
+        drifts = below.slopes(above.system), above.slopes(below.system)
+        kind = self._changes_of_pairs if below.system.damping is None else self._changes_of_motions
+        return kind((below, above), drifts)
 
-    def _changes_of_pairs(self, below: Motions, above: Motions, drift_a: Complexes, drift_b: Complexes) -> Changes:
+    def _changes_of_pairs(self, states: tuple[Motions, Motions], drifts: Sequence[Complexes]) -> Changes:
         """As `_changes`, without dissipation: what changes is real at one load and a complex pair at the other."""
-        rows, columns = np.flatnonzero(below.grows), np.flatnonzero(above.grows)
-        alike = below.alike(above, rows, columns)
-        same = [(int(rows[i]), int(columns[j])) for i, j in assign(alike) if alike[i, j] > ALIKE]
-        begun = [int(j) for j in columns if j not in {j for _, j in same}]
-        ended = [int(i) for i in rows if i not in {i for i, _ in same}]
+        (below, above), span = states, states[1].system.fx - states[0].system.fx
+        same, begun, ended = recognised(below, above, ALIKE)
         if len(begun) + len(ended) > 1:
             raise DoubtError
-        levels_a, levels_b = np.flatnonzero(~below.grows), np.flatnonzero(~above.grows)
-        begins, ends = [], []
-        for k in begun:
-            inside = TrackPoint.pair(above, drift_b, k)
-            outside, levels_a = _levels_of(inside, below, drift_a, levels_a)
-            begins.append((k, self._edge(Track(self.at, outside, inside), inside.fx, outside.fx)))
-        for k in ended:
-            inside = TrackPoint.pair(below, drift_a, k)
-            outside, levels_b = _levels_of(inside, above, drift_b, levels_b)
-            ends.append((k, self._edge(Track(self.at, inside, outside), inside.fx, outside.fx)))
+        levels = [np.flatnonzero(~each.grows) for each in states]
+        edges: list[dict[int, Edge]] = [{}, {}]
+        for inside, k in [(1, k) for k in begun] + [(0, k) for k in ended]:
+            # the two real levels that are the pair at the other load
+            out, pair = 1 - inside, TrackPoint.of(states[inside], drifts[inside], k)
+            expected = pair.numbers + (states[out].system.fx - pair.fx) * pair.slopes
+            _, two = nearest_pair(states[out].values[levels[out]], expected)
+            members = [k], [int(level) for level in levels[out][two]]
+            edges[inside][k] = self._edge(self._track(states, drifts, *(members[::-1] if inside else members)))
+            levels[out] = np.delete(levels[out], two)
         if not (below.whole and above.whole):  # some have no partner, as another one is nearer to the point there
-            alike = below.alike(above, levels_a, levels_b)
-            pairs = [(levels_a[i], levels_b[j]) for i, j in assign(alike) if alike[i, j] > ALIKE]
-            levels_a, levels_b = (np.array(sorted(int(pair[end]) for pair in pairs), dtype=np.int64) for end in (0, 1))
-        if len(levels_a) != len(levels_b):
+            alike = below.alike(above, *levels)
+            pairs = [(levels[0][i], levels[1][j]) for i, j in assign(alike) if alike[i, j] > ALIKE]
+            levels = [np.array(sorted(int(pair[end]) for pair in pairs), dtype=np.int64) for end in (0, 1)]
+        if len(levels[0]) != len(levels[1]):
             raise DoubtError
-        self._check_levels(below, above, drift_a, drift_b, levels_a, levels_b)
-        for i, j in same:
-            pair = TrackPoint.pair(below, drift_a, i), TrackPoint.pair(above, drift_b, j)
-            span = above.fx - below.fx
-            ends_of_pair = ((each.numbers[1].real, span * each.slopes[1].real) for each in pair)
-            width, place = lowest(*(np.array([-number]) for end in ends_of_pair for number in end))
-            if width[0] * span > self.narrowest:
-                self._look_inside(Track(self.at, *pair), float(place[0]))
-        return Changes(same, begins, ends)
 
-    def _check_levels(
-        self,
-        below: Motions,
-        above: Motions,
-        drift_a: Complexes,
-        drift_b: Complexes,
-        levels_a: Indices,
-        levels_b: Indices,
-    ) -> None:
-        """A DoubtError if two real levels meet between two loads at which they are neighbours."""
+        # two real levels may meet between two loads at which they are neighbours
         before = self._before
-        arrival = drift_a if before is None or before.fx >= below.fx else below.slopes(before)
-        span = above.fx - below.fx
-        (g0, v0), (g1, v1), (_, v2) = (
-            (np.diff(state.values[levels].real), span * np.diff(drift[levels].real))
-            for state, levels, drift in (
-                (below, levels_a, drift_a),
-                (above, levels_b, drift_b),
-                (below, levels_a, arrival),
-            )
+        arrival = drifts[0] if before is None or before.fx >= below.system.fx else below.slopes(before)
+        (g0, g1), (v0, v1, v2) = (
+            [np.diff(state.values[own].real) for state, own in zip(states, levels, strict=True)],
+            [
+                span * np.diff(drift[own].real)
+                for drift, own in zip((*drifts, arrival), (*levels, levels[0]), strict=True)
+            ],
         )
         width, place = lowest(g0**2, 2 * g0 * v0, g1**2, 2 * g1 * v1)
         near = width * span > self.narrowest
@@ -291,12 +243,24 @@ class Search:
         bent |= np.abs(v2 - v0) > g0  # their speed is another one, so that the equilibrium may have jumped
         if np.any(bent & ~near):
             raise DoubtError  # they would meet if they went on as on the way to the lower load
-        for k in np.flatnonzero(near):
-            ends = (
-                TrackPoint.pair(below, drift_a, *levels_a[k : k + 2]),
-                TrackPoint.pair(above, drift_b, *levels_b[k : k + 2]),
+        looks = []
+        for k in np.flatnonzero(near).tolist():
+            looks.append((self._track(states, drifts, levels[0][k : k + 2], levels[1][k : k + 2]), place[k]))
+        for i, j in same:  # a complex pair may be real in between
+            track = self._track(states, drifts, [i], [j])
+            width, place = lowest(
+                *(np.array([n]) for p in track.points for n in (growth_of(p.numbers), span * growth_of(p.slopes)))
             )
-            self._look_inside(Track(self.at, *ends), float(place[k]))
+            if width[0] * span > self.narrowest:
+                looks.append((track, place[0]))
+        for track, where in looks:
+            self._look_inside(track, float(where))
+        return same, edges[1], edges[0]
+
+    def _track(self, states: Sequence[Motions], drifts: Sequence[Complexes], *members: Any) -> Track:
+        """The motion that has these members at the lower load and those at the upper one."""
+        below, above = (TrackPoint.of(*each[:2], *each[2]) for each in zip(states, drifts, members, strict=True))
+        return Track(self.at, below, above)
 
     def _look_inside(self, track: Track, place: float) -> None:
         """Look where the growth of a pair may have the other sign than at both ends: a DoubtError if it has.
@@ -305,9 +269,8 @@ class Search:
         its sign.
         """
         (below, above), sign = track.ends, np.sign(track.growth(track.ends[0]))
-        span = above - below
+        span, least = above - below, np.inf
         fx = below + float(np.clip(place, 0.01, 0.99)) * span
-        least = np.inf
         for _ in range(LOOKS):
             found, expected = sign * track.growth(fx), least
             loads = sorted(track.known)
@@ -321,82 +284,75 @@ class Search:
             if not curve > 0 or (len(loads) == 3 and found > 0.5 * min(values[0], values[-1])):
                 raise DoubtError(fx)  # it does not dip where the slopes say so: the loads are too far apart
             fx, least = low - 0.5 * float(slope / curve) * span, least - 0.25 * slope**2 / curve
-            if not below < fx < above:
-                return
-            if least > BEND * max(values[three]) and abs(found - expected) < 0.1 * least:
-                return  # the parabola has told what was then found
-            if min(abs(fx - load) for load in loads) < 0.5 * self.narrowest:
+            told = least > BEND * max(values[three]) and abs(found - expected) < 0.1 * least  # what was then found
+            if told or not below < fx < above or min(abs(fx - load) for load in loads) < 0.5 * self.narrowest:
                 return
         raise DoubtError(fx)
 
-    def _edge(self, track: Track, inside: float, outside: float) -> Edge:
+    def _edge(self, track: Track) -> Edge:
         """The edge of a motion that grows at one of two loads; in doubt unless its growth begins or ends once."""
-        change = sign_change(track.growth, *sorted((inside, outside)))
-        ends = sorted((inside, outside))
-        if change.smooth:
-            if not track.pairs or not ends[0] < change.loads[0] < change.loads[-1] < ends[1]:
-                return track.edge(change)
-            width = self._width_beside(track, change.loads)
-            if width > self.narrowest:
-                raise DoubtError
-            return track.edge(change)
-        left, right = (track.at(fx) for fx in (change.loads[0], change.loads[-1]))
-        jump = float(np.abs(left.stiffness - right.stiffness).max())
-        largest, usual = (max(abs(track.growth(fx)) for fx in loads) for loads in (change.loads, ends))
-        wide = not track.pairs and ends[1] - ends[0] > 100 * self.narrowest  # s is not smooth where two coalesce
-        if jump < 1e-7 * left.frequency**2 and (wide or largest > 1e-3 * usual):
-            raise DoubtError(change.fx)  # the equilibrium does not jump: the motion has become another one on the way
+        change, (below, above) = sign_change(track.growth, *track.ends), track.ends
+        left, right = change.loads[0], change.loads[-1]
+        if not change.smooth:
+            one, other = track.at(left), track.at(right)
+            jump = float(np.abs(one.stiffness - other.stiffness).max())
+            largest, usual = (max(abs(track.growth(fx)) for fx in loads) for loads in (change.loads, track.ends))
+            wide = not track.pairs and above - below > 100 * self.narrowest  # s is not smooth where two coalesce
+            if jump < 1e-7 * one.frequency**2 and (wide or largest > 1e-3 * usual):
+                raise DoubtError(change.fx)  # the equilibrium does not jump: the motion has become another one
+        elif track.pairs and below < left < right < above:
+            # on either side of the edge the growth may change its sign again
+            slope = (track.growth(right) - track.growth(left)) / (right - left)
+            for end, near in zip(track.points, (left, right), strict=True):
+                sign, step, drift = np.sign(growth_of(end.numbers)), near - end.fx, growth_of(end.slopes)
+                numbers = growth_of(end.numbers), drift * step, track.growth(near), slope * step
+                if abs(step) * lowest(*(np.array([sign * each]) for each in numbers))[0][0] > self.narrowest:
+                    raise DoubtError
         return track.edge(change)
 
-    def _width_beside(self, track: Track, loads: list[float]) -> float:
-        """The widest stretch on either side of an edge on which the growth may change its sign again."""
-        left, right = loads[0], loads[-1]
-        slope = (track.growth(right) - track.growth(left)) / (right - left)
-        widths = []
-        for end, near, drift in ((track.points[0], left, slope), (track.points[1], right, slope)):
-            sign, step = np.sign(track.growth(end.fx)), near - end.fx
-            at_end = sign * track.growth(end.fx), sign * track.growth_slope(end) * step
-            numbers = (*at_end, sign * track.growth(near), sign * drift * step)
-            widths.append(abs(step) * float(lowest(*(np.array([number]) for number in numbers))[0][0]))
-        return max(widths)
-
-    def _changes_of_motions(self, below: Motions, above: Motions, drift_a: Complexes, drift_b: Complexes) -> Changes:
+    def _changes_of_motions(self, states: tuple[Motions, Motions], drifts: Sequence[Complexes]) -> Changes:
         """As `_changes`, with dissipation."""
-        span = above.fx - below.fx
-        alike = below.alike(above) * closeness(below.values, span * drift_a, above.values, span * drift_b)
+        (below, above), span = states, states[1].system.fx - states[0].system.fx
+        alike = below.alike(above) * closeness(below.values, span * drifts[0], above.values, span * drifts[1])
         if not (below.whole and above.whole):  # some have no partner, as another one is nearer to the point there
             alike[alike < ALIKE] = 0.0
         image = dict(assign(alike))
         origin = {j: i for i, j in image.items()}
-        rows, columns = (np.flatnonzero(each.grows).tolist() for each in (below, above))
+        rows, columns = (np.flatnonzero(each.grows).tolist() for each in states)
         if any(i not in image for i in rows) or any(j not in origin for j in columns):
             raise DoubtError
         for i in {*rows, *(origin[j] for j in columns)}:
             if alike[i, image[i]] < max(ALIKE, 0.8 * alike[i].max(), 0.8 * alike[:, image[i]].max()):
                 raise DoubtError
         known = np.array(sorted(image.items()), dtype=int).reshape(-1, 2).T
-        span = above.fx - below.fx
-        a, b, slope_a, slope_b = below.values[known[0]], above.values[known[1]], drift_a[known[0]], drift_b[known[1]]
-        p, q = neighbours(a, span * slope_a, b, span * slope_b)
-        width, place = excursion(*((each[p], each[q]) for each in (a, span * slope_a, b, span * slope_b)))
+        ends = [each for k in (0, 1) for each in (states[k].values[known[k]], span * drifts[k][known[k]])]
+        p, q = neighbours(*ends)
+        width, place = excursion(*((each[p], each[q]) for each in ends))
         if width.max(initial=0.0) * span > self.narrowest:
-            raise DoubtError(below.fx + float(place[np.argmax(width)]) * span)
+            raise DoubtError(below.system.fx + float(place[np.argmax(width)]) * span)
 
-        def edge(i: int, j: int, begins: bool) -> Edge:
-            track = Track(self.at, TrackPoint.motion(below, drift_a, i), TrackPoint.motion(above, drift_b, j))
-            return self._edge(track, *(track.ends[::-1] if begins else track.ends))
+        def edge(i: int) -> Edge:
+            return self._edge(self._track(states, drifts, [i], [image[i]]))
 
         same = [(i, image[i]) for i in rows if above.grows[image[i]]]
-        begun = [(j, edge(origin[j], j, True)) for j in columns if not below.grows[origin[j]]]
-        ended = [(i, edge(i, image[i], False)) for i in rows if not above.grows[image[i]]]
-        return Changes(same, begun, ended)
+        begun = {j: edge(origin[j]) for j in columns if not below.grows[origin[j]]}
+        return same, begun, {i: edge(i) for i in rows if not above.grows[image[i]]}
 
 
-def _levels_of(inside: TrackPoint, state: Motions, drift: Complexes, levels: Indices) -> tuple[TrackPoint, Indices]:
-    """The two real levels that are a complex pair at another load, and all others; a DoubtError if that is not sure."""
-    step = state.fx - inside.fx
-    i, j = nearest_pair(state.values[levels], inside.numbers + step * inside.slopes)
-    return TrackPoint.pair(state, drift, int(levels[i]), int(levels[j])), np.delete(levels, [i, j])
+def _edge_at(state: Motions, k: int, fx: float, error: float) -> Edge:
+    """The edge of a motion that grows from the start, without an error, or that is not solved for."""
+    value = complex(state.values[k])
+    value = value if state.system.damping is not None else value.real
+    return Edge(fx, error, value, float(state.overlap[k]), "contact change" if error else "start")
+
+
+def recognised(below: Motions, above: Motions, least: float) -> tuple[list[tuple[int, int]], list[int], list[int]]:
+    """The motions that grow at both of two loads, as far as they are alike, those that have begun, and have ended."""
+    rows, columns = np.flatnonzero(below.grows), np.flatnonzero(above.grows)
+    alike = below.alike(above, rows, columns) + 1e-300
+    same = [(int(rows[i]), int(columns[j])) for i, j in assign(alike) if alike[i, j] > least]
+    begun = [int(j) for j in columns if j not in {j for _, j in same}]
+    return same, begun, [int(i) for i in rows if i not in {i for i, _ in same}]
 
 
 def closeness(a: Complexes, slope_a: Complexes, b: Complexes, slope_b: Complexes) -> Floats:

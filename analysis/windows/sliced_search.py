@@ -20,7 +20,7 @@ the same folder share them (:mod:`~faultgouge.analysis.windows.slices`).
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from itertools import chain, pairwise
+from itertools import pairwise
 from pathlib import Path
 from typing import NoReturn
 
@@ -32,17 +32,17 @@ from ..arrays import Floats, Indices
 from ..errors import FaultgougeError, NoEquilibriumError
 from ..factors.lanczos import Slice
 from ..progress import report_progress
-from .edges import Increments, LostPairError, Window
-from .limits import LIMITS, Limits
+from .edges import DoubtError
+from .motions import Motions, System
+from .onset import Increments, Window
 from .quiet import Quiet
-from .ranks import ALONE, Ranks
-from .search import DoubtError, Search
-from .states import Motions
+from .search import Search
+from .slices import ALONE, LIMITS, Limits, Ranks, slices
 from .store import NEW_PASS, Candidate, SlicePass, SliceResult, pass_folder
-from .system import System
 
-Small = tuple[Floats, ...]
-"""A and, with dissipation, G in a basis."""
+
+class LostPairError(FaultgougeError):
+    """A motion cannot be followed to another load; the text is one sentence."""
 
 
 class SlicedSearch:
@@ -87,7 +87,14 @@ class SlicedSearch:
         first: Window | None = None
         while done < len(loads) and first is None:
             ahead = 1 if self._keeps(here) else self.limits.increments_ahead
-            places = [here, *self._reach(loads[done : done + ahead])]
+            places = [here]
+            for load in loads[done : done + ahead]:
+                try:
+                    places.append(self.at(float(load)))
+                except NoEquilibriumError:
+                    if len(places) == 1:
+                        raise
+                    break
             first = self._walk(places, 0)
             here = places[-1]
             done += len(places) - 1
@@ -96,25 +103,21 @@ class SlicedSearch:
             self.doubtful = [(float(loads[0]), max(each.fx for each in self.passed))]
         return first, tuple(each for each in self.doubtful if each[0] < last)
 
-    def _reach(self, loads: Floats) -> list[System]:
-        """The systems at loads as far as there are equilibria; the error if there is none at the first."""
-        places: list[System] = []
-        for load in loads:
-            try:
-                places.append(self.at(float(load)))
-            except NoEquilibriumError:
-                if not places:
-                    raise
-                break
-        return places
-
     def _walk(self, places: Sequence[System], depth: int) -> Window | None:
         """The first window on some increments: parts of one that was divided `depth` times."""
-        for (here, there), candidates in zip(pairwise(places), self._announced(places), strict=True):
+        candidates = self._announced(places)
+        for k, (here, there) in enumerate(pairwise(places)):
             if not self.passed or self.passed[-1].fx < here.fx:
                 self.passed.append(here)
-            window, doubt = self._earliest(candidates, here, there, depth == self.limits.depth)
-            parts = self._parts(here, there) if doubt and depth < self.limits.depth else []
+            own = sorted((each for each in candidates if each.increment == k), key=lambda each: each.onset)
+            window, doubt = self._earliest(own, here, there, depth == self.limits.depth)
+            parts: list[System] = []
+            if doubt and depth < self.limits.depth:
+                inside = here.fx + (there.fx - here.fx) * np.arange(1, self.limits.parts) / self.limits.parts
+                try:
+                    parts = [self.at(float(load)) for load in inside]
+                except NoEquilibriumError:  # one of the parts has no equilibrium at its end
+                    parts = []
             if parts:
                 window = self._walk([here, *parts, there], depth + 1) or window
             elif doubt:
@@ -122,14 +125,6 @@ class SlicedSearch:
             if window is not None:
                 return window
         return None
-
-    def _parts(self, here: System, there: System) -> list[System]:
-        """Where an increment is divided; nowhere if one of the parts has no equilibrium at its end."""
-        loads = here.fx + (there.fx - here.fx) * np.arange(1, self.limits.parts) / self.limits.parts
-        try:
-            return [self.at(float(load)) for load in loads]
-        except NoEquilibriumError:
-            return []
 
     # What the system itself has
 
@@ -165,70 +160,61 @@ class SlicedSearch:
         A motion that grows at the lower load already, as no slice has seen, is followed back along the loads that were
         passed.
         """
-        below = [each for each in self.passed if each.fx <= here.fx]
-        for begin in reversed(below):
-            end = there if begin is below[-1] else below[below.index(begin) + 1]
-            windows = self._windows_near(candidate, begin, end)
-            if not windows:
-                return None
-            if windows[0].kind != "start" or begin is below[0]:
-                return windows[0]
+        places = [*(each for each in self.passed if each.fx <= here.fx), there]
+        for k in range(len(places) - 2, -1, -1):
+            windows = self._windows_near(candidate, places[k], places[k + 1])
+            if not windows or windows[0].kind != "start" or k == 0:
+                return windows[0] if windows else None
         return None
 
     def _windows_near(self, candidate: Candidate, here: System, there: System) -> Sequence[Window]:
         """The windows of the few motions next to an announced one."""
         known = {each.fx: each for each in (here, there)}
 
-        def near(below: System, above: System) -> tuple[Motions, Motions]:
+        def motions(system: System) -> Motions:
+            value = candidate.value + candidate.slope * (system.fx - candidate.inside)
             try:
-                one, other = (
-                    Motions.near(each, [candidate.expected(each.fx, not each.dissipative)], [10])
-                    for each in (below, above)
-                )
+                return Motions.near(system, [(value.real if system.damping is None else value, 10)])
             except LinAlgError:
                 raise DoubtError from None
-            return one, other
 
         def lost(system: System) -> NoReturn:
-            what = (
-                f"a motion of the frequency {candidate.value.imag:.6g}"
-                if system.dissipative
-                else f"the pair of eigenvalues about {candidate.value.real:.6g}"
-            )
+            pair = f"the pair of eigenvalues about {candidate.value.real:.6g}"
+            what = pair if system.damping is None else f"a motion of the frequency {candidate.value.imag:.6g}"
             raise LostPairError(
                 f"{what} cannot be told from its neighbours between F_x = {here.fx:.10g} and {there.fx:.10g}: take "
                 "smaller increments"
             )
 
         narrowest = 1e-7 * max(abs(here.fx), abs(there.fx))
-        search = Search(lambda fx: known.get(fx) or self.at(fx), narrowest, near, decompose=lost)
+        few = lambda below, above: (motions(below), motions(above))  # noqa: E731
+        search = Search(lambda fx: known.get(fx) or self.at(fx), narrowest, few, decompose=lost)
         inside = [candidate.inside] if here.fx < candidate.inside < there.fx else []
         *_, (_, found) = search.along(np.array([here.fx, *inside, there.fx]))
         return found
 
     # What slices announce
 
-    def _announced(self, places: Sequence[System]) -> list[list[Candidate]]:
-        """The motions that slices announce on each increment, by increasing onset, of all ranks and searches."""
+    def _announced(self, places: Sequence[System]) -> list[Candidate]:
+        """The motions that slices announce, of all ranks and searches."""
         first, stop = self._range(places[0])
         while True:
-            stored = self._stored(places)
+            stored = self.ranks.together(lambda: self._stored(places) if self.ranks.rank == 0 else NEW_PASS)[0]
             fresh = self.ranks.together(partial(self._search_slices, places, stored))
-            found = sorted(chain(stored.found, *fresh), key=lambda each: each.border.modes)
+            every = (*stored.found, *(each for one in fresh for each in one))
+            found = sorted(every, key=lambda each: each.border.modes)
             if stored.folder is None or sum(each.border.size for each in found) == stop - first:
                 break
             if not any(fresh):
                 time.sleep(self.limits.wait_seconds)
         self.crowded = self.crowded or any(each.crowded for each in found)
-        increments = zip(*(each.candidates for each in found), strict=True)
-        return [sorted(chain(*each), key=lambda candidate: candidate.onset) for each in increments]
+        return [candidate for each in found for candidate in each.candidates]
 
     def _stored(self, places: Sequence[System]) -> SlicePass:
         """Results that other searches have left; none if bases are kept, since later increments need them."""
         if self.folder is None or self._keeps(places[0]):
             return NEW_PASS
-        folder = pass_folder(self.folder, places, self._range(places[0]), self.limits)
-        return self.ranks.together(lambda: SlicePass.read(folder) if self.ranks.rank == 0 else NEW_PASS)[0]
+        return SlicePass.read(pass_folder(self.folder, places, self._range(places[0]), self.limits))
 
     def _search_slices(self, places: Sequence[System], stored: SlicePass) -> list[SliceResult]:
         """Results of this rank's slices, without the slices that are stored."""
@@ -254,45 +240,36 @@ class SlicedSearch:
         return found
 
     def _search_slice(self, basis: Slice, places: Sequence[System]) -> SliceResult:
-        """The windows of the small families between the loads."""
-        small = [reduce_system(basis.vectors, each, places[0].active) for each in places]
-        if len(small[0]) == 1 and len(small[0][0]) < len(places[0].active):
-            small = [(_with_larger_feed(block, self.limits.excess),) for (block,) in small]
+        """The windows of the small families between the loads, of one slice's own motions."""
+        blocks = [reduce_system(basis.vectors, each, places[0].active) for each in places]
+        damped = len(blocks[0]) == 2
+        if not damped and len(blocks[0][0]) < len(places[0].active):
+            blocks = [[_with_larger_feed(block, self.limits.excess)] for (block,) in blocks]
         quiet, found = Quiet(Motions.of), []
-        for (here, there), (a, b) in zip(pairwise(places), pairwise(small), strict=True):
-            found.append(list(self._windows_of(basis, (here.fx, a), (there.fx, b), quiet)))
-        return SliceResult(basis.border, found, quiet.crowded)
-
-    def _windows_of(
-        self, basis: Slice, here: tuple[float, Small], there: tuple[float, Small], quiet: Quiet
-    ) -> Iterator[Candidate]:
-        """The windows of one slice's own motions between two loads."""
-        increment = there[0] - here[0]
-
-        def small(fx: float) -> System:
-            share = (fx - here[0]) / increment
-            return System(
-                fx, *((1 - share) * one + share * other for one, other in zip(here[1], there[1], strict=True))
-            )
-
-        last = there[0] + self.limits.reach * increment
-        few = quiet if len(here[1]) == 2 else None
-        *_, (_, windows) = Search(small, self.limits.window * increment, few).along(np.array([here[0], last]))
         own, spacing = basis.values[basis.own], basis.border.spacing
-        for window in windows:
-            if not own[0] - spacing <= window.frequency**2 <= own[-1] + spacing:
-                continue  # twice is better than not at all, where two slices meet
-            end = last if window.fx_end is None else window.fx_end
-            inside = there[0] if window.fx_onset < there[0] <= end else 0.5 * (window.fx_onset + end)
-            state = Motions.of(small(inside))
-            growing = np.flatnonzero(state.grows)
-            if len(growing):
-                value = window.onset.eigenvalue
-                k = growing[np.argmin(np.abs(state.values[growing].real - np.real(value)))]
-                if len(here[1]) == 2:
-                    k = growing[np.argmin(np.abs(state.values[growing].imag - np.imag(value)))]
-                slope = state.slopes(small(here[0] if inside > here[0] else last))[k]
-                yield Candidate(window.fx_onset, inside, complex(state.values[k]), complex(slope))
+        for k, (here, there) in enumerate(pairwise(places)):
+            span = there.fx - here.fx
+
+            def small(fx: float, k: int = k, begin: float = here.fx, span: float = span) -> System:
+                share = (fx - begin) / span
+                return System(fx, *((1 - share) * a + share * b for a, b in zip(*blocks[k : k + 2], strict=True)))
+
+            last = there.fx + self.limits.reach * span
+            search = Search(small, self.limits.window * span, quiet if damped else None)
+            *_, (_, windows) = search.along(np.array([here.fx, last]))
+            for window in windows:
+                if not own[0] - spacing <= window.frequency**2 <= own[-1] + spacing:
+                    continue  # twice is better than not at all, where two slices meet
+                end = last if window.fx_end is None else window.fx_end
+                inside = there.fx if window.fx_onset < there.fx <= end else 0.5 * (window.fx_onset + end)
+                state = Motions.of(small(inside))
+                growing = np.flatnonzero(state.grows)
+                if len(growing):
+                    apart = state.values[growing] - window.onset.eigenvalue
+                    j = growing[np.argmin(np.abs(apart.imag if damped else apart.real))]
+                    slope = state.slopes(small(here.fx if inside > here.fx else last))[j]
+                    found.append(Candidate(k, window.fx_onset, inside, complex(state.values[j]), complex(slope)))
+        return SliceResult(basis.border, found, quiet.crowded)
 
     # Bases
 
@@ -312,7 +289,7 @@ class SlicedSearch:
 
     def _bases(self, place: System, stored: SlicePass) -> Iterable[Slice]:
         """The bases of this rank's slices; those of an earlier load as long as those of all ranks serve."""
-        mine = [self._mixing(each, place) for each in self._kept]
+        mine = [_mixing(each, place) for each in self._kept]
         mixing = [each for one in self.ranks.together(lambda: mine) for each in one]
         if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing:
             return self._kept
@@ -322,41 +299,35 @@ class SlicedSearch:
             bases = self._kept = list(bases)
         return bases
 
-    def _mixing(self, basis: Slice, place: System) -> float:
-        """The typical symmetric coupling of a basis over the spacing of its levels; a new basis has none."""
-        if len(basis.vectors) != len(place.active):
-            return np.inf
-        block = reduce_system(basis.vectors, System(place.fx, place.stiffness), place.active)[0]
-        symmetric = 0.5 * (block + block.T)
-        symmetric -= np.diag(np.diag(symmetric))
-        parts = np.array_split(np.arange(len(block)), max(1, len(block) // 60))
-        widths = [max(float(np.ptp(basis.values[each])), np.finfo(float).tiny) for each in parts]
-        return float(
-            np.median(
-                [np.linalg.norm(symmetric[np.ix_(each, each)]) / w for each, w in zip(parts, widths, strict=True)]
-            )
-        )
-
     def _new_bases(self, place: System, stored: SlicePass) -> Iterator[Slice]:
         """The bases of slices of the spectrum; a small operator has one, which the first rank makes."""
-        matrix = csr_array(place.stiffness)[place.active][:, place.active]
-        symmetric = csc_array(0.5 * (matrix + matrix.T))
-        if len(place.active) <= self.limits.one_basis:
-            if self.ranks.rank == 0 and not stored.found:
-                values, vectors = eigh(symmetric.toarray(), driver="evd", overwrite_a=True, check_finite=False)
-                yield Slice(0, values, vectors, slice(*self._range(place)))
-            return
-        from .slices import slices  # with libraries that nothing else needs
-
-        yield from slices(
-            symmetric, self.limits.margin, self._range(place), self.limits, ranks=self.ranks, stored=stored
-        )
+        matrix = csr_array(place.inner[0])
+        symmetric, wanted = csc_array(0.5 * (matrix + matrix.T)), self._range(place)
+        if len(place.active) > self.limits.one_basis:
+            yield from slices(symmetric, self.limits.margin, wanted, self.limits, ranks=self.ranks, stored=stored)
+        elif self.ranks.rank == 0 and not stored.found:
+            values, vectors = eigh(symmetric.toarray(), driver="evd", overwrite_a=True, check_finite=False)
+            yield Slice(0, values, vectors, slice(*wanted))
 
 
-def reduce_system(vectors: Floats, system: System, active: Indices) -> Small:
+def reduce_system(vectors: Floats, system: System, active: Indices) -> list[Floats]:
     """X^T A X and, with dissipation, X^T G X."""
     matrices = [system.stiffness] if system.damping is None else [system.stiffness, system.damping]
-    return tuple(vectors.T @ (csr_array(each)[active][:, active] @ vectors) for each in matrices)
+    return [vectors.T @ (csr_array(each)[active][:, active] @ vectors) for each in matrices]
+
+
+def _mixing(basis: Slice, place: System) -> float:
+    """The typical symmetric coupling of a basis over the spacing of its levels; a new basis has none."""
+    if len(basis.vectors) != len(place.active):
+        return np.inf
+    block = reduce_system(basis.vectors, System(place.fx, place.stiffness), place.active)[0]
+    symmetric = 0.5 * (block + block.T)
+    symmetric -= np.diag(np.diag(symmetric))
+    shares = []
+    for each in np.array_split(np.arange(len(block)), max(1, len(block) // 60)):
+        width = max(float(np.ptp(basis.values[each])), np.finfo(float).tiny)
+        shares.append(np.linalg.norm(symmetric[np.ix_(each, each)]) / width)
+    return float(np.median(shares))
 
 
 def _with_larger_feed(block: Floats, excess: float) -> Floats:

@@ -1,26 +1,123 @@
-"""The slices of a spectrum, shared by threads and by ranks.
+"""The slices of a spectrum, shared by threads and by processes that search together, and their sizes.
 
-Several ranks count together (:mod:`~faultgouge.analysis.windows.ranks`). Each then finds a run of neighbouring
-slices that no other search has found or taken (:mod:`~faultgouge.analysis.windows.store`), by
-:mod:`~faultgouge.analysis.factors.lanczos`.
+The eigenvectors of slices take most of the time, and one slice needs nothing of another. So each rank finds the
+eigenvectors of its own slices, a run of neighbouring ones that no other search has found or taken
+(:mod:`~faultgouge.analysis.windows.store`), by :mod:`~faultgouge.analysis.factors.lanczos`. It hands the pairs that may
+turn complex to the other ranks. All ranks count eigenvalues together, and do the rest alike and in step. No rank has
+the vectors of another, and the result is that of one process to the bit.
 """
 
+import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
 from itertools import chain, pairwise
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.sparse import csc_array
-from threadpoolctl import threadpool_limits
 
 from ..arrays import Floats
 from ..errors import FaultgougeError
 from ..factors.inertia import count_places, places_of_numbers
-from ..factors.lanczos import Border, Factorization, Slice, SlicedSpectrum, compare_slices, factor_shifted
-from .limits import LIMITS, Limits
-from .ranks import ALONE, Ranks
-from .store import NEW_PASS, Shift, SlicePass, Take
+from ..factors.lanczos import Border, Factorization, Slice, SlicedSpectrum, SliceSizes, compare_slices, factor_shifted
+from .store import NEW_PASS, SlicePass
+
+Mine = TypeVar("Mine")
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@dataclass(frozen=True)
+class Ranks:
+    """This process among those that search together; one by itself by default.
+
+    Attributes
+    ----------
+    rank, size : int
+        Number of this process, and how many there are.
+    gather : callable
+        Anything that pickles -> the list of what all ranks have given, by rank, on each of them.
+    workers : int
+        Threads of this process.
+    """
+
+    rank: int = 0
+    size: int = 1
+    gather: Callable[[Any], list[Any]] = lambda mine: [mine]
+    workers: int = field(default_factory=cores)
+
+    def part(self, count: int) -> slice:
+        """Range of neighbouring items that this rank has."""
+        return slice(self.rank * count // self.size, (self.rank + 1) * count // self.size)
+
+    def together(self, work: Callable[[], Mine]) -> list[Mine]:
+        """The results of the work of all ranks, by rank.
+
+        Raises
+        ------
+        FaultgougeError
+            The first one that a rank has met, on all ranks; at once one of those that end all ranks (`one_rank`).
+        """
+        try:
+            mine: tuple[Mine | None, FaultgougeError | None] = work(), None
+        except FaultgougeError as error:
+            if error.one_rank:
+                raise
+            mine = None, error
+        everyone: Sequence[Any] = self.gather(mine)
+        for _, met in everyone:
+            if met is not None:
+                raise met
+        return [each for each, _ in everyone]
+
+
+ALONE = Ranks()
+"""One process."""
+
+
+@dataclass(frozen=True)
+class Limits(SliceSizes):
+    """Sizes and tolerances of the search of large packings; the defaults are meant for packings."""
+
+    all_windows: int = 300
+    """Disks up to which all windows are sought, from all eigenvalues: half a second for a decomposition, which grows
+    with the cube of the number. Beyond, the first window is sought in slices of the spectrum."""
+    one_basis: int = 1000
+    """Coordinates up to which the basis is one dense decomposition: less than a second. Beyond, it comes in
+    slices."""
+    count_spacing: int = 240
+    """Eigenvalues between two places at which they are counted; shifts are interpolated in between."""
+    margin: int = 30
+    """Further modes of a slice on either side, coupled to its own in all orders. What is farther away changes levels by
+    less than (coupling / spacing)^2 / 30 of their spacing."""
+    mixing: float = 0.1
+    """Typical symmetric coupling within a slice, in level spacings, up to which its basis serves at other loads."""
+    reach: float = 0.1
+    """Share of an increment by which slices are extrapolated, so that a motion that a slice has grow a little late is
+    found in time. Announced onsets are trusted to twice that."""
+    window: float = 1e-3
+    """Narrowest windows of slices that are looked for, in increments: the slices' own error is larger."""
+    excess: float = 0.2
+    """Number added to the antisymmetric couplings of a slice, in units of mixing^2 times the spacing of its levels."""
+    parts: int = 4
+    """Parts of a doubtful increment: four cost little more than two while a basis passes by."""
+    depth: int = 2
+    """How often parts are divided again; the finest are a sixteenth."""
+    largest_basis: float = 3e8
+    """Numbers of a basis that is kept from increment to increment, 2.4 GB."""
+    increments_ahead: int = 2
+    """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""
+    wait_seconds: float = 2.0
+    """Seconds between two looks at the results of other searches, when these have taken all slices that are left."""
+
+
+LIMITS = Limits()
+"""The defaults."""
 
 
 def slices(
@@ -56,60 +153,53 @@ def slices(
     SliceError
         If eigenvalues do not converge, or neighbouring slices disagree.
     """
+    from threadpoolctl import threadpool_limits  # nothing else needs it
+
     spectrum = SlicedSpectrum(matrix, limits, factorise)
+    first, stop = modes or (0, matrix.shape[0])
     mine: list[Border] = []
     failure: FaultgougeError | None = None
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(ranks.workers) as pool:
-        shifts = stored.shifts or _shifts(spectrum, pool, ranks, limits, modes or (0, matrix.shape[0]))
-        if ranks.rank == 0 and not stored.shifts:
-            stored.keep_shifts(shifts)
+
+        def count_below(places: Floats) -> list[int]:
+            own = places[ranks.part(len(places))]
+            return [each for one in ranks.together(lambda: list(pool.map(spectrum.below, own))) for each in one]
+
+        shifts = stored.shifts
+        if not shifts:
+            places, numbers = count_places(spectrum.matrix, count_below, (first, stop), limits.count_spacing)
+            pieces = max(1, round((stop - first) / limits.slice_size))
+            ends = first + np.arange(pieces + 1) * (stop - first) // pieces
+            borders = places_of_numbers(places, numbers, ends)
+            middles = 0.5 * (borders[:-1] + borders[1:])
+            shifts = [(float(at), (int(a), int(b))) for at, (a, b) in zip(middles, pairwise(ends), strict=True)]
+            if ranks.rank == 0:
+                stored.keep_shifts(shifts)
         found = {each.modes for each in stored.borders}
         wanted = [each for each in shifts if each[1] not in found]
-        own = wanted[ranks.part(len(wanted))]
+        waiting: deque[Future[Slice]] = deque()
+
+        def next_slice() -> Slice:
+            part = waiting.popleft().result()
+            mine.append(part.border)
+            compare_slices(*mine[-2:])
+            return part
+
         try:
             with stored.lock_slices() as take:
-                for part in _in_turn(pool, ranks.workers, spectrum, own, margin, take):
-                    mine.append(part.border)
-                    compare_slices(*mine[-2:])
-                    yield part
+                for shift, own in wanted[ranks.part(len(wanted))]:
+                    if take(own):
+                        waiting.append(pool.submit(spectrum.slice_about, shift, own, margin))
+                    if len(waiting) > ranks.workers:
+                        yield next_slice()
+                while waiting:
+                    yield next_slice()
         except FaultgougeError as error:
             failure = error
 
-    def borders() -> list[Border]:
+    def borders_found() -> list[Border]:
         if failure is not None:
             raise failure
         return mine
 
-    compare_slices(*sorted(chain(stored.borders, *ranks.together(borders))))
-
-
-def _in_turn(
-    pool: ThreadPoolExecutor, workers: int, spectrum: SlicedSpectrum, shifts: Sequence[Shift], margin: int, take: Take
-) -> Iterator[Slice]:
-    """Slices in their order, those that could be taken."""
-    waiting: deque[Future[Slice]] = deque()
-    for shift, own in shifts:
-        if take(own):
-            waiting.append(pool.submit(spectrum.slice_about, shift, own, margin))
-        if len(waiting) > workers:
-            yield waiting.popleft().result()
-    while waiting:
-        yield waiting.popleft().result()
-
-
-def _shifts(
-    spectrum: SlicedSpectrum, pool: ThreadPoolExecutor, ranks: Ranks, limits: Limits, modes: tuple[int, int]
-) -> list[Shift]:
-    """The shifts of all slices from one eigenvalue number on, and before another."""
-
-    def count_below(shifts: Floats) -> list[int]:
-        mine = shifts[ranks.part(len(shifts))]
-        return [each for one in ranks.together(lambda: list(pool.map(spectrum.below, mine))) for each in one]
-
-    first, stop = modes
-    places, numbers = count_places(spectrum.matrix, count_below, modes, limits.count_spacing)
-    pieces = max(1, round((stop - first) / limits.slice_size))
-    ends = first + np.arange(pieces + 1) * (stop - first) // pieces
-    borders = places_of_numbers(places, numbers, ends)
-    middles = 0.5 * (borders[:-1] + borders[1:])
-    return [(float(middle), (int(a), int(b))) for middle, (a, b) in zip(middles, pairwise(ends), strict=True)]
+    compare_slices(*sorted(chain(stored.borders, *ranks.together(borders_found))))

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 from uuid import uuid4
 from zipfile import BadZipFile
 
@@ -29,8 +29,7 @@ from numpy.typing import NDArray
 from ..errors import BadInputError
 from ..factors.lanczos import Border
 from ..files.atomic_write import make_folder, write_whole
-from .limits import Limits
-from .system import System
+from .motions import System
 
 Shift = tuple[float, tuple[int, int]]
 """The shift of a slice, and the numbers of the first eigenvalue that belongs to it and of the first that does not."""
@@ -47,6 +46,8 @@ NAMES_OF_SLICES = 16
 LOCK_FILE = "taken"
 """The file whose bytes are locked, each by the search that has taken the slice which begins at so many modes."""
 
+Read = TypeVar("Read")
+
 
 class DamagedSliceError(BadInputError):
     """The file of a slice cannot be read: one sentence."""
@@ -57,39 +58,36 @@ class Candidate(NamedTuple):
 
     Attributes
     ----------
+    increment : int
+        On which of the increments of the pass.
     onset, inside : float
         The load from which on it grows, and one at which it still does; force per top disk.
     value, slope : complex
         lambda, or s with dissipation, at the load `inside`, and its change over the load.
     """
 
+    increment: int
     onset: float
     inside: float
     value: complex
     slope: complex
 
-    def expected(self, fx: float, real: bool) -> complex:
-        """Where its eigenvalue is at another load, or the real part of a pair."""
-        value = self.value + self.slope * (fx - self.inside)
-        return value.real if real else value
 
-
-@dataclass(frozen=True, eq=False)
-class SliceResult:
+class SliceResult(NamedTuple):
     """The result of the search in a slice.
 
     Attributes
     ----------
     border : Border
         Which slice it is.
-    candidates : sequence of sequence of Candidate
+    candidates : list of Candidate
         The motions that begin to grow in it, increment by increment.
     crowded : bool
         Whether dashpots couple more of its motions than a slice can hold.
     """
 
     border: Border
-    candidates: Sequence[Sequence[Candidate]]
+    candidates: list[Candidate]
     crowded: bool = False
 
 
@@ -114,9 +112,21 @@ class SlicePass:
     @classmethod
     def read(cls, folder: Path) -> "SlicePass":
         """Read the results in a folder, if it exists; DamagedSliceError if a file has another format."""
-        found = sorted((_read_candidates(path) for path in folder.glob("*-*.npz")), key=lambda each: each.border.modes)
-        shifts = folder / SHIFTS_FILE
-        return cls(folder, found, _shifts(shifts) if shifts.exists() else ())
+
+        def result(data: Mapping[str, NDArray]) -> SliceResult:
+            first, stop = (int(number) for number in data["modes"])
+            motions = [(int(k.real), onset.real, inside.real, *rest) for k, onset, inside, *rest in data["motions"]]
+            candidates = [Candidate(k, float(a), float(b), *map(complex, rest)) for k, a, b, *rest in motions]
+            return SliceResult(Border((first, stop), *map(float, data["border"])), candidates, bool(data["crowded"]))
+
+        def shifts(data: Mapping[str, NDArray]) -> list[Shift]:
+            pairs = zip(data["shift"], data["modes"], strict=True)
+            return [(float(shift), (int(first), int(stop))) for shift, (first, stop) in pairs]
+
+        found = [_read(path, result) for path in folder.glob("*-*.npz")]
+        kept = folder / SHIFTS_FILE
+        found.sort(key=lambda each: each.border.modes)
+        return cls(folder, found, _read(kept, shifts) if kept.exists() else ())
 
     @property
     def borders(self) -> list[Border]:
@@ -142,22 +152,15 @@ class SlicePass:
                     fcntl.lockf(taken, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, modes[0])
                 except OSError as error:
                     return error.errno not in (errno.EAGAIN, errno.EACCES)
-                return not (folder / _name(modes)).exists()
+                return not (folder / "{}-{}.npz".format(*modes)).exists()
 
             yield take
 
     def keep(self, found: SliceResult) -> None:
         """Write the results of a slice, if there is a folder; OutputError if the file cannot be written."""
-        flat = [(k, each) for k, candidates in enumerate(found.candidates) for each in candidates]
-        self._write(
-            _name(found.border.modes),
-            modes=found.border.modes,
-            border=found.border[1:],
-            crowded=found.crowded,
-            increments=len(found.candidates),
-            increment=[k for k, _ in flat],
-            motions=np.array([each for _, each in flat], complex),
-        )
+        modes, *border = found.border
+        motions = np.array(found.candidates, complex).reshape(-1, len(Candidate._fields))
+        self._write("{}-{}.npz".format(*modes), modes=modes, border=border, crowded=found.crowded, motions=motions)
 
     def keep_shifts(self, shifts: Sequence[Shift]) -> None:
         """Write the shifts of all slices, if there is a folder; an OutputError if that cannot be."""
@@ -173,11 +176,21 @@ class SlicePass:
             own.replace(self.folder / name)
 
 
+def _read(path: Path, convert: Callable[[Mapping[str, NDArray]], Read]) -> Read:
+    try:
+        with np.load(path) as data:
+            return convert(data)
+    except (OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, BadZipFile) as error:
+        raise DamagedSliceError(
+            f"{path} is damaged: delete the file, and what it had is searched for again."
+        ) from error
+
+
 NEW_PASS = SlicePass()
 """A pass without results and without a folder."""
 
 
-def pass_folder(parent: Path, places: Sequence[System], modes: tuple[int, int], limits: Limits) -> Path:
+def pass_folder(parent: Path, places: Sequence[System], modes: tuple[int, int], limits: object) -> Path:
     """Folder of the results on the increments between some loads."""
     digest = hashlib.sha256(repr((version("faultgouge"), modes, limits)).encode())
     for place in places:
@@ -199,35 +212,3 @@ def remove_passes(parent: Path) -> None:
                 folder.rmdir()
     with suppress(OSError):
         parent.rmdir()
-
-
-def _name(modes: tuple[int, int]) -> str:
-    """The file of a slice."""
-    return f"{modes[0]}-{modes[1]}.npz"
-
-
-def _read_candidates(path: Path) -> SliceResult:
-    with _open_slice(path) as data:
-        first, stop = (int(number) for number in data["modes"])
-        candidates: list[list[Candidate]] = [[] for _ in range(int(data["increments"]))]
-        for k, (onset, inside, *motion) in zip(data["increment"], data["motions"], strict=True):
-            candidates[int(k)].append(Candidate(float(onset.real), float(inside.real), *map(complex, motion)))
-        border = Border((first, stop), *(float(each) for each in data["border"]))
-        return SliceResult(border, candidates, bool(data["crowded"]))
-
-
-def _shifts(path: Path) -> list[Shift]:
-    with _open_slice(path) as data:
-        pairs = zip(data["shift"], data["modes"], strict=True)
-        return [(float(shift), (int(first), int(stop))) for shift, (first, stop) in pairs]
-
-
-@contextmanager
-def _open_slice(path: Path) -> Iterator[Mapping[str, NDArray]]:
-    try:
-        with np.load(path) as data:
-            yield data
-    except (OSError, EOFError, ValueError, TypeError, LookupError, RuntimeError, BadZipFile) as error:
-        raise DamagedSliceError(
-            f"{path} is damaged: delete the file, and what it had is searched for again."
-        ) from error

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from faultgouge.analysis import complex_windows
 from faultgouge.analysis.windows import Motions, System
+from faultgouge.analysis.windows.edges import TrackPoint
 from faultgouge.analysis.windows.search import lowest
-from faultgouge.analysis.windows.tracks import TrackPoint
 from faultgouge.figures.style import INK, STYLE
 
 Operator = Callable[[float], np.ndarray]
@@ -49,7 +49,7 @@ def pair_at(operator: Operator, fx: float, other: float) -> TrackPoint:
     state = Motions.of(here)
     drift = state.slopes(there)
     near = np.argsort(np.abs(state.values - 10.0))
-    return TrackPoint.pair(state, drift, *([near[0]] if state.grows[near[0]] else near[:2]))
+    return TrackPoint.of(state, drift, *([near[0]] if state.grows[near[0]] else near[:2]))
 
 
 def draw(axes: Axes, operator: Operator, title: str, says: str) -> None:

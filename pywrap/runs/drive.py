@@ -397,6 +397,15 @@ def drive(
         If the layer leaves the bed.
     EngineError
         If disks move through one another.
+
+    Examples
+    --------
+
+    >>> scene = {"packing": {"disks": 8, "radii": [0.5], "width": 3.0}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
+    >>> scene |= {"drive": {"spring": 20.0, "velocity": 1e-4, "until": 1.0}, "damping": {"cn": 1.0}}
+    >>> *_, last = faultgouge.drive(faultgouge.Scene.from_mapping(scene))
+    >>> print(f"{last.sample.force:.4f} after a displacement of {last.sample.displacement:.2e}")
+    0.0019 after a displacement of 3.63e-06
     """
     settings = require_section(scene.drive, "drive")
     if start is None:

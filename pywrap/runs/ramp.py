@@ -90,6 +90,17 @@ def ramp(
         If the scene has no section [ramp].
     NoEquilibriumError
         If the packing flows.
+
+    Examples
+    --------
+
+    The ramp proceeds as it is consumed:
+
+    >>> for equilibrium in faultgouge.ramp("three_disks.toml"):
+    ...     if faultgouge.stability(equilibrium.packing).stable is False:
+    ...         break
+    >>> print(f"{equilibrium.fx:.3f}")
+    1.950
     """
     settings = require_section(scene.ramp, "ramp")
     if start is None:

@@ -96,6 +96,17 @@ class Scene(Section):
         Sections that every scene has; relax may be left out in TOML.
     ramp, perturb, friction, drive, damping, units, output
         Sections or None, which means that the feature is not in the run.
+
+    Examples
+    --------
+
+    Three disks, of which the upper one is drawn:
+
+    >>> scene = faultgouge.Scene.from_toml("three_disks.toml")
+    >>> scene.packing.disks, scene.law.kn, scene.ramp.until
+    (3, 200000.0, 2.4)
+    >>> faultgouge.Scene.from_mapping({"packing": {"disks": 40}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}).packing.seed
+    7
     """
 
     model_config = ConfigDict(extra="allow")

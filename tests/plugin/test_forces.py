@@ -98,48 +98,48 @@ def rates(packing, displacement):
     return np.sum(normal * branch, axis=1), np.sum(tangent * branch, axis=1) - (u + other[2])
 
 
+KINDS = [-1.0, 0.05, 0.5, 0.99, 1.0, -0.2, 0.1]
+
+
 @pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize(("mu", "exponent"), [(0.3, 1.5), (1.0, 1.0)], ids=["Hertz", "harmonic"])
-def test_matrix_of_a_slider_is_the_one_sided_derivative(reference_packing, mu, sign, exponent):
-    """Of each contact what a displacement asks for: it closes or parts, and at the bound it slides or sticks."""
+@pytest.mark.parametrize(
+    ("mu", "law"),
+    [
+        (0.3, {"coulomb": True}),
+        (1.0, {"coulomb": True, "exponent": 1.0}),
+        (1.0, {"rescaled": True}),
+        (0.3, {"rescaled": True}),
+    ],
+    ids=["slider", "harmonic slider", "rescaled", "rescaled, mostly at the bound"],
+)
+def test_matrix_is_the_one_sided_derivative(reference_packing, mu, law, sign):
+    """Of each contact what a displacement asks for: it closes or parts, and a slider at the bound slides or sticks."""
     packing = reference_packing(mu)
-    packing = replace(packing, law=replace(packing.law, exponent=exponent, coulomb=True))
-    packing = with_slips(packing, [-1.0, 0.05, 0.5, 0.99, 1.0, -0.2, 0.1])
+    packing = with_slips(replace(packing, law=replace(packing.law, **law)), KINDS)
     difference, law, slip = differences(packing, sign), packing.law, packing.contacts.slip
     matrix, seen = np.empty_like(difference), np.zeros(4)
     for k, column in enumerate(sign * np.eye(len(matrix))):
         opens, slips = rates(packing, column)
-        # how fast the size of the slip nears the limit, which falls while the contact opens
-        rescaled = law.rescales * np.minimum(opens, 0.0) * np.abs(slip) / (2 * packing.geometry.overlap)
-        nears = np.sign(slip) * slips + rescaled + opens * law.mu * law.kn / law.kt
-        seen += [
-            np.sum(law.at_bound(packing.geometry.overlap, slip) & (a * opens > 0) & (b * nears > 0))
-            for a in (-1, 1)
-            for b in (-1, 1)
-        ]
-        matrix[:, k] = stiffness_matrix(packing, parting=opens > 0, sliding=nears > 0)[:, [k]].toarray()[:, 0]
-    # as of rescaled slips, below; harmonic disks are as stiff in every contact as in the stiffest one
-    scale = (4e-7 if exponent > 1 else 8e-7) * np.abs(matrix).max()
-    assert np.abs(difference - matrix).max() < scale
-    assert seen.all()
-    for other in (stiffness_matrix(packing), stiffness_matrix(packing, sliding=True)):
-        assert np.abs(difference - other.toarray()).max() > 100 * scale
-
-
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("mu", [1.0, 0.3])
-def test_matrix_of_rescaled_slips_is_the_one_sided_derivative(reference_packing, mu, sign):
-    """Each column with the derivative of each contact that its displacement asks for: it closes, or it parts."""
-    packing = with_slips(reference_packing(mu), [-1.0, 0.05, 0.5, 0.99, 1.0, -0.2, 0.1])
-    packing = replace(packing, law=replace(packing.law, rescaled=True))
-    difference = differences(packing, sign)
-    matrix = np.empty_like(difference)
-    for k, column in enumerate(sign * np.eye(len(matrix))):
-        opens, _ = rates(packing, column)
-        matrix[:, k] = stiffness_matrix(packing, parting=opens > 0)[:, [k]].toarray()[:, 0]
+        branch = {"parting": opens > 0}
+        if law.coulomb:
+            # how fast the size of the slip nears the limit, which falls while the contact opens
+            rescaled = law.rescales * np.minimum(opens, 0.0) * np.abs(slip) / (2 * packing.geometry.overlap)
+            nears = np.sign(slip) * slips + rescaled + opens * law.mu * law.kn / law.kt
+            at_bound = law.at_bound(packing.geometry.overlap, slip)
+            seen += [np.sum(at_bound & (a * opens > 0) & (b * nears > 0)) for a in (-1, 1) for b in (-1, 1)]
+            branch["sliding"] = nears > 0
+        matrix[:, k] = stiffness_matrix(packing, **branch)[:, [k]].toarray()[:, 0]
     # as above; differences to one side are divided by half the width
-    assert np.abs(difference - matrix).max() < 4e-7 * np.abs(matrix).max()
-    closing, parting = (stiffness_matrix(packing, parting=share).toarray() for share in (0.0, 1.0))
-    assert np.abs(difference - closing).max() > 1e-3 * np.abs(matrix).max()
-    total = stiffness_matrix(replace(packing, law=replace(packing.law, rescaled=False))).toarray()
-    np.testing.assert_allclose(parting, total, rtol=0, atol=4e-16 * np.abs(matrix).max())  # b is summed otherwise
+    scale = (4e-7 if law.exponent > 1 else 8e-7) * np.abs(matrix).max()
+    assert np.abs(difference - matrix).max() < scale
+    assert seen.all() == law.coulomb
+    others = [{}, {"sliding": True}] if law.coulomb else [{"parting": 0.0}, {"parting": 1.0}]
+    for other in others:
+        assert np.abs(difference - stiffness_matrix(packing, **other).toarray()).max() > 100 * scale
+
+
+def test_parting_with_rescaled_slips_is_as_with_total_ones(reference_packing):
+    packing = with_slips(reference_packing(0.3), KINDS)
+    rescaled = replace(packing, law=replace(packing.law, rescaled=True))
+    parting, total = stiffness_matrix(rescaled, parting=1.0).toarray(), stiffness_matrix(packing).toarray()
+    np.testing.assert_allclose(parting, total, rtol=0, atol=4e-16 * np.abs(total).max())  # b is summed otherwise

@@ -97,17 +97,21 @@ def test_same_trajectory(trajectory, unchanged, changes):
         pytest.param(1, "floor", marks=pytest.mark.long),
         pytest.param(1, "weaken", marks=pytest.mark.long),
         (2, "weaken"),
+        (1, "spring"),
     ],
 )
 @pytest.mark.slow
 def test_restart_in_a_new_process(trajectory, unchanged, variables, lmp, tmp_path, ranks, acts):
-    """Without more; with a signal, which goes by the time of the run, which a restart file keeps; and with friction
-    that has weakened, which the restart file keeps as the last forces had it."""
+    """Without more; with a signal, which goes by the time of the run, which a restart file keeps; with friction that
+    has weakened, which the file keeps as the last forces had it; and with a spring, whose protocol counts from the
+    beginning."""
     rows = (f"{0.1 * k} {(-1) ** k * 0.3}" for k in range(21))
     (tmp_path / "wave.txt").write_text("\n".join(rows))
     extra = ""
     if acts == "weaken":
         extra = f"variable v0 index 0.01\nvariable v_ss index 1.0\ninclude {DECKS}/weaken.in"
+    elif acts == "spring":
+        extra = "fix drive top drive/spring 50.0 protocol 3 0.6 0 0.6 -3 10\n"
     elif acts:
         extra = f"variable signal index wave.txt\nvariable on index {acts}\ninclude {DECKS}/signal.in"
     straight = trajectory(ranks=ranks, extra=extra, middle=RESTART)

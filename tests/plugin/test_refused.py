@@ -120,3 +120,15 @@ def test_refused(change, says):
 def test_model_of_the_refusals_runs(lmp, run):
     """Also where disks are deleted that leave the slips of the others."""
     lmp(MODEL.format(**{**GOOD, "run": run}))
+
+
+@pytest.mark.slow
+def test_the_layout_of_another_version_is_refused(lmp, tmp_path):
+    """A restart file whose slips have another layout; one of this layout is read."""
+    state, mark = tmp_path / "state.restart", (0x4D444C53).to_bytes(4, "little")
+    lmp(MODEL.format(**{**GOOD, "run": "run 0\nunfix 1\nwrite_restart state.restart"}))
+    lmp("read_restart state.restart\nrun 0\n")
+    before, after = state.read_bytes().split(mark)
+    state.write_bytes(before + mark + (7).to_bytes(4, "little") + after[4:])
+    done = lmp("read_restart state.restart\n", fails=True)
+    assert "mindlin/smooth of another version: read the file with" in done.stdout + done.stderr

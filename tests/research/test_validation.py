@@ -70,3 +70,13 @@ def test_the_rule_of_osullivan_and_bray_is_safe():
     assert compute.time_steps((0.0,), 1e-3) == [pytest.approx(FOUND["time_steps"][0], rel=1e-9)]
     assert FOUND["time_steps"][0]["over_rule"] == pytest.approx(1.86, abs=1e-3)
     assert all(row["over_rule"] > 1.8 for row in FOUND["time_steps"])
+
+
+@pytest.mark.long
+def test_density_of_states_of_a_thousand_spheres():
+    """Within two standard errors of all eigenvalues, of which LAPACK needs a third of a minute."""
+    again = compute.density_of_states()
+    assert again == pytest.approx(FOUND["density"], rel=1e-3)
+    assert again["spheres"] > 1000
+    assert again["motions"] == again["eigenvalues"] == 6 * again["spheres"] - 3
+    assert again["difference"] < 2 * again["noise"]

@@ -68,7 +68,8 @@ def program() -> Callable[..., object]:
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # Rich would double the time of --help
         help=QUESTION,
-        epilog="Examples: faultgouge stability deck.in; faultgouge init -o scene.toml && faultgouge onset scene.toml",
+        epilog="Examples: faultgouge examples pour && faultgouge stability pour.in; "
+        "faultgouge init -o scene.toml && faultgouge onset scene.toml",
     )
     app.callback()(_options)
     for family in FAMILIES:

@@ -14,7 +14,19 @@ from ..analysis.counted import counted
 from ..signal_guard import is_root, keeps
 from .packings import verdict_of
 from .pictures import modes_of
-from .terminal import Frame, PackingFile, Results, command, locked, progress, say, status, stored_packing, working
+from .terminal import (
+    RAMPED,
+    Frame,
+    PackingFile,
+    Results,
+    command,
+    locked,
+    progress,
+    say,
+    status,
+    stored_packing,
+    working,
+)
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing
@@ -32,7 +44,7 @@ OF_LAYER = (
 )
 OF_CONTACTS = (
     "A table of contacts: slips (CSV with id1, id2, 0 being the floor, slip; or a LAMMPS dump local); with --material "
-    "forces, of YADE, MercuryDPM (.fstat), LIGGGHTS or LAMMPS."
+    "forces, of YADE, MercuryDPM (.fstat), LIGGGHTS or LAMMPS, or measured ones (RigidLibrary)."
 )
 OF_MATERIAL = "For spheres of a table: young, poisson, density, friction, restitution; or kn, kt and exponent."
 OF_BALANCE = (
@@ -154,8 +166,17 @@ def _spheres(
         read_spheres,
         verdict_within_digits,
     )
+    from faultgouge.analysis.files.measured_forces import is_measured, measured_forces
 
-    law, spheres = material_of(material), read_spheres(file, frame)
+    law = material_of(material)
+    if contacts is not None and is_measured(contacts):
+        with working("draws of the forces"):
+            found, counts = measured_forces(file, contacts, law, frame)
+        if is_root():
+            write_configuration(output, found, {"deck": ""})
+            yield "\n".join([f"written to {output}", *counts])
+        return
+    spheres = read_spheres(file, frame)
     if contacts is None:
         found = spheres.of_material(law)
     else:
@@ -314,7 +335,7 @@ def _deck_around(file: Path) -> str:
     )
 
 
-@command("faultgouge export run.h5 --mode pair -o packing.vtp", alone=True)
+@command(f"{RAMPED} && faultgouge export run.h5 --mode pair", alone=True)
 def export(
     file: PackingFile,
     frame: Frame = -1,
@@ -337,7 +358,6 @@ def export(
     """
     from faultgouge.analysis import Configuration, PackingFileError, RunFile
     from faultgouge.analysis.files.formats import (
-        HEAD_OF_CONTACTS,
         ModeVectors,
         check_writer,
         choose_frames,
@@ -345,6 +365,7 @@ def export(
         write_frames,
         write_packing,
     )
+    from faultgouge.analysis.files.formats.tables import HEAD_OF_CONTACTS
 
     with locked(output, file, head=HEAD_OF_CONTACTS if output.suffix == ".csv" else ""):
         if frames is not None:

@@ -27,7 +27,14 @@ OF_MODES = (
 )
 
 
-@command("faultgouge onset scene.toml --json", reads="onset", task="onset", writes="file", as_json=True, aloud=True)
+@command(
+    "faultgouge examples scene && faultgouge onset scene.toml --json",
+    reads="onset",
+    task="onset",
+    writes="file",
+    as_json=True,
+    aloud=True,
+)
 def onset(
     scene: SceneFile,
     output: Annotated[

@@ -14,6 +14,7 @@ from ..analysis.counted import counted
 from ..signal_guard import is_root, keeps
 from .studies import TRIED, try_cases
 from .terminal import (
+    RAMPED,
     Frame,
     NewFolder,
     PackingFile,
@@ -124,7 +125,7 @@ def _extremes(output: Path, quick: bool) -> Results:
                 write_whole(output / "stability.json", (output / "extremes.json").read_bytes())
 
 
-@command("faultgouge spectrum run.h5 --json", alone=True, as_json=True)
+@command(f"{RAMPED} && faultgouge spectrum run.h5 --json", alone=True, as_json=True)
 def spectrum(
     file: PackingFile,
     frame: Frame = -1,
@@ -269,7 +270,7 @@ def _gain_of(packing: HasConfiguration) -> dict[str, Any] | None:
     return gains | {"direction": displacement.direction.tolist()}
 
 
-@command("faultgouge settle scene.toml -o run.h5 && faultgouge timestep run.h5", as_json=True)
+@command("faultgouge examples disks && faultgouge timestep disks.csv --material young=1e9,density=1100", as_json=True)
 def timestep(file: AnyPacking, material: MaterialOf = None, frame: Frame = -1) -> Results:
     """Compute the largest stable time step of a packing, beside the rules that users have.
 
@@ -300,7 +301,7 @@ def timestep(file: AnyPacking, material: MaterialOf = None, frame: Frame = -1) -
     yield {key: None if value == inf else value for key, value in document.items()}
 
 
-@command("faultgouge vibrations packing.h5 -o vibrations", writes="folder", alone=True)
+@command("faultgouge examples fcc && faultgouge vibrations fcc.in -o vibrations", writes="folder", alone=True)
 def vibrations(
     file: AnyPacking,
     output: NewFolder = Path("vibrations"),
@@ -319,8 +320,8 @@ def vibrations(
     from faultgouge.analysis.files.atomic_write import write_whole
     from faultgouge.analysis.files.formats import write_packing
     from faultgouge.figures import save
+    from faultgouge.figures.series import draw_vibrations, draw_waves
     from faultgouge.figures.style import report_failure
-    from faultgouge.figures.vibrations import draw_vibrations, draw_waves
 
     if along not in ("x", "y", "z"):
         raise typer.BadParameter(f"--along {along}: give x, y or z")

@@ -14,6 +14,7 @@ from ..analysis.counted import counted
 from .runs import growth_in
 from .terminal import (
     OF_PACKING,
+    RAMPED,
     Frame,
     PackingFile,
     Results,
@@ -67,7 +68,7 @@ def modes_of(packing: HasConfiguration, which: str) -> tuple[list[ModeShape], st
     return find_modes(packing, None if which == "pair" else int(which))
 
 
-@command("faultgouge draw run.h5 --mode pair -o mode.svg", writes="file", alone=True)
+@command(f"{RAMPED} && faultgouge draw run.h5 --mode pair", writes="file", alone=True)
 def draw(
     file: PackingFile,
     frame: Annotated[
@@ -117,8 +118,7 @@ def _picture_of_run(file: Path) -> Figure | None:
     from faultgouge.analysis import RunFile
     from faultgouge.analysis.motion.hysteresis import turning_points
     from faultgouge.figures import draw_cycle
-    from faultgouge.figures.drive import draw_drive
-    from faultgouge.figures.series import draw_growth
+    from faultgouge.figures.series import draw_drive, draw_growth
     from faultgouge.pywrap.runs.drive import series_and_slips
 
     with RunFile(file) as run:
@@ -133,7 +133,7 @@ def _picture_of_run(file: Path) -> Figure | None:
     return None
 
 
-@command("faultgouge movie perturb.h5 -o eruption.gif", alone=True)
+@command(f"{RAMPED} && faultgouge movie run.h5 -o ramp.gif", alone=True)
 def movie(
     file: PackingFile,
     mode: WhichMode = None,
@@ -162,8 +162,7 @@ def movie(
     """
     from faultgouge.analysis import BadInputError, Configuration
     from faultgouge.analysis.files.formats import ModeVectors, write_mode_frames
-    from faultgouge.figures.film import DOTS, film_of_modes
-    from faultgouge.figures.writers import check_name, usual_suffix, write_film
+    from faultgouge.figures.film import DOTS, check_name, film_of_modes, usual_suffix, write_film
 
     output = output or Path("film").with_suffix(usual_suffix())
     dots = DOTS if dots is None and output.suffix.lower() == ".gif" else dots
@@ -196,8 +195,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
     """The run if the file has its trajectory, else its drive or its ramp."""
     from faultgouge.analysis import PackingFileError, RunFile
     from faultgouge.analysis.files.configuration_file import holds_configuration
-    from faultgouge.figures.drive import course_of
-    from faultgouge.figures.film import RunMotion, film_of_ramp, film_of_run
+    from faultgouge.figures.film import Course, RunMotion, film_of_ramp, film_of_run
     from faultgouge.pywrap.runs.drive import series_and_slips
 
     if file.suffix == ".disks" or holds_configuration(file):
@@ -215,7 +213,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
                     f"{file} has {len(shown)} of its {len(times)} states between t = {first:g} and {last:g}, and a "
                     "film shows two or more: give a longer --span"
                 )
-            course = course_of(*driven, [times[k] for k in shown], first, last)
+            course = Course.of_drive(*driven, [times[k] for k in shown], first, last)
         packings = [run.packing(k) for k in shown]
     if len(packings) < 2:
         raise PackingFileError(
@@ -225,7 +223,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
     return film_of_ramp(packings, count, color, dots=dots, course=course, by_way=driven is not None)
 
 
-@command("faultgouge view run.h5 -o page.html", writes="file", alone=True)
+@command(f"{RAMPED} && faultgouge view run.h5 -o page.html", writes="file", alone=True)
 def view(
     file: Annotated[Path, Argument(metavar="FILE", help=OF_PACKING, callback=refuse_scene)],
     loads: Annotated[int | None, Option(min=1, help=OF_LOADS)] = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict
 from math import ceil
 from pathlib import Path
@@ -12,7 +13,7 @@ import typer
 from ..analysis.counted import counted
 from ..analysis.table_display import table_of
 from ..signal_guard import is_root, keeps
-from .terminal import Out, Results, SceneFile, command, progress, report_fallback, say, status
+from .terminal import LAYER, Out, Results, SceneFile, command, progress, report_fallback, say, status
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing, RunFile
@@ -48,25 +49,31 @@ def examples(
     """List ten examples that run in seconds each, or copy one into this folder."""
     from importlib.resources import files
 
-    shelf = {
-        Path(each.name).stem: each for each in (files("faultgouge") / "scenes" / "examples").iterdir() if each.is_file()
-    }
-    # the first two lines of an example are what it shows, and the command that runs it
-    heads = {key: [line.strip('# "') for line in shelf[key].read_text().splitlines()[:2]] for key in sorted(shelf)}
+    scenes = files("faultgouge") / "scenes"
+    shelf = {Path(each.name).stem: each for each in (scenes / "examples").iterdir() if each.is_file()}
+
+    def head(text: str) -> list[str]:
+        """What an example shows, and the command that runs the example: its first two lines."""
+        return [line.strip('# "') for line in text.splitlines()[:2]]
+
     if name is None:
-        yield from (f"{key:9} {what}\n{'':9} {command}" for key, (what, command) in heads.items())
+        for key in sorted(shelf):
+            yield "{:9} {}\n{:9} {}".format(key, (lines := head(shelf[key].read_text()))[0], "", lines[1])
         yield "\nfaultgouge examples NAME copies one into this folder."
         return
-    if (key := name.rsplit(".", 1)[0]) not in shelf:
-        raise typer.BadParameter(f"there is no example {name}: take one of {', '.join(heads)}")
-    copy = Path(shelf[key].name)
-    if copy.exists():
-        raise typer.BadParameter(f"{copy} exists in this folder: move it away, or use another folder")
-    copy.write_bytes(shelf[key].read_bytes())
-    yield "{}: {}\nnext: {}".format(copy, *heads[key])
+    # scenes of studies that take minutes are copied, too, with the packing that they name, but not listed
+    name = name.rsplit(".", 1)[0]
+    if not (chosen := shelf.get(name, scenes / f"{name}.toml")).is_file():
+        raise typer.BadParameter(f"there is no example {name}: take one of {', '.join(sorted(shelf))}")
+    text = chosen.read_text()
+    for each in [chosen, *(scenes / named for named in re.findall(r'^file = "(.+)"', text, re.MULTILINE))]:
+        if Path(each.name).exists():
+            raise typer.BadParameter(f"{each.name} exists in this folder: move it away, or use another folder")
+        Path(each.name).write_bytes(each.read_bytes())
+    yield "{}: {}\nnext: {}".format(chosen.name, *head(text))
 
 
-@command("faultgouge settle scene.toml -o run.h5", reads="settle", task="settle", writes="run")
+@command(f"{LAYER} && faultgouge settle scene.toml", reads="settle", task="settle", writes="run")
 def settle(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     """Settle the packing of a scene under its load, at F_x = 0."""
     from faultgouge.pywrap import Record
@@ -78,7 +85,7 @@ def settle(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     yield f"{last}; written to {output}"
 
 
-@command("mpiexec -n 2 faultgouge ramp scene.toml -o run.h5", reads="ramp", task="ramp", writes="run", as_json=True)
+@command(f"{LAYER} && mpiexec -n 2 faultgouge ramp scene.toml", reads="ramp", task="ramp", writes="run", as_json=True)
 def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     """Raise F_x from equilibrium to equilibrium, and store each equilibrium.
 
@@ -153,7 +160,13 @@ def _settle_or_read(scene: Scene, record: Record) -> Equilibrium:
     return record.last
 
 
-@command("faultgouge perturb scene.toml -o run.h5", reads="perturb", task="perturb", writes="run", as_json=True)
+@command(
+    "faultgouge examples eruption && faultgouge perturb eruption.toml",
+    reads="perturb",
+    task="perturb",
+    writes="run",
+    as_json=True,
+)
 def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Results:
     """Run the dynamics from the equilibrium at perturb.fx, and record D(t).
 

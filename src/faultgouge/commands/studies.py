@@ -88,7 +88,7 @@ def study_command(name: str) -> CommandInfo | None:
     return COMMANDS.pop(name)
 
 
-@command("faultgouge explain scene.toml", reads="explain", task="settle", as_json=True)
+@command("faultgouge examples scene && faultgouge explain scene.toml", reads="explain", task="settle", as_json=True)
 def explain(scene: SceneFile) -> Results:
     """Explain what a scene includes, what it leaves out, and why.
 
@@ -96,11 +96,12 @@ def explain(scene: SceneFile) -> Results:
     what LAMMPS has loaded with and without each part.
     """
     from faultgouge.assessment.explain import explain as explain_scene
+    from faultgouge.assessment.explain import in_words
 
     with status("setting up the run with and without each part"):
-        explanation = explain_scene(scene)
-    yield from explanation.in_words()
-    yield explanation.as_dict()
+        found = explain_scene(scene)
+    yield from in_words(found)
+    yield found
 
 
 @command(
@@ -137,10 +138,10 @@ def reproduce(
 )
 def report(
     output: NewFolder = Path("report"),
-    quick: Annotated[bool, Option("--quick", help="Fewer points: a minute instead of ten.")] = False,
+    quick: Annotated[bool, Option("--quick", help="Fewer points: half a minute instead of two.")] = False,
 ) -> Results:
-    """Measure error against run time: which method to use when, for six tasks, with figures and numbers."""
-    from faultgouge.assessment.work_precision import report as run_studies
+    """Measure error against run time: which method to use when, for seven tasks, with figures and numbers."""
+    from faultgouge.assessment.work_precision.run import report as run_studies
 
     run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
     yield f"written: {output}/report.md"
@@ -160,8 +161,8 @@ def extremes(
 
 def try_cases(output: Path, quick: bool) -> Results:
     """What `extremes` does in a folder."""
-    from faultgouge.assessment.extremes import check
-    from faultgouge.assessment.extremes import extremes as try_all
+    from faultgouge.assessment.extremes.run import check
+    from faultgouge.assessment.extremes.run import extremes as try_all
 
     result = try_all(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
     counts = Counter(case["status"] for case in result["cases"])
@@ -243,7 +244,11 @@ def _gather(sweep: Sweep, rows: list[dict[str, Any]], output: Path) -> Results:
     yield from gather(sweep, rows, output, say) if gather and rows else ()
 
 
-@command("faultgouge merge shard1 shard2 shard3 -o whole", alone=True)
+@command(
+    "faultgouge examples sweep && "
+    "for k in 1 2; do faultgouge sweep sweep.toml -o $k --shard $k/2; done && faultgouge merge 1 2",
+    alone=True,
+)
 def merge(
     parts: Annotated[list[Path], Argument(metavar="DIR...", help="Folders of `sweep --shard`.")],
     output: Annotated[Path, Option("-o", "--output", help="The folder to write.")] = Path("merged"),

@@ -33,6 +33,10 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 P = ParamSpec("P")
 
+LAYER = "faultgouge examples scene"
+RAMPED = f"{LAYER} && faultgouge ramp scene.toml"
+"""With which examples of commands begin: each runs in an empty folder."""
+
 SECONDS_BETWEEN_LINES = 60.0
 """Seconds between two lines of progress off a terminal."""
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import complex_windows
-from faultgouge.analysis.windows.edges import sign_change
 
 BASIS = np.eye(12) + 0.1 * np.random.default_rng(2).normal(size=(12, 12))
 INVERSE = np.linalg.inv(BASIS)
@@ -41,12 +40,13 @@ def test_edge_where_the_equilibrium_jumps():
     assert window.error < 1e-9
 
 
-def test_a_function_within_rounding_of_zero_at_an_end_has_its_root_there():
-    """Loads in either order of the two values; the slope is that between the ends."""
-    for small, large in ((0.0, 1.0), (1.0, 0.0)):
-        root = sign_change({small: 2e-12, large: 1.0 + 2e-12}.__getitem__, 0.0, 1.0)
-        assert (root.fx, root.loads, root.smooth) == (small, [small], True)
-        assert root.error == pytest.approx(2e-12, rel=1e-12)
+@pytest.mark.parametrize("ulps", [-3, -1, 0, 1, 3])
+def test_a_load_that_is_the_root_itself(ulps):
+    """D is rounding there, of either sign: the edge is a root for all that, with the error that rounding leaves."""
+    own = 1.0 + ulps * np.spacing(1.0)
+    (window,) = complex_windows(family(1.0, 15.5), [-1.0, own, 3.0])
+    assert window.kind == "coalescence"
+    assert abs(window.fx_onset - 1.0) <= 2 * window.error < 1e-12
 
 
 def test_forces_out_of_balance_at_random_are_an_error_of_the_load(path):

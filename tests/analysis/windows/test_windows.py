@@ -19,7 +19,6 @@ from faultgouge.analysis import (
 from faultgouge.analysis.uncertain_digits import with_uncertainty
 from faultgouge.analysis.windows import Limits, Motions, NoGrowthError, System, force_bearing, full_operator
 from faultgouge.analysis.windows.pair_over_load import Plane
-from faultgouge.analysis.windows.search import assign, lowest
 
 
 @pytest.mark.parametrize("d", [0.01, 0.3])
@@ -108,22 +107,6 @@ def test_gap_inside_a_window_is_seen():
     assert second.fx_end is None
 
 
-def test_jump_is_no_coalescence():
-    def operator(f):
-        return embedded([[10, 1.0], [-0.3 if f > 0.321 else 0.3, 10]])
-
-    (window,) = complex_windows(operator, [0.0, 1.0])
-    assert window.kind == "contact change"
-    # Bracketed to 1e-9 of the increment; the middle of the bracket is in error by half of it.
-    assert abs(window.fx_onset - 0.321) <= window.error < 1e-9
-
-
-@pytest.mark.parametrize("loads", [[1.0], [0.0, 0.0], [1.0, 0.0], [0.0, np.nan]])
-def test_impossible_loads(loads):
-    with pytest.raises(ValueError, match="increasing"):
-        complex_windows(normal_form(0.1), loads)
-
-
 def test_noise_loses_its_imaginary_part():
     """A double eigenvalue in Jordan form splits by (u |A|)^(1/2), real or complex as rounding has it."""
     split = 0
@@ -138,17 +121,6 @@ def test_noise_loses_its_imaginary_part():
         inner[1, 0] = -1e-8  # imaginary parts of 1e-4
         assert Motions.of(System(0.0, basis @ inner @ basis.T)).grows.sum() == 1
     assert split > 0
-
-
-def test_the_lowest_place_of_parabolas():
-    """(t - 0.3)^2 - w^2 from its ends: the width is 2 w, and what a twentieth of the smaller end adds."""
-    for w in (0.0, 1e-3, 0.1):
-        d0, d1 = 0.09 - w * w, 0.49 - w * w
-        width, at = lowest(*(np.array([v]) for v in (d0, -0.6, d1, 1.4)))
-        assert at[0] == pytest.approx(0.3, abs=1e-12)
-        assert width[0] == pytest.approx(2 * np.sqrt(w * w + 0.05 * d0 * 4 * 0.3 * 0.7), rel=1e-9)
-    width, _ = lowest(*(np.array([v]) for v in (1.0, -0.1, 1.0, 0.1)))
-    assert width[0] == 0
 
 
 @pytest.mark.parametrize("disks", [300, 50])
@@ -202,16 +174,6 @@ def test_a_complex_pair_is_not_torn_by_a_level_beside_it():
     turn[1:3, 1:3] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     turned = Motions.of(System(1.0, turn @ operator @ turn.T))
     assert pair.closest(turned) == np.flatnonzero(turned.grows).tolist()
-
-
-def test_modes_that_cross_keep_their_names():
-    """Coupled so weakly that the levels pass each other within the increment, and strongly enough not to."""
-    for product, exchanged in ((1e-6, True), (-1e-6, True), (4.0, False)):
-        here, there = (Motions.of(System(fx, crossing(0.37, product)(fx))) for fx in (0.0, 1.0))
-        expected = [(k, k) for k in range(12)]
-        if exchanged:
-            expected[:2] = [(0, 1), (1, 0)]
-        assert sorted(assign(here.alike(there))) == expected
 
 
 @pytest.mark.parametrize("noise", [1e-12, 1e-9, 1e-6])

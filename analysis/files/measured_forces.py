@@ -1,0 +1,171 @@
+r"""Contact forces that a laboratory has measured, in RigidLibrary's two text files: counts and chances, and no rates.
+
+**Files.** Numbers between commas, without names; of a contact there are often two rows, one measured at either disk.
+
+=========  ====================================================================
+particles  ``[step,] id, x, y, radius, flag``
+contacts   ``step, id1, id2, f_t, f_n``; f_t along n turned by 90 degrees; walls
+           have negative numbers, and are left out
+=========  ====================================================================
+
+(S. Henkes, D. A. Quint, Y. Fily and J. M. Schwarz, Phys. Rev. Lett. 116, 028001, 2016; of photoelastic disks K. Liu,
+J. E. Kollmer, K. E. Daniels, J. M. Schwarz and S. Henkes, Phys. Rev. Lett. 126, 088002, 2021.) The sign of all f_t that
+balances the forces better is taken.
+
+**What they tell.** Measured forces are out of balance by half of a disk's mean contact force, and those of the two
+sides of a contact differ by a sixth. Errors of 2 % move growth rates by more than 5 % in six of ten tables, as rates
+come from the small asymmetric part of K. Numbers survive: contacts, those at Coulomb's bound, motions without
+stiffness, and how often a packing with forces drawn from the errors is unstable. A load balances each such packing.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import eigvalsh
+
+from ..arrays import Floats, derive_frozen
+from ..configuration import Configuration
+from ..counted import counted
+from ..elasticity.material_spheres import Material, spheres_of_material
+from ..errors import PackingFileError
+from ..motion.eigenvalues import active_coordinates, mass_weighted
+from ..motion.stability import stability
+from ..operators.stiffness import stiffness_matrix
+
+USUAL_ERROR = 1 / 6
+"""Error of f_n where the table has one row, or two equal ones, for a contact: the median of photoelastic tables."""
+
+DRAWN_FORCES = 10
+"""Draws of the forces: a chance of one half is then known within a third."""
+
+FREE_OF_SPRINGS = 1e-9
+"""Eigenvalue of the springs, over the largest, of a motion without stiffness."""
+
+NO_RATE = (
+    "no growth rate is given: errors of 2 % of the forces move it by more than 5 % in six of ten tables, and measured "
+    "forces have larger ones"
+)
+
+
+def is_measured(contacts: Path) -> bool:
+    """Whether a table of contacts has rows of five numbers between commas from its first line on."""
+    with contacts.open(errors="replace") as lines:
+        words = next(lines, "").split(",")
+    try:
+        return len([float(word) for word in words]) == 5
+    except ValueError:
+        return False
+
+
+def _rows(path: Path, widths: tuple[int, ...]) -> Floats:
+    try:
+        rows = np.loadtxt(path, delimiter=",", ndmin=2)
+    except (OSError, ValueError) as error:
+        raise PackingFileError(f"{path} is no table of numbers between commas: {error}") from error
+    if rows.shape[1] not in widths or not np.isfinite(rows).all():
+        raise PackingFileError(
+            f"{path} has rows of {rows.shape[1]} numbers: RigidLibrary's particles have [step,] id, x, y, radius, flag "
+            "and its contacts step, id1, id2, ft, fn, all finite."
+        )
+    return rows
+
+
+def measured_forces(
+    particles: Path, contacts: Path, material: Material, frame: int = -1, draws: int = DRAWN_FORCES
+) -> tuple[Configuration, list[str]]:
+    """A packing with measured contact forces, and what can be said of it.
+
+    Parameters
+    ----------
+    frame : int
+        Which of the steps of the table of contacts, in their order.
+
+    Returns
+    -------
+    configuration : Configuration
+        Disks with the forces as they are, as one whose stability is not known.
+    says : list of str
+        Counts, rigidity, the chance of "unstable", and why there is no rate.
+
+    Raises
+    ------
+    PackingFileError
+        If a table is none of RigidLibrary's, or a contact names a disk that is not there.
+    """
+    disks, rows = _rows(particles, (5, 6)), _rows(contacts, (5,))
+    steps = np.unique(rows[:, 0])
+    if not -len(steps) <= frame < len(steps):
+        raise PackingFileError(f"{contacts} has {counted(len(steps), 'step')}, and no number {frame}.")
+    rows = rows[rows[:, 0] == steps[frame]]
+    if disks.shape[1] == 6:
+        disks = disks[disks[:, 0] == steps[frame]][:, 1:]
+    walls = (rows[:, 1:3] < 0).any(axis=1)  # the files do not say where these are
+    rows = rows[~walls]
+    where = {int(each): k for k, each in enumerate(disks[:, 0])}
+    strange = [each for each in rows[:, 1:3].ravel() if int(each) not in where]
+    if strange:
+        raise PackingFileError(f"{contacts}: a contact names disk {strange[0]:g}, which is not in {particles}.")
+    # mean of the rows of each pair; the tangent turns with the normal, so that f_t is the same from both sides
+    ends = np.sort([[where[int(one)], where[int(other)]] for one, other in rows[:, 1:3]], axis=1)
+    pairs, place, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    tangential, normal = (np.bincount(place.ravel(), rows[:, k]) / count for k in (3, 4))
+    i, j = pairs[normal > 0].T
+    differ = np.abs(rows[:, 4] - normal[place.ravel()]) / np.maximum(normal[place.ravel()], np.finfo(float).tiny)
+    twice = differ[(count[place.ravel()] > 1) & (differ > 0)]
+    error = 2 * float(np.median(twice)) if len(twice) else USUAL_ERROR
+    fn, ft = normal[normal > 0], tangential[normal > 0]
+    centre, radius = disks[:, 1:3], disks[:, 3]
+    branch = np.pad(centre[i] - centre[j], ((0, 0), (0, 1)))
+    along = np.cross([0.0, 0.0, 1.0], branch / np.linalg.norm(branch, axis=1)[:, None])
+    mass = np.pi * radius**2 * (material.density or 1.0)
+
+    def packing(fn: Floats, ft: Floats) -> Configuration:
+        bound = material.friction * fn
+        found = spheres_of_material(
+            centre, radius, material._replace(density=None), mass=mass, contacts=(i, j, branch), normal_force=fn,
+            tangential_force=np.clip(ft, -bound, bound)[:, None] * along,
+        )  # fmt: skip
+        return derive_frozen(found, inertia=0.5 * mass * radius**2)
+
+    def imbalance(found: Configuration) -> Floats:
+        force, own = found.contact_force[:, 0], np.bincount(np.concatenate([i, j]), np.tile(fn, 2), len(radius))
+        touches = np.bincount(np.concatenate([i, j]), minlength=len(radius))
+        inside = touches > 2  # fewer are rattlers, or held by a wall that the files do not have
+        return np.asarray(np.linalg.norm(force, axis=1)[inside] * touches[inside] / own[inside])
+
+    found, other = packing(fn, ft), packing(fn, -ft)
+    lacks, flipped = imbalance(found), imbalance(other)
+    if len(lacks) and flipped.mean() < lacks.mean():
+        found, lacks, ft = other, flipped, -ft
+    at_bound = int(found.contacts.at_bound.sum())
+    rng, seen = np.random.default_rng(0), []
+    for _ in range(draws):
+        drawn = fn * np.maximum(1 + error * rng.standard_normal(len(fn)), 0.1)
+        seen.append(stability(packing(drawn, ft + error * fn * rng.standard_normal(len(fn)))).stable)
+    unknown = f", and {seen.count(None)} not known" if None in seen else ""
+    left_out = f"; {counted(int(walls.sum()), 'row')} of walls left out, whose place no file has" if walls.any() else ""
+    says = [
+        f"{counted(len(fn), 'contact')} of {counted(len(np.unique(pairs)), 'disk')}, {at_bound} at Coulomb's bound; "
+        f"forces on a disk are out of balance by {np.median(lacks) if len(lacks) else 0:.2g} of its mean contact force "
+        f"(median), and f_n is taken with an error of {error:.2g}{left_out}",
+        f"{_floppy(found)} motions without stiffness beside those of a free body, if contacts at the bound slide",
+        f"unstable in {seen.count(False)} of {draws} draws of the forces within this error{unknown}",
+        NO_RATE,
+    ]
+    return derive_frozen(found, slips_known=False, remarks=tuple(says)), says
+
+
+def _floppy(found: Configuration) -> int:
+    """Motions of the disks in contact that stretch no spring, without translations and rotation as a whole."""
+    c, none = found.contacts, np.zeros_like(found.contacts.normal)
+    springs = derive_frozen(
+        c, normal_force=np.zeros(len(c)), tangential_force=none, closing=none, parting=none,
+        tangential_stiffness=np.where(c.at_bound, 0.0, c.tangential_stiffness),
+    )  # fmt: skip
+    matrix = mass_weighted(stiffness_matrix(derive_frozen(found, contacts=springs)), found)
+    moves = active_coordinates(matrix)
+    values = eigvalsh(matrix[moves][:, moves].toarray())
+    disks = len(np.unique(np.concatenate([c.i, c.j])))
+    return 3 * disks - 3 - int(np.sum(values > FREE_OF_SPRINGS * values[-1]))
