@@ -8,50 +8,12 @@ that it does not change the path.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from ..analysis import NoEquilibriumError
 
-P = TypeVar("P", covariant=True)
-
-
-class AtLoad(Protocol[P]):
-    """An equilibrium: its load and its packing."""
-
-    @property
-    def fx(self) -> float: ...
-
-    @property
-    def packing(self) -> P: ...
-
-
-E = TypeVar("E", bound=AtLoad[object], covariant=True)
-S = TypeVar("S", bound=AtLoad[object])
-
-
-class EquilibriumSolver(Protocol[S]):
-    """Finds the equilibrium at one load after the other."""
-
-    def solve(self, load: float, below: S | None, beside: S | None, ahead: bool) -> S:
-        """The equilibrium at a load, reached from the equilibrium `below`; `below` is None where the path begins.
-
-        Parameters
-        ----------
-        load : float
-            The load, in the unit of the path.
-        below, beside : equilibrium, optional
-            The equilibrium from which the new one is reached, and another one near it, for an initial guess.
-        ahead : bool
-            Whether the path goes on from the result, at a load larger than all so far.
-
-        Raises
-        ------
-        NoEquilibriumError
-            If the packing flows.
-        """
-
-    def close(self) -> None:
-        """End the processes and files of the solver."""
+E = TypeVar("E")
+"""An equilibrium: its load `fx`, and its `packing`."""
 
 
 class LoadPath(Generic[E]):
@@ -59,20 +21,23 @@ class LoadPath(Generic[E]):
 
     Parameters
     ----------
-    solver : EquilibriumSolver
-        Finds each equilibrium.
+    solver : object
+        `solve(load, below, beside, ahead)` finds the equilibrium at a load, reached from the equilibrium `below`, which
+        is None where the path begins; `beside` is another one near it, for an initial guess, or None; `ahead` says
+        whether the path goes on from the result, at a load larger than all so far. It raises NoEquilibriumError if the
+        packing flows. `close()` ends the processes and files of the solver.
     equilibria : sequence
         Equilibria of the path that are known already, by increasing load.
     onward : bool
         Whether the solver may go on by other ways where the branch of equilibria ends.
     """
 
-    def __init__(self, solver: EquilibriumSolver[E], equilibria: Sequence[E] = (), onward: bool = True) -> None:
+    def __init__(self, solver: Any, equilibria: Sequence[E] = (), onward: bool = True) -> None:
         self.solver, self._onward = solver, onward
-        self.equilibria = list(equilibria)
-        self._between: tuple[E | None, E] | None = None  # a kept one, and the last one found above it
+        self.equilibria: list[Any] = list(equilibria)
+        self._between: tuple[Any, Any] | None = None  # a kept one, and the last one found above it
 
-    def __call__(self: LoadPath[AtLoad[P]], load: float) -> P:
+    def __call__(self, load: float) -> Any:
         """The packing in equilibrium at a load."""
         load, kept = float(load), self.equilibria
         below = next((each for each in reversed(kept) if each.fx <= load), None)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -146,55 +145,43 @@ def onset_run(
     scene = scene.model_copy(update={"damping": None})
     with show_progress(watch, "settling: "):
         start = settle(scene, mu, bed=bed)
-    _check_modes(start.packing, modes)
-    takes_all = takes_all_modes(start.packing, modes)
-    whole = reached is not None or (takes_all and not first)
-    reached = reached or (lambda _: None)
-    reached(start)
+    count = len(active_coordinates(full_operator(start.packing)))
+    if modes is not None and modes[0] >= count:
+        raise SceneError(f"modes {modes[0]}:{modes[1]} are no part of the {count} modes of the packing, 0:{count}")
+    if reached is not None:
+        reached(start)
+
+    def with_dashpots(packing: Packing) -> Packing:
+        assert damping is not None
+        return packing.with_dissipation(damping.cn, damping.ct, damping.tau)
+
     with show_progress(watch), Engine(start.packing) as engine:
-        path = scene_path(engine, start, scene, onward=True)
-        forces = _climb(path, wanted, reached) if whole else wanted
+        path, forces = scene_path(engine, start, scene, onward=True), wanted
+        if reached is not None or (takes_all_modes(start.packing, modes) and not first):
+            report_progress(f"ramp up to F_x = {wanted[-1]:g}")
+            for equilibrium in path.climb(wanted[1:]):
+                if reached is not None:
+                    reached(equilibrium)
+            forces = np.array([each.fx for each in path.equilibria])
         flows = len(forces) < len(wanted)
-
-        def with_dashpots(packing: Packing) -> Packing:
-            assert damping is not None
-            return packing.with_dissipation(damping.cn, damping.ct, damping.tau)
-
-        def at(fx: float) -> Packing:
-            return path(fx) if damping is None else with_dashpots(path(fx))
-
+        at = path if damping is None else lambda fx: with_dashpots(path(fx))
         search = partial(find_onset, dissipation=dissipation, modes=modes, first=first, known=known, folder=folder)
-        with _errors_of_scene(path, flows, dissipation):
+        try:
             found = search(at, forces, ranks=search_ranks())
+        except TurningPointError:
+            raise
+        except (OnsetError, NoEquilibriumError) as error:
+            raise _as_user_reads(error, path, flows, dissipation) from error
         equilibria = tuple(path.equilibria)
         last = equilibria[-1].fx
-        near = np.zeros(0) if near_onset is None else found.fx_c + near_onset
-        between = {fx: path(fx) for fx in near[(near >= 0) & (near <= last)].tolist()}
+        near = [] if near_onset is None else (found.fx_c + near_onset).tolist()
+        between = {fx: path(fx) for fx in near if 0 <= fx <= last}
         report_progress("the path once more, with other increments")
         found = with_path_error(found, path, with_dashpots)
     return replace(found, mu=mu, equilibria=equilibria, between=between, flows_beyond=last if flows else None)
 
 
-def _climb(path: LoadPath[Equilibrium], loads: Floats, reached: Callable[[Equilibrium], None]) -> Floats:
-    """The loads that have an equilibrium, up to the last one or to where the packing flows."""
-    report_progress(f"ramp up to F_x = {loads[-1]:g}")
-    for equilibrium in path.climb(loads[1:]):
-        reached(equilibrium)
-    return np.array([each.fx for each in path.equilibria])
-
-
-@contextmanager
-def _errors_of_scene(path: LoadPath[Equilibrium], flows: bool, dissipation: bool) -> Iterator[None]:
-    """Errors of a search, as the user of a scene reads them; a turning point is told as it is."""
-    try:
-        yield
-    except TurningPointError:
-        raise
-    except (OnsetError, NoEquilibriumError) as error:
-        raise _of_scene(error, path, flows, dissipation) from error
-
-
-def _of_scene(
+def _as_user_reads(
     error: OnsetError | NoEquilibriumError, path: LoadPath[Equilibrium], flows: bool, dissipation: bool
 ) -> FaultgougeError:
     """The error of a search, as the user of a scene reads it."""
@@ -221,15 +208,6 @@ def search_ranks() -> Ranks:
     mine = MPI.Get_processor_name(), own
     beside = world.allgather(mine).count(mine)  # a launcher that binds ranks to cores leaves each its own
     return Ranks(world.rank, world.size, world.allgather, max(1, len(mine[1]) // beside))
-
-
-def _check_modes(packing: Packing, modes: tuple[int, int] | None) -> None:
-    """Refuse modes that a packing does not have."""
-    if modes is None:
-        return
-    count = len(active_coordinates(full_operator(packing)))
-    if modes[0] >= count:
-        raise SceneError(f"modes {modes[0]}:{modes[1]} are no part of the {count} modes of the packing, 0:{count}")
 
 
 def load_at_onset(scene: Scene, known: dict[float, Onset] | None = None) -> float:

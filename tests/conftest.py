@@ -126,8 +126,8 @@ def faultgouge_here_in() -> Callable[..., subprocess.CompletedProcess]:
     """Runs the command in a folder within this process, which saves the second that a process takes to start."""
 
     def run(folder: Path, *words: object, code: int | None = 0) -> subprocess.CompletedProcess:
+        from faultgouge.cli import fail
         from faultgouge.commands import program
-        from faultgouge.exit_status import fail
 
         out, err, exit_code, before = io.StringIO(), io.StringIO(), 0, Path.cwd()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):

@@ -21,13 +21,12 @@ ROOT = Path(faultgouge.__file__).parent
 
 FLOORS = {
     "faultgouge": (
-        ("lammps_inputs", "parent_death", "plugin", "mpi_rank", "registered"),
+        ("lammps_inputs", "parent_death", "plugin", "registered"),
         ("analysis",),
         ("figures", "pywrap"),
         ("assessment", "studies"),
-        ("signal_guard", "notebook", "stored_files"),
-        ("browser_view", "drawing", "merging_pair"),
-        ("commands", "exit_status"),
+        ("signal_guard", "notebook", "door"),
+        ("commands",),
         ("cli",),
         ("__main__",),
     ),
@@ -238,7 +237,7 @@ INSIDE = {
     "pywrap.granular.lammps_arrays": "velocities of a live LAMMPS are set in a unit that the Configuration has",
     "pywrap.runs.path_error": "the stated errors that a page compares with true ones, at the windows of its own search",
     "pywrap.runs.drive": "slips and clock advances from the rows of a drive.h5",
-    "pywrap.scenes.drive_section": "the scale of the probe that a page states",
+    "pywrap.scenes.sections": "the scale of the probe that a page states",
 }
 """Modules behind the doors that research uses for all that, and what for."""
 

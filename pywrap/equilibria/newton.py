@@ -126,117 +126,67 @@ def iterate_newton(
     int
         Force evaluations.
     """
-    base, since, rattlers = start.packing, start.graph, _Rattlers(start, IDLE_FORCE_SHARE if patient else 0.0)
-    displacement, factors, answers = guess or Guess(np.zeros(3 * len(base)))
+    base, since, top = start.packing, start.graph, start.still.top
+    displacement, factors, last = guess or Guess(np.zeros(3 * len(base)))
     iterations, gain = PATIENCE if patient else (NEWTON_ITERATIONS, LEAST_GAIN)
-    course = _Course(start.floor, answers, force_tolerance, gain)
-    evaluations = 0
+    # rattlers carry no more than an equilibrium may leave
+    idle = IDLE_FORCE_SHARE * float(start.derivatives.normal_force.max(initial=0.0)) if patient else 0.0
+    loose = (_count_bearing_contacts(start, max(FLOORS_OF_ROUNDING * start.floor, idle)) == 0) & ~top
+    times_moved = np.zeros(len(base), dtype=np.int64)
+    best: Trial | None = None
+    # `last` and `earlier` are the residuals of the two iterations before, and the factors of K are of an earlier trial
+    floor, earlier, worse, evaluations = start.floor, np.inf, 0, 0
     for iteration in range(iterations):
         if _lammps_refuses(displacement, base):
             return None, evaluations
         trial, evaluations = displaced(base, displacement), evaluations + 1
-        # What a guess lacks lies in soft directions, where a small force is a large displacement: it has to be solved.
-        if course.is_finished(trial, result=guess is None or iteration > 0):
-            return course.best, evaluations
-        if factors is None or not course.may_reuse_factors(trial.residual, len(base)):
-            course.floor = trial.floor
-            hit = rattlers.find_hit(trial)
-            if len(hit):
-                displacement = _out_of_the_way(trial.packing, hit, displacement)
+        residual = trial.residual
+        if best is not None and residual > gain * best.residual:  # a change of contacts may cost some iterations
+            if best.residual < FLOORS_OF_ROUNDING * floor:
+                # below the floor the trial that moved less is as good
+                return trial if residual < best.residual and floor < best.residual else best, evaluations
+            worse += 1
+            if worse > ITERATIONS_WITHOUT_GAIN:
+                return None, evaluations
+        # what a guess lacks lies in soft directions, where a small force is a large displacement: it has to be solved
+        if (guess is None or iteration > 0) and (best is None or residual < best.residual):
+            best = trial
+        if best is not None:
+            if residual <= (0.1 * floor if force_tolerance is None else force_tolerance):
+                return best, evaluations
+            # the next residual falls by at least the factor of this one, rounding apart: it may be far below the floor
+            factor = last / earlier if earlier < np.inf else FIRST_GAIN
+            if residual < floor and factor * last < 0.1 * floor:
+                return best, evaluations
+        suffice = residual * (residual / last) ** REUSE_ITERATIONS < 0.1 * floor
+        if factors is None or not (suffice or (len(base) > REUSE_SIZE and residual <= REUSE_LIMIT * last)):
+            floor, count = trial.floor, _count_bearing_contacts(trial, trial.floor)
+            # rattlers that a neighbour ran into, and disks with one contact left, new rattlers
+            hit = ((count == 1) & ~top) | (loose & (count > 0))
+            disks = np.flatnonzero(hit & (times_moved < RATTLER_MOVES))
+            times_moved[disks] += 1
+            if len(disks):
+                displacement = _out_of_the_way(trial.packing, disks, displacement)
                 trial, evaluations = displaced(base, displacement), evaluations + 1
-            factors = factor_stiffness(trial, course.floor, since, factors)
-        course.go_on(trial.residual)
+            factors = factor_stiffness(trial, floor, since, factors)
+        earlier, last = last, trial.residual
         step = None if factors is None else factors.solve(trial.force)
         if factors is None or step is None or too_long(step, base):
             return None, evaluations
         if iteration < FREEING_ITERATIONS and factors.expelled.any():
             step.reshape(3, -1)[:, factors.expelled] *= base.law.exponent
-        if base.compensated and trial.residual < FLOORS_OF_ROUNDING * _floor_of(displacement, trial):
-            base, since, displacement = trial.packing, trial.graph, np.zeros_like(displacement)
+        if base.compensated:
+            # the displacement is a double: from its rounding on it is measured from the iterate
+            rounding = trial.coordinate_rounding + EPSILON * float(np.abs(displacement).max())
+            if trial.residual < FLOORS_OF_ROUNDING * trial.force_rounding(rounding):
+                base, since, displacement = trial.packing, trial.graph, np.zeros_like(displacement)
         displacement = displacement + step
     return None, evaluations
-
-
-class _Course:
-    """How the residual falls from iteration to iteration, and when it falls no more.
-
-    Parameters
-    ----------
-    floor : float
-        Residual that rounding leaves.
-    answers : float
-        Largest force to which the first displacement is the response.
-    force_tolerance : float or None
-        Residual to stop at.
-    gain : float
-        Factor of the residual that counts as a gain.
-    """
-
-    def __init__(self, floor: float, answers: float, force_tolerance: float | None, gain: float) -> None:
-        self.floor, self._tolerance, self._gain = floor, force_tolerance, gain
-        self.best: Trial | None = None
-        self._worse = 0  # iterations that gained nothing; changes of contacts cost some
-        self._earlier, self._last = np.inf, answers  # residuals of the two iterations before
-
-    def is_finished(self, trial: Trial, result: bool) -> bool:
-        """Whether the iteration ends: `best` is then the result, or None if the iteration has failed."""
-        residual = trial.residual
-        if self.best is not None and residual > self._gain * self.best.residual:
-            if self.best.residual < FLOORS_OF_ROUNDING * self.floor:
-                if residual < self.best.residual and self.floor < self.best.residual:
-                    self.best = trial  # below the floor the trial that moved less is as good
-                return True
-            self._worse += 1
-            if self._worse > ITERATIONS_WITHOUT_GAIN:
-                self.best = None
-                return True
-        if result and (self.best is None or residual < self.best.residual):
-            self.best = trial
-        if self.best is None:
-            return False
-        if residual <= (0.1 * self.floor if self._tolerance is None else self._tolerance):
-            return True
-        # The next residual falls by at least the factor of this one, rounding apart: it may be far below the floor.
-        factor = self._last / self._earlier if self._earlier < np.inf else FIRST_GAIN
-        return residual < self.floor and factor * self._last < 0.1 * self.floor
-
-    def may_reuse_factors(self, residual: float, disks: int) -> bool:
-        """Whether the factors of an earlier K serve for the next iteration."""
-        if residual * (residual / self._last) ** REUSE_ITERATIONS < 0.1 * self.floor:
-            return True
-        return disks > REUSE_SIZE and residual <= REUSE_LIMIT * self._last
-
-    def go_on(self, residual: float) -> None:
-        """Another iteration is made from here."""
-        self._earlier, self._last = self._last, residual
-
-
-class _Rattlers:
-    """Which disks carry nothing, or no more than a share of the largest force; how often each has been moved."""
-
-    def __init__(self, start: Trial, share: float) -> None:
-        # no more than an equilibrium may leave
-        nothing = max(FLOORS_OF_ROUNDING * start.floor, share * float(start.derivatives.normal_force.max(initial=0.0)))
-        self._loose = (_count_bearing_contacts(start, nothing) == 0) & ~start.still.top
-        self._moved = np.zeros(len(self._loose), dtype=np.int64)
-
-    def find_hit(self, trial: Trial) -> Indices:
-        """Disks to be moved: rattlers that a neighbour ran into, and disks with one contact left, new rattlers."""
-        count = _count_bearing_contacts(trial, trial.floor)
-        hit = ((count == 1) & ~trial.still.top) | (self._loose & (count > 0))
-        disks = np.flatnonzero(hit & (self._moved < RATTLER_MOVES))
-        self._moved[disks] += 1
-        return disks
 
 
 def _count_bearing_contacts(trial: Trial, least: float) -> Floats:
     """Number of contacts of each disk that carry more than a given force, shape (N,)."""
     return trial.graph.count(trial.derivatives.normal_force > least)
-
-
-def _floor_of(displacement: Floats, trial: Trial) -> float:
-    """The rounding floor with the rounding of the displacement, which is a double."""
-    return trial.force_rounding(trial.coordinate_rounding + EPSILON * float(np.abs(displacement).max()))
 
 
 def too_long(step: Floats, packing: Packing) -> bool:

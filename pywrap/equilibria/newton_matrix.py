@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...analysis.arrays import Floats, Indices
-from ...analysis.factors.linear_solver import Band, BandSolver, Booleans, Solver, SparseSolver
+from ...analysis.factors.linear_solver import BandSolver, Booleans, Solver, SparseSolver
 from ...analysis.packing.disk_operators import assemble_stiffness, contact_terms
 from ..lammps.contact_graph import ContactGraph
 from ..lammps.trial_state import Trial
@@ -87,26 +87,24 @@ def factor_stiffness(
         return None
     matters = loaded & (law.normal_force > IDLE_FORCE_SHARE * law.normal_force.max(initial=0.0))
     idle = graph.count(matters) == 0  # disks with none but contacts that carry nothing that matters
-    expelled = _find_expelled(graph, loaded, old) & ~trial.still.top
-    if unknowns <= BAND_SIZE:
-        return StiffnessFactors(_band_matrix(graph.band(active), terms, idle), expelled)
-    near = nearby.solver if nearby is not None and isinstance(nearby.solver, SparseSolver) else None
-    return StiffnessFactors(_sparse(graph, loaded, terms, idle, near), expelled)
-
-
-def _find_expelled(graph: ContactGraph, loaded: Booleans, old: Booleans | None) -> Booleans:
-    """Disks with one loaded contact, or with two loaded contacts that are both new, shape (N,)."""
+    # disks with one loaded contact, or with two that are both new
     count = graph.count(loaded)
-    if old is None:
-        return count == 1
-    return (count == 1) | ((count == 2) & (graph.per_disk(loaded & old) == 0))
-
-
-def _band_matrix(band: Band, terms: Floats, idle: Booleans) -> BandSolver:
-    """K in a band."""
-    matrix = band.matrix(terms)
-    matrix[2 * band.width] = _stiffen_idle(matrix[2 * band.width], band.disks, idle)
-    return BandSolver(band, matrix)
+    expelled = count == 1
+    if old is not None:
+        expelled |= (count == 2) & (graph.per_disk(loaded & old) == 0)
+    expelled &= ~trial.still.top
+    if unknowns <= BAND_SIZE:
+        band = graph.band(active)
+        rows = band.matrix(terms)
+        rows[2 * band.width] = _stiffen_idle(rows[2 * band.width], band.disks, idle)
+        return StiffnessFactors(BandSolver(band, rows), expelled)
+    i, j, disks = graph.i, graph.j[: graph.pairs], len(graph.radius)
+    matrix = assemble_stiffness(terms, i, j, disks)
+    matrix.setdiag(_stiffen_idle(matrix.diagonal(), np.tile(np.arange(disks), 3), idle))
+    matrix.eliminate_zeros()
+    coupled = np.flatnonzero(loaded[: graph.pairs])
+    near = nearby.solver if nearby is not None and isinstance(nearby.solver, SparseSolver) else None
+    return StiffnessFactors(SparseSolver(matrix, i[coupled], j[coupled], near), expelled)
 
 
 def _stiffen_idle(diagonal: Floats, disk: Indices, idle: Booleans) -> Floats:
@@ -118,15 +116,3 @@ def _stiffen_idle(diagonal: Floats, disk: Indices, idle: Booleans) -> Floats:
         np.maximum.at(stiffest, disk, diagonal)
         held[creeping] = diagonal[creeping] + HOLDING_SHARE * stiffest[disk[creeping]]
     return held
-
-
-def _sparse(
-    graph: ContactGraph, loaded: Booleans, terms: Floats, idle: Booleans, nearby: SparseSolver | None
-) -> SparseSolver:
-    """K as a sparse matrix."""
-    i, j, disks = graph.i, graph.j[: graph.pairs], len(graph.radius)
-    matrix = assemble_stiffness(terms, i, j, disks)
-    matrix.setdiag(_stiffen_idle(matrix.diagonal(), np.tile(np.arange(disks), 3), idle))
-    matrix.eliminate_zeros()
-    coupled = np.flatnonzero(loaded[: graph.pairs])
-    return SparseSolver(matrix, i[coupled], j[coupled], nearby)

@@ -28,7 +28,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from warnings import warn
 
 import numpy as np
@@ -54,12 +54,12 @@ from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import Dynamics
 from ..lammps.engine import Engine
 from ..lammps.instance import EngineError
-from ..scenes.drive_section import Drive
 from ..scenes.packing_section import GeneratedPacking
 from ..scenes.scene import Scene
+from ..scenes.sections import Drive
 from ..scenes.validation import SceneError, require_section
 from ..settling.settle import law_of, settle, settle_bed
-from .run_iterator import run_of_scene
+from .ramp import run_of_scene
 from .run_recorder import Record, raise_on_all_ranks
 from .undamped import Checkpoint
 
@@ -472,12 +472,9 @@ class DriveRecord(Record):
     spring.
     """
 
-    def __init__(
-        self, path: Path, scene: Scene, saved: Callable[[str, Path], object] = lambda words, path: None
-    ) -> None:
-        super().__init__(path, scene, task="drive", saved=saved)
-        self._others: Mapping[Path, Scene] = {}
-        self._step, self._decided = 0, 1
+    TASK = "drive"
+    _others: Mapping[Path, Scene] = {}  # replaced, and never changed
+    _step, _decided = 0, 1
 
     def _stored_equilibrium(self, file: RunFile) -> Equilibrium:
         return Equilibrium.of(file.packing(0))
@@ -582,6 +579,12 @@ def drive_of(file: RunFile) -> Drive | None:
     if file.attributes.get("task") != "drive":
         return None
     return Drive.model_validate(json.loads(file.attributes["scene"])["drive"])
+
+
+def series_and_slips(file: RunFile) -> tuple[dict[str, NDArray[Any]], list[Slip]] | None:
+    """The series of a drive.h5 and its slips that have ended; None of another file, or where the run has not begun."""
+    begun = drive_of(file) is not None and SERIES in file.names_of_series
+    return (file.series(SERIES), slips_in(file)) if begun else None
 
 
 def slips_in(file: RunFile) -> list[Slip]:

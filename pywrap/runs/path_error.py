@@ -36,8 +36,10 @@ The stated error is the largest of :math:`|F_{2h} - F_h|`, twice the span, and :
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -49,7 +51,6 @@ from ...analysis.arrays import Floats
 from ...analysis.windows import System, Window, eigenvalues_near
 from ..equilibria.quasistatic import Equilibrium
 from ..load_path import LoadPath
-from .nearby_root import nearby_root
 
 Vanishes = Callable[[Packing], float]
 
@@ -71,6 +72,22 @@ LONGEST_RUN = 2
 UNCERTAINTY_OF_CORRECTION = 2.0
 """Uncertainty of an extrapolated onset, in units of the correction. As a rule a correction is good to a tenth.
 Where its coefficient changes sign along the path, the correction is wrong by more than itself."""
+
+SECANT_STEPS = 8
+"""Secant steps to the onset on the other path; two or three do."""
+
+WIDENINGS = 20
+"""Factors of two between the half of an increment and the smallest step in which a jump is looked for."""
+
+NOISE_IN_ROUNDINGS = 10
+"""Rounding errors about which the last of the secant steps may still jump."""
+
+SLOPE_TOLERANCE = 1e-3
+"""Distance of a root, in half increments, up to which the slope of what vanishes is the same on all paths: both its
+curvature and the paths' difference change the slope by about this share."""
+
+SECANT_TOLERANCE = 0.02
+"""Last secant step, in units of the shift, at which the shift is known: it only has to tell the size of an error."""
 
 
 @dataclass(frozen=True)
@@ -176,11 +193,7 @@ class PathErrors:
     def __init__(self, path: LoadPath[Equilibrium]) -> None:
         self.path = path
         self._states = [bearing_contacts(each.packing) for each in path.equilibria]
-        self._coarser, self._finer, self._moved = (
-            [path.equilibria[0]],
-            [path.equilibria[0]],
-            [[path.equilibria[0]] for _ in LOAD_SHIFTS],
-        )
+        self._known: dict[str | float, list[Equilibrium]] = defaultdict(lambda: [path.equilibria[0]])
 
     def error(self, fx: float, vanishes: Vanishes, rounding: float) -> PathError:
         """The effect of the increments on the onset at fx, whose rounding error is known.
@@ -201,30 +214,38 @@ class PathErrors:
         """
         changed = self.changes(fx)
         ramp = np.array([*(each.fx for each in self.path.equilibria if each.fx < fx), fx])
+        steps = np.diff(ramp)
+        halved = np.sort(np.concatenate([ramp, 0.5 * (ramp[1:] + ramp[:-1])]))
         few = len(changed) < FEWEST_INCREMENTS
-        other = _halve_loads(ramp) if few else _thin_loads(ramp, changed)
-        increment = float(np.diff(ramp).max())
+        other = halved if few else _thin_loads(ramp, changed)
+        increment, slope = float(steps.max()), None
 
-        slope = None
-
-        def shift_path(through: Floats, known: list[Equilibrium]) -> float:
+        def shift(name: str | float, through: Floats) -> float:
+            """The onset on the path through some loads, less fx; the path goes on from its known equilibria."""
             nonlocal slope
+            inner, known = through[1:-1], self._known[name]
+            common = 0
+            while common < min(len(inner), len(known) - 1) and known[common + 1].fx == inner[common]:
+                common += 1
+            there = LoadPath(self.path.solver, known[: common + 1], onward=False)
             try:
-                there = self._along(through, known)
+                for load in inner[common:].tolist():
+                    there(load)
+                    self._known[name] = [*there.equilibria]
                 root, slope = nearby_root(lambda load: vanishes(there(load)), fx, rounding, 0.5 * increment, slope)
             except PATH_FAILURES:
                 return np.nan
             return root - fx
 
-        shift = shift_path(other, self._coarser)
-        weight = _cubes(other) / _cubes(ramp) - 1
+        coarse = shift("coarser", other)
+        weight = float(np.sum(np.diff(other) ** 3) / np.sum(steps**3)) - 1
         if not changed.any():
-            return PathError(shift, 0.0, (), weight, False, rounding, increment)
-        finer = 0.0 if few else shift_path(_halve_loads(ramp), self._finer)
+            return PathError(coarse, 0.0, (), weight, False, rounding, increment)
+        finer = 0.0 if few else shift("finer", halved)
         moved = (
-            shift_path(_shift_loads(ramp, share), known) for share, known in zip(LOAD_SHIFTS, self._moved, strict=True)
+            shift(share, np.concatenate([ramp[:1], ramp[:-1] + share * steps, ramp[-1:]])) for share in LOAD_SHIFTS
         )
-        return PathError(shift, finer, tuple(moved), weight, True, rounding, increment)
+        return PathError(coarse, finer, tuple(moved), weight, True, rounding, increment)
 
     def changes(self, fx: float) -> NDArray[np.bool_]:
         """In which increments of the ramp up to fx contacts close, open, or reach or leave the Coulomb bound.
@@ -234,20 +255,6 @@ class PathErrors:
         before = self._states[: sum(each.fx < fx for each in self.path.equilibria)]
         states = [*before, bearing_contacts(self.path(fx))]
         return np.array([a != b for a, b in pairwise(states)])
-
-    def _along(self, through: Floats, known: list[Equilibrium]) -> LoadPath[Equilibrium]:
-        """The path through the inner loads of `through`, from the equilibria `known`; new ones are added to them."""
-        inner = through[1:-1]
-        common = 0
-        while common < min(len(inner), len(known) - 1) and known[common + 1].fx == inner[common]:
-            common += 1
-        path = LoadPath(self.path.solver, known[: common + 1], onward=False)
-        try:
-            for load in inner[common:]:
-                path(float(load))
-        finally:
-            known[:] = path.equilibria
-        return path
 
 
 def bearing_contacts(packing: Packing) -> frozenset[tuple[int, int, bool]]:
@@ -266,19 +273,6 @@ def _thin_loads(loads: Floats, changed: NDArray[np.bool_]) -> Floats:
         run = run + 1 if leave else 0
         kept.append(not leave)
     return loads[[*kept, True]]
-
-
-def _halve_loads(loads: Floats) -> Floats:
-    return np.sort(np.concatenate([loads, 0.5 * (loads[1:] + loads[:-1])]))
-
-
-def _shift_loads(loads: Floats, share: float) -> Floats:
-    """The loads moved up by a share of their increments; the first and the last stay besides."""
-    return np.concatenate([loads[:1], loads[:-1] + share * np.diff(loads), loads[-1:]])
-
-
-def _cubes(loads: Floats) -> float:
-    return float(np.sum(np.diff(loads) ** 3))
 
 
 def squared_gap(eigenvalue: float) -> Vanishes:
@@ -303,3 +297,57 @@ def growth_near(frequency: float, with_dashpots: Callable[[Packing], Packing]) -
         return last.real
 
     return growth
+
+
+def nearby_root(
+    function: Callable[[float], float], fx: float, rounding: float, reach: float, slope: float | None
+) -> tuple[float, float | None]:
+    """The load nearest to fx, known to a share of its distance, at which a function changes its sign, and its slope.
+
+    By the slope of the function on another path, if that is known and the load is near; else by secants or, where the
+    function jumps there, by halving.
+
+    Parameters
+    ----------
+    function : callable
+        Takes a load, force.
+    fx, rounding, reach : float
+        Where to begin, how uncertain the root is from rounding, and how far it may be, force.
+    slope : float or None
+        Of the function on another path, its unit / force.
+
+    Returns
+    -------
+    tuple of float and float or None
+        The load, nan beyond the reach; and the slope, None at a jump.
+    """
+    at, step = cache(function), max(30 * rounding, 1e-9 * fx)
+    if slope and abs(at(fx) / slope) < SLOPE_TOLERANCE * reach:
+        return fx - at(fx) / slope, slope
+    root, a, b = np.nan, fx, fx + step
+    for _ in range(SECANT_STEPS):
+        if at(a) == at(b):
+            break
+        a, b = b, b - at(b) * (b - a) / (at(b) - at(a))
+        if not abs(b - fx) < reach:
+            break
+        if abs(b - a) <= max(SECANT_TOLERANCE * abs(b - fx), rounding):
+            root = b
+            break
+    else:
+        root = b if abs(b - a) <= NOISE_IN_ROUNDINGS * rounding else np.nan
+    if np.isfinite(root):
+        return root, (at(root + step) - at(root)) / step
+    # a jump: steps to either side grow until the sign changes, and the last is halved
+    sign, near, far = np.sign(at(fx)), 0.0, max(NOISE_IN_ROUNDINGS * rounding, reach * 2.0**-WIDENINGS)
+    while far <= reach:
+        for side in (-1.0, 1.0):
+            if np.sign(at(fx + side * far)) == sign:
+                continue
+            low, high = near, far
+            while high - low > max(SECANT_TOLERANCE * high, rounding):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if np.sign(at(fx + side * middle)) == sign else (low, middle)
+            return fx + side * high, None
+        near, far = far, 4 * far
+    return np.nan, None

@@ -1,25 +1,61 @@
-"""The ramp of a scene: its equilibria one after the other, as run.h5 stores them.
+"""The ramp of a scene: its equilibria one after the other, as run.h5 stores them; and what all runs of a scene share.
 
 All functions are collective over the ranks of the communicator.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import wraps
 from pathlib import Path
+from typing import Concatenate, Generic, ParamSpec, TypeVar
 
 import numpy as np
 from mpi4py import MPI
 
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.engine import Engine
-from ..scenes.scene import Scene
+from ..scenes.scene import Scene, scene_of
 from ..scenes.sections import Ramp
 from ..scenes.validation import require_section
 from ..settling.settle import settle
 from .ramp_loads import all_loads, way_to
-from .run_iterator import run_of_scene
 from .scene_path import next_equilibrium
+
+Options = ParamSpec("Options")
+Step = TypeVar("Step")
+
+
+class RunIterator(Generic[Step]):
+    """The steps of a run; its printed form says in an interactive session how to use the run."""
+
+    def __init__(self, name: str, steps: Iterator[Step]) -> None:
+        self._name, self._steps = name, steps
+
+    def __iter__(self) -> Iterator[Step]:
+        return self
+
+    def __next__(self) -> Step:
+        return next(self._steps)
+
+    def __repr__(self) -> str:
+        return (
+            f"<{self._name}: an iterator, which computes what is asked for: `for each in {self._name}(scene): ...`, or "
+            f"`*_, last = {self._name}(scene)`>"
+        )
+
+
+def run_of_scene(
+    function: Callable[Concatenate[Scene, Options], Iterator[Step]],
+) -> Callable[Concatenate[Scene | str | Path, Options], Iterator[Step]]:
+    """The function, which also takes the path of a scene, and whose iterator prints."""
+
+    @wraps(function)
+    def run(scene: Scene | str | Path, *args: Options.args, **options: Options.kwargs) -> Iterator[Step]:
+        name = function.__name__
+        return RunIterator(name, function(scene_of(scene, name), *args, **options))
+
+    return run
 
 
 @run_of_scene

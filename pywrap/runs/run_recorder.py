@@ -63,15 +63,17 @@ class Record:
         If the file cannot be written, or another run is writing it.
     """
 
+    TASK: Task = "ramp"
+
     def __init__(
         self,
         path: Path,
         scene: Scene,
         communicator: MPI.Comm | None = None,
-        task: Task = "ramp",
+        task: Task | None = None,
         saved: Callable[[str, Path], object] = lambda words, path: None,
     ) -> None:
-        self.path, self.scene, self.task = path, scene, task
+        self.path, self.scene, self.task = path, scene, task or self.TASK
         self.communicator = communicator or MPI.COMM_WORLD
         self.remark = ""
         self._file: RunFile | None = None
@@ -225,20 +227,15 @@ class Record:
                 if samples:
                     columns = {key: [getattr(sample, key) for sample in samples] for key in vars(samples[0])}
                     self._file.append_series(name, **columns)
-                self.append_motions(motions)
+                if motions:
+                    low = [motion.position_low for _, motion in motions if motion.position_low is not None]
+                    times, positions = [time for time, _ in motions], [motion.position for _, motion in motions]
+                    self._file.append_trajectory(times, positions, low or None)
                 state: dict[str, Any] = {} if reached is None else {"step": reached.step, **reached.state}
                 self._file.put_checkpoint(**state)
             self._say_saved(f", and the series {name}" + (f" up to t = {samples[-1].time:g}" if samples else ""))
         samples.clear()
         motions.clear()
-
-    def append_motions(self, motions: list[tuple[float, MotionState]]) -> None:
-        """Write positions of an undamped run at some times, series trajectory."""
-        if self._file is None or not motions:
-            return
-        low = [motion.position_low for _, motion in motions if motion.position_low is not None]
-        times, positions = [time for time, _ in motions], [motion.position for _, motion in motions]
-        self._file.append_trajectory(times, positions, low or None)
 
     def _say_saved(self, more: str = "") -> None:
         """Say what the stored file contains, if nothing is still to be written."""
@@ -276,10 +273,8 @@ class Record:
 def _stored_steps(scene: Scene, disks: int, steps: Indices) -> Indices:
     """The steps at which an undamped run stores positions: some of the steps of its samples."""
     wanted = None if scene.output is None else scene.output.trajectory
-    if wanted is not None:
+    if wanted or wanted is False or disks > DISKS_OF_FILM:
         return steps if wanted else steps[:0]
-    if disks > DISKS_OF_FILM:
-        return steps[:0]
     times = np.linspace(0, steps[-1], STATES_OF_FILM + 1)[1:]
     return np.unique(steps[np.searchsorted(steps, times)])
 
@@ -307,25 +302,22 @@ def _difference(stored: dict[str, Any], wanted: dict[str, Any], task: Task) -> s
     """The first key in which two resolved scenes differ, ramp.until left aside: a ramp may be prolonged.
 
     Sections that the command of the file does not read are left aside, too, and those that a settled packing does not
-    need and one of the two does not have, since a ramp goes on from a file of `settle`.
+    need and one of the two does not have, since a ramp goes on from a file of `settle`. A key that a file does not have
+    because the file is older than the key has its default.
     """
     stored, wanted = COMMANDS[task].part(stored), COMMANDS[task].part(wanted)
     may_lack = {"relax", "ramp", "output"} if task == "ramp" else set()
     for section in sorted(stored.keys() | wanted.keys()):
-        if section in may_lack - (stored.keys() & wanted.keys()):
-            continue
         here, there = stored.get(section), wanted.get(section)
+        if section in may_lack and (here is None or there is None):
+            continue
         if isinstance(here, dict) and isinstance(there, dict):
+            fields = {key: field for model in SECTIONS.get(section, ()) for key, field in model.model_fields.items()}
+            usual = {key: field.default for key, field in fields.items() if not field.is_required()}
             for key in sorted(here.keys() | there.keys()):
-                old, new = (each.get(key, _default(section, key)) for each in (here, there))
+                old, new = (each.get(key, usual.get(key)) for each in (here, there))
                 if (section, key) != ("ramp", "until") and old != new:
                     return f"{section}.{key} is {old} there and {new} here"
         elif here != there:
             return f"{section} is {'there' if here is not None else 'missing there'}"
     return ""
-
-
-def _default(section: str, key: str) -> Any:
-    """Value of a key that a file does not have because the file is older than the key."""
-    fields = (model.model_fields[key] for model in SECTIONS.get(section, ()) if key in model.model_fields)
-    return next((field.default for field in fields if not field.is_required()), None)

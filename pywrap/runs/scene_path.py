@@ -5,7 +5,7 @@ All functions are collective over the ranks of the engine.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from types import SimpleNamespace
 
 from ...analysis import NoEquilibriumError
 from ..equilibria.quasistatic import Equilibrium, equilibrate, rounding_floor
@@ -27,14 +27,11 @@ def next_equilibrium(
     settings = require_section(scene.ramp, "ramp")
     if settings.method == "newton":
         return equilibrate(engine, last, fx, settings.force_tolerance, beside, onward)
-    floor = rounding_floor(last.packing)
+    tolerance = settings.force_tolerance
+    tolerance = 1.5 * rounding_floor(last.packing) if tolerance is None else tolerance
     engine.restore(last.packing)
     engine.set_fx(fx)
-    relaxation = engine.relax(
-        settings.force_tolerance if settings.force_tolerance is not None else 1.5 * floor,
-        scene.relax.damping,
-        scene.relax.time_step,
-    )
+    relaxation = engine.relax(tolerance, scene.relax.damping, scene.relax.time_step)
     if relaxation.status == "no":
         raise NoEquilibriumError(
             f"the relaxation at F_x = {fx:.10g} did not come to rest in {relaxation.steps} steps (a disk feels "
@@ -42,35 +39,6 @@ def next_equilibrium(
         )
     packing = engine.packing
     return Equilibrium(packing, relaxation.residual, rounding_floor(packing), relaxation.steps)
-
-
-@dataclass(frozen=True)
-class EngineSolver:
-    """The equilibria of a scene.
-
-    Attributes
-    ----------
-    engine : Engine
-        LAMMPS with the packing of `start`; the caller closes it.
-    scene : Scene
-        With a section [ramp], for its method and force tolerance.
-    start : Equilibrium
-        Where the path begins.
-    onward : bool
-        Whether the path goes on by other ways where Newton's branch of equilibria ends, as in `ramp`.
-    """
-
-    engine: Engine
-    scene: Scene
-    start: Equilibrium
-    onward: bool = False
-
-    def solve(self, load: float, below: Equilibrium | None, beside: Equilibrium | None, ahead: bool) -> Equilibrium:
-        """As of :class:`~faultgouge.pywrap.load_path.EquilibriumSolver`."""
-        return next_equilibrium(self.engine, below or self.start, load, self.scene, beside, self.onward and ahead)
-
-    def close(self) -> None:
-        """The engine is the caller's."""
 
 
 def scene_path(engine: Engine, start: Equilibrium, scene: Scene, *, onward: bool = False) -> LoadPath[Equilibrium]:
@@ -92,4 +60,8 @@ def scene_path(engine: Engine, start: Equilibrium, scene: Scene, *, onward: bool
     LoadPath
         F_x -> the packing in equilibrium.
     """
-    return LoadPath(EngineSolver(engine, scene, start, onward), [start])
+
+    def solve(load: float, below: Equilibrium | None, beside: Equilibrium | None, ahead: bool) -> Equilibrium:
+        return next_equilibrium(engine, below or start, load, scene, beside, onward and ahead)
+
+    return LoadPath(SimpleNamespace(solve=solve, close=lambda: None), [start])

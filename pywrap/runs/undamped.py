@@ -15,13 +15,12 @@ from mpi4py import MPI
 from ...analysis import Packing, largest_frequency, mean_square_displacement, stable_timestep
 from ...analysis.arrays import Floats, Indices
 from ..equilibria.quasistatic import Equilibrium
-from ..lammps.dynamics import Dynamics, MotionState, Weakening
+from ..lammps.dynamics import MotionState, Weakening
 from ..lammps.engine import Engine
 from ..scenes.scene import Scene
 from ..scenes.sections import Friction, Perturb
 from ..scenes.validation import SceneError, require_section
-from .ramp import reach
-from .run_iterator import run_of_scene
+from .ramp import reach, run_of_scene
 
 ACCURATE_SHARE = 0.05
 """Time step of undamped runs in units of the stability limit, 2/omega_max without dashpots: the fastest mode is then
@@ -179,24 +178,30 @@ def perturb(
     target = None if everyone == "top" else [int(disk) for disk in everyone]
     forces = *settings.cosine, target, weakening, settings.forcing(), settings.on or "layer"
 
+    part = max(SHORTEST_PART, -(-int(settings.time / dt) // MOST_PARTS))  # by the length of the run alone
+    ends = range(part, int(steps[-1]), part)
+
     def run() -> Iterator[Sample]:
         with Engine(packing, communicator) as engine, engine.undamped(dt, *forces) as dynamics:
-            last = 0
+            last, sampled = 0, set(steps.tolist())
             if resume is not None:
                 last = resume.step
                 dynamics.resume(last, resume.state)
-            ends = _ends_of_parts(int(settings.time / dt))
-            for step in steps[steps > last].tolist():
-                for end in ends[(ends > last) & (ends < step)].tolist():
-                    dynamics.advance(end - last)
-                    last = end
-                    _end_part(dynamics, end, keep)
+            for step in sorted(each for each in sampled | set(ends) if each > last):
                 motion, last = dynamics.advance(step - last), step
-                if watch is not None:
-                    watch(step * dt, motion)
-                yield _sample_run(step * dt, motion, packing)
-                if step in ends and step < steps[-1]:
-                    _end_part(dynamics, step, keep)
+                if step in sampled:
+                    if watch is not None:
+                        watch(step * dt, motion)
+                    moved = mean_square_displacement(
+                        motion.position, packing.position, packing.box_length, motion.position_low, packing.position_low
+                    )
+                    energy, layer = motion.kinetic_energy(packing), motion.velocity[packing.top, 0].mean()
+                    yield Sample(step * dt, float(moved), energy, float(layer), motion.friction)
+                if step in ends:
+                    state = dynamics.state()
+                    dynamics.resume(step, state)  # as a run does that is continued from here
+                    if keep is not None:
+                        keep(Checkpoint(step, state))
 
     return run()
 
@@ -223,29 +228,3 @@ def without_perturbation(scene: Scene) -> Scene:
 def weakening_of(friction: Friction, v0: float) -> Weakening:
     """The scene's mu(v) for a threshold v_0, length / time."""
     return Weakening(B=friction.B, w=friction.w, mu_ss=friction.mu_ss, v0=v0, v_ss=friction.velocity_scale(v0))
-
-
-def _sample_run(time: float, motion: MotionState, packing: Packing) -> Sample:
-    displaced = mean_square_displacement(
-        motion.position, packing.position, packing.box_length, motion.position_low, packing.position_low
-    )
-    return Sample(
-        time=time,
-        msd=float(displaced),
-        kinetic_energy=motion.kinetic_energy(packing),
-        layer_velocity=float(motion.velocity[packing.top, 0].mean()),
-        friction=motion.friction,
-    )
-
-
-def _ends_of_parts(total: int) -> Indices:
-    """The steps at which the parts of a run end; they depend on its length alone, and not on when it is sampled."""
-    part = max(SHORTEST_PART, -(-total // MOST_PARTS))
-    return np.arange(part, total, part)
-
-
-def _end_part(dynamics: Dynamics, step: int, keep: Callable[[Checkpoint], None] | None) -> None:
-    state = dynamics.state()
-    dynamics.resume(step, state)  # as a run does that is continued from here
-    if keep is not None:
-        keep(Checkpoint(step, state))

@@ -6,7 +6,7 @@ section that a command requires is reported before any work starts.
 
 A section such as [trigger] belongs to one study, which registers its model in its file, ``faultgouge/studies/NAME.py``;
 a scene with the section [NAME] imports this file. Numbers of a section that may have a unit say so in their annotation:
-``Annotated[Positive, TIME]`` (:mod:`~faultgouge.pywrap.scenes.quantities`).
+``Annotated[Positive, TIME]`` (:mod:`~faultgouge.pywrap.scenes.units`).
 """
 
 from collections.abc import Mapping

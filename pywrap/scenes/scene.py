@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -47,11 +47,9 @@ from pydantic_core import InitErrorDetails
 
 from ...analysis import MindlinLaw
 from .command_sections import check_study_section, command_of, errors_in, require_sections, study_model, study_models
-from .drive_section import Drive
-from .packing_section import GeneratedPacking, SettlingLoad, StoredPacking, kind_of_packing
-from .quantities import as_numbers
-from .sections import Damping, Friction, Inertia, Law, Load, Output, Perturb, Ramp, Relax
-from .units import Units, real_units
+from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
+from .sections import Damping, Drive, Friction, Inertia, Law, Load, Output, Perturb, Ramp, Relax, refuse_first
+from .units import Units, as_numbers, real_units
 from .validation import (
     KEYS_TO_ADD,
     SceneError,
@@ -59,7 +57,6 @@ from .validation import (
     digest_of,
     files_named,
     read_toml,
-    refusal_sentence,
     sections_in,
     sentence,
 )
@@ -167,62 +164,42 @@ class Scene(Section):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        self._check_perturb()
-        cannot = refuse_impossible(self)
-        if cannot is not None:
-            raise refusal_sentence(*cannot)
-        if self.friction and self.law.mus[0] == 0:
-            raise refusal_sentence("friction", "has no mu to weaken: leave it out or give law.mu a value above 0")
-        self._check_damping()
-        self._check_drive()
+        refuse_first(self._cases())
         real_units(self)
         return self
 
-    def _check_perturb(self) -> None:
-        """[perturb] starts on the ramp, and names disks of the packing."""
-        perturb, ramp = self.perturb, self.ramp
-        if perturb is None:
-            return
-        if ramp and perturb.fx is not None and perturb.fx > max(0.0, ramp.first):
-            says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.first}: ramp further"
-            raise refusal_sentence("perturb.fx", says)
-        if perturb.fx is None and ramp is None:
-            raise refusal_sentence(
-                "perturb.fx", "is missing: give it, or a section [ramp] in which the onset is sought"
-            )
-        if isinstance(perturb.target, tuple):
-            disks = self.packing.disks
-            beyond = [disk for disk in perturb.target if disk >= disks]
-            if beyond:
-                raise refusal_sentence("perturb.target", f"names disk {beyond[0]}: name disks from 0 to {disks - 1}")
-
-    def _check_damping(self) -> None:
-        """[damping] acts on something."""
-        if self.damping is None:
-            return
-        if self.ramp and self.ramp.method == "overdamped":
-            says = (
+    def _cases(self) -> Iterator[tuple[str, object, str]]:
+        """Keys that do not agree with others, for `refuse_first`."""
+        mu, ramp, perturb, drive, damping = self.law.mus[0], self.ramp, self.perturb, self.drive, self.damping
+        if perturb is not None:
+            missing = "is missing: give it, or a section [ramp] in which the onset is sought"
+            yield "perturb.fx", perturb.fx is None and ramp is None, missing
+            if ramp and perturb.fx is not None:
+                says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.first}: ramp further"
+                yield "perturb.fx", perturb.fx > max(0.0, ramp.first), says
+            if isinstance(perturb.target, tuple):
+                disks, last = self.packing.disks, max(perturb.target)
+                yield "perturb.target", last >= disks, f"names disk {last}: name disks from 0 to {disks - 1}"
+        if (cannot := refuse_impossible(self)) is not None:
+            yield cannot[0], True, cannot[1]
+        needless = "has no mu to weaken: leave it out or give law.mu a value above 0"
+        yield "friction", self.friction and mu == 0, needless
+        if damping is not None:
+            overdamped = (
                 "acts in dynamics ([perturb]) and no equilibrium depends on it, so that an overdamped ramp has no use "
+                'for it: set ramp.method = "newton", or leave [damping] out'
             )
-            raise refusal_sentence("damping", says + 'for it: set ramp.method = "newton", or leave [damping] out')
-        if self.damping.ct > 0 and self.law.mus[0] == 0:
-            says = f"= {self.damping.ct:g} has no friction to damp: leave it out or give law.mu a value above 0"
-            raise refusal_sentence("damping.ct", says)
-
-    def _check_drive(self) -> None:
-        """[drive] has friction, a signal within the run, and no drag on a layer that moves rigidly."""
-        if self.drive is None:
-            return
-        if self.law.mus[0] == 0:
-            raise refusal_sentence("drive", "needs friction, which holds the layer: give law.mu a value above 0")
-        if self.drive.at is not None:
-            end = self.drive.length(self.law.mus[0] * self.load.fy)
-            if self.drive.at >= end:
-                says = f"= {self.drive.at:g} is after the end of the run, {end:g}: let the signal begin before"
-                raise refusal_sentence("drive.at", says)
-        if self.drive.spring == "rigid" and self.damping and self.damping.tau is not None:
-            says = "would slow down a layer that is moved rigidly: leave it out, or give drive.spring a stiffness"
-            raise refusal_sentence("damping.tau", says)
+            yield "damping", ramp and ramp.method == "overdamped", overdamped
+            says = f"= {damping.ct:g} has no friction to damp: leave it out or give law.mu a value above 0"
+            yield "damping.ct", damping.ct > 0 and mu == 0, says
+        if drive is not None:
+            yield "drive", mu == 0, "needs friction, which holds the layer: give law.mu a value above 0"
+            if drive.at is not None:
+                end = drive.length(mu * self.load.fy)
+                says = f"= {drive.at:g} is after the end of the run, {end:g}: let the signal begin before"
+                yield "drive.at", drive.at >= end, says
+            slows = "would slow down a layer that is moved rigidly: leave it out, or give drive.spring a stiffness"
+            yield "damping.tau", drive.spring == "rigid" and damping and damping.tau is not None, slows
 
     @classmethod
     def from_toml(cls, path: str | Path, packing: Mapping[str, Any] | None = None, command: str | None = None) -> Scene:
@@ -332,15 +309,14 @@ def _check_keys(mapping: Mapping[str, Any]) -> None:
     errors: list[InitErrorDetails] = []
     sections = SECTIONS | _of_studies(mapping)
     for name, section in mapping.items():
-        keys = section if isinstance(section, Mapping) else {}
-        models = sections.get(name, ())
-        known = {key for model in models for key in model.model_fields}
-        if name not in Scene.model_fields and not models:
-            errors.append({"type": "extra_forbidden", "loc": (name,), "input": section})
-        elif models and keys is not section:
+        if not (models := sections.get(name, ())):
+            if name not in Scene.model_fields:
+                errors.append({"type": "extra_forbidden", "loc": (name,), "input": section})
+        elif not isinstance(section, Mapping):
             errors.append({"type": "dict_type", "loc": (name,), "input": section})
         else:
-            errors += [{"type": "extra_forbidden", "loc": (name, key), "input": section} for key in keys.keys() - known]
+            unknown = [key for key in section if not any(key in model.model_fields for model in models)]
+            errors += [{"type": "extra_forbidden", "loc": (name, key), "input": section} for key in unknown]
     if errors:
         raise ValidationError.from_exception_data("Scene", errors)
 
@@ -377,14 +353,15 @@ def refuse_endless(scene: Scene, task: Task) -> None:
     equilibria = 1.0 + (ramp.length / ramp.step if ramp is not None and task not in ("settle", "perturb") else 0.0)
     steps = 0.0
     if perturb is not None and task in ("perturb", "reproduce"):
-        steps = perturb.time / (perturb.time_step or _undamped_step(scene))
+        lightest = min(1.0, scene.inertia_factor) * (getattr(scene.packing, "mass", None) or 1.0)
+        usual = 0.1 * math.sqrt(lightest / (6 * _overlap_and_stiffness(scene)[1]))
+        steps = perturb.time / (perturb.time_step or usual)
     memory, written = disks * BYTES_IN_MEMORY, disks * BYTES_WRITTEN * equilibria
+    installed = float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
     if steps > STEPS_OF_A_YEAR:
         found = f"{steps:.2g} time steps, a year and more: lower perturb.time, or raise perturb.time_step"
-    elif memory > _installed_memory():
-        found = (
-            f"{memory / 1e9:.2g} GB of memory, and this machine has {_installed_memory() / 1e9:.2g}: take fewer disks"
-        )
+    elif memory > installed:
+        found = f"{memory / 1e9:.2g} GB of memory, and this machine has {installed / 1e9:.2g}: take fewer disks"
     elif task == "ramp" and written > LARGEST_FILE:
         found = f"a file of {written / 1e12:.2g} TB: take a larger ramp.step, or fewer disks"
     else:
@@ -397,18 +374,21 @@ def refuse_impossible(scene: Scene) -> tuple[str, str] | None:
     packing, law, fy = scene.packing, scene.law, scene.load.fy
     if not isinstance(packing, GeneratedPacking):
         return None
-    if packing.settle_at is not None:
-        cannot = refuse_impossible(_at_settling(scene, packing.settle_at))
-        if cannot is not None:
+    if (at := packing.settle_at) is not None:
+        settling = {
+            "law": law.model_copy(update={"kn": at.kn or law.kn}),
+            "load": scene.load.model_copy(update={"fy": at.fy or fy}),
+            "packing": packing.model_copy(update={"settle_at": None}),
+        }
+        if (cannot := refuse_impossible(scene.model_copy(update=settling))) is not None:
             return "packing.settle_at", f"does not settle, since {' '.join(cannot)}"
-    overlap = _law(scene).overlap_of_force(fy)
-    smallest = min(packing.radii)
+    (overlap, stiffness), smallest = _overlap_and_stiffness(scene), min(packing.radii)
     if not overlap < smallest:
         return "load.fy", (
             f"= {fy:g} presses two disks {overlap:.2g} into each other, deeper than the smallest radius {smallest:g}, "
             f"where the contact law does not hold: lower it, or raise law.kn = {law.kn:g}"
         )
-    rounding = DOUBLE_ROUNDING * packing.width * _stiffness(scene, fy) / fy
+    rounding = DOUBLE_ROUNDING * packing.width * stiffness / fy
     if not rounding < ROUNDING_LIMIT:
         return "law.kn", (
             f"= {law.kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is {rounding:.1g} of F_y, "
@@ -417,29 +397,8 @@ def refuse_impossible(scene: Scene) -> tuple[str, str] | None:
     return None
 
 
-def _at_settling(scene: Scene, at: SettlingLoad) -> Scene:
-    """The scene with the load and the stiffness under which its packing settles."""
-    law = scene.law.model_copy(update={"kn": at.kn or scene.law.kn})
-    load = scene.load.model_copy(update={"fy": at.fy or scene.load.fy})
-    packing = scene.packing.model_copy(update={"settle_at": None})
-    return scene.model_copy(update={"law": law, "load": load, "packing": packing, "ramp": None})
-
-
-def _stiffness(scene: Scene, force: float) -> float:
-    law = _law(scene)
-    return float(law.normal_stiffness(law.overlap_of_force(force)))
-
-
-def _law(scene: Scene) -> MindlinLaw:
-    """The repulsion alone."""
-    return MindlinLaw(scene.law.kn, kt=0.0, mu=0.0, exponent=scene.law.exponent)
-
-
-def _undamped_step(scene: Scene) -> float:
-    packing = scene.packing
-    lightest = min(1.0, scene.inertia_factor) * ((isinstance(packing, GeneratedPacking) and packing.mass) or 1.0)
-    return 0.1 * math.sqrt(lightest / (6 * _stiffness(scene, scene.load.fy)))
-
-
-def _installed_memory() -> float:
-    return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
+def _overlap_and_stiffness(scene: Scene) -> tuple[float, float]:
+    """Overlap and normal stiffness of a contact that carries F_y."""
+    law = MindlinLaw(scene.law.kn, kt=0.0, mu=0.0, exponent=scene.law.exponent)  # the repulsion alone
+    overlap = law.overlap_of_force(scene.load.fy)
+    return float(overlap), float(law.normal_stiffness(overlap))

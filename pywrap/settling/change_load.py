@@ -92,7 +92,10 @@ def _rest(packing: Packing, communicator: MPI.Comm | None) -> Packing:
         except NoEquilibriumError:
             found = None
         if packing.law.frictional:
-            return found or _relax(engine, packing)
+            if found is None:  # overdamped dynamics until forces are down at rounding
+                engine.restore(packing)
+                engine.relax(finest_tolerance(packing))
+            return found or engine.packing
     if found is not None and is_minimum(found):
         return found
     found, reached = minimize_energy(packing)
@@ -100,10 +103,3 @@ def _rest(packing: Packing, communicator: MPI.Comm | None) -> Packing:
         return found
     with Engine(packing, communicator) as engine:
         return settle_loose(engine, packing, bed=False)
-
-
-def _relax(engine: Engine, packing: Packing) -> Packing:
-    """Overdamped dynamics from a packing until forces are down at rounding."""
-    engine.restore(packing)
-    engine.relax(finest_tolerance(packing))
-    return engine.packing

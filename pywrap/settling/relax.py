@@ -54,7 +54,18 @@ def bring_to_rest(packing: Packing, watch: Watch | None = None) -> tuple[Equilib
             "ever: leave --fx out, and raise F_x by `faultgouge ramp`."
         )
     with show_progress(watch):
-        resting = _with_friction(packing) if slipped else _without(packing)
+        if slipped:
+            with Engine(packing) as engine:
+                engine.relax(finest_tolerance(packing))
+                resting = engine.packing
+        else:
+            # where disks rest does not depend on their masses, and the time step of dynamics is that of masses of one
+            law = replace(packing.law, mu=0.0, ct=0.0)
+            smooth = replace(packing, law=law, mass=np.ones(len(packing)))
+            with Engine(smooth) as engine:
+                resting = settle_loose(engine, smooth, bed=False)
+            resting = clear_rattlers(resting, idle_disks(resting))
+            resting = replace(resting, law=packing.law, angle=packing.angle, mass=packing.mass)
     idle = len(idle_disks(resting))
     if idle > 0.5 * len(resting):
         raise NoEquilibriumError(
@@ -78,18 +89,3 @@ def _what_moved(before: Packing, found: Equilibrium) -> str:
         f"{moved.max():.3g}, all by {np.sqrt(np.mean(moved**2)):.3g} (rms); "
         f"{counted(len(new - old), 'contact')} closed and {len(old - new)} opened"
     )
-
-
-def _without(packing: Packing) -> Packing:
-    # where disks rest does not depend on their masses, and the time step of dynamics is that of masses of one
-    law, ones = replace(packing.law, mu=0.0, ct=0.0), np.ones(len(packing))
-    smooth = replace(packing, law=law, mass=ones)
-    with Engine(smooth) as engine:
-        found = settle_loose(engine, smooth, bed=False)
-    return replace(clear_rattlers(found, idle_disks(found)), law=packing.law, angle=packing.angle, mass=packing.mass)
-
-
-def _with_friction(packing: Packing) -> Packing:
-    with Engine(packing) as engine:
-        engine.relax(finest_tolerance(packing))
-        return engine.packing

@@ -14,15 +14,14 @@ import numpy as np
 from mpi4py import MPI
 
 from ...analysis import MindlinLaw, NoEquilibriumError, Packing
-from ...analysis.arrays import Floats
 from ...analysis.files.formats import packing_of
 from ...analysis.progress import Watch, report_progress, show_progress
 from ..equilibria.quasistatic import Equilibrium, equilibrate, idle_disks
 from ..equilibria.rattlers import clear_rattlers
 from ..lammps.engine import Engine
 from ..scenes.packing_section import GeneratedPacking
-from ..scenes.quantities import DIGITS
 from ..scenes.scene import Scene, scene_of
+from ..scenes.units import DIGITS
 from ..scenes.validation import SceneError
 from .change_load import change_load
 from .minimize_energy import settle_loose
@@ -101,23 +100,20 @@ def settle(
         try:
             return equilibrate(engine, Equilibrium.of(packing), packing.fx)
         except NoEquilibriumError as error:
-            raise NoEquilibriumError(
-                f"the packing does not come to rest (a disk feels {packing.residual:.2g}): {_cure(scene, packing)}"
-            ) from error
-
-
-def _cure(scene: Scene, packing: Packing) -> str:
-    """Advice for a packing that has no equilibrium nearby."""
-    if 0 < packing.law.mu < LEAST_BEARING_FRICTION:
-        return f"friction of mu = {packing.law.mu:g} holds next to nothing; take a larger law.mu, or 0 for no friction"
-    if isinstance(scene.packing, GeneratedPacking):
-        return (
-            "put more disks into the upper layer (leave packing.top out for as many as it takes), or try another seed"
-        )
-    return (
-        f"no equilibrium lies near where {scene.packing.file} has its disks: check law and load against those it was "
-        "settled with, or bring it to rest by `faultgouge import --relax`"
-    )
+            if 0 < (friction := packing.law.mu) < LEAST_BEARING_FRICTION:
+                cure = (
+                    f"friction of mu = {friction:g} holds next to nothing; take a larger law.mu, or 0 for no friction"
+                )
+            elif isinstance(scene.packing, GeneratedPacking):
+                more = "put more disks into the upper layer (leave packing.top out for as many as it takes)"
+                cure = f"{more}, or try another seed"
+            else:
+                cure = (
+                    f"no equilibrium lies near where {scene.packing.file} has its disks: check law and load against "
+                    "those it was settled with, or bring it to rest by `faultgouge import --relax`"
+                )
+            says = f"the packing does not come to rest (a disk feels {packing.residual:.2g}): {cure}"
+            raise NoEquilibriumError(says) from error
 
 
 def settle_bed(
@@ -129,9 +125,58 @@ def settle_bed(
 
     Scenes that settle without friction, and differ only in friction and in what follows, share it.
     """
-    law = law_of(scene, scene.law.mus[0] if mu is None else mu)
-    generated = isinstance(scene.packing, GeneratedPacking)
-    return _settle_starts(scene, law, communicator) if generated else _take_stored(scene, law)
+    law, section = law_of(scene, scene.law.mus[0] if mu is None else mu), scene.packing
+    if not isinstance(section, GeneratedPacking):
+        packing = _in_arithmetic(section.packing(law, **load_of(scene)), scene.precision)
+        if packing.residual > LARGEST_IMBALANCE * scene.load.fy:
+            raise SceneError(
+                f"{section.file}: the packing is not in balance, a disk feels {packing.residual:.3g} under "
+                f"fy = {scene.load.fy:g}: check law and load against those it was settled with, or bring it to rest by "
+                "`faultgouge import --relax`"
+            )
+        return packing
+    own, settling_law, fy = settling_units(scene, law)
+    for draw in range(STARTS):  # the first of the seed's loose starts whose upper layer stays on top
+        if draw:
+            report_progress(f"the upper layer sank through the bed: loose start {draw + 1} of {STARTS}")
+        start = own.start(draw)
+        assert start.top is not None
+        smooth = settling_law if own.settle_friction else replace(settling_law, mu=0.0)
+        loose = packing_of(start, smooth, start.top, **load_of(scene) | {"fy": fy})
+        with Engine(loose, communicator) as engine:
+            packing = settle_loose(engine, loose)
+        idle = idle_disks(packing)
+        if len(idle) <= 0.5 * len(packing):
+            break
+    else:
+        raise NoEquilibriumError(
+            f"the upper layer sank through the bed from each of {STARTS} loose starts, and {len(idle)} of "
+            f"{len(packing)} disks carry nothing: without friction only a layer that closes the box stays on top, so "
+            "put more disks into it (leave packing.top out for as many as it takes)"
+        )
+    if not own.settle_friction:
+        packing = replace(clear_rattlers(packing, idle), angle=np.zeros(len(packing)))
+    wanted = own_units(section, law, scene.load.fy)[2]
+    if own.settle_at is not None and wanted != packing.fy:
+        packing = change_load(packing, wanted, communicator)
+        if not packing.law.frictional:
+            # those that touch nothing stay where they were put at the load of settling
+            touching = [*packing.contacts.i, *packing.contacts.j]
+            packing = clear_rattlers(packing, np.intersect1d(idle_disks(packing), touching))
+    # from the units of the packing to those of the scene
+    length, radius, contacts = 2 * min(section.radii), section.start(draw).radius, packing.contacts
+    found = replace(
+        packing,
+        position=length * packing.position,
+        radius=radius,
+        contacts=contacts.slipped(length * contacts.slip),
+        law=law,
+        # where disks rest does not depend on their masses
+        mass=section.mass_of(radius),
+        box_length=None if packing.box_length is None else section.width,
+        fy=scene.load.fy,
+    )
+    return found.loaded(0.0)  # a contact that carries next to nothing may open by rounding
 
 
 def shared_bed(scene: Scene) -> Packing | None:
@@ -152,44 +197,6 @@ def load_of(scene: Scene) -> dict[str, Any]:
     """Load and other properties of the packings of a scene, besides disks and law."""
     drag_time = scene.damping.tau if scene.damping else None
     return {"fy": scene.load.fy, "inertia_factor": scene.inertia_factor, "drag_time": drag_time}
-
-
-def _settle_starts(scene: Scene, law: MindlinLaw, communicator: MPI.Comm | None) -> Packing:
-    """The first of the seed's loose starts whose upper layer stays on top, settled in `own_units`."""
-    assert isinstance(scene.packing, GeneratedPacking)
-    section, own, fy = settling_units(scene, law)
-    settling_law = own if section.settle_friction else replace(own, mu=0.0)
-    for draw in range(STARTS):
-        if draw:
-            report_progress(f"the upper layer sank through the bed: loose start {draw + 1} of {STARTS}")
-        start = section.start(draw)
-        assert start.top is not None
-        loose = packing_of(start, settling_law, start.top, **load_of(scene) | {"fy": fy})
-        with Engine(loose, communicator) as engine:
-            packing = settle_loose(engine, loose)
-        idle = len(idle_disks(packing))
-        if idle <= 0.5 * len(packing):
-            break
-    else:
-        raise NoEquilibriumError(
-            f"the upper layer sank through the bed from each of {STARTS} loose starts, and {idle} of {len(packing)} "
-            "disks carry nothing: without friction only a layer that closes the box stays on top, so put more disks "
-            "into it (leave packing.top out for as many as it takes)"
-        )
-    if not section.settle_friction:
-        packing = replace(clear_rattlers(packing, idle_disks(packing)), angle=np.zeros(len(packing)))
-    if section.settle_at is not None:
-        packing = _carry(packing, own_units(scene.packing, law, scene.load.fy)[2], communicator)
-    return _in_scene(packing, scene, law, scene.packing.start(draw).radius)
-
-
-def _carry(packing: Packing, fy: float, communicator: MPI.Comm | None) -> Packing:
-    """A packing that has settled, under another load."""
-    carried = change_load(packing, fy, communicator)
-    if fy == packing.fy or packing.law.frictional:
-        return carried
-    # those that touch nothing stay where they were put at the load of settling
-    return clear_rattlers(carried, np.intersect1d(idle_disks(carried), [*carried.contacts.i, *carried.contacts.j]))
 
 
 def settling_units(scene: Scene, law: MindlinLaw) -> tuple[GeneratedPacking, MindlinLaw, float]:
@@ -242,39 +249,8 @@ def _round_numbers(number: float) -> float:
     return float(f"{number:.{DIGITS}g}")
 
 
-def _in_scene(packing: Packing, scene: Scene, law: MindlinLaw, radius: Floats) -> Packing:
-    """A packing in `own_units`, converted to the units of the scene, with the scene's law, load and radii."""
-    assert isinstance(scene.packing, GeneratedPacking)
-    length = 2 * min(scene.packing.radii)
-    contacts = packing.contacts
-    found = replace(
-        packing,
-        position=length * packing.position,
-        radius=radius,
-        contacts=contacts.slipped(length * contacts.slip),
-        law=law,
-        # where disks rest does not depend on their masses
-        mass=scene.packing.mass_of(radius),
-        box_length=None if packing.box_length is None else scene.packing.width,
-        fy=scene.load.fy,
-    )
-    return found.loaded(0.0)  # a contact that carries next to nothing may open by rounding
-
-
 def _in_arithmetic(packing: Packing, precision: str) -> Packing:
     """The packing with low parts of its coordinates, or without."""
     if precision == "double":
         return replace(packing, position_low=None)
     return packing if packing.compensated else replace(packing, position_low=np.zeros_like(packing.position))
-
-
-def _take_stored(scene: Scene, law: MindlinLaw) -> Packing:
-    assert not isinstance(scene.packing, GeneratedPacking)
-    packing = _in_arithmetic(scene.packing.packing(law, **load_of(scene)), scene.precision)
-    if packing.residual > LARGEST_IMBALANCE * scene.load.fy:
-        raise SceneError(
-            f"{scene.packing.file}: the packing is not in balance, a disk feels {packing.residual:.3g} under "
-            f"fy = {scene.load.fy:g}: check law and load against those it was settled with, or bring it to rest by "
-            "`faultgouge import --relax`"
-        )
-    return packing

@@ -12,13 +12,10 @@ from typing import TYPE_CHECKING, Any
 from .analysis.names_on_use import names_on_use
 
 if TYPE_CHECKING:  # each is imported when it is used
-    from .browser_view import view
-    from .drawing import draw
-    from .merging_pair import pair
+    from .door import draw, elastic_moduli, frames, load, pair, spectrum, stability, stress, vibrations, view
     from .pywrap import Scene, from_lammps, perturb, ramp, relax, settle
     from .pywrap.onset import onset
     from .pywrap.runs.drive import drive
-    from .stored_files import elastic_moduli, frames, load, spectrum, stability, stress, vibrations
     from .studies.sweep.run_sweep import sweep
 
     __version__: str

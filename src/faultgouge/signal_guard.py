@@ -12,7 +12,8 @@ CPU time (SIGXCPU) ends the child, the guard prints a sentence as well; also if 
 at its command `quit`, with whatever code.
 
 Under mpiexec every rank has its guard. mpiexec passes a signal to all ranks, and kills the other ranks when the work of
-one rank has ended. The guards therefore end `SECONDS_TO_END`, and the work after them. Only rank 0 prints.
+one rank has ended. The guards therefore end `SECONDS_TO_END`, and the work after them. Only rank 0 prints. Commands
+that need no MPI (``spectrum``, ``--help``) do not import mpi4py: the launchers tell the rank through the environment.
 """
 
 from __future__ import annotations
@@ -28,10 +29,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from . import parent_death
-from .mpi_rank import is_root, size
 
 GRACE = 0.8
 """Seconds that the work has after a signal to close files and to end other processes."""
@@ -55,6 +55,40 @@ _lock = mmap.mmap(-1, 4096)
 CLOSED, ENDED = 4094, 4095
 """The bytes of the shared memory that are not zero once the work has closed its files after a signal, and once it has
 come to its end and has said what there is to say."""
+
+
+RANKS = ("PMI_RANK", "PMIX_RANK", "OMPI_COMM_WORLD_RANK", "SLURM_PROCID")
+"""Where MPICH, PMIx, OpenMPI and Slurm tell a process its rank."""
+
+RANK_VARIABLES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "SLURM_STEP_NUM_TASKS")
+"""Where launchers tell the number of ranks; SLURM_NTASKS would be that of a whole allocation."""
+
+
+def rank() -> int:
+    """Rank of this process in MPI's world; 0 without MPI."""
+    world = _world()
+    return _first(RANKS, 0) if world is None else int(world.rank)
+
+
+def size() -> int:
+    """Number of ranks in MPI's world; 1 without MPI."""
+    world = _world()
+    return _first(RANK_VARIABLES, 1) if world is None else int(world.size)
+
+
+def is_root() -> bool:
+    """Whether this process is the one that speaks and writes."""
+    return rank() == 0
+
+
+def _world() -> Any:
+    """MPI's world communicator where a module has imported MPI, and MPI has not ended; None otherwise."""
+    mpi = sys.modules.get("mpi4py.MPI")
+    return None if mpi is None or mpi.Is_finalized() else mpi.COMM_WORLD
+
+
+def _first(names: tuple[str, ...], otherwise: int) -> int:
+    return next((int(os.environ[name]) for name in names if os.environ.get(name, "").isdecimal()), otherwise)
 
 
 class Interrupted(BaseException):

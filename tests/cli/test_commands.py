@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 import pytest
 from reference_layer import LAYER, SMALL, toml
+from table_rows import rows_of
 
 from faultgouge.analysis import (
     RunFile,
@@ -154,21 +155,6 @@ def test_dumps_that_are_asked_for_hold_the_equilibria(faultgouge_here, beyond):
     assert printed["residual"] < 1.2e-10
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (("spectrum", "scene.toml"), "run `faultgouge ramp scene.toml -o run.h5`, and give run.h5"),
-        (("draw", "scene.toml"), "scene.toml is a scene, and this command reads a stored packing"),
-        (("view", "scene.toml"), "scene.toml is a scene, and this command reads a stored packing"),
-        (("onset", "run.h5"), "run.h5 is a stored run, and onset reads a scene: give its .toml file"),
-        (("onset", "disks.csv"), "convert it by `faultgouge import disks.csv -o packing.h5`"),
-        (("stability", "scene.toml"), "scene.toml is a scene, and this command reads a stored packing"),
-    ],
-)
-def test_a_file_of_the_wrong_kind_is_refused_with_what_to_do(refusal, words, says):
-    assert says in refusal(*words)
-
-
 def test_a_packing_of_another_code_is_converted_before_a_command_reads_it(refusal, tmp_path):
     (tmp_path / "disks.csv").write_text("x,y,radius\n1.25,0.5,0.5\n2.24,0.5,0.5\n")
     assert f"by `faultgouge import {tmp_path / 'disks.csv'} -o packing.h5`" in refusal(
@@ -178,7 +164,7 @@ def test_a_packing_of_another_code_is_converted_before_a_command_reads_it(refusa
 
 @pytest.mark.slow
 def test_a_lack_of_memory_is_no_fault_of_the_program(capsys):
-    from faultgouge.exit_status import fail
+    from faultgouge.cli import fail
 
     with pytest.raises(MemoryError) as lack:
         np.empty(1 << 55)
@@ -205,7 +191,7 @@ def test_the_overview_has_the_whole_first_sentence_of_each_command(faultgouge_he
     _, table = faultgouge_here("--help").stdout.split("Commands:")
     text = " ".join(table.split())
     assert "ramp Raise F_x from equilibrium to equilibrium, and store each equilibrium. perturb Run" in text
-    assert "merge Join the shards of a sweep; the table is that of an undivided sweep. examples" in text
+    assert "merge Join the shards of a sweep; the table is that of an undivided sweep. eruptions" in text
     commands = program().commands
     hidden = {name for name in commands if commands[name].hidden}
     assert hidden == set()
@@ -249,32 +235,7 @@ def test_a_scene_that_cannot_be_run(refusal, tmp_path, command, change, code, sa
 
 @pytest.mark.parametrize(
     ("command", "code", "says"),
-    [
-        ("init", 2, "scene.toml exists"),
-        ("ramp scene.toml -o ramp.h5", 2, "holds a run of another scene (load.fy is 3.0 there and 3.00001 here)"),
-        ("rampp scene.toml", 2, "rampp"),
-        ("spectrum no.h5", 2, "no.h5 does not exist"),
-        ("spectrum scene.toml", 2, "scene.toml is a scene, and this command reads a stored packing"),
-        ("spectrum no.disks", 2, "no.disks cannot be read"),
-        ("spectrum ramp.h5 --values --gain", 2, "--values computes nothing but eigenvalues"),
-        ("onset scene.toml --modes 600", 2, "as in --modes 0:600"),
-        ("onset scene.toml --modes 900:910", 2, "are no part of"),
-        ("draw ramp.h5 -o p.bmp", 2, "a .png, a .svg or a .pdf"),
-        ("draw ramp.h5 --mode all", 2, "--mode all: give pair, or the number of a mode, from 0"),
-        ("draw ramp.h5 --mode 9999", 2, "modes, counted from 0"),
-        ("draw ramp.h5 --mode pair --frame 0", 2, "no two of them are about to meet"),
-        ("movie ramp.h5 -o film.avi", 2, "a .gif or an .mp4"),
-        ("movie perturb.h5 --span 5 6", 2, "its times go from 0 to"),
-        ("export ramp.h5 -o packing.pdb", 2, "exports are .vtp, .xyz, .gsd, .data, .csv"),
-        ("export ramp.h5 -o packing.data --mode pair", 2, "has no room for modes"),
-        ("export ramp.h5 --frame 9", 2, "there is no frame 9"),
-        ("export ramp.h5 -o nowhere/packing.vtp", 1, "cannot be written"),
-        ("export ramp.h5 -o film.pvd", 2, "add --frames all"),
-        ("export ramp.h5 -o film.vtp --frames all", 2, "several frames go into .xyz, .gsd, .pvd"),
-        ("export ramp.h5 -o film.xyz --frames 3", 2, "give all, START:STOP or START:STOP:STEP"),
-        ("export ramp.h5 -o film.xyz --frames 5:9", 2, "has 5 frames, and none of them is meant"),
-        ("export ramp.h5 -o film.xyz --frames all --mode pair", 2, "without --frame and --mode"),
-    ],
+    rows_of("cli/refused_commands.txt"),
 )
 @pytest.mark.slow
 def test_a_command_that_cannot_be_run(refusal, tmp_path, beyond, command, code, says):

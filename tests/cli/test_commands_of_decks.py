@@ -11,11 +11,6 @@ from reference_layer import BIN
 from faultgouge.analysis.files.configuration_file import read_configuration
 
 
-def test_deck_that_clears_all(faultgouge_here, tmp_path):
-    (tmp_path / "cleared.in").write_text(DECK.format(**FLAT, word="contacts") + "clear\n")
-    assert "no pair_style after `clear`, which takes all away" in faultgouge_here("import", "cleared.in", code=1).stderr
-
-
 def test_deck_that_moves_its_own_file(faultgouge_here, tmp_path):
     deck = DECK.format(**FLAT, word="contacts") + "shell mv pile.in done.in\n"
     (tmp_path / "pile.in").write_text(deck)
@@ -53,15 +48,6 @@ def test_decks_that_end_early_on_two_ranks(faultgouge, tmp_path, monkeypatch, wa
     left = {each.name for each in tmp_path.iterdir()} - {"pile.in", "temporary", "log.lammps"}
     assert left == ({"pile.h5"} if quits else {"pile.restart", "pile.restart.in"})
     assert not any(temporary.iterdir())
-
-
-@pytest.mark.parametrize("begins", ["echo none\n", "echo log\n"])
-def test_deck_that_hides_its_commands(faultgouge_here, tmp_path, begins):
-    """A user of the command has no script in Python to which he could give commands."""
-    (tmp_path / "mute.in").write_text(begins + DECK.format(**FLAT, word="contacts").replace("6000", "10"))
-    said = faultgouge_here("import", "mute.in", code=1).stderr
-    assert "The deck has no pair_style: leave `echo none` and `echo log` out of the deck" in said
-    assert "from_lammps" not in said
 
 
 @pytest.mark.parametrize(

@@ -82,16 +82,6 @@ def _check_film_of_spheres(faultgouge_here, tmp_path, configuration):
     assert ElementTree.parse(tmp_path / files[-1]).find(".//Piece").get("NumberOfVerts") == "3"
 
 
-def test_refused_options_and_decks(faultgouge_here, tmp_path):
-    (tmp_path / "pile.in").write_text(DECK.format(**ROUND, word="contacts"))
-    assert "leave all options" in faultgouge_here("import", "pile.in", "--kn", "3", code=2).stderr
-    assert "greater than or equal to 0" in faultgouge_here("import", "pile.in", "--balance", "nan", code=2).stderr
-    assert "--balance are for a LAMMPS deck" in faultgouge_here("import", "a.csv", "--balance", "1", code=2).stderr
-    (tmp_path / "in.wrong").write_text("units nothing\npair_style granular\n")
-    assert "LAMMPS stopped: " in faultgouge_here("import", "in.wrong", code=1).stderr
-    assert not (tmp_path / "packing.h5").exists()
-
-
 SIDE = "fix side all wall/gran hertz/history ${{kn}} NULL 10 NULL 0.9 1 xplane -0.94 NULL {word}\nfix move"
 
 
@@ -313,17 +303,6 @@ def test_bare_files_of_lammps(faultgouge_here, tmp_path):
         assert "3 spheres, " in faultgouge_here("import", "around.in", "--balance", "1e9", "-o", f"{file}.h5").stdout
 
 
-def test_decks_of_liggghts(faultgouge_here, tmp_path):
-    for lines in (
-        "atom_style granular\n",
-        "units si\nhard_particles yes\n",
-        "units si\natom_style sphere\nregion b block 0 1 0 1 0 1\ncreate_box 1 b\n"
-        "fix m1 all property/global youngsModulus peratomtype 5.e6\n",
-    ):
-        (tmp_path / "lig.in").write_text(lines)
-        assert "this is a deck of LIGGGHTS, whose" in faultgouge_here("import", "lig.in", code=1).stderr
-
-
 def test_packing_in_which_nothing_touches(faultgouge_here, tmp_path):
     far = DECK.format(**FLAT, word="contacts").replace("0.5 0 units", "0.7 0 units").replace("-0.45", "-0.8")
     far = far.replace("single 0.45", "single 0.8").replace("1.3", "2.5").replace("run 6000", "run 0")
@@ -348,25 +327,41 @@ def two_on_three():
     return "\n".join(lines) + "\n"
 
 
-def test_restart_after_the_last_run(faultgouge_here, tmp_path):
-    """LAMMPS forgets histories there, since the compute has asked for another list of neighbours."""
-    deck = two_on_three()
-    compute = "compute pairs all pair/local force\n"
-    (tmp_path / "fine.in").write_text(f"{deck}{compute}")
-    faultgouge_here("import", "fine.in", "-o", "fine.h5")
-    (tmp_path / "lost.in").write_text(f"{deck}{compute}write_restart pile.restart\n")
-    says = faultgouge_here("import", "lost.in", "-o", "lost.h5", code=1).stderr
-    assert "'write_restart pile.restart' stands after the last run" in says
-    assert "by `restart N FILE` before it" in says
+PILE, ROW = DECK.format(**FLAT, word="contacts"), two_on_three()
+DUMPED = ROW.replace("run 20000", "dump all all custom 20000 d id x y z\ndump_modify all sort id\nrun 20000")
+LIGGGHTS = "units si\natom_style sphere\nregion b block 0 1 0 1 0 1\ncreate_box 1 b\n"
+AFTER = "compute pairs all pair/local force\nwrite_restart pile.restart\n"
+REFUSED = [
+    ("pile.in --kn 3", PILE, 2, "leave all options"),
+    ("pile.in --balance nan", PILE, 2, "greater than or equal to 0"),
+    ("a.csv --balance 1", "", 2, "--balance are for a LAMMPS deck"),
+    ("in.wrong", "units nothing\npair_style granular\n", 1, "LAMMPS stopped: "),
+    ("pile.lammps", PILE, 2, "LAMMPS decks (.in, in.NAME)"),
+    ("lig.in", "atom_style granular\n", 1, "this is a deck of LIGGGHTS, whose"),
+    ("lig.in", "units si\nhard_particles yes\n", 1, "this is a deck of LIGGGHTS, whose"),
+    ("lig.in", f"{LIGGGHTS}fix m1 all property/global youngsModulus peratomtype 5.e6\n", 1, "of LIGGGHTS, whose"),
+    ("cleared.in", f"{PILE}clear\n", 1, "no pair_style after `clear`, which takes all away"),
+    (
+        "mute.in",
+        f"echo none\n{PILE}",
+        1,
+        "no pair_style: leave `echo none` and `echo log` out",
+    ),
+    ("mute.in", f"echo log\n{PILE}", 1, "no pair_style: leave `echo none` and `echo log` out"),
+    # LAMMPS forgets histories there, since the compute has asked for another list of neighbours
+    ("lost.in", f"{ROW}{AFTER}", 1, "'write_restart pile.restart' stands after the last run"),
+    ("again.in", f"{DUMPED}undump all\nrerun d dump x y\n", 1, "'rerun d dump x y' puts the positions of a dump"),
+]
 
 
-def test_rerun_after_the_last_run(faultgouge_here, tmp_path):
-    """The positions of a dump come without histories."""
-    dumps = "dump all all custom 20000 pile.dump id x y z\ndump_modify all sort id\nrun 20000"
-    deck = two_on_three().replace("run 20000", dumps)
-    (tmp_path / "again.in").write_text(f"{deck}undump all\nrerun pile.dump dump x y\n")
-    says = faultgouge_here("import", "again.in", code=1).stderr
-    assert "'rerun pile.dump dump x y' puts the positions of a dump, which has no tangential histories" in says
+@pytest.mark.parametrize(("words", "deck", "code", "says"), REFUSED)
+def test_what_is_refused_is_said_with_its_cause(faultgouge_here, tmp_path, words, deck, code, says):
+    file, *more = words.split()
+    (tmp_path / file).write_text(deck)
+    said = faultgouge_here("import", file, *more, code=code).stderr
+    assert says in said
+    assert "from_lammps" not in said  # a user of the command has no script in Python
+    assert not (tmp_path / "packing.h5").exists()
 
 
 @pytest.mark.parametrize("command", ["delete_atoms group upper", "reset_atoms id"])
@@ -380,11 +375,6 @@ def test_ids_that_change_after_the_last_run(faultgouge_here, tmp_path, command):
     (tmp_path / "other.in").write_text(f"{deck}{command}\n")
     says = faultgouge_here("import", "other.in", "-o", "other.h5", code=1).stderr
     assert f"'{command}' after the last run gives particles other IDs" in says
-
-
-def test_deck_of_another_name(faultgouge_here, tmp_path):
-    (tmp_path / "pile.lammps").write_text(DECK.format(**FLAT, word="contacts"))
-    assert "LAMMPS decks (.in, in.NAME)" in faultgouge_here("import", "pile.lammps", code=2).stderr
 
 
 def test_contacts_at_the_bound_stick_or_slide(faultgouge_here, tmp_path):

@@ -82,7 +82,7 @@ def test_drive_is_a_table_of_slips_pictures_a_film_and_spectra(faultgouge_here, 
     assert "eigenvalues" in faultgouge_here("spectrum", "drive.h5", "--frame", slip["frame_before"]).stdout
     backwards = faultgouge_here("movie", "drive.h5", "--span", "9", "1", "-o", "film.gif", code=2).stderr
     assert f"has 0 of its {len(times)} states between t = 9 and 1" in backwards
-    assert "is the table of the slips" in faultgouge_here("drive", "scene.toml", "-o", "drive.csv", code=1).stderr
+    assert "is the table of the slips" in faultgouge_here("drive", "scene.toml", "-o", "slips.csv", code=1).stderr
 
 
 @pytest.mark.slow

@@ -48,8 +48,8 @@ def test_spectrum_of_a_run_file_is_that_of_the_packing_and_says_how_far_it_moves
 @pytest.mark.slow
 def test_spectrum_of_a_large_packing(faultgouge_here, beyond, monkeypatch):
     pairs = json.loads(faultgouge_here("spectrum", beyond / "ramp.h5", "--json").stdout)["pair_count"]
-    monkeypatch.setattr("faultgouge.commands.spectrum.MOST_PAIRS", pairs - 1)
-    monkeypatch.setattr("faultgouge.commands.spectrum.VERDICT_FIRST", 0)
+    monkeypatch.setattr("faultgouge.commands.packings.MOST_PAIRS", pairs - 1)
+    monkeypatch.setattr("faultgouge.commands.packings.VERDICT_FIRST", 0)
     assert "coordinates: LAPACK needs" in faultgouge_here("spectrum", beyond / "ramp.h5", "--values").stderr
     said = faultgouge_here("spectrum", beyond / "ramp.h5").stdout
     assert said.count("D grows as") == pairs - 1
@@ -79,7 +79,7 @@ def test_one_rank_alone_prints_the_spectrum(faultgouge_here, tmp_path, reference
     with RunFile.create(tmp_path / "run.h5", reference_packing(1.0)) as file:
         file.append(reference_packing(1.0))
         file.complete = True
-    monkeypatch.setattr("faultgouge.mpi_rank.rank", lambda: 1)
+    monkeypatch.setattr("faultgouge.signal_guard.rank", lambda: 1)
     for more in ((), ("--json",), ("--values",)):
         assert faultgouge_here("spectrum", "run.h5", *more).stdout == ""
 

@@ -55,19 +55,6 @@ def test_a_deck_is_run_and_judged(faultgouge_here, tmp_path):
     assert json.loads(faultgouge_here("stability", "pile.in", "--json").stdout)["stable"] is True
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (("none.h5",), "none.h5 does not exist"),
-        (("none.in",), "none.in does not exist"),
-        (("run.h5", "--rise", "fy"), "--rise fy: the load rises along fx"),
-        (("run.h5", "--time", "-1"), "--time -1: the time that motion is followed is a positive number"),
-    ],
-)
-def test_what_is_no_file_direction_or_time_is_refused(refusal, stored, words, says):
-    assert says in refusal("stability", *words)
-
-
 @pytest.mark.long
 def test_without_a_file_it_is_the_old_name_of_extremes(faultgouge_here, tmp_path):
     done = faultgouge_here("stability", "-o", "cases", "--quick")

@@ -7,7 +7,8 @@ from functools import partial
 import h5py
 import numpy as np
 import pytest
-from reference_layer import REFERENCE
+from reference_layer import REFERENCE, toml
+from table_rows import rows_of
 
 from faultgouge.analysis import RunFile, read_dump
 from faultgouge.pywrap import EngineError, Equilibrium, Scene, SceneError, drive
@@ -202,44 +203,9 @@ def test_rigid_layer_has_force_and_no_slips(scene, tmp_path):
 
 PULSE = {"signal": "pulse", "omega": 1.0}
 DRAWN = {"spring": 10.0, "velocity": 1e-3, "until": 1.0}
-REFUSED_SCENES = [
-    ({"drive": {"spring": 10.0}}, "drive.velocity or drive.protocol says how"),
-    ({"drive": {"spring": 10.0, "velocity": 1e-3, "protocol": [[1, 1]]}}, "give one of the two"),
-    ({"drive": {"spring": "soft", "velocity": 1e-3}}, 'give a stiffness above 0, or "rigid"'),
-    ({"drive": {"spring": 10.0, "velocity": 0.0}}, "moves nothing"),
-    ({"drive": {"spring": 1e-90, "velocity": 1e-300}}, "give a number between 1e-100 and 1e\\+100"),
-    ({"drive": {"spring": 10.0, "velocity": 1e-3}}, "drive.until is missing"),
-    ({"drive": {"spring": 10.0, "protocol": [[1e-3, 0.0]]}}, "give pairs of a velocity and a time above 0"),
-    ({"drive": {"spring": "rigid", "velocity": 1e-3, "slips": 3}}, "drive.until is missing"),
-    ({"drive": DRAWN | {"spring": "rigid", "slips": 3}}, "drive.slips needs a spring"),
-    ({"drive": DRAWN | {"at": 3.0}}, "drive.at stands without signal"),
-    ({"drive": DRAWN | PULSE}, "drive.at is missing"),
-    ({"drive": DRAWN | {"signal": "pulse", "at": 0.5}}, "drive.omega is the freq"),
-    ({"drive": DRAWN | PULSE | {"at": 1.0}}, "after the end"),
-    (
-        {"drive": {"spring": 10.0, "protocol": [[1e-3, 2.0]], "signal": "pulse", "omega": 1.0, "at": 3.0}},
-        "after the end",
-    ),
-    (
-        {"drive": {"spring": 10.0, "velocity": 1e-3, "slips": 1, "signal": "pulse", "omega": 1.0, "at": 601.0}},
-        "of the run, 600",
-    ),
-    ({"drive": DRAWN | {"untill": 1.0}}, "until"),
-    ({"law": {"kn": 2e5, "mu": 0.0}, "damping": {"cn": 60.0}}, "drive needs friction"),
-    ({"damping": {"tau": 10.0}, "drive": {"spring": "rigid", "velocity": 1.0, "until": 1.0}}, "damping.tau would"),
-    ({"damping": None}, r"the scene has no section \[damping\]: add it"),
-]
-REFUSED_RUNS = [
-    ({"drive": DRAWN | {"velocity": 0.1}}, r"periods of its slowest vibration, and slow driving takes 100 or more"),
-    ({"drive": DRAWN | {"spring": 1e9, "velocity": 1e-11}}, "blows up: lower drive.spring"),
-    ({"damping": {"cn": 1e6}}, "blows up: lower damping.cn and damping.ct"),
-    ({"drive": DRAWN | {"spring": "rigid", "velocity": 1e3}}, "the smallest radius 0.5: lower drive.velocity"),
-    ({"drive": DRAWN | {"velocity": 1e-20, "until": 1e50}}, "the run would take .* time steps of"),
-    ({"drive": DRAWN | {"signal": "pulse", "at": 0.5, "omega": 1e9}}, "has a period of 6.28e-09, and the time step is"),
-]
 
 
-@pytest.mark.parametrize(("change", "says"), REFUSED_SCENES + REFUSED_RUNS)
+@pytest.mark.parametrize(("change", "says"), rows_of("pywrap/refused_drives.txt", DRAWN=DRAWN, PULSE=PULSE))
 def test_what_cannot_be_driven_is_refused_before_it_begins(settled, change, says):
     """Scenes that make no sense, and drives that are not slow, or that time steps do not follow."""
     sections = {**BASE, "drive": DRAWN, **change}
@@ -255,22 +221,9 @@ def test_what_cannot_be_driven_is_refused_before_it_begins(settled, change, says
 @pytest.mark.ranks
 @pytest.mark.slow
 def test_command_on_two_ranks_is_the_same_to_the_bit(scene, faultgouge, faultgouge_here, tmp_path):
-    packing = scene(**THROWN).packing.file
-    text = f"""[packing]
-file = "{packing}"
-[law]
-kn = 2e5
-[load]
-fy = 3.0
-[damping]
-cn = 60.0
-[drive]
-spring = 10.0
-velocity = 5e-3
-until = 0.6
-states = 0.2
-"""
-    (tmp_path / "scene.toml").write_text(text)
+    drive = {"spring": 10.0, "velocity": 5e-3, "until": 0.6, "states": 0.2}
+    wanted = BASE | {"packing": {"file": str(scene(**THROWN).packing.file)}, "damping": {"cn": 60.0}, "drive": drive}
+    (tmp_path / "scene.toml").write_text(toml(wanted))
     results = []
     for ranks, run in ((1, faultgouge_here), (2, partial(faultgouge, ranks=2))):
         done = run("drive", "scene.toml", "-o", f"{ranks}.h5", "--json")
@@ -353,27 +306,10 @@ def test_clock_advance_is_the_time_between_comparable_slips(scene, tmp_path):
 @pytest.mark.long
 def test_signal_that_does_nothing_has_no_clock_advance_beyond_its_error(faultgouge_here, tmp_path, scale):
     """A small layer with the standard law, shortly before its first slip; without a force runs are the same."""
-    text = f"""[packing]
-disks = 20
-seed = 2
-[law]
-kn = 2e5
-history = "coulomb"
-[load]
-fy = 3.0
-[damping]
-cn = 60.0
-ct = 17.0
-[drive]
-spring = 10.0
-velocity = 4e-3
-until = 26
-signal = "pulse"
-at = 9
-omega = 2.0
-scale = {scale}
-"""
-    (tmp_path / "scene.toml").write_text(text)
+    signal = {"signal": "pulse", "at": 9.0, "omega": 2.0, "scale": scale}
+    wanted = BASE | {"packing": {"disks": 20, "seed": 2}, "law": {"kn": 2e5, "history": "coulomb"}}
+    drive = {"spring": 10.0, "velocity": 4e-3, "until": 26.0, **signal}
+    (tmp_path / "scene.toml").write_text(toml(wanted | {"drive": drive}))
     told = json.loads(faultgouge_here("drive", "scene.toml", "-o", "d.h5", "--json").stdout)
     assert told["slips"]
     assert len(told["clock_advances_of_noise"]) == NOISES

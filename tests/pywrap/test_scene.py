@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from reference_layer import REFERENCE
+from table_rows import rows_of
 
 from faultgouge import registered
 from faultgouge.pywrap.lammps.decks import DECKS
@@ -124,89 +125,9 @@ def test_a_file_counts_from_the_folder_of_the_scene(tmp_path):
 
 @pytest.mark.parametrize(
     ("changes", "says"),
-    [
-        # law and damping
-        ({"law.exponent": 1.25}, "law.exponent = 1.25 is refused: give 1.5 or 1"),
-        ({"law.history": "whole"}, "law.history = 'whole' is refused"),
-        (
-            {"law.history": "rescaled", "law.exponent": 1},
-            'law.history = "rescaled" needs a law.exponent of 1.4 or more',
-        ),
-        ({"damping.tau": 0.0}, "damping.tau = 0.0 is refused: give a number above 0"),
-        ({"damping": {}}, "damping has nothing in it: give cn, ct or tau, or leave the section out"),
-        ({"damping.cm": 1.0}, "damping.cm is no key of [damping]: the nearest is damping.c"),
-        ({"damping.ct": 1.0, "law.mu": 0.0}, "damping.ct = 1 has no friction to damp"),
-        (
-            {"damping.cn": 1.0, "ramp.method": "overdamped"},
-            "damping acts in dynamics ([perturb]) and no equilibrium depends on it, so that an overdamped ramp has no",
-        ),
-        # names
-        ({"packing.dsks": 10}, "packing.dsks is no key of [packing]: the nearest is packing.disks."),
-        ({"law.friction": 0.5}, "law.friction is no key of [law]: the nearest is law.mu."),
-        ({"packing.kn": 1.0}, "packing.kn is no key of [packing]: the nearest is law.kn."),
-        ({"kn": 200000.0}, "kn stands outside of its section: move it below [law]."),
-        ({"precison": "double"}, "precison is no key of a scene: the nearest is precision."),
-        ({"law": None}, "law is missing: add the section [law]."),
-        ({"ramp": {}}, "ramp.until is missing: add until to [ramp]."),
-        ({"load": 3.0}, "load is not a section: write [load] and its keys below."),
-        # numbers
-        ({"packing.disks": 0}, "packing.disks = 0 is refused: give a number above 0."),
-        ({"packing.disks": 1.5}, "packing.disks = 1.5 is refused: give a whole number."),
-        ({"packing.disks": True}, "packing.disks = True is refused: give a whole number."),
-        ({"packing.disks": 10**9}, "packing.disks = 1000000000 is refused: give a number of at most 10000000."),
-        ({"packing.seed": -1}, "packing.seed = -1 is refused: give a number of at least 0."),
-        ({"packing.radii": []}, "packing.radii = [] is refused: give at least one number."),
-        ({"packing.radii": [0.5, 0.0]}, "packing.radii.1 = 0.0 is refused: give a number above 0."),
-        ({"packing.radii": 0.5}, "packing.radii = 0.5 is refused: give a list of numbers."),
-        ({"packing.periodic": 1}, "packing.periodic = 1 is refused: give true or false."),
-        ({"law.kn": math.nan}, "law.kn = nan is refused: give a finite number."),
-        ({"law.kn": -1.0, "law.kt": "2/7 kn"}, "law.kn = -1.0 is refused: give a number above 0."),
-        (
-            {"law.kn": "2e5"},
-            "law.kn = '2e5' is refused: give a number; a number with a unit needs the section [units].",
-        ),
-        ({"law.kt": -1.0}, "law.kt = -1.0 is refused: give a number of at least 0."),
-        ({"law.mu": [1.0, math.nan]}, "law.mu = [1.0, nan] is refused"),
-        ({"law.mu": 10**400}, "is refused: give a number of at least 0, or a list"),
-        ({"law.mu": [1.0, 1]}, "law.mu = [1, 1] names one value twice: give each once."),
-        # what no packing bears
-        ({"law.kn": 5e-324}, "law.kn = 5e-324 is refused: give a number between 1e-100 and 1e+100"),
-        ({"law.kt": 1e-320}, "law.kt"),
-        ({"load.fy": 1e9}, "presses two disks 2.9e+02 into each other, deeper than the smallest radius 0.5"),
-        ({"law.kn": 1e14}, "no packing comes to rest"),
-        ({"packing.width": 1e10}, "packing.width = 1e+10 is"),
-        ({"packing.seed": 2**64}, "packing.seed"),
-        ({"ramp.step": 1e-12}, "ramp.step = 1e-12 makes 1e+12 equilibria"),
-        ({"friction.v_ss": "1e400 v0"}, "friction.v_ss"),
-        # choices
-        ({"precision": "single"}, "precision = 'single' is refused: give 'double' or 'compensated'."),
-        ({"ramp.method": "fire"}, "ramp.method = 'fire' is refused: give 'newton' or 'overdamped'."),
-        ({"perturb.target": "floor"}, "perturb.target = 'floor' is refused"),
-        ({"perturb.target": [-1]}, "perturb.target = [-1] is refused"),
-        ({"law.kt": "2/0 kn"}, 'law.kt = "2/0 kn" is no share of kn'),
-        ({"friction.v_ss": "0 v0"}, "friction.v_ss = '0 v0' is refused"),
-        ({"friction.v_ss": 1.0, "friction.v0": "measured"}, "friction.v0 = 'measured' is refused"),
-        # what does not go together
-        ({"packing.top": 101}, "packing.top = 101 is more than the 100 disks of the packing: lower it."),
-        ({"packing.width": 2.7}, "packing.width = 2.7 is under two cutoffs of one largest diameter, 2.8: widen"),
-        ({"packing.width": 1.0, "packing.periodic": False}, "packing.periodic = false leaves the sides open"),
-        ({"ramp.step": 0.2, "ramp.until": 0.1}, "ramp.step = 0.2 is larger than until = 0.1: take a smaller step."),
-        ({"perturb.time_step": 2.0}, "perturb.time = 1.0 is shorter than one step, 2.0"),
-        ({"perturb.amplitude": 1e-09}, "perturb.omega is missing: an amplitude needs"),
-        ({"perturb.target": [100]}, "perturb.target names disk 100: name disks from 0 to 99."),
-        (
-            {"ramp.until": 0.05, "perturb.fx": 0.1},
-            "perturb.fx = 0.1 lies beyond the last equilibrium, ramp.until = 0.05",
-        ),
-        ({"friction": {}}, "friction.v_ss is missing, and the paper gives no value: give a velocity, or a multiple"),
-        ({"friction.v0": 0.0, "friction.v_ss": "10 v0"}, 'friction.v_ss = "10 v0" is no velocity because v0 = 0'),
-        ({"law.mu": 0.0, "friction.v_ss": 1.0}, "friction has no mu to weaken"),
-        ({"law": {"kt": 1.0}}, "law.kt stands without kn: give kn"),
-        ({"packing": {"file": str(REFERENCE), "seed": 1}}, "packing.seed cannot stand beside packing.file"),
-        # of a scene, and not of `import`
-        ({"packing": {"file": SHIPPED}}, "which disks are the upper layer: add packing.top, 12 (the highest"),
-        ({"packing": {"file": SHIPPED, "top": "y>1000"}}, "is refused: packing.top = y>1000: this layer of"),
-    ],
+    rows_of(
+        "pywrap/refused_scenes.txt", nan=math.nan, REFERENCE=str(REFERENCE), SHIPPED=str(DECKS / "packing100.data")
+    ),
     ids=lambda value: str(value)[:60],
 )
 def test_what_cannot_be_run_is_refused_in_one_sentence(refused_scene, changes, says):

@@ -4,15 +4,15 @@ import json
 
 import numpy as np
 import pytest
+from table_rows import rows_of
 
 from faultgouge import load
 from faultgouge.analysis import MindlinLaw
 from faultgouge.analysis.files.formats import write_packing
 from faultgouge.pywrap import Scene
 from faultgouge.pywrap.scenes.command_sections import study_models
-from faultgouge.pywrap.scenes.quantities import dimensions_of
 from faultgouge.pywrap.scenes.scene import SECTIONS
-from faultgouge.pywrap.scenes.units import dashpot, quality_factor, real_units, restitution
+from faultgouge.pywrap.scenes.units import dashpot, dimensions_of, quality_factor, real_units, restitution
 
 QUARTZ = {
     "grain_diameter": "0.1 mm",
@@ -62,16 +62,7 @@ def test_units_of_a_file_are_those_of_its_smallest_disk_whatever_the_format(tmp_
 
 @pytest.mark.parametrize(
     ("keys", "says"),
-    [
-        ({"density": "5 m"}, 'units.density = "5 m" does not convert to kg/m^3'),
-        ({"grain_diameter": "ten"}, "units.grain_diameter"),
-        ({"grain_diameter": "3"}, "does not convert to m"),
-        ({"youngs_modulus": "-3 GPa"}, "give a quantity above 0"),
-        ({"youngs_modulus": "1e999 GPa"}, "give a quantity above 0"),
-        ({"poisson_ratio": 0.5}, "give a number below 0.5"),
-        ({"restitution": 0.9}, "units.impact_velocity is missing"),
-        ({"overburden": "10 MPa"}, "set load.fy = 74.6"),
-    ],
+    rows_of("pywrap/refused_units.txt"),
 )
 def test_units_that_do_not_convert_are_refused_in_one_sentence(refused_scene, keys, says):
     assert says in refused_scene({**LEAST, "units": {**QUARTZ, **keys}})
@@ -188,32 +179,7 @@ MASSES = [LEAST["packing"] | {"mass": mass} for mass in (1.0, 4.0)]
 
 @pytest.mark.parametrize(
     ("sections", "says"),
-    [
-        ({"load": {"fy": "3 kg"}}, 'load.fy = "3 kg" does not convert to kg'),
-        (
-            {"load": {"fy": "3 N"}, "units": {**QUARTZ, "overburden": "10 MPa"}},
-            "leave load.fy out, or set load.fy = 74.6",
-        ),
-        (
-            {"law": {"kn": "1e8 N/m^1.5"}, "load": {"fy": 3.0}},
-            "not the stiffness of Hertz's contact of these grains, 3.18",
-        ),
-        (
-            {"packing": {"radii": ["60 um"]}, "load": {"fy": 3.0}},
-            "smallest disks of 0.00012 m, and units.grain_diameter",
-        ),
-        ({"packing": {"radii": ["50 um", 0.7]}, "load": {"fy": 3.0}}, "numbers beside quantities"),
-        ({"packing": {"mass": "1 g"}, "load": {"fy": 3.0}}, "not the mass of a smallest grain of units.density, 1.38"),
-        ({"packing": {"width": "3 s"}, "load": {"fy": 3.0}}, 'packing.width = "3 s" does not convert to m'),
-        ({"packing": {"radii": ["50 um"], "disks": -1}, "load": {"fy": 3.0}}, "packing.disks = -1 is refused"),
-        ({"law": {"exponent": 1.0}, "load": {"fy": "3 N"}}, "units takes k_n from Hertz's contact"),
-        ({"law": {"mu": 0.5}}, "load.fy is missing: add fy to [load]"),
-        (
-            {"drive": {"spring": "1 N/m", "protocol": ["1 s"]}, "load": {"fy": 3.0}},
-            "drive.protocol = ['1 s'] is refused",
-        ),
-        ({"perturb": {"fx": 0.0, "time": "soon"}, "load": {"fy": 3.0}}, 'perturb.time = "soon" does not convert to s'),
-    ],
+    rows_of("pywrap/refused_quantities.txt", QUARTZ=QUARTZ),
 )
 def test_quantities_that_do_not_fit_are_refused_in_one_sentence(refused_scene, sections, says):
     assert says in refused_scene({**SIZED, **sections})

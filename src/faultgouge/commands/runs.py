@@ -1,7 +1,8 @@
-"""The commands init, settle, ramp and perturb: a scene, its equilibria and its undamped run."""
+"""The commands init and examples, which write a scene; and settle, ramp, perturb and drive, which run it."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict
 from math import ceil
 from pathlib import Path
@@ -9,119 +10,164 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..mpi_rank import is_root
-from ..signal_guard import keeps
-from .terminal import (
-    LAYER,
-    Answer,
-    Out,
-    SceneFile,
-    command,
-    growth_in,
-    lock_output,
-    print_line,
-    progress,
-    report_fallback,
-    say,
-    say_remark,
-    status,
-)
+from ..analysis.counted import counted
+from ..analysis.table_display import table_of
+from ..signal_guard import is_root, keeps
+from .terminal import LAYER, Out, Results, SceneFile, command, progress, report_fallback, say, status
 
 if TYPE_CHECKING:
-    from faultgouge.analysis import Packing
-    from faultgouge.analysis.motion.hysteresis import Hysteresis
+    from faultgouge.analysis import Packing, RunFile
+    from faultgouge.analysis.responses.growth_of_run import GrowthOfRun
     from faultgouge.pywrap import Equilibrium, Record, Scene
-    from faultgouge.pywrap.lammps.dynamics import Weakening
-    from faultgouge.pywrap.scenes.sections import Ramp
-
-app = typer.Typer()
 
 MOST_LOOSE = 0.1
 """Share of the disks above the upper layer from which the command says so: of 20 seeds of 40 disks two have more."""
 
+SLIP_COLUMNS = (
+    "begins", "ends", "force_before", "force_after", "slip", "kinetic_energy", "frame_before", "frame_after",
+)  # fmt: skip
+"""Columns of the table of slips."""
 
-@app.command(epilog="Example: faultgouge init -o scene.toml")
+
+@command("faultgouge init -o scene.toml", writes="new", alone=True)
 def init(
-    context: typer.Context,
     output: Annotated[Path, typer.Option("-o", "--output", help="The scene to write.")] = Path("scene.toml"),
-) -> None:
+) -> Results:
     """Write a scene with every section and key, commented."""
-    if output.exists():
-        raise typer.BadParameter(f"{output} exists: give another name with -o, or delete it")
     from importlib.resources import files
 
     from faultgouge.analysis.files.atomic_write import write_text
 
-    lock_output(context, output)
-    if is_root():
-        write_text(output, (files("faultgouge") / "scenes" / "commented.toml").read_text())
-        print_line(f"written to {output}; next: faultgouge onset {output}")
+    write_text(output, (files("faultgouge") / "scenes" / "commented.toml").read_text())
+    yield f"written to {output}; next: faultgouge onset {output}"
 
 
-@command(app, f"{LAYER} && faultgouge settle scene.toml", reads="settle", task="settle", records=True, as_json=False)
-def settle(scene: SceneFile, output: Out = Path("run.h5")) -> Answer:
+@command("faultgouge examples pour", alone=True)
+def examples(
+    name: Annotated[str | None, typer.Argument(help="Which one is copied into this folder.")] = None,
+) -> Results:
+    """List ten examples that run in seconds each, or copy one into this folder."""
+    from importlib.resources import files
+
+    scenes = files("faultgouge") / "scenes"
+    shelf = {Path(each.name).stem: each for each in (scenes / "examples").iterdir() if each.is_file()}
+
+    def head(text: str) -> list[str]:
+        """What an example shows, and the command that runs the example: its first two lines."""
+        return [line.strip('# "') for line in text.splitlines()[:2]]
+
+    if name is None:
+        for key in sorted(shelf):
+            yield "{:9} {}\n{:9} {}".format(key, (lines := head(shelf[key].read_text()))[0], "", lines[1])
+        yield "\nfaultgouge examples NAME copies one into this folder."
+        return
+    # scenes of studies that take minutes are copied, too, with the packing that they name, but not listed
+    name = name.rsplit(".", 1)[0]
+    if not (chosen := shelf.get(name, scenes / f"{name}.toml")).is_file():
+        raise typer.BadParameter(f"there is no example {name}: take one of {', '.join(sorted(shelf))}")
+    text = chosen.read_text()
+    for each in [chosen, *(scenes / named for named in re.findall(r'^file = "(.+)"', text, re.MULTILINE))]:
+        if Path(each.name).exists():
+            raise typer.BadParameter(f"{each.name} exists in this folder: move it away, or use another folder")
+        Path(each.name).write_bytes(each.read_bytes())
+    yield "{}: {}\nnext: {}".format(chosen.name, *head(text))
+
+
+@command(f"{LAYER} && faultgouge settle scene.toml", reads="settle", task="settle", writes="run")
+def settle(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     """Settle the packing of a scene under its load, at F_x = 0."""
     from faultgouge.pywrap import Record
 
     with Record(output, scene, saved=keeps) as record:
-        say_remark(record)
         last = _settle_or_read(scene, record)
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
             record.finish()
-    return Answer([f"{last}; written to {output}"])
+    yield f"{last}; written to {output}"
 
 
-@command(app, f"{LAYER} && mpiexec -n 2 faultgouge ramp scene.toml", reads="ramp", task="ramp", records=True)
-def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Answer | None:
+@command(f"{LAYER} && mpiexec -n 2 faultgouge ramp scene.toml", reads="ramp", task="ramp", writes="run", as_json=True)
+def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     """Raise F_x from equilibrium to equilibrium, and store each equilibrium.
 
     With turning points in ramp.until, F_x goes up, down and below zero. When F_x
     returns to an earlier value, the command prints the remaining displacement of
     the layer and the work of the loads.
     """
+    from faultgouge.analysis import RunFile
+    from faultgouge.analysis.motion.hysteresis import hysteresis
     from faultgouge.pywrap import Record
     from faultgouge.pywrap import ramp as ramp_up
     from faultgouge.pywrap.runs.ramp_loads import all_loads, count_behind
-    from faultgouge.pywrap.scenes.validation import require_section
+    from faultgouge.pywrap.runs.run_recorder import fallbacks
 
-    settings = require_section(scene.ramp, "ramp")
+    assert scene.ramp is not None
+    loads = all_loads(scene.ramp)
     with Record(output, scene, saved=keeps) as record:
-        say_remark(record)
         start = _settle_or_read(scene, record)
-        loads = all_loads(settings)
-        total, done = len(loads), count_behind(settings, record.forces)
+        done = count_behind(scene.ramp, record.forces)
         dumps = output.with_suffix("") if scene.output is not None and scene.output.dumps else None
-        for equilibrium in progress(ramp_up(scene, start, dumps=dumps, behind=done), "equilibria", total, done):
+        for equilibrium in progress(ramp_up(scene, start, dumps=dumps, behind=done), "equilibria", len(loads), done):
             report_fallback(equilibrium)
             record.append(equilibrium)
         record.finish()
     assert record.last is not None
     if not is_root():
-        return None
-    left = _hysteresis(output, settings)
-    result = {"equilibria": _equilibria(output), "hysteresis": None if left is None else asdict(left)}
-    if record.last.fx != loads[-1]:
-        beyond = f"{output} goes on from F_x = {loads[-1]:g}, where ramp.until ends, to F_x = {record.last.fx:g}"
-        return Answer([f"{beyond}: nothing is left to compute"], result)
-    says = [f"F_x = {record.last.fx:g} reached; residual force {record.last.residual:.2g}; written to {output}"]
-    if left is not None:
-        says.append(
-            f"F_x is back at {left.fx:g}, and so is the upper layer: the path closes, to rounding"
-            if left.closes
-            else f"F_x is back at {left.fx:g}: since F_x first had this value, the upper layer has moved by "
+        return
+    with RunFile(output) as file:
+        columns = {name: file.observable(name).tolist() for name in ("fx", "residual", "floor", "evaluations")}
+        count, ways, turns = len(file), fallbacks(file), len(scene.ramp.turning_points) > 1
+        rows = [
+            {name: column[k] for name, column in columns.items()}
+            | {"contacts": len(file.packing(k).contacts), "way": ways.get(k)}
+            for k in range(count)
+        ]
+        left = hysteresis([file.packing(k) for k in range(count)]) if turns else None
+    fx, residual = record.last.fx, record.last.residual
+    if fx != loads[-1]:
+        beyond = f"{output} goes on from F_x = {loads[-1]:g}, where ramp.until ends, to F_x = {fx:g}"
+        yield f"{beyond}: nothing is left to compute"
+    else:
+        yield f"F_x = {fx:g} reached; residual force {residual:.2g}; written to {output}"
+    if left is not None and left.closes:
+        yield f"F_x is back at {left.fx:g}, and so is the upper layer: the path closes, to rounding"
+    elif left is not None:
+        yield (
+            f"F_x is back at {left.fx:g}: since F_x first had this value, the upper layer has moved by "
             f"{left.remaining:.4g}, and the work of the loads is {left.work:.4g}"
         )
-    return Answer(says, result)
+    yield {"equilibria": rows, "hysteresis": None if left is None else asdict(left)}
+
+
+def _settle_or_read(scene: Scene, record: Record) -> Equilibrium:
+    """The last equilibrium of a file; in a new one the settled packing, which is then in it."""
+    from faultgouge.pywrap import settle
+
+    if record.remark:
+        say(record.remark)
+    if record.last is None:
+        with status("settling") as show:
+            record.append(settle(scene, watch=lambda what: show(f"settling: {what}")))
+        assert record.last is not None
+        packing = record.last.packing
+        height = packing.position[:, 1]
+        loose = int((height[packing.rattlers] > height[packing.top].mean()).sum()) if packing.top.any() else 0
+        if loose > MOST_LOOSE * len(packing):  # the layer went through them while the packing settled
+            say(
+                f"{loose} of {len(packing)} disks lie above the upper layer, where no force acts on them: another "
+                "packing.seed, or more disks in the layer (packing.top), leaves fewer there"
+            )
+    assert record.last is not None
+    return record.last
 
 
 @command(
-    app,
     "faultgouge examples eruption && faultgouge perturb eruption.toml",
     reads="perturb",
     task="perturb",
-    records=True,
+    writes="run",
+    as_json=True,
 )
-def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Answer | None:
+def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Results:
     """Run the dynamics from the equilibrium at perturb.fx, and record D(t).
 
     Without perturb.fx the load is just beyond the onset, which is found first; with
@@ -131,125 +177,195 @@ def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Answer | None
     was long enough. With several friction coefficients, the run uses the first.
     """
     from faultgouge.analysis import RunFile
-    from faultgouge.pywrap import Record
-    from faultgouge.pywrap.scenes.validation import require_section
+    from faultgouge.pywrap import Record, reach
+    from faultgouge.pywrap.onset import load_at_onset
+    from faultgouge.pywrap.runs.ramp import step_of
+    from faultgouge.pywrap.runs.undamped import sample_steps, weakening_of, without_perturbation
 
-    require_section(scene.perturb, "perturb")
-    mus = scene.law.mus
+    mus, settings = scene.law.mus, scene.perturb
+    assert settings is not None
     if len(mus) > 1:
         say(f"the run uses mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene")
     with Record(output, scene, task="perturb", saved=keeps) as record:
-        say_remark(record)
-        if record.last is None:
-            record.append(_start(scene))
-        assert record.last is not None
-        weakening = _weakening(scene, record)
-        run = record.undamped(scene, record.last, weakening=weakening)
-        largest = 0.0
-        for sample in progress(run, "samples", _lines(scene, record.last)):
-            last, largest = sample, max(largest, sample.msd)
+        if record.remark:
+            say(record.remark)
+        if (start := record.last) is None:
+            if (fx := settings.fx) is None:
+                fx = load_at_onset(scene)
+                say(f"the scene has no perturb.fx: the run starts at F_x = {fx:.10g}, chosen by the onset")
+            for start in progress(reach(scene, fx), "equilibria", ceil(fx / step_of(scene) * (1 - 1e-9)) + 1):
+                report_fallback(start)
+            assert start is not None
+            sample_steps(settings, start.packing)  # refuses what the packing does not allow, before anything is written
+            record.append(start)
+        lines, weakening = len(sample_steps(settings, start.packing)[1]), None
+        if scene.friction is not None:
+            threshold, why = scene.friction.v0, ""
+            if isinstance(threshold, str):
+                run = record.undamped(without_perturbation(scene), start, "calibration")
+                threshold = max(abs(sample.layer_velocity) for sample in progress(run, "calibrating v0", lines))
+                why = " (the largest velocity of the upper layer in an unforced run of this length: rounding noise)"
+            weakening = weakening_of(scene.friction, float(threshold))
+            say(f"v0 = {threshold:.3g}{why}, v_ss = {weakening.v_ss:.3g}")
+        samples = [*progress(record.undamped(scene, start, weakening=weakening), "samples", lines)]
         record.finish()
     if not is_root():
-        return None
+        return
     with RunFile(output) as file:
-        series, packing = file.series("undamped"), file.packing()
-    growth, columns = growth_in(output, series), {name: column.tolist() for name, column in series.items()}
-    reached = f"D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}"
-    return Answer(
-        [f"F_x = {packing.fx:g}, mu = {mus[0]:g}: {reached}", growth.says],
-        {"mu": mus[0], "fx": packing.fx} | growth.as_dict() | columns,
-        f"written to {output}",
-    )
+        growth, series, packing = growth_in(file), file.series("undamped"), file.packing()
+    assert growth is not None
+    last, largest = samples[-1], max(sample.msd for sample in samples)
+    yield f"F_x = {packing.fx:g}, mu = {mus[0]:g}: D = {last.msd:.3g} after t = {last.time:g}, at most {largest:.3g}"
+    yield growth.says
+    columns = {name: column.tolist() for name, column in series.items()}
+    yield {"mu": mus[0], "fx": packing.fx} | growth.as_dict() | columns
+    yield f"written to {output}"
 
 
-def _start(scene: Scene) -> Equilibrium:
-    """The equilibrium at perturb.fx, or just beyond the onset."""
-    from faultgouge.pywrap import reach
-    from faultgouge.pywrap.onset import load_at_onset
-    from faultgouge.pywrap.runs.ramp import step_of
+def growth_in(file: RunFile) -> GrowthOfRun | None:
+    """Growth of D in the undamped run of a perturb.h5, beside the spectrum's prediction at the time step of the run;
+    None of another file, or where the run has not begun."""
+    import json
 
-    assert scene.perturb is not None
-    fx = scene.perturb.fx
-    if fx is None:
-        fx = load_at_onset(scene)
-        say(f"the scene has no perturb.fx: the run starts at F_x = {fx:.10g}, chosen by the onset")
-    total = ceil(fx / step_of(scene) * (1 - 1e-9)) + 1
-    for start in progress(reach(scene, fx), "equilibria", total):
-        report_fallback(start)
-    _lines(scene, start)  # refuses what the packing does not allow, before anything is written
-    return start
+    from faultgouge.analysis.responses.growth_of_run import growth_of_run
+    from faultgouge.pywrap.runs.undamped import time_step
 
-
-def _lines(scene: Scene, start: Equilibrium) -> int:
-    """Lines of the series of an undamped run; a time step or a time that the packing does not allow is refused."""
-    from faultgouge.pywrap.runs.undamped import sample_steps
-
-    assert scene.perturb is not None
-    return len(sample_steps(scene.perturb, start.packing)[1])
-
-
-def _weakening(scene: Scene, record: Record) -> Weakening | None:
-    """The friction that falls with velocity, its threshold v_0 calibrated if the scene says so."""
-    from faultgouge.pywrap.runs.undamped import weakening_of, without_perturbation
-
-    if scene.friction is None:
+    if file.attributes.get("task") != "perturb" or "undamped" not in file.names_of_series:
         return None
-    assert record.last is not None
-    threshold, why = scene.friction.v0, ""
-    if isinstance(threshold, str):
-        run = record.undamped(without_perturbation(scene), record.last, "calibration")
-        samples = progress(run, "calibrating v0", _lines(scene, record.last))
-        threshold = float(max(abs(sample.layer_velocity) for sample in samples))
-        why = " (the largest velocity of the upper layer in an unforced run of this length: rounding noise)"
-    weakening = weakening_of(scene.friction, threshold)
-    say(f"v0 = {threshold:.3g}{why}, v_ss = {weakening.v_ss:.3g}")
-    return weakening
-
-
-def _hysteresis(path: Path, settings: Ramp) -> Hysteresis | None:
-    """Displacement and work that remain when F_x returns; None on a ramp without turning points."""
-    from faultgouge.analysis import RunFile
-    from faultgouge.analysis.motion.hysteresis import hysteresis
-
-    if len(settings.turning_points) < 2:
+    series, packing = file.series("undamped"), file.packing()
+    if len(series["time"]) < 2:
         return None
-    with RunFile(path) as file:
-        return hysteresis([file.packing(k) for k in range(len(file))])
+    settings = json.loads(file.attributes.get("scene", "{}")).get("perturb") or {}
+    dt = time_step(packing, settings.get("time_step"))
+    return growth_of_run(packing, series["time"], series["msd"], series["friction"], dt)
 
 
-def _equilibria(path: Path) -> list[dict[str, Any]]:
-    from faultgouge.analysis import RunFile
-    from faultgouge.pywrap.runs.run_recorder import fallbacks
+@command(
+    "faultgouge examples drive && faultgouge drive drive.toml -o drive.h5",
+    reads="drive", task="settle", writes="run", as_json=True,
+)  # fmt: skip
+def drive(scene: SceneFile, output: Out = Path("drive.h5")) -> Results:
+    """Draw the upper layer with a spring whose far end moves: the layer sticks and slips.
 
-    with RunFile(path) as file:
-        ways = fallbacks(file)
-        names = ("fx", "residual", "floor", "evaluations")
-        rows = zip(*(file.observable(name).tolist() for name in names), strict=True)
-        return [
-            dict(zip(names, row, strict=True)) | {"contacts": len(file.packing(k).contacts), "way": ways.get(k)}
-            for k, row in enumerate(rows)
-        ]
+    The packing settles at F_x = 0; then the spring of [drive] draws, with the dashpots
+    of [damping]. The file contains the force on each disk of the layer, the displacement
+    and the mean height of the layer and the kinetic energy over time, and states at
+    intervals and at both ends of each slip, which spectrum and draw take by --frame.
+    The slips are also written as a table beside the file, with the suffix .csv.
+    """
+    import numpy as np
 
+    from faultgouge.analysis import OutputError, RunFile
+    from faultgouge.analysis.files.atomic_write import check_output, write_text
+    from faultgouge.analysis.responses.slips import friction_of
+    from faultgouge.pywrap.runs.drive import NOISES, SERIES, advance_error, all_slips_in, clock_advance, strays
 
-def _settle_or_read(scene: Scene, record: Record) -> Equilibrium:
-    """The last equilibrium of a file; in a new one the settled packing, which is then in it."""
-    from faultgouge.pywrap import settle
-
-    if record.last is None:
-        with status("settling") as show:
-            record.append(settle(scene, watch=lambda what: show(f"settling: {what}")))
-        assert record.last is not None
-        _say_loose(record.last.packing)
-    assert record.last is not None
-    return record.last
-
-
-def _say_loose(packing: Packing) -> None:
-    """Say that many disks have come to lie above the layer, through which they went while the packing settled."""
-    height = packing.position[:, 1]
-    loose = int((height[packing.rattlers] > height[packing.top].mean()).sum()) if packing.top.any() else 0
-    if loose > MOST_LOOSE * len(packing):
+    settings, table, head = scene.drive, output.with_suffix(".csv"), ",".join(SLIP_COLUMNS)
+    assert settings is not None
+    if table == output:
+        raise OutputError(f"{output} is the table of the slips: give the run another name, {output.stem}.h5")
+    check_output(table, output, head=head)
+    others: dict[Path, Scene] = {}
+    if settings.signal is not None:  # runs without the signal, and with signals as small as noise
+        noises = {f"noise{number}": settings.with_noise(number) for number in range(1, NOISES + 1)}
+        for name, changed in ({"without": settings.without_signal()} | noises).items():
+            others[output.with_suffix(f".{name}{output.suffix}")] = scene.model_copy(update={"drive": changed})
+    for path in others:
+        check_output(path, output)
+    start = _drive(output, scene, "driving", others=others)
+    for path, other in others.items():
+        _drive(path, other, f"driving {path.name}", start)
+    if not is_root():
+        return
+    with RunFile(output) as file:
+        (slips, under_way), series, times = all_slips_in(file), file.series(SERIES), file.observable("time")
+        out = np.flatnonzero(strays(file.packing(-1), file.packing(0))).tolist()
+    rows = [
+        asdict(slip)
+        | {
+            "frame_before": int(np.searchsorted(times, slip.begins, side="right") - 1),
+            "frame_after": int(np.searchsorted(times, slip.ends)),
+        }
+        for slip in slips
+    ]
+    friction = friction_of(series["time"], series["force"], slips, scene.load.fy)
+    result = {
+        "slips": rows,
+        "under_way": None if under_way is None else asdict(under_way),
+        "cycles": max(0, len(slips) - 1),
+        "friction": asdict(friction),
+        "time": float(series["time"][-1]),
+        "states": len(times),
+        "strays": out,
+    }
+    write_text(table, "\n".join([head, *(",".join(repr(row[key]) for key in SLIP_COLUMNS) for row in rows), ""]), head)
+    if out:
         say(
-            f"{loose} of {len(packing)} disks lie above the upper layer, where no force acts on them: another "
-            "packing.seed, or more disks in the layer (packing.top), leaves fewer there"
+            "squeezed out of the bed, above the layer, where no force acts: disks "
+            f"{', '.join(map(str, out))}; they were stopped there"
         )
+    time, mean = f"t = {result['time']:.4g}", f"F/F_y is {friction.mean:.3g} on average"
+    unended = "" if under_way is None else (
+        f": a slip that began at t = {under_way.begins:.4g} is under way, F has fallen from "
+        f"{under_way.force_before:.4g} to {under_way.force_after:.4g}"
+    )  # fmt: skip
+    if slips:
+        headings = [key.replace("force", "F").replace("_", " ") for key in SLIP_COLUMNS]
+        yield table_of(headings, [[f"{row[key]:.4g}" for key in SLIP_COLUMNS] for row in rows])
+        apart = (slips[-1].begins - slips[0].begins) / max(1, len(slips) - 1)
+        recurrence = f", one in {apart:.4g} units of time" if len(slips) > 1 else ""
+        yield (
+            f"{counted(len(slips), 'slip')} up to {time}{recurrence}; {mean} from the first slip on, "
+            f"{friction.before:.3g} before slips, {friction.after:.3g} after them{unended}"
+        )
+    else:
+        why = ", of a rigid drive, which counts no slips" if settings.spring == "rigid" else unended or ": no slip"
+        yield f"{time}{why}; {mean}, at most {friction.largest:.3g}"
+    if others:
+        without, *noisy = others
+        noise = [clock_advance(path, without) for path in noisy]
+        result["clock_advance"] = advance = clock_advance(output, without)
+        result["clock_advance_error"] = error = advance_error(noise, float(series["time"][1] - series["time"][0]))
+        result["clock_advances_of_noise"] = noise
+        yield _advance_in_words(advance, error, len(noise))
+    yield result
+    yield f"written to {', '.join(map(str, [output, *others]))} and {table}"
+
+
+def _drive(output: Path, scene: Scene, what: str, start: Packing | None = None, others: Any = None) -> Packing:
+    """Run a drive to its end, from a packing or from the settled packing of the scene; returns the packing.
+
+    The files of other scenes, which differ in the signal, begin where the signal does.
+    """
+    from faultgouge.pywrap import Equilibrium
+    from faultgouge.pywrap.runs.drive import DriveRecord, check_drive, settle_for_drive
+
+    with DriveRecord(output, scene, saved=keeps) as record:
+        if record.remark:
+            say(record.remark)
+        if record.last is None:
+            if start is None:
+                with status("settling") as show:
+                    start = settle_for_drive(scene, watch=lambda words: show(f"settling: {words}"))
+                for warning in check_drive(scene, start):
+                    say(f"warning: {warning}")
+            record.append(Equilibrium.of(start))
+        assert record.last is not None
+        with status(what) as show:
+            slips = record.slips
+            for step in record.drive(others):
+                slips += step.slip is not None
+                show(f"{what}: t = {step.sample.time:.4g}, F = {step.sample.force:.3g}, {counted(slips, 'slip')}")
+        record.finish()
+        return record.last.packing
+
+
+def _advance_in_words(advance: float | None, error: float | None, runs: int) -> str:
+    if advance is None:
+        return "clock advance: not known, since no slip follows the signal, with or without it; let the run be longer"
+    side = "earlier" if advance >= 0 else "later"
+    earlier = f"the next slip of comparable size is {abs(advance):.4g} {side} than without the signal"
+    if error is None:
+        return f"{earlier}; with noise none follows in the run"
+    alone = ", which noise alone may do" if abs(advance) <= error else ""
+    return f"{earlier}, \u00b1 {error:.2g} (95 %, of {runs} runs with noise of 1e-12){alone}"

@@ -1,28 +1,31 @@
-"""The commands explain, reproduce, report and extremes, and those of the studies that register themselves.
+"""The commands explain, reproduce, report, extremes, sweep, merge, and those of the studies that register themselves.
 
 A study of `faultgouge.studies` says by its decorator what its command is (:mod:`faultgouge.registered`): a study of one
 scene, or a task that runs for a scene or a sweep.
 """
 
+from __future__ import annotations
+
 from collections import Counter
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Argument, Option
 from typer.models import CommandInfo
 
 from .. import registered
-from ..mpi_rank import is_root
-from ..signal_guard import keeps
-from .sweeps import DryRun, Shard, run_task
+from ..analysis.counted import counted
+from ..signal_guard import is_root, keeps
 from .terminal import (
-    Answer,
+    COMMANDS,
     Folder,
     NewFolder,
+    Results,
     SceneFile,
     Workers,
     command,
-    lock_folder,
+    locked,
     print_line,
     progress,
     read_scene,
@@ -30,61 +33,63 @@ from .terminal import (
     status,
 )
 
-app = typer.Typer()
+if TYPE_CHECKING:
+    from faultgouge.studies.sweep.sweep_plan import Sweep
 
 REPLACED = "; the same command starts from the beginning and replaces them"
+OF_SHARD = "Only part K of N, for job arrays; each part needs its own folder."
+OF_DRY_RUN = "Print the remaining work, and how long it takes by the rows that are there."
+Shard = Annotated[str, Option(metavar="K/N", help=OF_SHARD)]
+DryRun = Annotated[bool, Option("--dry-run", help=OF_DRY_RUN)]
 
 
-def names_of_commands() -> list[str]:
-    """The names of the studies that are commands."""
-    return [name for name in registered.names() if find_command(name)]
-
-
-def find_command(name: str) -> CommandInfo | None:
+def study_command(name: str) -> CommandInfo | None:
     """The command of a study; None if no study of this name has one."""
     about = registered.description(name)
     if about is None or not about.given.get("example"):
         return None
-    own, example = typer.Typer(), about.given["example"]
+    example, of_run = about.given["example"], "of_run" in about.given
     if about.kind == "study":
         words = about.given.get("kept", "what was found so far")
         kept = f"{{output}}/{name}.jsonl has {words}; the same command continues from there"
 
-        def study(scene: SceneFile, output: Folder = Path(name)) -> Answer:
+        def study(scene: SceneFile, output: Folder = Path(name)) -> Results:
             run = registered.study_of(name)
-            result = run(scene, output, say, lambda rows, count: progress(rows, run.counts, count))
-            return Answer(result=result, written=f"written: {output}/{name}.{'md' if run.page else 'json'}")
+            yield run(scene, output, say, lambda rows, count: progress(rows, run.counts, count))
+            yield f"written: {output}/{name}.{'md' if run.page else 'json'}"
 
         study.__doc__ = about.says
-        command(own, example, name=name, reads=name, kept=kept)(study)
-    else:
-        metavar, argument = "SCENE|SWEEP", f"A scene, or a sweep of the task {name}."
-        if "of_run" in about.given:
-            metavar, argument = "SCENE|SWEEP|drive.h5", f"A scene, a sweep of the task {name}, or a run of `drive`."
+        command(example, name=name, reads=name, writes="folder", kept=kept, as_json=True)(study)
+        return COMMANDS.pop(name)
+    argument = f"a sweep of the task {name}"
+    of_task = Argument(
+        metavar="SCENE|SWEEP|drive.h5" if of_run else "SCENE|SWEEP",
+        help=f"A scene, {argument}, or a run of `drive`." if of_run else f"A scene, or {argument}.",
+    )
 
-        def task(
-            file: Annotated[Path, typer.Argument(metavar=metavar, help=argument, show_default=False)],
-            output: Folder = Path(name),
-            shard: Shard = "1/1",
-            workers: Workers = None,
-            dry_run: DryRun = False,
-        ) -> None:
-            if file.suffix == ".h5" and (of_run := registered.study_of(name).of_run) is not None:
-                keeps(f"{output} has the states so far; the same command continues from there", output)
-                if is_root():
-                    with lock_folder(output):
-                        for line in of_run(file, output, say, lambda rows, count: progress(rows, "states", count)):
-                            print_line(line)
-                return
-            run_task(name, file, output, shard, workers, dry_run)
+    def task(
+        file: Annotated[Path, of_task],
+        output: Folder = Path(name),
+        shard: Shard = "1/1",
+        workers: Workers = None,
+        dry_run: DryRun = False,
+    ) -> Results:
+        if file.suffix == ".h5" and (run := registered.study_of(name).of_run) is not None:
+            keeps(f"{output} has the states so far; the same command continues from there", output)
+            if is_root():
+                with locked(output, kind="folder"):
+                    yield from run(file, output, say, lambda rows, count: progress(rows, "states", count))
+            return
+        yield from _run_task(name, file, output, shard, workers, dry_run)
 
-        task.__doc__ = about.says
-        command(own, example, name=name, as_json=False)(task)
-    return own.registered_commands[0]
+    task.__doc__ = about.says
+    task.__annotations__["file"] = Annotated[Path, of_task]
+    command(example, name=name)(task)
+    return COMMANDS.pop(name)
 
 
-@command(app, "faultgouge examples scene && faultgouge explain scene.toml", reads="explain", task="settle")
-def explain(scene: SceneFile) -> Answer:
+@command("faultgouge examples scene && faultgouge explain scene.toml", reads="explain", task="settle", as_json=True)
+def explain(scene: SceneFile) -> Results:
     """Explain what a scene includes, what it leaves out, and why.
 
     The command sets the run of the scene up in LAMMPS, takes no step, and compares
@@ -95,16 +100,21 @@ def explain(scene: SceneFile) -> Answer:
 
     with status("setting up the run with and without each part"):
         found = explain_scene(scene)
-    return Answer(in_words(found), found)
+    yield from in_words(found)
+    yield found
 
 
-@app.command(epilog="Example: faultgouge reproduce -o results")
+@command(
+    "faultgouge reproduce -o results",
+    kept="what is in {output} so far is kept; the same command starts from the beginning and replaces it",
+    writes="folder",
+)
 def reproduce(
     scene: Annotated[
-        Path | None, typer.Argument(metavar="[SCENE]", help="A scene of your own, in place of that of the package.")
+        Path | None, Argument(metavar="[SCENE]", help="A scene of your own, in place of that of the package.")
     ] = None,
     output: NewFolder = Path("results"),
-) -> None:
+) -> Results:
     """Run the paper's protocol on one packing: figures, numbers and a report.
 
     Without a scene, figures 1, 3 and 4 show paper.toml. Figure 5 shows
@@ -116,48 +126,142 @@ def reproduce(
     wanted = read_scene(scene or shipped / "paper.toml", "reproduce", "reproduce")
     from faultgouge.studies.reproduce import reproduce as run_protocol
 
-    keeps(f"what is in {output} so far is kept; the same command starts from the beginning and replaces it", output)
     triggered = read_scene(shipped / "triggered.toml", "reproduce") if scene is None else None
-    with lock_folder(output):
-        run_protocol(wanted, output, say, triggered)
-    print_line(f"written: {output}/report.md")
+    run_protocol(wanted, output, say, triggered)
+    yield f"written: {output}/report.md"
 
 
 @command(
-    app,
     "faultgouge report --quick -o report",
     kept="{output} has the studies that were finished" + REPLACED,
-    as_json=False,
+    writes="folder",
 )
 def report(
     output: NewFolder = Path("report"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer points: half a minute instead of two.")] = False,
-) -> Answer:
+    quick: Annotated[bool, Option("--quick", help="Fewer points: half a minute instead of two.")] = False,
+) -> Results:
     """Measure error against run time: which method to use when, for seven tasks, with figures and numbers."""
     from faultgouge.assessment.work_precision.run import report as run_studies
 
     run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
-    return Answer(written=f"written: {output}/report.md")
+    yield f"written: {output}/report.md"
 
 
-Quick = Annotated[bool, typer.Option("--quick", help="About half of the cases, in a few seconds.")]
 TRIED = "{output} has the cases that were finished" + REPLACED
 
 
-@command(app, "mpiexec -n 2 faultgouge extremes -o extremes", kept=TRIED)
-def extremes(output: NewFolder = Path("extremes"), quick: Quick = False) -> Answer:
+@command("mpiexec -n 2 faultgouge extremes -o extremes", kept=TRIED, writes="folder", as_json=True)
+def extremes(
+    output: NewFolder = Path("extremes"),
+    quick: Annotated[bool, Option("--quick", help="About half of the cases, in a few seconds.")] = False,
+) -> Results:
     """Test stiff and extreme cases: each holds within a stated bound, or is refused in one sentence."""
-    return try_cases(output, quick)
+    yield from try_cases(output, quick)
 
 
-def try_cases(output: Path, quick: bool) -> Answer:
+def try_cases(output: Path, quick: bool) -> Results:
     """What `extremes` does in a folder."""
-    from faultgouge.assessment.extremes.run import check, extremes
+    from faultgouge.assessment.extremes.run import check
+    from faultgouge.assessment.extremes.run import extremes as try_all
 
-    result = extremes(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
+    result = try_all(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
     counts = Counter(case["status"] for case in result["cases"])
-    written = (
+    yield result
+    yield (
         f"{counts.total()} cases: {counts['holds']} hold, {counts['refused']} are refused in a sentence, "
         f"{counts['fails']} fail; written: {output}/extremes.md"
     )
-    return Answer(result=result, written=written, fails=lambda: check(result))
+    check(result)
+
+
+@command("faultgouge examples sweep && faultgouge sweep sweep.toml -o sweep")
+def sweep(
+    file: Annotated[
+        Path, Argument(metavar="SWEEP", help="The sweep, a TOML file; `faultgouge examples sweep` has one.")
+    ],
+    output: Folder = Path("sweep"),
+    shard: Shard = "1/1",
+    workers: Workers = None,
+    dry_run: DryRun = False,
+) -> Results:
+    """Run one task for every scene of a product of keys: results.jsonl, the table results.csv, and a picture.
+
+    A sweep names a task (onset, triggering, ..., or a function of your own as
+    "file.py:function"). Section [sweep] has lists of values or ranges for any keys
+    of a scene, as in "packing.seed" = "1:200". Sections [scene.SECTION] have the
+    keys that all scenes share. Each result is written as soon as it is known, and
+    the same command continues an interrupted sweep. A scene that fails is a row with
+    its error sentence, and is tried again, unless it is refused or has no
+    equilibrium. If every scene has failed, the exit code is 1. With several ranks,
+    possibly on several machines, one rank distributes the work: mpiexec -n 5 keeps 4
+    cores busy.
+    """
+    yield from _run_task(None, file, output, shard, workers, dry_run)
+
+
+def _run_task(task: str | None, file: Path, output: Path, shard: str, workers: int | None, dry_run: bool) -> Results:
+    """Run a sweep, or a scene or a sweep by the command of one task, and tell what there is to say of all rows."""
+    from faultgouge.analysis.files.atomic_write import check_own
+    from faultgouge.studies.sweep.draw import draw_sweep
+    from faultgouge.studies.sweep.run_sweep import (
+        missing_points,
+        read_results,
+        remaining_work,
+        require_result,
+        run_sweep,
+    )
+    from faultgouge.studies.sweep.sweep_plan import Sweep, other_packings, points_of
+
+    wanted = Sweep.from_toml(file) if task is None else Sweep.of_task(file, task)
+    part, of = (text.isdecimal() and int(text) for text in shard.partition("/")[::2])
+    if not (part and of and part <= of):
+        raise typer.BadParameter(f"--shard {shard}: give the part and the number of parts, as in --shard 1/3")
+    if is_root() and (sentence := other_packings(wanted)):
+        say(sentence)
+    if dry_run:
+        known = read_results(output / "results.jsonl") if is_root() else {}
+        yield from remaining_work(missing_points(points_of(wanted.points, (part, of)), known), known.values())
+        return
+    for name, head in getattr(registered.study_of(wanted.task), "writes", {}).items():
+        check_own(output / name, head)
+    keeps(f"{output}/results.jsonl has the scenes that have ended; the same command continues from there", output)
+    rows = run_sweep(wanted, output, (part, of), say, lambda rows, count: progress(rows, "scenes", count), workers)
+    if not is_root():
+        return
+    if task is None:
+        failed = sum(row["says"] is not None for row in rows)
+        drawn = draw_sweep(rows, output, say)
+        yield f"{counted(len(rows), 'scene')}, {failed} of them failed; written: {output}/results.csv{drawn}"
+    elif not rows:
+        yield "this part of the sweep has no scenes"
+    yield from _gather(wanted, rows, output)
+    require_result(rows)
+
+
+def _gather(sweep: Sweep, rows: list[dict[str, Any]], output: Path) -> Results:
+    """What the task of a sweep makes of all its rows."""
+    gather = getattr(registered.study_of(sweep.task), "gather", None)
+    yield from gather(sweep, rows, output, say) if gather and rows else ()
+
+
+@command(
+    "faultgouge examples sweep && "
+    "for k in 1 2; do faultgouge sweep sweep.toml -o $k --shard $k/2; done && faultgouge merge 1 2",
+    alone=True,
+)
+def merge(
+    parts: Annotated[list[Path], Argument(metavar="DIR...", help="Folders of `sweep --shard`.")],
+    output: Annotated[Path, Option("-o", "--output", help="The folder to write.")] = Path("merged"),
+) -> Results:
+    """Join the shards of a sweep; the table is that of an undivided sweep.
+
+    The shards are only read, and may still be running. Rows that the folder DIR of -o
+    has are kept. A row with a result goes before one with an error; two different
+    results of one scene are an error.
+    """
+    from faultgouge.studies.sweep.draw import draw_sweep
+    from faultgouge.studies.sweep.run_sweep import merge as merge_parts
+
+    sweep, rows = merge_parts(parts, output, print_line)
+    draw_sweep(rows, output, say)
+    yield from _gather(sweep, rows, output)

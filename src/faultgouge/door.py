@@ -1,12 +1,15 @@
-"""Read a packing from a file of any kind."""
+"""The functions of the package that most users need, beside those of its rooms: packings of files of any kind, pictures
+and pages of them, and the pair of eigenvalues that merges at the onset of a scene.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import wraps
+from html import escape
 from pathlib import Path
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, Literal, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,10 +21,18 @@ from .analysis import stability as stability_of_packing
 from .analysis import stress as stress_of_packing
 from .analysis import vibrations as vibrations_of_packing
 from .analysis.files.configuration_file import holds_configuration, read_configuration
-from .analysis.files.formats import Disks, is_hdf5, packing_of, upper_layer
+from .analysis.files.formats import is_hdf5, packing_of, upper_layer
 from .analysis.files.formats.lammps_dump import dump_frames
 from .analysis.files.runfile import law_of_parameters
 from .analysis.has_configuration import HasConfiguration
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from .figures import PairCurve
+    from .figures.browser_page import Axis
+    from .pywrap import Scene
 
 
 def load(
@@ -84,7 +95,9 @@ def load(
     if path.suffix == ".h5" or (path.is_file() and is_hdf5(path)):
         with RunFile(path) as run:
             return packing_in(run, frame)
-    disks = _read_disks(path, frame)
+    from .pywrap.lammps.restart_file import read_disks
+
+    disks = read_disks(path, None if frame == -1 else frame)
     if width is not None:
         disks = replace(disks, box_length=width)
     given = disks.given
@@ -232,7 +245,180 @@ def packing_in(run: RunFile, frame: int = -1) -> Packing:
     return packing if settings is None or settings.spring == "rigid" else replace(packing, spring=settings.spring)
 
 
-def _read_disks(path: Path, frame: int) -> Disks:
-    from .pywrap.lammps.restart_file import read_disks
+@takes_file
+def draw(
+    packing: HasConfiguration,
+    ax: Axes | None = None,
+    mode: int | Literal["pair"] | None = None,
+    color: str = "mobilised",
+    caption: bool = False,
+) -> Figure:
+    """Draw a packing with its force chains, or a mode of it.
 
-    return read_disks(path, None if frame == -1 else frame)
+    Parameters
+    ----------
+    packing : Packing, Configuration, str or Path
+        The packing, or the file of one.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a figure of its own, with a legend, by default.
+    mode : int or "pair", optional
+        A mode by its number, counted by the real part of the eigenvalue from 0; "pair": the fastest growing complex
+        pair, or the two real modes that are closest to meeting, of which `ax` shows the first.
+    color : {"mobilised", "slip", "force", "none"}
+        What the colour of a contact shows, without a mode.
+    caption : bool
+        Whether to print load and numbers of contacts above, in a new figure.
+
+    Returns
+    -------
+    Figure
+        The figure of the axes.
+
+    Raises
+    ------
+    BadInputError
+        If `ax` is no axes, or the packing has no such mode.
+
+    Examples
+    --------
+
+    >>> start = faultgouge.settle("three_disks.toml").packing
+    >>> faultgouge.draw(start).savefig("packing.png")
+    >>> print(faultgouge.draw(start, mode=0).axes[0].get_title())
+    mode 0: $\\lambda = 383.589$
+    participation ratio 0.99, rotation 28 % of the kinetic energy
+    """
+    from .figures import draw_mode, draw_packing
+
+    if mode is None:
+        return draw_packing(packing, ax, color, caption)
+    if mode != "pair" and not isinstance(mode, int):
+        raise BadInputError(f"draw takes the number of a mode, or 'pair', and not mode = {mode!r}.")
+    return draw_mode(packing, None if mode == "pair" else mode, ax)
+
+
+def pair(scene: Scene | str | Path, mu: float | None = None) -> PairCurve:
+    """Follow the pair of eigenvalues that merges at the first onset of a scene, without dissipation.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        With a section [ramp], or its file.
+    mu : float, optional
+        One of its friction coefficients; the first by default.
+
+    Returns
+    -------
+    PairCurve
+        The pair at the loads of the ramp, and at loads that crowd at the onset, up to the end of its window, or to
+        twice the onset. ``faultgouge.figures.draw_pair([curve])`` draws the curve.
+
+    Raises
+    ------
+    OnsetError, NoEquilibriumError
+        As of :func:`faultgouge.onset`.
+
+    Examples
+    --------
+
+    >>> curve = faultgouge.pair("three_disks.toml")
+    >>> curve.eigenvalues[0].round(3)
+    array([1188.882+0.j, 1484.786+0.j])
+    >>> curve.eigenvalues[-1].round(3)
+    array([1523.763-277.111j, 1523.763+277.111j])
+    """
+    from .figures import PairCurve
+    from .pywrap.onset import ONSET_DISTANCES, onset_run
+    from .pywrap.scenes.scene import scene_of
+    from .pywrap.scenes.validation import require_section
+
+    scene = scene_of(scene, "pair")
+    near = ONSET_DISTANCES * require_section(scene.ramp, "ramp").first
+    friction = scene.law.mus[0] if mu is None else mu
+    return PairCurve.of_onset(onset_run(scene, friction, reached=lambda _: None, near_onset=near, first=True))
+
+
+class ViewedPage(type(Path())):  # type: ignore[misc]  # the class of paths of this system
+    """The path of a page, which a notebook shows."""
+
+    def _repr_html_(self) -> str:
+        return f'<iframe srcdoc="{escape(self.read_text())}" width="100%" height="640" style="border: 0"></iframe>'
+
+
+def view(
+    file: str | Path,
+    output: str | Path = "page.html",
+    loads: int | None = None,
+    say: Callable[[str], Any] = print,
+    progress: Callable[[Sequence[HasConfiguration]], Iterable[HasConfiguration]] = iter,
+) -> ViewedPage:
+    """Write a page of a stored packing, ramp, undamped run or driven run.
+
+    Parameters
+    ----------
+    file : str or Path
+        A run.h5, drive.h5 or perturb.h5, the dumps of a deck, or what `import` has made of a LAMMPS deck.
+    output : str or Path
+        The page, .html.
+    loads : int, optional
+        Number of equilibria on the page, equally spaced; by default as many as take a minute, and 60 at the most.
+    say, progress : callable
+        Takes a line about long work; wraps the packings while their eigenvalues are computed.
+
+    Returns
+    -------
+    ViewedPage
+        The path of the page; in a notebook the page itself is seen.
+
+    Raises
+    ------
+    BadInputError
+        If the page is no .html.
+    PackingFileError
+        If the file is missing or damaged.
+
+    Examples
+    --------
+
+    >>> page = faultgouge.view("run.h5", "page.html", say=lambda line: None)
+    >>> page.read_text()[:15]
+    '<!doctype html>'
+    """
+    from .figures.browser_page import loads_shown, write_view
+    from .figures.followed_pairs import seconds
+
+    path, output = path_of(file, "view"), Path(output)
+    if output.suffix.lower() != ".html":
+        raise BadInputError(f"-o {output}: a page is an .html")
+    last = load(path)
+    packings, series, axis = [last], None, None
+    if isinstance(last, Configuration):
+        particles = "disks" if last.dimension == 2 else "spheres"
+        title = f"{path.name}: {len(last)} {particles} as LAMMPS left them"
+    elif path.suffix == ".disks":
+        title = f"{path.name}: {len(last)} disks, Fₓ = {last.fx:g}"
+    else:
+        with RunFile(path) as run:
+            packings, axis, title = _of_run(run, loads_shown(len(last)) if loads is None else loads)
+            series = run.series("undamped") if "undamped" in run.names_of_series else None
+    if seconds(packings) > 5:
+        say(f"eigenvalues of {len(packings)} loads of {len(packings[0])} disks: about {seconds(packings):.0f} s")
+    write_view(packings, output, title, series, progress, axis)
+    return ViewedPage(output)
+
+
+def _of_run(run: RunFile, most: int) -> tuple[list[Any], Axis | None, str]:
+    """The packings of a page, what changes from one to the next, and the title of the page."""
+    from .analysis.motion.hysteresis import turning_points
+    from .figures.browser_page import Axis, equally_spaced
+
+    driven = "time" in run.observables
+    turns = [] if driven else turning_points(run.fx)
+    chosen = sorted({*equally_spaced(len(run), most), *turns})
+    packings = [packing_in(run, k) for k in chosen]
+    axis = Axis("t", "time of the run", run.observable("time")[chosen]) if driven else None
+    ends = [run.fx[k] for k in sorted({0, *turns, len(run) - 1})]
+    span = f", Fₓ = {' to '.join(f'{fx:g}' for fx in ends)}" if not driven else ""
+    what = "undamped run" if "undamped" in run.names_of_series else "equilibria"
+    what = "states of a driven run" if driven else what
+    return packings, axis, f"{run.path.name}: {what} of {len(packings[0])} disks{span}"

@@ -1,0 +1,388 @@
+"""The commands import and export: packings of other codes and decks of LAMMPS as run.h5, and packings for others."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer import Argument, Option
+
+from ..analysis.counted import counted
+from ..signal_guard import is_root, keeps
+from .packings import verdict_of
+from .pictures import modes_of
+from .terminal import (
+    RAMPED,
+    Frame,
+    PackingFile,
+    Results,
+    command,
+    locked,
+    progress,
+    say,
+    status,
+    stored_packing,
+    working,
+)
+
+if TYPE_CHECKING:
+    from faultgouge.analysis import Packing
+    from faultgouge.analysis.files.formats import Disks
+    from faultgouge.pywrap import Scene
+
+OF_SOURCE = (
+    "A LAMMPS deck (.in), or a restart that was kept with its deck (NAME.restart beside NAME.restart.in); or LAMMPS "
+    "data, dump or restart (atom style sphere), NAME.disks, CSV, extended XYZ, GSD, packing.json, or a file that "
+    "MDAnalysis reads with radii."
+)
+OF_LAYER = (
+    "The upper layer: a number of highest disks that touch something, type:2 or type:NAME, ids:1,4,7-9, ids:@FILE, "
+    "group:NAME of a restart, or a region such as 'y>10 and x<5'. By default the upper layer of the file."
+)
+OF_CONTACTS = (
+    "A table of contacts: slips (CSV with id1, id2, 0 being the floor, slip; or a LAMMPS dump local); with --material "
+    "forces, of YADE, MercuryDPM (.fstat), LIGGGHTS or LAMMPS, or measured ones (RigidLibrary)."
+)
+OF_MATERIAL = "For spheres of a table: young, poisson, density, friction, restitution; or kn, kt and exponent."
+OF_BALANCE = (
+    "For a deck: force on a particle that may be out of balance, as a share of the mean contact force; 1e-4 by default."
+)
+OF_FLOOR = "y of the floor in the file; the packing is shifted so that the floor is at 0."
+OF_FRAMES = "Frames of the undamped run if the file has its trajectory, else of the ramp; .xyz, .gsd or .pvd."
+
+
+@command("faultgouge examples pour && faultgouge import pour.in -o packing.h5", name="import", writes="new")
+def import_(
+    file: Annotated[Path, Argument(metavar="FILE", help=OF_SOURCE)],
+    output: Annotated[Path, Option("-o", "--output", help="The run.h5 to write.")] = Path("packing.h5"),
+    top: Annotated[str | None, Option(metavar="LAYER", help=OF_LAYER)] = None,
+    scene: Annotated[Path | None, Option(help="Law, load, damping and inertia of this scene.")] = None,
+    kn: Annotated[float | None, Option(help="Normal stiffness, without a scene.")] = None,
+    kt: Annotated[str | None, Option(help="Tangential stiffness: a number, or '2/7 kn'.")] = None,
+    mu: Annotated[float | None, Option(help="Friction coefficient; 1 by default.")] = None,
+    exponent: Annotated[float | None, Option(help="1.5 (Hertz, the default) or 1.")] = None,
+    fy: Annotated[float | None, Option(help="Load on each disk of the layer.")] = None,
+    fx: Annotated[float | None, Option(help="Shear force on each disk of the layer; 0 by default.")] = None,
+    inertia: Annotated[float | None, Option(help="I_0 in I = I_0 m R^2; 1 by default.")] = None,
+    floor: Annotated[float, Option(help=OF_FLOOR)] = 0.0,
+    width: Annotated[
+        str | None, Option(metavar="L|open", help="Period along x, or open sides; by default as in the file.")
+    ] = None,
+    contacts: Annotated[Path | None, Option(help=OF_CONTACTS)] = None,
+    frame: Annotated[int | None, Option(help="Number of the frame; negative numbers count from the last.")] = None,
+    relax: Annotated[bool, Option("--relax", help="Bring a packing out of balance to rest.")] = False,
+    material: Annotated[str | None, Option(metavar="KEY=VALUE,...", help=OF_MATERIAL)] = None,
+    columns: Annotated[
+        str | None, Option(metavar="NAME,...", help="Names of the columns of --contacts, with --material.")
+    ] = None,
+    slides: Annotated[
+        bool, Option("--slides", help="For a deck: contacts at Coulomb's bound slide; by default they stick.")
+    ] = False,
+    balance: Annotated[float | None, Option(min=0.0, help=OF_BALANCE)] = None,
+) -> Results:
+    """Run a LAMMPS deck and give the verdict on its last state, or convert a packing of another code, to a run.h5.
+
+    spectrum, draw and the key packing.file of a scene take the run.h5. A packing in
+    balance is imported unchanged, to the bit. With --relax, a packing out
+    of balance comes to rest under law and load. It relaxes without friction, and
+    friction then starts with zero slips. If the file has slips, it relaxes with
+    friction. The command prints how far the disks moved.
+
+    A LAMMPS deck (NAME.in, in.NAME) is run in its own folder, as lmp -in does there, and
+    its last state is stored unchanged, with LAMMPS's own granular styles, disks or
+    spheres. The command ends with the first sentence of the verdict. With --relax
+    LAMMPS first runs on with drag until the packing rests. A state that cannot be
+    taken is kept in a restart file, with a deck that goes on from it.
+    """
+    from faultgouge.analysis import BadInputError, PackingFileError
+    from faultgouge.analysis.files.configuration_file import write_configuration
+    from faultgouge.pywrap.granular.balance import BALANCE
+    from faultgouge.pywrap.granular.run_deck import run_deck
+
+    if material is not None:
+        yield from _spheres(file, output, material, contacts, columns, -1 if frame is None else frame)
+        return
+    is_bare = not floor and all(
+        each is None for each in (top, scene, kn, kt, mu, exponent, fy, fx, inertia, width, contacts, frame)
+    )
+    kept = file.with_name(f"{file.name}.in")
+    if is_bare and file.suffix == ".restart" and kept.is_file():
+        file = kept
+    if file.suffix == ".in" or file.name.startswith("in."):
+        if not is_bare:
+            raise typer.BadParameter(
+                f"{file} is a deck, which says all by itself: leave all options but -o, --relax, --slides and --balance"
+            )
+        keeps(f"nothing has been written to {output} yet")
+        text = file.read_text(errors="replace") if file.is_file() else ""  # a deck may move its own file
+        allowed = BALANCE if balance is None else balance
+        with status(f"{file}: LAMMPS runs") as show:
+            found = run_deck(file, slides=slides, balance=allowed, relaxes=relax, keep=output, notice=say, show=show)
+        keeps(f"{output} has been written; whether the packing is stable says `faultgouge stability {output}`", output)
+        if is_root():
+            write_configuration(output, found, {"deck": text})
+            yield from _deck_in_words(found, output)
+        return
+    if slides or balance is not None:
+        raise typer.BadParameter("--slides and --balance are for a LAMMPS deck (.in): leave them out")
+    given = {"kn": kn, "kt": _number(kt), "mu": mu, "exponent": exponent, "fy": fy, "fx": fx, "inertia_factor": inertia}
+    try:
+        disks = _disks(file, frame, floor, width, contacts)
+        packing = _packing(disks, top, scene, {key: value for key, value in given.items() if value is not None})
+    except (PackingFileError, BadInputError) as error:
+        if lines := _deck_around(file) if is_bare else "":
+            raise type(error)(f"{error}\n{lines}") from error
+        raise
+    yield from _import_disks(file, output, disks, top, packing, relax)
+
+
+def _in_words(found: object, output: Path) -> str:
+    return f"{repr(found).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}"
+
+
+def _deck_in_words(found: Any, output: Path) -> Results:
+    """The packing that LAMMPS left, its largest stable time step beside Rayleigh's, and whether it is stable."""
+    from faultgouge.analysis import rayleigh_timestep, stable_timestep
+
+    yield _in_words(found, output)
+    step, usual = stable_timestep(found), rayleigh_timestep(found)
+    beside = "" if usual is None else f", {step / usual:.3g} of Rayleigh's formula ({usual:.4g})"
+    yield f"largest stable time step {step:.4g}{beside}"
+    verdict = verdict_of(found)
+    yield "\n".join([verdict.sentences[0], *verdict.remarks])
+
+
+def _spheres(
+    file: Path, output: Path, material: str, contacts: Path | None, columns: str | None, frame: int
+) -> Results:
+    """Store spheres of a table with the forces of their contacts, and give the verdict that the digits allow."""
+    from faultgouge.analysis.files.configuration_file import write_configuration
+    from faultgouge.analysis.files.contact_tables import (
+        material_of,
+        read_contacts,
+        read_spheres,
+        verdict_within_digits,
+    )
+    from faultgouge.analysis.files.measured_forces import is_measured, measured_forces
+
+    law = material_of(material)
+    if contacts is not None and is_measured(contacts):
+        with working("draws of the forces"):
+            found, counts = measured_forces(file, contacts, law, frame)
+        if is_root():
+            write_configuration(output, found, {"deck": ""})
+            yield "\n".join([f"written to {output}", *counts])
+        return
+    spheres = read_spheres(file, frame)
+    if contacts is None:
+        found = spheres.of_material(law)
+    else:
+        found = read_contacts(spheres, contacts, law, None if columns is None else columns.split(","), frame)
+    if not is_root():
+        return
+    write_configuration(output, found, {"deck": ""})
+    keeps(f"{output} has been written", output)
+    yield _in_words(found, output)
+    if contacts is None:
+        yield "\n".join(found.remarks)
+        return
+    with working("stability"):
+        verdict, says = verdict_within_digits(found)
+    yield f"{verdict}\n{says}"
+
+
+def _disks(file: Path, frame: int | None, floor: float, width: str | None, contacts: Path | None) -> Disks:
+    """The disks of the file; options replace numbers of the file."""
+    from faultgouge.analysis.files.formats.tables import read_slips
+    from faultgouge.pywrap.lammps.restart_file import read_disks
+
+    disks = read_disks(file, frame).above(floor)
+    if width is not None:
+        period = None if width == "open" else _number(width)
+        if period is not None and not (isinstance(period, float) and period > 0):
+            raise typer.BadParameter(f"--width {width}: give the period along x, above 0, or open")
+        disks = replace(disks, box_length=period)
+    if contacts is None:
+        return disks
+    given = {key: value for key, value in disks.given.items() if key != "slips_known"}
+    return replace(disks, slips=read_slips(contacts, disks.length_unit), given=given)
+
+
+def _number(text: str | None) -> float | str | None:
+    """A number, or the text that is none."""
+    try:
+        return None if text is None else float(text)
+    except ValueError:
+        return text
+
+
+def _packing(disks: Disks, top: str | None, scene: Path | None, options: dict[str, Any]) -> Packing:
+    """The packing under the law and the load of the scene, of the options, or of the file.
+
+    All that none of them says is told in one sentence, with the command that would do.
+    """
+    from faultgouge.analysis import BadInputError
+    from faultgouge.analysis.files.formats import packing_of, upper_layer
+    from faultgouge.analysis.files.formats.disks import LAYER_WAYS
+    from faultgouge.pywrap.settling.settle import law_of, load_of
+
+    decided = [f"--{key.removesuffix('_factor')}" for key in options if key != "fx"]
+    if scene is not None and decided:
+        raise typer.BadParameter(f"{decided[0]} cannot stand beside --scene, which decides it: leave one out")
+    values = options if scene else {**disks.given, **options}
+    gaps = {"--top 10": "which disks are the upper layer"} if top is None and disks.top is None else {}
+    if scene is None and "kn" not in values:
+        gaps["--kn 2e5"] = "the normal stiffness"
+    if scene is None and "fy" not in values:
+        gaps["--fy 3"] = "the load on each disk of the upper layer"
+    if gaps:
+        *others, last = gaps.values()
+        missing = f"{', '.join(others)} and {last}" if others else last
+        ways = f"; --top takes {LAYER_WAYS}" if "--top 10" in gaps else ""
+        names = " ".join(each.split()[0] for each in gaps)
+        example = f"faultgouge import ... {' '.join(gaps)}"
+        raise BadInputError(f"{disks.source} does not say {missing}: add {names}, as in `{example}`{ways}")
+    layer = upper_layer(disks, top)
+    wanted = _scene(scene, values, float(disks.radius.min()))
+    load = load_of(wanted) | {"fx": 0.0} | {key: values[key] for key in ("fx", "inertia_factor") if key in values}
+    return packing_of(disks, law_of(wanted, wanted.law.mus[0]), layer, **load)
+
+
+def _scene(scene: Path | None, values: dict[str, Any], smallest: float) -> Scene:
+    """The scene, or a scene made of options and file; its disks have the smallest radius of the packing."""
+    from faultgouge.pywrap.scenes.scene import Scene
+
+    sections: dict[str, Any] = {"packing": {"radii": [smallest], "width": 20 * smallest}}
+    if scene is not None:
+        return Scene.from_toml(scene, packing=sections["packing"], command="settle")
+    history = next((name for name in ("rescaled", "coulomb") if values.get(name)), "total")
+    for name, keys in (("law", ("kn", "kt", "mu", "exponent")), ("damping", ("cn", "ct", "tau")), ("load", ("fy",))):
+        if section := {key: values[key] for key in keys if key in values}:
+            sections[name] = section
+    return Scene.from_mapping(sections | {"law": sections["law"] | {"history": history}})
+
+
+def _import_disks(file: Path, output: Path, disks: Disks, top: str | None, packing: Packing, relax: bool) -> Results:
+    """Store a packing in balance, or brought to rest if that is wanted, and say what it is."""
+    from faultgouge.analysis import PackingFileError, RunFile
+    from faultgouge.analysis.files.formats.disks import layer_remark
+    from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
+    from faultgouge.pywrap.settling.relax import bring_to_rest
+    from faultgouge.pywrap.settling.settle import LARGEST_IMBALANCE
+
+    for remark in filter(None, (disks.remark, layer_remark(disks, top, packing.top))):
+        say(f"{file}: {remark}")
+    keeps(f"nothing has been written to {output} yet")
+    if not len(packing.contacts) or packing.residual > LARGEST_IMBALANCE * packing.fy:
+        if not relax:
+            feels = f"a disk feels {packing.residual:.3g}" if len(packing.contacts) else "no disk touches another"
+            raise PackingFileError(
+                f"{file} is not in balance under fy = {packing.fy:g}: {feels}; check law and load, or let it come to "
+                "rest with --relax."
+            )
+        with status("coming to rest") as show:
+            resting, words = bring_to_rest(packing, watch=lambda what: show(f"coming to rest: {what}"))
+        yield words
+        packing = resting.packing
+    if is_root():
+        with RunFile.create(output, packing, {"task": "import"}) as run:
+            run.append(packing, floor=rounding_floor(packing), evaluations=0)
+            with run.change():
+                run.complete = True
+    if not packing.slips_known:
+        say(f"{file} gives no tangential forces: they are taken as zero, and nothing can be said of the stability")
+    contacts_of = f"{counted(len(packing.contacts), 'contact')}, {counted(len(packing.rattlers), 'rattler')}"
+    yield (
+        f"{counted(len(packing), 'disk')}, {int(packing.top.sum())} of them the upper layer, {contacts_of}; residual "
+        f"{packing.residual:.2g}; written to {output}"
+    )
+
+
+AROUND = """\
+pair_style gran/hertz/history 1e5 NULL 50 NULL 0.5 1   # the contact law: KN KT GAMMA_N GAMMA_T MU
+pair_coeff * *
+fix floor all wall/gran hertz/history 1e5 NULL 50 NULL 0.5 1 zplane 0 NULL contacts
+fix load all gravity 1.0 vector 0 0 -1
+fix move all nve/sphere
+fix drag all viscous 1.0
+timestep 1e-4
+run 100000   # until it rests; 0 for a restart at rest"""
+
+
+def _deck_around(file: Path) -> str:
+    """Lines of a deck for a restart or data file of LAMMPS, to be filled in; empty for other files."""
+    from faultgouge.analysis.files.formats import RESTART_BEGINNING
+
+    if not file.is_file():
+        return ""
+    with file.open("rb") as stream:
+        first = stream.readline(500)
+    head = first.decode(errors="replace")
+    if first.startswith(RESTART_BEGINNING):
+        reads = f"comm_modify vel yes\nread_restart {file.name}"
+    elif head.startswith("LAMMPS data file"):
+        units = (re.findall(r"units = (\w+)", head) or ["lj"])[0]
+        reads = f"units {units}\natom_style sphere\nboundary f f f\ncomm_modify vel yes\nread_data {file.name}"
+    else:
+        return ""
+    deck = file.with_suffix(".in").name
+    return (
+        f"For spheres, or any other law, write a deck beside it, here {deck} with the laws and walls of the run that "
+        f"made the file, and give `faultgouge import {deck}`:\n\n{reads}\n{AROUND}"
+    )
+
+
+@command(f"{RAMPED} && faultgouge export run.h5 --mode pair", alone=True)
+def export(
+    file: PackingFile,
+    frame: Frame = -1,
+    mode: Annotated[
+        str | None, Option("--mode", metavar="pair|N", help="Also a mode as vectors, as in `faultgouge draw`.")
+    ] = None,
+    frames: Annotated[str | None, Option("--frames", metavar="all|START:STOP[:STEP]", help=OF_FRAMES)] = None,
+    output: Annotated[Path, Option("-o", "--output", help="A .vtp, .pvd, .xyz, .data, .gsd or .csv.")] = Path(
+        "packing.vtp"
+    ),
+) -> Results:
+    """Write a stored packing for ParaView (.vtp), OVITO and ASE (.xyz), LAMMPS (.data) or HOOMD (.gsd).
+
+    The file contains disks with radii, net forces and mobilised friction; contacts
+    with forces and slips (in .vtp as lines); modes as vectors (not in .data). A .csv
+    has a row for each contact.
+    `faultgouge import` reads .xyz, .data and .gsd back unchanged, to the bit. A .gsd
+    needs pip install 'faultgouge[export]'. With --frames the file is a film of
+    displacements; a .pvd for ParaView comes with a folder of .vtp.
+    """
+    from faultgouge.analysis import Configuration, PackingFileError, RunFile
+    from faultgouge.analysis.files.formats import (
+        ModeVectors,
+        check_writer,
+        choose_frames,
+        frames_of,
+        write_frames,
+        write_packing,
+    )
+    from faultgouge.analysis.files.formats.tables import HEAD_OF_CONTACTS
+
+    with locked(output, file, head=HEAD_OF_CONTACTS if output.suffix == ".csv" else ""):
+        if frames is not None:
+            if mode is not None or frame != -1:
+                raise typer.BadParameter("--frames stands without --frame and --mode: leave these out")
+            check_writer(output, frames=True)
+            if file.suffix == ".disks":
+                raise PackingFileError(f"{file} is one packing: leave --frames out, or give a run.h5.")
+            with RunFile(file) as run:
+                numbers = choose_frames(run, frames)
+                write_frames(output, progress(frames_of(run, numbers), "frames", len(numbers)))
+                what = "an undamped run" if "trajectory" in run.names_of_series else "equilibria"
+            yield f"{counted(len(numbers), 'frame')} of {what}; written to {output}"
+            return
+        packing = stored_packing(file, frame)
+        check_writer(output, mode is not None)
+        modes = [] if mode is None else modes_of(packing, mode)[0]
+        vectors = [ModeVectors(f"mode_{each.number}", each.eigenvalue, each.displacement) for each in modes]
+        load = "" if isinstance(packing, Configuration) else f"F_x = {packing.fx:g}: "
+        yield f"{load}{write_packing(output, packing, vectors)}; written to {output}"
