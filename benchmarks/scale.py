@@ -39,7 +39,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from faultgouge.analysis import OnsetError, Packing, RunFile, find_onset, stiffness_matrix
-from faultgouge.assessment.extremes.cases.packings import crystal
+from faultgouge.assessment.extremes.packings import crystal
 from faultgouge.pywrap import Engine, Equilibrium, NoEquilibriumError, Scene, equilibrate, settle
 from faultgouge.pywrap.equilibria.newton_matrix import factor_stiffness
 from faultgouge.pywrap.equilibria.quasistatic import rounding_floor

@@ -146,7 +146,7 @@ def show(name: str, configuration: Configuration) -> None:
     size = f"exp({told['growth_rate']:.3g} t)" if found.stable is False else f"{told['amplification']:.3g}"
     print(
         f"{name:24s}{len(configuration):8d}{found.at_bound:9d}{verdict:>11s}{size:>14s}{told['time']:8.3g}"
-        f"{found.searched:9.2g}{seconds:8.0f}{memory:6.2f}",
+        f"{found.sticking.searched:9.2g}{seconds:8.0f}{memory:6.2f}",
         flush=True,
     )
 

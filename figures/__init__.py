@@ -5,12 +5,11 @@ open no window and change no setting of matplotlib. Labels of lengths, forces an
 may have any units.
 """
 
-from .cycle import draw_cycle
 from .mode import draw_mode
 from .packing import draw_packing
 from .pages import render
 from .pair import PairCurve, draw_pair
-from .series import draw_series
+from .series import draw_cycle, draw_series
 from .style import INK, save, save_as, styled
 
 __all__ = [

@@ -8,27 +8,26 @@ mode is 8 bits a coordinate.
 import base64
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike
 
-from faultgouge.analysis import Packing, Stability
+from faultgouge.analysis import Configuration, Packing, Stability
 from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.counted import counted
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.analysis.has_configuration import HasConfiguration
 from faultgouge.analysis.motion.hysteresis import layer_displacement, turning_points
 
+from .disk_view import View, cell_of, walls_of, within_cell
 from .followed_pairs import SECONDS_OF_1000, FollowedPair, Progress, RampEigenvalues, follow_eigenvalues
-from .images import Images
-from .packing_artist import LEAST_SHARE, PackingArtist
+from .packing import LEAST_SHARE, faces_of
 from .pair import curve_through
 from .style import BULK, EDGE, FLOOR, INK, MOBILIZATION, UPPER
 
@@ -42,19 +41,14 @@ FEWEST_ON_PAGE, MOST_ON_PAGE = 4, 40
 """Pairs of a page, at least and at most."""
 
 
-@dataclass(frozen=True, eq=False)
-class Axis:
-    """The quantity that changes from one packing of a page to the next.
+SINGLE = np.finfo(np.float32)
 
-    Attributes
-    ----------
-    name : str
-        Its symbol.
-    meaning : str
-        What it is, in words.
-    values : ndarray, shape (S,)
-        Its value for each packing.
-    """
+IMAGE_MARGIN = 0.5
+"""Images of disks beyond the sides of a periodic box that move into sight, in units of the largest radius."""
+
+
+class Axis(NamedTuple):
+    """The quantity that changes from one packing of a page to the next: its symbol, what it is, and its values (S,)."""
 
     name: str
     meaning: str
@@ -63,9 +57,8 @@ class Axis:
     @classmethod
     def of_loads(cls, packings: Sequence[HasConfiguration]) -> "Axis":
         """The shear force of a ramp; a load parameter of other codes."""
-        values = np.array([packing.fx for packing in packings])
-        layer = packings[0].top.any()
-        return cls("Fₓ", "force on each disk of the upper layer" if layer else "the load", values)
+        meaning = "force on each disk of the upper layer" if packings[0].top.any() else "the load"
+        return cls("Fₓ", meaning, np.array([packing.fx for packing in packings]))
 
 
 def equally_spaced(count: int, most: int) -> list[int]:
@@ -97,66 +90,125 @@ def write_view(
     axis : Axis, optional
         What changes from packing to packing; the load by default.
     """
-    axis = Axis.of_loads(packings) if axis is None else axis
+    axis, first = axis or Axis.of_loads(packings), packings[0]
     followed = follow_eigenvalues(packings, progress)
-    opens = _best_frame(followed.verdicts)
-    room = BYTES_OF_MODES / (2 * packings[0].coordinates * len(packings))
+    verdicts, opens = followed.verdicts, _best_frame(followed.verdicts)
+    room = BYTES_OF_MODES / (2 * first.coordinates * len(packings))
     pairs = followed.pairs[: int(np.clip(room, FEWEST_ON_PAGE, MOST_ON_PAGE))]
-    legs = _legs(axis.values) if len(packings) > 1 else []
-    cycle = _cycle([each for each in packings if isinstance(each, Packing)])
-    images = [Images.of(packing) for packing in packings]
+    # on each part of the path the axis rises, or falls
+    ends = [0, *turning_points(axis.values), len(packings) - 1] if len(packings) > 1 else []
+    legs = [np.arange(a, b + 1) for a, b in pairwise(ends)]
+    disks = [each for each in packings if isinstance(each, Packing)]
+    moved = layer_displacement(disks)[:, 0].tolist() if len(disks) > 1 else []
+    seen = {} if series is None else {name: series[name][series["msd"] > 0] for name in ("time", "msd")}
+    images = [(_spheres if first.dimension == 3 else _disks)(packing) for packing in packings]
+    low, high = np.min([each.low for each in images], axis=0), np.max([each.high for each in images], axis=0)
     data = {
         "axis": {"name": axis.name} if legs else None,
         "legs": [leg.tolist() for leg in legs],
         "opens": opens,
-        "dissipative": any(verdict.dissipative for verdict in followed.verdicts),
+        "dissipative": any(verdict.dissipative for verdict in verdicts),
         "frames": [_frame(packing, axis, images[k], followed, k) for k, packing in enumerate(packings)],
         "pairs": [_pair(pair, axis, legs) for pair in pairs],
-        "cycle": cycle,
-        "series": None if series is None else _series(series),
-        **_scene(packings, images),
-    }
-    page = _template().render(
-        title=title,
-        axis=axis if legs else None,
-        count=len(packings),
-        opens=opens,
-        dissipative=data["dissipative"],
-        grows=any(verdict.undamped.growth_rate for verdict in followed.verdicts),
-        cycle=cycle is not None,
-        series=series is not None,
-        gradient=", ".join(_colours(8)),
-        legend=_legend(packings[0]),
-        data=json.dumps(data, separators=(",", ":"), default=_encode, allow_nan=False).replace("<", "\\u003c"),
-    )
-    write_text(path, page)
-
-
-def _template() -> Any:
+        "cycle": {"moved": moved, "force": [packing.fx for packing in disks]} if moved else None,
+        "series": seen or None,
+        "dimension": first.dimension,
+        "radius": first.radius,
+        "faces": FACES,
+        "colours": _colours(256),
+        "edge": EDGE,
+        "ink": INK,
+        "wall": FLOOR,
+        "extent": [low.tolist(), high.tolist()],
+        "periodic": images[0].periodic,
+        "walls": [wall._asdict() for wall in walls_of(first)],
+        "corners": images[0].corners.tolist(),
+    }  # fmt: skip
     folder = files(__package__ or "") / "view"
     loader = FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8"))
     environment = Environment(loader=loader, undefined=StrictUndefined, autoescape=True, trim_blocks=True)
-    return environment.get_template("page.html.j2")
+    page = environment.get_template("page.html.j2").render(
+        title=title,
+        axis=axis if legs else None,
+        count=len(packings),
+        **{name: data[name] for name in ("opens", "dissipative")},
+        grows=any(verdict.undamped.growth_rate for verdict in verdicts),
+        cycle=bool(moved),
+        series=series is not None,
+        gradient=", ".join(_colours(8)),
+        legend=_legend(first),
+        data=json.dumps(data, separators=(",", ":"), default=_encode, allow_nan=False).replace("<", "\\u003c"),
+    )
+    write_text(path, page)
 
 
 def _best_frame(verdicts: Sequence[Stability]) -> int:
     """Where the page opens: the fastest growth of a packing that rests, else of any; the last one if nothing grows."""
     unstable = [verdict.growth_rate if verdict.stable is False else 0.0 for verdict in verdicts]
     not_stable = [0.0 if verdict.stable else verdict.growth_rate for verdict in verdicts]
-    without = [verdict.undamped.growth_rate for verdict in verdicts]
-    for rates in (unstable, not_stable, without):
+    for rates in (unstable, not_stable, [verdict.undamped.growth_rate for verdict in verdicts]):
         if max(rates) > 0:
             return int(np.argmax(rates))
     return len(verdicts) - 1
 
 
-SINGLE = np.finfo(np.float32)
+class _Images(NamedTuple):
+    """Every image of a particle and of a contact that the page draws.
+
+    Attributes
+    ----------
+    place : ndarray, shape (n, 3)
+        Centres, length.
+    particle : ndarray of int, shape (n,)
+        Index of the particle of each image.
+    bar : ndarray, shape (c, 2, 3)
+        Ends of the bars of contacts, length.
+    contact : ndarray of int, shape (c,)
+        Index of the contact of each bar.
+    low, high : ndarray, shape (dimension,)
+        The frame of the picture of disks; of spheres what lies in it.
+    corners : ndarray, shape (8, 3)
+        Of the box of spheres; bit k of the number of a corner says on which side along edge k.
+    periodic : bool
+        Whether a picture of disks repeats.
+    """
+
+    place: Floats
+    particle: ArrayLike
+    bar: Floats
+    contact: Any
+    low: Floats
+    high: Floats
+    corners: Floats
+    periodic: bool
 
 
-def _legs(values: Floats) -> list[np.ndarray]:
-    """Numbers of the packings on each part of the path on which the axis rises, or falls."""
-    ends = [0, *turning_points(values), len(values) - 1]
-    return [np.arange(a, b + 1) for a, b in pairwise(ends)]
+def _disks(packing: HasConfiguration) -> _Images:
+    view = View.of(packing, margin=IMAGE_MARGIN * packing.radius.max())
+    place, start, end = (np.pad(each, ((0, 0), (0, 1))) for each in (view.place, view.start, view.end))
+    room = 1.1 if packing.top.any() else 0.3  # for the arrow of the load
+    top = float((packing.position[:, 1] + packing.radius).max()) + room * float(packing.radius.min())
+    bars, high, none = np.stack([start, end], axis=1), np.array([view.high[0], top]), np.zeros((0, 3))
+    return _Images(place, view.disk, bars, view.contact, view.low, high, none, bool(len(view.edges)))
+
+
+def _spheres(packing: HasConfiguration) -> _Images:
+    """Spheres within the box; of a contact through a periodic side each partner has half."""
+    own: Configuration = packing.configuration
+    cell, place, c, branch = cell_of(own), within_cell(own, own.position), own.contacts, own.branch
+    bars = np.stack([place[c.i], place[c.i] - branch], axis=1)
+    apart = np.linalg.norm(bars[:, 1] - place[c.j], axis=1) > 1e-6 * own.radius.max()
+    through = np.flatnonzero(~c.wall & apart)
+    bars[through, 1] += 0.5 * branch[through]
+    again = np.stack([place[c.j[through]] + 0.5 * branch[through], place[c.j[through]]], axis=1)
+    low, high = (place - own.radius[:, None]).min(axis=0), (place + own.radius[:, None]).max(axis=0)
+    for wall in walls_of(own):
+        wall.cut(low, high)
+    edges = np.where(own.periodic[:, None], cell, np.diag(high - low))
+    begin = np.where(own.periodic, own.origin, low)
+    corners = np.array([begin + sum((number >> k & 1) * edges[k] for k in range(3)) for number in range(8)])
+    contact = np.concatenate([np.arange(len(c)), through])
+    return _Images(place, np.arange(len(own)), np.concatenate([bars, again]), contact, low, high, corners, False)
 
 
 def _array(values: ArrayLike, kind: str) -> dict[str, str]:
@@ -171,11 +223,10 @@ def _encode(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else _array(value, "f4")
 
 
-def _frame(packing: HasConfiguration, axis: Axis, images: Images, followed: RampEigenvalues, k: int) -> dict[str, Any]:
+def _frame(packing: HasConfiguration, axis: Axis, images: _Images, followed: RampEigenvalues, k: int) -> dict[str, Any]:
     """The part of the page's data that belongs to one packing."""
     verdict, contacts, force = followed.verdicts[k], packing.configuration.contacts, packing.normal_force
     share = np.log(np.maximum(packing.mobilised, LEAST_SHARE)) / np.log(LEAST_SHARE)
-    faces = PackingArtist.faces(packing)
     return {
         "value": float(axis.values[k]),
         "force": packing.fx if packing.top.any() else None,
@@ -184,56 +235,47 @@ def _frame(packing: HasConfiguration, axis: Axis, images: Images, followed: Ramp
         "pairs": verdict.undamped.pairs,
         "rate": verdict.growth_rate,
         "undamped": verdict.undamped.growth_rate,
-        "place": _array(images.place, "f4"),
+        "place": images.place,
         "disk": _array(images.particle, "u2"),
-        "face": _array([FACES.index(to_hex(face)) for face in faces], "u1"),
+        "face": _array([FACES.index(to_hex(face)) for face in faces_of(packing)], "u1"),
         "angle": _array(getattr(packing, "angle", np.zeros(len(packing))), "f4"),
-        "bars": _array(images.bar, "f4"),
+        "bars": images.bar,
         "i": _array(contacts.i[images.contact], "i2"),
         "j": _array(contacts.j[images.contact], "i2"),
-        "width": _array((force / force.max(initial=np.finfo(float).tiny))[images.contact], "f4"),
+        "width": (force / force.max(initial=np.finfo(float).tiny))[images.contact],
         "share": _array(np.clip(255 * (1 - share), 0, 255)[images.contact], "u1"),
-        "re": _array(followed.values[k].real, "f4"),
-        "im": _array(followed.values[k].imag, "f4"),
+        "re": followed.values[k].real,
+        "im": followed.values[k].imag,
     }
 
 
 def sentences_of(verdict: Stability) -> list[str]:
     """Sentences of a page: the verdict, the eigenvalues without dissipation, and contacts at Coulomb's bound."""
-    undamped, contacts = verdict.undamped, verdict.at_bound
-    kinds = (
-        (undamped.pairs, "pair of eigenvalues", "pairs of eigenvalues", "complex"),
-        (undamped.negative, "eigenvalue", "eigenvalues", "negative"),
-    )
-    found = [f"{counted(count, one, many)} {_is(count)} {kind}" for count, one, many, kind in kinds if count]
+
+    def are(count: int | None, noun: str, kind: str, plural: str | None = None) -> list[str]:
+        return [f"{counted(count, noun, plural)} {'is' if count == 1 else 'are'} {kind}"] if count else []
+
+    undamped = verdict.undamped
+    found = are(undamped.pairs, "pair of eigenvalues", "complex", "pairs of eigenvalues")
+    found += are(undamped.negative, "eigenvalue", "negative")
     says = [verdict.sentences[0], *([" and ".join(found)] if found else [])]
     if found and verdict.dissipative:
         says[1] = f"without dissipation {says[1]}, D would grow as exp({undamped.growth_rate:.3g} t)"
-    if contacts:
-        says.append(f"{counted(contacts, 'contact')} {_is(contacts)} at Coulomb's bound")
-    says += verdict.remarks
+    says += [*are(verdict.at_bound, "contact", "at Coulomb's bound"), *verdict.remarks]
     return [f"{each[0].upper()}{each[1:]}." for each in says]
-
-
-def _is(count: int) -> str:
-    return "is" if count == 1 else "are"
 
 
 def _pair(pair: FollowedPair, axis: Axis, legs: Sequence[np.ndarray]) -> dict[str, Any]:
     """The eigenvalues of a pair at the packings, the curves through them, and the shapes of its modes."""
-    mean, square = _mean_and_square(pair.eigenvalues)
-    curves = []
-    for leg in legs:
-        load, values = curve_through(axis.values[leg], pair.eigenvalues[leg])
-        along_mean, along_square = _mean_and_square(values)
-        curves.append({"load": load, "mean": along_mean, "square": along_square})
-    shapes = [_shape(pair, k) if np.isfinite(each) else None for k, each in enumerate(mean)]
-    return {"mean": _array(mean, "f4"), "square": _array(square, "f4"), "curves": curves, "shapes": shapes}
+    found = _mean_and_square(pair.eigenvalues)
+    ways = [curve_through(axis.values[leg], pair.eigenvalues[leg]) for leg in legs]
+    shapes = [_shape(pair, k) if np.isfinite(each) else None for k, each in enumerate(found["mean"])]
+    return {**found, "curves": [{"load": load, **_mean_and_square(values)} for load, values in ways], "shapes": shapes}
 
 
-def _mean_and_square(eigenvalues: np.ndarray) -> tuple[Floats, Floats]:
+def _mean_and_square(eigenvalues: np.ndarray) -> dict[str, Floats]:
     """Mean of both members, and the square of their difference."""
-    return eigenvalues.mean(axis=1).real, ((eigenvalues[:, 0] - eigenvalues[:, 1]) ** 2).real
+    return {"mean": eigenvalues.mean(axis=1).real, "square": ((eigenvalues[:, 0] - eigenvalues[:, 1]) ** 2).real}
 
 
 def _shape(pair: FollowedPair, k: int) -> dict[str, Any]:
@@ -241,21 +283,8 @@ def _shape(pair: FollowedPair, k: int) -> dict[str, Any]:
     first, second = pair.modes[k]
     rows = np.stack([first.real, first.imag if pair.eigenvalues[k, 0].imag else second.real])
     largest = np.abs(rows).max(axis=(1, 2)) / 127
-    whole = np.rint(np.divide(rows, largest[:, None, None], out=np.zeros_like(rows), where=largest[:, None, None] > 0))
+    whole = np.rint(rows / np.where(largest > 0, largest, 1.0)[:, None, None])
     return {"scale": largest.tolist(), "rows": _array(whole, "i1")}
-
-
-def _cycle(packings: Sequence[Packing]) -> dict[str, list[float]] | None:
-    """F_x and the displacement of the upper layer; None of a single packing."""
-    if len(packings) < 2:
-        return None
-    return {"moved": layer_displacement(packings)[:, 0].tolist(), "force": [packing.fx for packing in packings]}
-
-
-def _series(series: dict[str, Any]) -> dict[str, Any]:
-    """The positive D(t) of an undamped run."""
-    seen = series["msd"] > 0
-    return {name: series[name][seen] for name in ("time", "msd")}
 
 
 def _colours(count: int) -> list[str]:
@@ -264,26 +293,13 @@ def _colours(count: int) -> list[str]:
 
 def _legend(packing: HasConfiguration) -> str:
     """Meaning of the colours of the particles, in words."""
-    kinds = ["White: rattlers, which touch nothing."] if len(packing.rattlers) else []
     configuration = packing.configuration
-    if packing.top.any():
-        kinds.insert(0, "Yellow: upper layer.")
-    elif configuration.contacts.wall.any() or not configuration.free.all():
-        kinds.insert(0, "Red: walls, and particles that are held.")
-    if packing.configuration.dimension == 3:
-        kinds.append("Drag to turn.")
-    return " ".join([*kinds, "Width of a bar: normal force."])
-
-
-def _scene(packings: Sequence[HasConfiguration], images: Sequence[Images]) -> dict[str, Any]:
-    """The part that all packings of a page share: the particles, the colours and the frame of the picture."""
-    return {
-        "dimension": images[0].dimension,
-        "radius": packings[0].radius,
-        "faces": FACES,
-        "colours": _colours(256),
-        "edge": EDGE,
-        "ink": INK,
-        "wall": FLOOR,
-        **Images.frame(images),
+    red = configuration.contacts.wall.any() or not configuration.free.all()
+    kinds = {
+        "Yellow: upper layer.": packing.top.any(),
+        "Red: walls, and particles that are held.": red and not packing.top.any(),
+        "White: rattlers, which touch nothing.": len(packing.rattlers),
+        "Drag to turn.": packing.dimension == 3,
+        "Width of a bar: normal force.": True,
     }
+    return " ".join(words for words, shown in kinds.items() if shown)

@@ -1,6 +1,5 @@
-"""What lies in a picture: planes that particles touch, the box, images of disks, lines at which the picture repeats."""
+"""What lies in a picture: planes that particles touch, the box, images of particles, lines at which it repeats."""
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,13 +27,15 @@ class Wall(NamedTuple):
         (low if self.sign > 0 else high)[self.axis] = self.place
 
 
-def walls_of(configuration: Configuration) -> tuple[Wall, ...]:
-    """The planes along the axes that particles touch."""
-    c = configuration.contacts
+def walls_of(packing: HasConfiguration) -> tuple[Wall, ...]:
+    """The planes along the axes that particles touch; the floor of a Packing."""
+    if isinstance(packing, Packing):
+        return (Wall(1, 1.0, 0.0),)
+    c, position, radius = packing.configuration.contacts, packing.position, packing.radius
     at = np.flatnonzero(c.wall & (np.abs(c.normal).max(axis=1) > ALONG_AXIS))
     axis = np.argmax(np.abs(c.normal[at]), axis=1)
     sign = np.sign(c.normal[at, axis])
-    place = configuration.position[c.i[at], axis] - sign * (configuration.radius[c.i[at]] - c.overlap[at])
+    place = position[c.i[at], axis] - sign * (radius[c.i[at]] - c.overlap[at])
     sides = sorted({*zip(axis.tolist(), sign.tolist(), strict=True)})
     return tuple(Wall(a, s, float(np.mean(place[(axis == a) & (sign == s)]))) for a, s in sides)
 
@@ -55,14 +56,13 @@ def within_cell(configuration: Configuration, position: Floats) -> Floats:
     return np.asarray(origin + (share - np.where(periodic, np.floor(share), 0.0)) @ cell)
 
 
-@dataclass(frozen=True, eq=False)
-class View:
+class View(NamedTuple):
     """Which images of the disks a picture shows, and its edges.
 
     Attributes
     ----------
-    left, right, bottom, ceiling : float
-        Edges, length.
+    low, high : ndarray, shape (2,)
+        Lower left and upper right corner, length.
     disk : ndarray of int, shape (n,)
         The disk of each image.
     place : ndarray, shape (n, 2)
@@ -77,10 +77,8 @@ class View:
         Ends of the lines at which the picture repeats, length.
     """
 
-    left: float
-    right: float
-    bottom: float
-    ceiling: float
+    low: Floats
+    high: Floats
     disk: Indices
     place: Floats
     contact: Indices
@@ -92,70 +90,58 @@ class View:
     @classmethod
     def of(cls, packing: HasConfiguration, margin: float = 0.0) -> "View":
         """Every image of every disk and contact that reaches to within a margin of the box; length."""
-        configuration, radius = packing.configuration, packing.radius
+        configuration, radius, walls = packing.configuration, packing.radius, walls_of(packing)
         cell, origin, periodic = cell_of(configuration), configuration.origin[:2], configuration.periodic[:2]
         contacts, branch = configuration.contacts, configuration.branch[:, :2]
-        walls = (Wall(1, 1.0, 0.0),) if isinstance(packing, Packing) else walls_of(configuration)
-        position = within_cell(configuration, packing.position)
-        low, high = _frame(packing, position, cell, origin, periodic, walls)
+        position, reach = within_cell(configuration, packing.position), radius[:, None]
+        low, high = (position - reach).min(axis=0), (position + reach).max(axis=0)
+        below, above = np.full((2, 2), 0.3 * radius.max())
+        if isinstance(packing, Packing):  # room for the arrows of the load
+            above[:] = (0, (1.5 if packing.fx or packing.fy else 0.3) * radius.max())
+            below[0] = 0
+        for wall in walls:
+            wall.cut(low, high)
+        corners = origin + np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) @ cell
+        low = np.where(periodic, corners.min(axis=0), low - below)
+        high = np.where(periodic, corners.max(axis=0), high + above)
         around = [np.arange(-2, 3) if each else [0] for each in periodic]
         images = position + (np.stack(np.meshgrid(*around), axis=-1).reshape(-1, 1, 2) @ cell)
         near_low, near_high = (np.where(periodic, side, far) for side, far in ((low, -np.inf), (high, np.inf)))
-        reach = radius[:, None]
         within = (images + reach > near_low - margin) & (images - reach < near_high + margin)
         image, disk = np.nonzero(within.all(axis=2))
         start = images[:, contacts.i]
         ends = np.stack([start, start - branch])
         within = (ends.max(axis=0) > near_low - margin) & (ends.min(axis=0) < near_high + margin)
         bar, contact = np.nonzero(within.all(axis=2))
-        (left, bottom), (right, ceiling) = low.tolist(), high.tolist()
         place, begin = images[image, disk], start[bar, contact]
-        edges = _edges(cell, origin, periodic, low, high, walls)
-        return cls(left, right, bottom, ceiling, disk, place, contact, begin, begin - branch[contact], walls, edges)
+        edges = corners[[[0, 1], [1, 3], [3, 2], [2, 0]]] if all(periodic) else _edges(periodic, low, high, walls)
+        return cls(low, high, disk, place, contact, begin, begin - branch[contact], walls, edges)
+
+    @property
+    def size(self) -> Floats:
+        """Width and height, length."""
+        return self.high - self.low
 
     def points(self, axes: Axes) -> float:
         """Points per unit of length, so that widths of lines are to scale; as the axes stand now."""
         box = axes.get_window_extent()
-        scale = min(box.width / (self.right - self.left), box.height / (self.ceiling - self.bottom))
-        return float(72 / figure_of(axes).dpi * scale)
+        return float(72 / figure_of(axes).dpi * min((box.width, box.height) / self.size))
 
     def part_of(self, wall: Wall) -> Floats:
         """Corners of the part of a wall in the picture, shape (4, 2), length."""
-        low, high = np.array([self.left, self.bottom]), np.array([self.right, self.ceiling])
+        low, high = self.low.copy(), self.high.copy()
         wall.cut(high, low)
         return np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
 
 
-def _frame(
-    packing: HasConfiguration,
-    position: Floats,
-    cell: Floats,
-    origin: Floats,
-    periodic: Any,
-    walls: tuple[Wall, ...],
-) -> tuple[Floats, Floats]:
-    """Lower left and upper right corner of a picture: the box along periodic axes, else the extent of the disks."""
-    reach, largest = packing.radius[:, None], packing.radius.max()
-    low, high = (position - reach).min(axis=0), (position + reach).max(axis=0)
-    if isinstance(packing, Packing):
-        low[1] = -0.3 * largest
-        high[1] += (1.5 if packing.fx or packing.fy else 0.3) * largest
-    else:
-        for wall in walls:
-            wall.cut(low, high)
-        low, high = low - 0.3 * largest, high + 0.3 * largest
-    corners = origin + np.array([[0, 0], [1, 0], [0, 1], [1, 1]]) @ cell
-    return np.where(periodic, corners.min(axis=0), low), np.where(periodic, corners.max(axis=0), high)
-
-
-def _edges(cell: Floats, origin: Floats, periodic: Any, low: Floats, high: Floats, walls: tuple[Wall, ...]) -> Floats:
-    """Lines at which a picture repeats, shape (e, 2, 2)."""
-    if all(periodic):
-        a, b, c, d = (origin + np.array(corner) @ cell for corner in ((0, 0), (1, 0), (1, 1), (0, 1)))
-        return np.array([[a, b], [b, c], [c, d], [d, a]])
-    begin, end = low.copy(), high.copy()
+def _edges(periodic: Any, low: Floats, high: Floats, walls: tuple[Wall, ...]) -> Floats:
+    """Lines at which a picture with one periodic side repeats, shape (e, 2, 2)."""
+    begin, end, lines = low.copy(), high.copy(), []
     for wall in walls:
         wall.cut(begin, end)
-    lines = [[[low[0], begin[1]], [low[0], end[1]]], [[high[0], begin[1]], [high[0], end[1]]]] if periodic[0] else []
-    lines += [[[begin[0], low[1]], [end[0], low[1]]], [[begin[0], high[1]], [end[0], high[1]]]] if periodic[1] else []
+    for axis in np.flatnonzero(periodic):
+        for place in (low[axis], high[axis]):
+            line = np.array([begin, end])
+            line[:, axis] = place
+            lines.append(line)
     return np.array(lines).reshape(-1, 2, 2)

@@ -105,16 +105,47 @@ def follow_eigenvalues(packings: Sequence[HasConfiguration], progress: Progress 
     packings : sequence of Packing or Configuration
         The equilibria, all with the same particles.
     """
-    followed = _Followed(packings)
     values, verdicts = [], []
+    pairs, kept = list[dict[int, Plane]](), dict[int, Motions]()
     for k, packing in enumerate(progress(packings)):
         modes = Motions.of(System.of(packing))
         values.append(modes.with_conjugates()[0])
         verdicts.append(_verdict_on(force_bearing(packing), modes, alone=len(packings) == 1))
-        followed.add(k, modes)
-    followed.close()
-    pairs = [_along(packings, each) for each in followed.pairs]
-    return RampEigenvalues(values, verdicts, sorted(pairs, key=lambda pair: -np.nanmax(pair.growth)))
+        if 32.0 * modes.right.size * (len(kept) + 1) <= MEMORY:  # right and left vectors
+            kept[k] = modes
+        taken = set()
+        for known in pairs:
+            # followed from its last load, or else from the closest one
+            closest = min(known, key=lambda n, fx=packing.fx: abs(packings[n].fx - fx))  # type: ignore[misc]
+            images = (_image(modes, known[n]) for n in dict.fromkeys((max(known), closest)))
+            members, plane = next((each for each in images if each), (None, None))
+            if plane is not None and members not in taken:
+                known[k] = plane
+                taken |= {members} if members and len(members) == 1 else set()
+        complex_ = [(int(each),) for each in np.flatnonzero(modes.grows)]
+        pairs += [{k: Plane.of(modes, members)} for members in complex_ if members not in taken]
+    if not pairs:
+        pairs = [{len(packings) - 1: plane} for plane in _about_to_meet(modes)]
+    # and back, to loads at which they are not yet known
+    for k in range(len(packings) - 2, -1, -1):
+        unknown = [each for each in pairs if k not in each and max(each) > k]
+        system = System.of(packings[k]) if unknown and k not in kept else None
+        for known in unknown:
+            later = known[min(n for n in known if n > k)]
+            if system is None:
+                _, image = _image(kept[k], later) or (None, None)
+            else:
+                image = later.at(system)
+                image = image if image.like(later) else None
+            if image is not None:
+                known[k] = image
+    found = []
+    for known in pairs:
+        eigenvalues = np.full((len(packings), 2), complex(np.nan, np.nan))
+        for k, plane in known.items():
+            eigenvalues[k] = _members_of(plane)[0]
+        found.append(FollowedPair(eigenvalues, known, packings))
+    return RampEigenvalues(values, verdicts, sorted(found, key=lambda pair: -np.nanmax(pair.growth)))
 
 
 def seconds(packings: Sequence[HasConfiguration]) -> float:
@@ -122,69 +153,11 @@ def seconds(packings: Sequence[HasConfiguration]) -> float:
     return (4 if packings[0].damped else 1) * SECONDS_OF_1000 * (packings[0].coordinates / 3000) ** 3 * len(packings)
 
 
-class _Followed:
-    """Pairs that are followed while the loads of a ramp come one after the other, and then back to where they began."""
-
-    def __init__(self, packings: Sequence[HasConfiguration]) -> None:
-        self.packings = packings
-        self.pairs: list[dict[int, Plane]] = []
-        self._modes: dict[int, Motions] = {}
-        self._last: Motions | None = None
-
-    def add(self, k: int, modes: Motions) -> None:
-        """The next load, with all of its modes."""
-        size = 32.0 * modes.right.size  # right and left vectors
-        if size * (len(self._modes) + 1) <= MEMORY:
-            self._modes[k] = modes
-        self._last, taken = modes, set()
-        for known, members in zip(self.pairs, self._members(k, modes), strict=True):
-            if members is not None and members not in taken:
-                known[k] = Plane.of(modes, members)
-                if len(members) == 1:
-                    taken.add(members)
-        complex_ = ((int(each),) for each in np.flatnonzero(modes.grows))
-        self.pairs += [{k: Plane.of(modes, members)} for members in complex_ if members not in taken]
-
-    def close(self) -> None:
-        """Follow all pairs back, to loads at which they are not yet known."""
-        if not self.pairs and self._last is not None:
-            self.pairs = [{len(self.packings) - 1: pair} for pair in _about_to_meet(self._last)]
-        for k in range(len(self.packings) - 2, -1, -1):
-            unknown = [known for known in self.pairs if k not in known and max(known) > k]
-            later = [known[min(n for n in known if n > k)] for known in unknown]
-            for known, image in zip(unknown, self._images(later, k), strict=True):
-                if image is not None:
-                    known[k] = image
-
-    def _members(self, k: int, modes: Motions) -> list[tuple[int, ...] | None]:
-        """The members of each pair at this load, followed from its last load, or else from its closest load."""
-        last = [max(known) for known in self.pairs]
-        found = _images_of(modes, [known[n] for known, n in zip(self.pairs, last, strict=True)])
-        fx = self.packings[k].fx
-        closest = [min(known, key=lambda n: abs(self.packings[n].fx - fx)) for known in self.pairs]
-        lost = [each for each, members in enumerate(found) if members is None and closest[each] != last[each]]
-        again = _images_of(modes, [self.pairs[each][closest[each]] for each in lost])
-        for each, members in zip(lost, again, strict=True):
-            found[each] = members
-        return found
-
-    def _images(self, pairs: Sequence[Plane], k: int) -> list[Plane | None]:
-        """Each of some pairs at a load, None where the pair is unknown there."""
-        if k in self._modes:
-            modes = self._modes[k]
-            return [None if members is None else Plane.of(modes, members) for members in _images_of(modes, pairs)]
-        system = System.of(self.packings[k])
-        images = [pair.at(system) for pair in pairs]
-        return [image if image.like(pair) else None for image, pair in zip(images, pairs, strict=True)]
-
-
-def _images_of(modes: Motions, pairs: Sequence[Plane]) -> list[tuple[int, ...] | None]:
-    """The modes closest to each of some pairs, None where their planes are not like those of the pair."""
-    found: list[tuple[int, ...] | None] = []
-    for pair in pairs:
-        members = tuple(pair.closest(modes))
-        found.append(members if Plane.of(modes, members).like(pair) else None)
-    return found
+def _image(modes: Motions, pair: Plane) -> tuple[tuple[int, ...], Plane] | None:
+    """The modes closest to a pair, and their plane; None where it is not like that of the pair."""
+    members = tuple(pair.closest(modes))
+    plane = Plane.of(modes, members)
+    return (members, plane) if plane.like(pair) else None
 
 
 def _verdict_on(packing: HasConfiguration, modes: Motions, alone: bool) -> Stability:
@@ -227,14 +200,6 @@ def _about_to_meet(modes: Motions) -> list[Plane]:
     except ValueError:
         return []
     return [Plane.of(modes, (first, second))]
-
-
-def _along(packings: Sequence[HasConfiguration], known: dict[int, Plane]) -> FollowedPair:
-    """A pair with its eigenvalues."""
-    found = np.full((len(packings), 2), complex(np.nan, np.nan))
-    for k, pair in known.items():
-        found[k] = _members_of(pair)[0]
-    return FollowedPair(found, known, packings)
 
 
 def _members_of(pair: Plane) -> tuple[Complexes, Complexes]:

@@ -7,30 +7,22 @@ largest displacement.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
+from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
 from matplotlib.figure import Figure
 
-from faultgouge.analysis import (
-    BadInputError,
-    Configuration,
-    Modes,
-    closest_to_meeting,
-    normal_modes,
-    spectrum,
-)
+from faultgouge.analysis import BadInputError, Modes, closest_to_meeting, normal_modes, spectrum
 from faultgouge.analysis.arrays import Complexes, Floats
 from faultgouge.analysis.has_configuration import HasConfiguration
 
 from .disk_view import View
-from .packing import PACKING_WIDTH
-from .packing_artist import PackingArtist
-from .spheres import add_scale_of_turns, draw_turns, new_figure
-from .style import EDGE, INK, STYLE, figure_of, require_axes, styled
+from .packing import PackingArtist, figure_for
+from .spheres import INTO, draw_spheres, flat
+from .style import EDGE, INK, figure_of, require_axes, styled
 
 TYPICAL_ARROW, LONGEST_ARROW = 1.2, 4.0
 """Length that three quarters of the arrows do not exceed, and length of the longest arrow at most, in units of the mean
@@ -46,8 +38,11 @@ is near."""
 PURE_ROTATION = 1e-9
 """Displacements that are smaller than this share of the rotations are rounding: a sphere spins about its contact."""
 
+TURNS = "#f4f4f4", "#1f5fa8"
+"""Colours of a sphere that does not rotate, and of the one that rotates most."""
 
-TWO_MOMENTS = "at two moments a quarter of a period apart"
+ARROWS: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1, "color": INK, "zorder": 5}
+ARROWS |= {"headwidth": 3.2, "headlength": 3.6, "headaxislength": 3.2, "minlength": 0.8}
 
 
 class ModeError(BadInputError):
@@ -56,7 +51,7 @@ class ModeError(BadInputError):
 
 @dataclass(frozen=True, eq=False)
 class ModeShape:
-    """How the disks of a packing move in a mode.
+    """How the particles of a packing move in a mode.
 
     Attributes
     ----------
@@ -80,14 +75,8 @@ class ModeShape:
     @classmethod
     def of(cls, packing: HasConfiguration, modes: Modes, number: int) -> "ModeShape":
         """One of the modes of a packing."""
-        moved = displacement(packing, modes.right[:, number])
-        return cls(
-            number,
-            complex(modes.values[number]),
-            moved,
-            float(modes.participation[number]),
-            float(modes.rotation[number]),
-        )
+        moved, value = displacement(packing, modes.right[:, number]), complex(modes.values[number])
+        return cls(number, value, moved, float(modes.participation[number]), float(modes.rotation[number]))
 
     @property
     def is_complex(self) -> bool:
@@ -95,7 +84,7 @@ class ModeShape:
         return self.eigenvalue.imag != 0
 
     def at(self, phase: float) -> Floats:
-        """The displacement at a phase of the oscillation, growth left out; shape (3, N)."""
+        """The displacement at a phase of the oscillation, growth left out; shape (axes, N)."""
         return np.real(self.displacement * np.exp(1j * phase))
 
     @property
@@ -128,47 +117,37 @@ def displacement(packing: HasConfiguration, vector: Complexes) -> Complexes:
     return np.asarray(moved / (largest if largest > PURE_ROTATION * rotation else rotation))
 
 
-def unstable_pair(packing: HasConfiguration, modes: Modes, believed: Sequence[complex]) -> tuple[list[ModeShape], str]:
-    """The modes that make a packing unstable, or are about to.
+def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list[ModeShape], str]:
+    """A mode of a packing by its number, or those that make it unstable, or are about to; with a description.
 
-    Parameters
-    ----------
-    believed : sequence of complex
-        Eigenvalues of the complex pairs that are no rounding noise, fastest growing first, as of
-        :func:`~faultgouge.analysis.motion.spectrum`.
-
-    Returns
-    -------
-    modes : list of ModeShape
-        The member with positive imaginary part of the fastest growing pair; without one, the two real modes that are
-        closest to a coalescence.
-    words : str
-        What they are.
-
-    Raises
-    ------
-    ModeError
-        If all modes are orthogonal, so that no two are about to meet.
+    Without a number: the member with positive imaginary part of the fastest growing pair; without one, the two real
+    modes that are closest to a coalescence. Raises ModeError if the packing has no such mode.
     """
-    if len(believed):
-        number = int(np.argmin(np.abs(modes.values - believed[0])))
-        words = "the complex pair" if len(believed) == 1 else f"the fastest growing of {len(believed)} complex pairs"
-        return [ModeShape.of(packing, modes, number)], words
+    modes = normal_modes(packing)
+    count = len(modes.values)
+    if number is not None:
+        if not 0 <= number < count:
+            raise ModeError(f"mode {number}: the packing has {count} modes, counted from 0")
+        return [ModeShape.of(packing, modes, number)], f"mode {number} of {count}"
+    if count < 2:
+        raise ModeError(f"the packing has {count} modes, and a pair is two of them")
+    pairs = spectrum(packing).pairs  # fastest growing first, without those that are rounding noise
+    if pairs:
+        words = "the complex pair" if len(pairs) == 1 else f"the fastest growing of {len(pairs)} complex pairs"
+        return [ModeShape.of(packing, modes, int(np.argmin(np.abs(modes.values - pairs[0].eigenvalue))))], words
     first, second, cosine = closest_to_meeting(modes)
     if cosine < ORTHOGONAL_COSINE:
+        where, later = (f"at F_x = {packing.fx:g} ", "a later --frame, or ") if packing.top.any() else ("", "")
         raise ModeError(
-            f"at F_x = {packing.fx:g} all modes are orthogonal to {ORTHOGONAL_COSINE:g}, so that no two of them are "
-            "about to meet: take a later --frame, or a mode by its number"
-            if packing.top.any()
-            else f"all modes are orthogonal to {ORTHOGONAL_COSINE:g}, so that no two of them are about to meet: take a "
-            "mode by its number"
+            f"{where}all modes are orthogonal to {ORTHOGONAL_COSINE:g}, so that no two of them are about to meet: "
+            f"take {later}a mode by its number"
         )
     words = f"the two real modes closest to meeting: the cosine between them is {cosine:.4f}"
-    return [ModeShape.of(packing, modes, number) for number in (first, second)], words
+    return [ModeShape.of(packing, modes, each) for each in (first, second)], words
 
 
 class ModeArtist:
-    """A mode on axes, whose phase can be changed from frame to frame.
+    """A mode of disks on axes, whose phase can be changed from frame to frame.
 
     Parameters
     ----------
@@ -181,23 +160,14 @@ class ModeArtist:
     def __init__(
         self, axes: Axes, packing: HasConfiguration, mode: ModeShape, points: float | None = None, moves: bool = False
     ) -> None:
-        self.mode, self.moves = mode, moves
+        self.mode = mode
         self.reach = FILM_DISPLACEMENT * packing.radius.max() if moves else _arrow_scale(packing, mode)
-        self.artist = PackingArtist(
-            axes, packing, view=View.of(packing, margin=self.reach if moves else 0.0), points=points
-        )
-        disk = self.artist.view.disk
-        chains = self.artist.chains
-        chains.set(color=EDGE, linewidth=0.4 if moves else 0.0, zorder=2)
-        self.artist.disks.set(array=np.zeros(len(disk)), cmap="RdBu_r", norm=Normalize(-1, 1))
-        self.arrows = None
-        if not moves:
-            still = np.zeros(len(disk))
-            self.arrows = axes.quiver(
-                *self.artist.view.place.T, still, still, angles="xy", scale_units="xy", scale=1, color=INK, width=0.007,
-                headwidth=3.2, headlength=3.6, headaxislength=3.2, minlength=0.8,
-            )  # fmt: skip
-            self.arrows.set(zorder=5)
+        view = View.of(packing, margin=self.reach if moves else 0.0)
+        self.artist = PackingArtist(axes, packing, view=view, points=points)
+        still = np.zeros(len(view.disk))
+        self.artist.chains.set(color=EDGE, linewidth=0.4 if moves else 0.0, zorder=2)
+        self.artist.disks.set(array=still, cmap="RdBu_r", norm=Normalize(-1, 1))
+        self.arrows = None if moves else axes.quiver(*view.place.T, still, still, width=0.007, **ARROWS)
         self.rotates = np.abs(mode.displacement[2]).max() or 1.0
 
     def magnification(self, phase: float) -> float:
@@ -211,8 +181,7 @@ class ModeArtist:
 
     def show(self, phase: float, magnified: float = 1.0) -> None:
         """Draw the mode at a phase, its motion magnified."""
-        moved = magnified * self.mode.at(phase)
-        disk = self.artist.view.disk
+        moved, disk = magnified * self.mode.at(phase), self.artist.view.disk
         self.artist.disks.set_array(moved[2, disk] / self.rotates)
         if self.arrows is None:
             self.artist.move(self.reach * moved[:2].T)
@@ -228,19 +197,25 @@ def _arrow_scale(packing: HasConfiguration, mode: ModeShape) -> float:
     return float(packing.radius.mean() * min(TYPICAL_ARROW / typical, LONGEST_ARROW / longest))
 
 
-def modes_of(packing: HasConfiguration, number: int | None = None) -> tuple[list[ModeShape], str]:
-    """A mode of a packing by its number, or the modes of `unstable_pair`; with a description.
-
-    Raises ModeError if the packing has no such mode.
-    """
-    modes = normal_modes(packing)
-    if number is None:
-        if len(modes.values) < 2:
-            raise ModeError(f"the packing has {len(modes.values)} modes, and a pair is two of them")
-        return unstable_pair(packing, modes, [pair.eigenvalue for pair in spectrum(packing).pairs])
-    if not 0 <= number < len(modes.values):
-        raise ModeError(f"mode {number}: the packing has {len(modes.values)} modes, counted from 0")
-    return [ModeShape.of(packing, modes, number)], f"mode {number} of {len(modes.values)}"
+def _show_mode(axes: Axes, packing: HasConfiguration, mode: ModeShape, phase: float, points: float | None) -> None:
+    """A mode at a phase on axes, with its numbers; of spheres at its largest displacement."""
+    title = mode.words
+    if packing.dimension == 2:
+        artist = ModeArtist(axes, packing, mode, points)
+        magnified = artist.magnification(phase) if phase else 1.0
+        artist.show(phase, magnified)
+        if phase:  # close to an onset the two moments differ by orders of magnitude
+            scale = "on the scale of the left picture" if magnified == 1 else f"arrows and colours times {magnified:g}"
+            title = f"a quarter of a period later\n{scale}"
+    else:
+        moved = mode.at(0.0)
+        turns = np.linalg.norm(moved[3:] / (np.linalg.norm(moved[3:], axis=0).max() or 1.0), axis=0)[:, None]
+        faces = (1 - turns) * np.array(to_rgb(TURNS[0])) + turns * np.array(to_rgb(TURNS[1]))
+        draw_spheres(axes, packing.configuration, {}, 0.0, faces)
+        order = np.argsort(-(packing.position @ INTO))
+        arrow = _arrow_scale(packing, mode) * flat(moved[:3].T)
+        axes.quiver(*flat(packing.position)[order].T, *arrow[order].T, width=0.008, **ARROWS)
+    axes.set_title(title, fontsize=7)
 
 
 def draw_mode(packing: HasConfiguration, number: int | None = None, axes: Axes | None = None) -> Figure:
@@ -270,12 +245,7 @@ def draw_mode(packing: HasConfiguration, number: int | None = None, axes: Axes |
     modes, words = modes_of(packing, number)
     if axes is None:
         return draw_modes(packing, modes, words)
-    with matplotlib.rc_context(fname=STYLE):
-        if packing.dimension == 3:
-            _draw_spheres_of(axes, packing.configuration, modes[0])
-        else:
-            ModeArtist(axes, packing, modes[0]).show(0.0)
-            axes.set_title(modes[0].words, fontsize=7)
+    styled(_show_mode)(axes, packing, modes[0], 0.0, None)
     return figure_of(axes)
 
 
@@ -291,59 +261,32 @@ def draw_modes(packing: HasConfiguration, modes: Sequence[ModeShape], words: str
     Returns
     -------
     Figure
-        A complex mode also a quarter of a period later.
+        A complex mode of disks also a quarter of a period later.
     """
-    if packing.dimension == 3:
-        return _draw_modes_of_spheres(packing.configuration, modes, words)
-    panels = [(mode, phase) for mode in modes for phase in ((0.0, np.pi / 2) if mode.is_complex else (0.0,))]
-    figure, axes, points = side_by_side(packing, len(panels))
+    spheres = packing.dimension == 3
+    later = [mode.is_complex and not spheres for mode in modes]
+    panels = [
+        (mode, phase) for mode, twice in zip(modes, later, strict=True) for phase in (0.0, np.pi / 2)[: 1 + twice]
+    ]
+    figure, axes, points = figure_for(packing, len(panels), below=0.95)
     for one, (mode, phase) in zip(axes, panels, strict=True):
-        artist = ModeArtist(one, packing, mode, points)
-        later = phase > 0  # close to an onset the two moments differ by orders of magnitude
-        magnified = artist.magnification(phase) if later else 1.0
-        artist.show(phase, magnified)
-        scale = "on the scale of the left picture" if magnified == 1 else f"arrows and colours times {magnified:g}"
-        one.set_title(f"a quarter of a period later\n{scale}" if later else mode.words, fontsize=7)
-    complex_ = any(mode.is_complex for mode in modes)
-    finish(figure, axes, packing, f"{words}, {TWO_MOMENTS}" if complex_ else words)
+        _show_mode(one, packing, mode, phase, points)
+    moments = ", at the largest displacement" if spheres else ", at two moments a quarter of a period apart"
+    finish(axes, packing, words + moments if spheres or any(later) else words)
     return figure
 
 
-def _draw_modes_of_spheres(packing: Configuration, modes: Sequence[ModeShape], words: str) -> Figure:
-    """Modes of spheres side by side, each at its largest displacement."""
-    figure = new_figure(packing, len(modes))
-    axes = figure.subplots(1, len(modes), squeeze=False)[0]
-    for one, mode in zip(axes, modes, strict=True):
-        _draw_spheres_of(one, packing, mode)
-    figure.suptitle(f"{words}, at the largest displacement", fontsize=8)
-    add_scale_of_turns(figure, axes)
-    return figure
-
-
-def _draw_spheres_of(axes: Axes, packing: Configuration, mode: ModeShape) -> None:
-    """A mode of spheres at its largest displacement, on axes."""
-    moved = mode.at(0.0)
-    turns = np.linalg.norm(moved[3:], axis=0).max() or 1.0
-    moved = np.concatenate([moved[:3], moved[3:] / turns])
-    draw_turns(axes, packing, moved, _arrow_scale(packing, mode))
-    axes.set_title(mode.words, fontsize=7)
-
-
-def side_by_side(packing: HasConfiguration, count: int) -> tuple[Figure, list[Axes], float]:
-    """A figure with axes for the same packing, and points per unit of length in them."""
-    view = View.of(packing)
-    across = PACKING_WIDTH - 0.1
-    height = across * (view.ceiling - view.bottom) / (view.right - view.left)
-    figure = Figure(figsize=(PACKING_WIDTH * count, height + 0.95), layout="constrained")
-    axes = figure.subplots(1, count, squeeze=False)[0]
-    return figure, list(axes), 72 * across / (view.right - view.left)
-
-
-def finish(figure: Figure, axes: Sequence[Axes], packing: HasConfiguration, words: str) -> None:
+def finish(axes: Sequence[Axes], packing: HasConfiguration, words: str) -> None:
     """The line above and the scale of rotation below."""
-    load = f"$F_x = {packing.fx:.6g}$: " if packing.top.any() else ""
+    figure, spheres = figure_of(axes[0]), packing.dimension == 3
+    load = f"$F_x = {packing.fx:.6g}$: " if packing.top.any() and not spheres else ""
     figure.suptitle(f"{load}{words}", fontsize=8)
-    scale = ScalarMappable(Normalize(-1, 1), "RdBu_r")
-    bar = figure.colorbar(scale, ax=list(axes), location="bottom", aspect=50, shrink=0.6, pad=0.02)
-    bar.set_ticks([-1, 0, 1], labels=["clockwise", "rotation", "anticlockwise"])
+    about: dict[str, Any] = {"ax": list(axes), "location": "bottom"}
+    if spheres:
+        scale = ScalarMappable(Normalize(0, 1), LinearSegmentedColormap.from_list("turns", TURNS))
+        bar = figure.colorbar(scale, aspect=40, shrink=0.5, **about)
+        bar.set_ticks([0, 1], labels=["no rotation", "largest rotation"])
+    else:
+        bar = figure.colorbar(ScalarMappable(Normalize(-1, 1), "RdBu_r"), aspect=50, shrink=0.6, pad=0.02, **about)
+        bar.set_ticks([-1, 0, 1], labels=["clockwise", "rotation", "anticlockwise"])
     bar.outline.set_linewidth(0.4)

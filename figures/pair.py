@@ -59,45 +59,37 @@ def curve_through(
     ends = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
     parts = [_curve(load[a:b], eigenvalues[a:b], coalescence) for a, b in ends.reshape(-1, 2)]
     gap = np.full((1, 3), complex(np.nan, np.nan))
-    rows = [row for part in parts for row in (part, gap)][:-1]
-    joined = np.concatenate(rows) if rows else gap[:0]
+    joined = np.concatenate([gap[:0], *(row for part in parts for row in (part, gap))])[:-1]
     return joined[:, 0].real, joined[:, 1:]
 
 
 def _curve(load: Floats, eigenvalues: NDArray[np.complex128], coalescence: float | None) -> NDArray[np.complex128]:
-    """Rows of a load and two eigenvalues along one stretch of known loads."""
+    """Rows of a load and two eigenvalues along one stretch of known loads, with loads that crowd at the roots of D."""
     falls = load[-1] < load[0]
     if falls:
         load, eigenvalues = load[::-1], eigenvalues[::-1]
     mean, square = eigenvalues.mean(axis=1).real, ((eigenvalues[:, 0] - eigenvalues[:, 1]) ** 2).real
     if len(load) > 1:
-        load, mean, square = _with_loads_between(load, mean, square, coalescence)
+        mean_at = PchipInterpolator(load, mean)
+        if coalescence is not None and load[0] < coalescence < load[-1]:
+            k = int(np.searchsorted(load, coalescence))
+            if load[k] == coalescence:
+                square = np.where(load == coalescence, 0.0, square)
+            elif square[k - 1] * square[k] < 0:
+                load, square = np.insert(load, k, coalescence), np.insert(square, k, 0.0)
+        square_at = PchipInterpolator(load, square)
+        roots = square_at.roots(extrapolate=False)
+        roots = roots[np.isfinite(roots)]
+        knots = np.union1d(load, roots)
+        # short steps at both ends, as an eigenvalue leaves a coalescence as a square root
+        share = np.sin(np.linspace(0, 0.5 * np.pi, LOADS_BETWEEN + 1)[:-1]) ** 2
+        load = np.append((knots[:-1, None] + np.diff(knots)[:, None] * share).ravel(), knots[-1])
+        # zero to the last bit, so that the branches meet
+        mean, square = mean_at(load), np.where(np.isin(load, roots), 0.0, square_at(load))
     root = 0.5 * np.sqrt(square.astype(np.complex128))
     below = np.where(square > 0, -root, root)
     rows = np.column_stack([load, mean + below, mean - below])
     return rows[::-1] if falls else rows
-
-
-def _with_loads_between(
-    load: Floats, mean: Floats, square: Floats, coalescence: float | None
-) -> tuple[Floats, Floats, Floats]:
-    """Loads, mean and D of a stretch, with loads in between that crowd at the roots of D."""
-    mean_at = PchipInterpolator(load, mean)
-    if coalescence is not None and load[0] < coalescence < load[-1]:
-        k = int(np.searchsorted(load, coalescence))
-        if load[k] == coalescence:
-            square = np.where(load == coalescence, 0.0, square)
-        elif square[k - 1] * square[k] < 0:
-            load, square = np.insert(load, k, coalescence), np.insert(square, k, 0.0)
-    square_at = PchipInterpolator(load, square)
-    roots = np.array([root for root in square_at.roots(extrapolate=False) if np.isfinite(root)])
-    knots = np.union1d(load, roots)
-    # short steps at both ends, as an eigenvalue leaves a coalescence as a square root
-    share = np.sin(np.linspace(0, 0.5 * np.pi, LOADS_BETWEEN + 1)[:-1]) ** 2
-    at = np.append((knots[:-1, None] + np.diff(knots)[:, None] * share).ravel(), knots[-1])
-    found = square_at(at)
-    found[np.isin(at, roots)] = 0.0  # to the last bit, so that the branches meet
-    return at, mean_at(at), found
 
 
 @dataclass(frozen=True, eq=False)

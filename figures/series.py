@@ -1,4 +1,7 @@
-"""A quantity over time, such as the mean square displacement D(t), which spans many decades."""
+"""Curves: a quantity over time, F_x over displacement, the force of a driven run, vibrations over frequency."""
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -7,10 +10,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 from numpy.typing import ArrayLike
 
-from faultgouge.analysis import Growth
+from faultgouge.analysis import ElasticModuli, Growth, Packing, PlaneWave, Vibrations
 from faultgouge.analysis.arrays import Floats
+from faultgouge.analysis.motion.hysteresis import hysteresis, layer_displacement, turning_points
+from faultgouge.analysis.responses.slips import Slip
 
-from .style import figure_of, styled
+from .style import EDGE, FLOOR, INK, MOBILIZATION, figure_of, styled
+
+SHARE_COLOUR = MOBILIZATION(0.35)
+"""Blue, of shares of rotation and of transverse waves."""
 
 BELOW_NOISE = 1e-2
 """Lower end of a picture of growth, in units of the median of the first quarter: the very first steps, which are many
@@ -22,12 +30,7 @@ SHIFT = 1.5
 
 @styled
 def draw_series(
-    time: ArrayLike,
-    values: ArrayLike,
-    axes: Axes | None = None,
-    *,
-    label: str | None = None,
-    color: str = "C1",
+    time: ArrayLike, values: ArrayLike, axes: Axes | None = None, *, label: str | None = None, color: str = "C1"
 ) -> Figure:
     """Draw a positive quantity over time on a logarithmic axis; values that are not positive are left out.
 
@@ -134,3 +137,156 @@ def scientific(value: float) -> str:
     """1.2 x 10^-3 for mathtext."""
     exponent = int(np.floor(np.log10(value)))
     return rf"{value / 10.0**exponent:.1f} \times 10^{{{exponent}}}"
+
+
+@styled
+def draw_cycle(packings: Sequence[Packing], axes: Axes | None = None) -> Figure:
+    """Draw F_x over the mean displacement of the upper layer along x, a path that may close or not.
+
+    Parameters
+    ----------
+    packings : sequence of Packing
+        Equilibria one after the other, all of the same disks.
+    axes : Axes, optional
+        Where to draw; a figure of its own by default.
+    """
+    axes = Figure(layout="constrained").add_subplot() if axes is None else axes
+    moved, label = in_powers_of_ten(layer_displacement(packings)[:, 0])
+    fx = np.array([packing.fx for packing in packings])
+    ends = [0, *turning_points(fx), len(fx) - 1]
+    for number, (begin, end) in enumerate(pairwise(ends)):
+        way, style = slice(begin, end + 1), ("-", "--", ":", "-.")[number % 4]
+        label_of_way = rf"${fx[begin]:.4g} \to {fx[end]:.4g}$"
+        axes.plot(moved[way], fx[way], color=f"C{number}", linestyle=style, label=label_of_way)
+    axes.plot(moved[[0]], fx[[0]], "o", color="C0", markersize=3)
+    axes.set(xlabel=label, ylabel="$F_x$")
+    axes.margins(0.08)
+    axes.legend(title="$F_x$", fontsize=7, title_fontsize=7)
+    left = hysteresis(packings)
+    if left is not None:
+        words = f"remains: {_format_signed(left.remaining)}, work: {_format_signed(left.work)}"
+        says = "the path closes, to rounding" if left.closes else words
+        axes.set_title(f"back at $F_x = {left.fx:.4g}$: {says}", fontsize=7)
+    return figure_of(axes)
+
+
+def in_powers_of_ten(moved: Floats) -> tuple[Floats, str]:
+    """Displacements of the upper layer in a power of ten, and the label of their axis."""
+    power = int(np.floor(np.log10(np.abs(moved).max() or 1.0)))
+    unit = rf" $/\,10^{{{power}}}$" if power else ""
+    return moved / 10.0**power, f"displacement of the upper layer{unit}"
+
+
+def _format_signed(value: float) -> str:
+    return "0" if value == 0 else f"${'-' if value < 0 else ''}{scientific(abs(value))}$"
+
+
+@styled
+def draw_drive(series: Mapping[str, Floats], slips: Sequence[Slip]) -> Figure:
+    """Draw force, displacement and thickness of the layer, and the contacts at Coulomb's bound, over time.
+
+    Parameters
+    ----------
+    series : mapping of str to ndarray, shape (S,)
+        Columns time, force, displacement, thickness and at_bound of a driven run.
+    slips : sequence of Slip
+        Its slips, each a band from its beginning to its end.
+    """
+    figure = Figure(figsize=(5.2, 4.6), layout="constrained")
+    panels = figure.subplots(4, 1, sharex=True, height_ratios=(2, 1, 1, 1))
+    time = series["time"]
+    risen = series["thickness"] - series["thickness"][0]
+    rows = [(series["force"], "force $F$", "C1"), (series["displacement"], "displacement", "C0")]
+    rows += [(risen, "dilation", "C0"), (series["at_bound"], "at the bound", "C0")]
+    draw_slips(panels, slips)
+    for axes, (values, label, color) in zip(panels, rows, strict=True):
+        axes.plot(time, values, color=color, linewidth=0.8)
+        axes.set_ylabel(label)
+        axes.margins(x=0)
+    panels[0].margins(y=0.12)
+    panels[-1].set_xlabel("$t$")
+    figure.align_ylabels()
+    return figure
+
+
+def draw_slips(panels: Sequence[Axes], slips: Sequence[Slip]) -> None:
+    """A band for each slip in panels over time, and its number in the first panel, which shows the force."""
+    for axes in panels:
+        for slip in slips:
+            axes.axvspan(slip.begins, slip.ends, color="0.85", linewidth=0)
+    for number, slip in enumerate(slips, 1):
+        panels[0].annotate(
+            str(number), (slip.begins, slip.force_before), (0, 3), textcoords="offset points", ha="center", fontsize=7
+        )
+
+
+@styled
+def draw_vibrations(found: Vibrations) -> Figure:
+    """g with its standard error and its window, what the motions are like, and Q.
+
+    Parameters
+    ----------
+    found : Vibrations
+        Of all modes, each of which is a dot, or of random vectors.
+    """
+    figure = Figure(figsize=(3.5, 5.6 if np.any(found.damping > 0) else 4.2), layout="constrained")
+    rows = figure.subplots(3 if np.any(found.damping > 0) else 2, sharex=True)
+    density, share = rows[0], rows[1]
+    density.fill_between(
+        found.frequency, found.density - found.density_error, found.density + found.density_error,
+        color=EDGE, linewidth=0, alpha=0.5,
+    )  # fmt: skip
+    density.plot(found.frequency, found.density, color=INK, linewidth=0.9)
+    density.set(ylabel=r"density of states $g(\omega)$", ylim=(0, None), xlim=(0, found.largest))
+    width = found.resolution[0]
+    density.plot([0.03 * found.largest, 0.03 * found.largest + width], [0.92, 0.92], color=FLOOR, linewidth=1.5,
+                 transform=density.get_xaxis_transform())  # fmt: skip
+    density.text(0.03 * found.largest + 1.5 * width, 0.92, "window", va="center", fontsize=6, color=FLOOR,
+                 transform=density.get_xaxis_transform())  # fmt: skip
+    if found.modes is not None:
+        share.plot(found.modes["frequency"], found.modes["participation"], ".", color=INK, markersize=2)
+    share.plot(found.frequency, found.rotation, color=SHARE_COLOUR, linewidth=0.9)
+    says = "participation (dots), rotation (line)" if found.modes is not None else "share of rotation"
+    share.set(ylabel=says, ylim=(0, 1))
+    if len(rows) == 3:
+        if found.modes is not None:
+            quality = found.modes["frequency"] / np.maximum(found.modes["damping"], np.finfo(float).tiny)
+            rows[2].plot(found.modes["frequency"], quality, ".", color=INK, markersize=2)
+        rows[2].plot(found.frequency, found.quality, color=SHARE_COLOUR, linewidth=0.9)
+        rows[2].set(ylabel="quality factor $Q$", yscale="log")
+    rows[-1].set_xlabel(r"$\omega$")
+    return figure
+
+
+@styled
+def draw_waves(waves: Sequence[PlaneWave], moduli: ElasticModuli | None = None) -> Figure:
+    """Frequency and attenuation of plane waves over their wave number, beside the speeds of the elastic moduli.
+
+    Parameters
+    ----------
+    waves : sequence of PlaneWave
+        Along one direction.
+    moduli : ElasticModuli, optional
+        Their lines are those of its isotropic part.
+    """
+    figure = Figure(figsize=(3.5, 4.4), layout="constrained")
+    above, below = figure.subplots(2, sharex=True)
+    most = max(wave.wave_number for wave in waves)
+    names = ("longitudinal", "transverse", "transverse, the other")
+    for kind in sorted({wave.polarisation for wave in waves}):
+        these = [wave for wave in waves if wave.polarisation == kind]
+        colour, mark = (INK if kind == 0 else SHARE_COLOUR), "os^"[kind]
+        number = [wave.wave_number for wave in these]
+        above.plot(number, [wave.frequency for wave in these], mark, color=colour, markersize=3.5, label=names[kind])
+        below.plot(number, [wave.attenuation for wave in these], mark, color=colour, markersize=3.5)
+    if moduli is not None:
+        lame = moduli.bulk - 2 * moduli.shear / moduli.dimension
+        speeds = np.sqrt(np.array([lame + 2 * moduli.shear, moduli.shear]) / moduli.density)
+        for speed, shade, name in zip(speeds, (INK, SHARE_COLOUR), ("P", "S"), strict=True):
+            above.plot([0, most], [0, speed * most], color=shade, linewidth=0.7, linestyle="--",
+                       label=f"{name}, elastic moduli")  # fmt: skip
+    above.set(ylabel=r"frequency $\omega$", ylim=(0, None))
+    above.legend(fontsize=6)
+    below.set(xlabel="wave number $q$", ylabel=r"attenuation $\gamma$", xlim=(0, 1.05 * most))
+    below.axhline(0, color=EDGE, linewidth=0.5)
+    return figure

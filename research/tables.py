@@ -1,6 +1,7 @@
 """Tables of research: lines of JSON, and files of JSON."""
 
 import json
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,18 @@ import numpy as np
 
 from faultgouge.studies.result_rows import append_row
 
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
 SWEEP_ROWS = "results.jsonl"
 """Name of the file of rows in the folder of a sweep."""
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The contents of a scene or of a sweep as they are written."""
+    return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:

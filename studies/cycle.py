@@ -23,9 +23,9 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
@@ -33,8 +33,15 @@ from scipy.linalg import lu_factor, lu_solve
 from ..analysis import Configuration, Packing, RunFile
 from ..analysis.arrays import Complexes, Floats, derive_frozen
 from ..analysis.counted import counted
-from ..analysis.files.atomic_write import FORMAT_KEY, check_format, check_own, make_folder, write_json
-from ..analysis.files.plain_file import read_plain, read_plain_text
+from ..analysis.files.atomic_write import (
+    FORMAT_KEY,
+    check_format,
+    check_own,
+    make_folder,
+    read_plain,
+    read_plain_text,
+    write_json,
+)
 from ..analysis.has_configuration import HasConfiguration
 from ..analysis.motion.eigenvalues import SAFETY, growing_undamped, in_balance, unit_rounding, zero_uncertainties
 from ..analysis.motion.linear import all_rates, linear_verdict
@@ -44,9 +51,8 @@ from ..analysis.responses.slips import Slip
 from ..analysis.table_display import table_of
 from ..pywrap import SceneError
 from ..pywrap.runs.drive import SERIES, drive_of, slips_in
-from .executors import Progress, Say
 from .result_rows import write_csv
-from .study import draw_all
+from .study import Progress, Say, draw_all
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -67,8 +73,7 @@ LINEAR_UP_TO = 1.0
 """Rates and eigenvalues up to which the axes are linear; beyond, they are logarithmic."""
 
 
-@dataclass(frozen=True)
-class LinearState:
+class LinearState(NamedTuple):
     """Linear motion about a state, with all contacts at Coulomb's bound sticking, or all sliding.
 
     Attributes
@@ -124,8 +129,8 @@ def cycle_state(packing: Packing, spring: float, lone: float = LONE_PARTICIPATIO
         "rests": bool(in_balance(configuration)),
         "residual": float(configuration.residual / configuration.normal_force.max(initial=np.finfo(float).tiny)),
         "at_bound": int(configuration.contacts.at_bound.sum()),
-        **{f"{name}_sticking": value for name, value in asdict(sticking).items()},
-        **{f"{name}_sliding": value for name, value in asdict(sliding).items()},
+        **{f"{name}_sticking": value for name, value in sticking._asdict().items()},
+        **{f"{name}_sliding": value for name, value in sliding._asdict().items()},
     }
 
 
@@ -152,18 +157,13 @@ def linear_state(configuration: Configuration, sliding: bool, lone: float = LONE
 def _damped_rate(motion: Motion, lone: float) -> float | None:
     """Largest 2 Re s of the motions that more than one disk takes part in; None if no such motion is known."""
     stiffness, damping = motion.stiffness.toarray(), motion.damping.toarray()
-    for s in _rates(motion):
+    # LAPACK's, the fastest growing first; of a large packing the fastest alone
+    large = len(motion.active) > ALL_RATES
+    for s in [linear_verdict(motion, decides=False).s] if large else all_rates(motion)[0]:
         pencil = s * s * np.eye(len(stiffness)) + s * damping + stiffness
         if _disks(motion, null_vector(pencil)[:, None])[0] >= lone:
             return float(2 * s.real)
     return None
-
-
-def _rates(motion: Motion) -> Sequence[complex] | Complexes:
-    """Eigenvalues s with dissipation, the fastest growing first: all of them, unless the packing is large."""
-    if len(motion.active) > ALL_RATES:
-        return [linear_verdict(motion, decides=False).s]
-    return all_rates(motion)[0]
 
 
 def null_vector(singular: Complexes) -> Complexes:
@@ -203,7 +203,7 @@ def draw_cycle_spectrum(
     """
     from matplotlib.figure import Figure
 
-    from ..figures.drive import draw_slips
+    from ..figures.series import draw_slips
 
     figure = Figure(figsize=(5.6, 6.2), layout="constrained")
     force, pairs, growth, lowest = panels = figure.subplots(4, 1, sharex=True, height_ratios=(1.3, 1, 1.3, 1))
@@ -214,15 +214,16 @@ def draw_cycle_spectrum(
     force.set_ylabel("force $F$")
     force.margins(y=0.12)
     two = any(state["damped_sticking"] != state["damped_sliding"] for state in states)
-    alone, other = ("all sticking", "all sliding") if two else (None, None)
-    _draw_states(pairs, states, "pairs_sticking", "C0")
-    _draw_states(growth, states, "undamped_sticking", "C0", f"without dissipation{f', {alone}' if two else ''}")
-    _draw_states(growth, states, "damped_sticking", "C2", f"with dissipation{f', {alone}' if two else ''}")
-    _draw_states(lowest, states, "lowest_sticking", "C0", alone)
-    if two:
-        _draw_states(pairs, states, "pairs_sliding", "C3")
-        _draw_states(growth, states, "damped_sliding", "C3", f"with dissipation, {other}")
-        _draw_states(lowest, states, "lowest_sliding", "C3", other)
+    for branch, colour, damped in (("sticking", "C0", "C2"), ("sliding", "C3", "C3")):
+        if branch == "sliding" and not two:
+            continue
+        words = f"all {branch}" if two else None
+        beside = f", {words}" if two else ""
+        _draw_states(pairs, states, f"pairs_{branch}", colour)
+        if branch == "sticking":
+            _draw_states(growth, states, "undamped_sticking", colour, f"without dissipation{beside}")
+        _draw_states(growth, states, f"damped_{branch}", damped, f"with dissipation{beside}")
+        _draw_states(lowest, states, f"lowest_{branch}", colour, words)
     pairs.set_ylabel("complex pairs")
     growth.set_ylabel("growth rate of $D$")
     lowest.set_ylabel("lowest eigenvalue")

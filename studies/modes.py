@@ -28,9 +28,8 @@ or more loaded: growth rates cannot grow without limit with the number of disks.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -53,15 +52,13 @@ from ..analysis.motion.eigenvalues import SAFETY, Complexes, exceeds_rounding, u
 from ..analysis.motion.spectrum import SLICED
 from ..analysis.table_display import table_of
 from ..pywrap import Equilibrium, Scene
-from ..pywrap.load_path import LoadPath
 from ..pywrap.scenes.command_sections import PATH, section_of
 from ..pywrap.scenes.validation import Positive, Section, require_section
 from .cycle import cycle
-from .executors import Say
 from .packing_tools import Start, path_from
 from .result_rows import Row, write_csv
 from .statistics import median
-from .study import draw_all, task
+from .study import Say, draw_all, task
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -120,8 +117,7 @@ class ModesSection(Section):
     )
 
 
-@dataclass(frozen=True)
-class PairCounts:
+class PairCounts(NamedTuple):
     """The complex pairs of one packing.
 
     Attributes
@@ -146,16 +142,12 @@ class PairCounts:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers: pairs, negative, share, growth_rate, omega (of the fastest pair), least_q."""
-        fastest = self.omega[0] if len(self.omega) else None
-        rates = [growth_rate(value) for value in self.negative[:1]] + [2 * w.imag for w in self.omega[:1]]
-        return {
-            "pairs": len(self.omega),
-            "share": 2 * len(self.omega) / self.modes if self.modes else 0.0,
-            "negative": len(self.negative),
-            "growth_rate": float(max(rates, default=0.0)),
-            "omega": None if fastest is None else float(fastest.real),
-            "least_q": float(np.min(self.omega.real / (2 * self.omega.imag))) if len(self.omega) else None,
-        }
+        w, count = self.omega, len(self.omega)
+        rates = [growth_rate(value) for value in self.negative[:1]] + [2 * each.imag for each in w[:1]]
+        share = 2 * count / self.modes if self.modes else 0.0
+        numbers = {"pairs": count, "share": share, "negative": len(self.negative)}
+        fastest, least = (float(w[0].real), float(np.min(w.real / (2 * w.imag)))) if count else (None, None)
+        return numbers | {"growth_rate": float(max(rates, default=0.0)), "omega": fastest, "least_q": least}
 
 
 def count_pairs(packing: Packing) -> PairCounts:
@@ -174,16 +166,13 @@ def count_pairs(packing: Packing) -> PairCounts:
     rounding = unit_rounding(dynamical_matrix(packing)[0].data)
     surely = np.sqrt(SAFETY * rounding * np.abs(values).max(initial=0.0))
     doubtful = np.flatnonzero((values.imag > 0) & (values.imag <= surely))
-    noise = [k for k in doubtful if not _is_real(packing, values[k], rounding)]
     values = values.copy()
-    values[noise] = values[noise].real
-    return replace(PairCounts.of(values), negative=tuple(negative_eigenvalues(packing).tolist()))
-
-
-def _is_real(packing: Packing, value: complex, rounding: float) -> bool:
-    found = nearest_modes(packing, value * (1 + SHIFT_OFFSET), 2)
-    nearest = int(np.argmin(np.abs(found.values - value)))
-    return exceeds_rounding(value, float(found.overlap[nearest]), rounding)
+    for k in doubtful:  # the vectors decide
+        near = nearest_modes(packing, values[k] * (1 + SHIFT_OFFSET), 2)
+        nearest = int(np.argmin(np.abs(near.values - values[k])))
+        if not exceeds_rounding(values[k], float(near.overlap[nearest]), rounding):
+            values[k] = values[k].real
+    return PairCounts.of(values)._replace(negative=tuple(negative_eigenvalues(packing).tolist()))
 
 
 def antisymmetric_norm(packing: Packing) -> float:
@@ -209,13 +198,18 @@ def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[s
     look : callable
         Packing -> the numbers of one load.
     """
-    settings = section_of(scene, ModesSection) or ModesSection()
-    step, wanted = require_section(scene.ramp, "ramp").step, settings.fx_over_fy
+    wanted = sorted((section_of(scene, ModesSection) or ModesSection()).fx_over_fy)
     row: dict[str, Any] = {"ends": "until", "loads": []}
+    step = require_section(scene.ramp, "ramp").step
     with path_from(rest, scene) as path:
-        for share in sorted(wanted):
-            try:
-                packing = _climb_to(path, share * scene.load.fy, step)
+        for share in wanted:
+            fx = share * scene.load.fy
+            try:  # by multiples of the step
+                for k in range(round(path.equilibria[-1].fx / step), int(fx / step) + 1):
+                    if path.equilibria[-1].fx < k * step < fx:
+                        path(k * step)
+                        del path.equilibria[:-2]  # thousands of equilibria of a large packing would fill the memory
+                packing = path(fx)
             except NoEquilibriumError:
                 row["ends"] = "no equilibrium"
                 break
@@ -224,15 +218,6 @@ def along_ramp(scene: Scene, rest: Equilibrium, look: Callable[[Packing], dict[s
                 break
             row["loads"].append({"fx_over_fy": share, "fx": packing.fx} | look(packing))
     return row | {"reach": path.equilibria[-1].fx, "contacts": len(rest.packing.contacts)}
-
-
-def _climb_to(path: LoadPath[Equilibrium], fx: float, step: float) -> Packing:
-    """The packing at fx, by multiples of the step up to there."""
-    for k in range(round(path.equilibria[-1].fx / step), int(fx / step) + 1):
-        if path.equilibria[-1].fx < k * step < fx:
-            path(k * step)
-            del path.equilibria[:-2]  # thousands of equilibria of a large packing would fill the memory
-    return path(fx)
 
 
 def load_row(packing: Packing) -> dict[str, Any]:
@@ -249,14 +234,11 @@ def load_row(packing: Packing) -> dict[str, Any]:
         value = found.omega[0] ** 2
         pair = nearest_modes(packing, value * (1 + SHIFT_OFFSET), 1)
         row |= {"participation": float(pair.participation[0]), "rotation": float(pair.rotation[0])}
-    digits = [
-        [float(f"{w.real:.{FREQUENCY_DIGITS}g}"), float(f"{w.imag:.{FREQUENCY_DIGITS}g}")] for w in found.omega.tolist()
-    ]
-    return row | {"frequencies": digits}
+    omegas = ((w.real, w.imag) for w in found.omega.tolist())
+    return row | {"frequencies": [[float(f"{part:.{FREQUENCY_DIGITS}g}") for part in each] for each in omegas]}
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(NamedTuple):
     """One set of packings.
 
     Attributes
@@ -360,8 +342,7 @@ def _write_plane_film(loads: Sequence[Mapping[str, Any]], path: Path) -> None:
     """The plane of frequencies along a ramp as a film, a frame for each load."""
     from matplotlib.figure import Figure
 
-    from ..figures.film import Film
-    from ..figures.writers import write_film
+    from ..figures.film import Film, write_film
 
     figure = Figure((5, 4), layout="constrained")
     axes = figure.add_subplot()
@@ -386,38 +367,35 @@ def _title(load: Mapping[str, Any]) -> str:
 def _gather(sweep: Sweep, rows: Sequence[Row], output: Path, say: Say) -> list[str]:
     """modes.json, modes.csv, pictures and a film in the folder of a sweep; the loads of the first packing in words."""
     scenes = {point.key: point.scene for point in sweep.points}
-    good = [row for row in rows if row["says"] is None]
-    lines: list[Row] = []
+    good, lines, packings = [row for row in rows if row["says"] is None], list[Row](), list[Row]()
     for row in good:
         scene = scenes[row["key"]]
         packing = {} if scene is None else scene.packing.model_dump()
         known = {"disks": packing.get("disks"), "seed": packing.get("seed")}
-        loads = row["result"]["loads"]
-        lines += [known | {key: each for key, each in load.items() if key != "frequencies"} for load in loads]
-    keys = ("ends", "reach", "contacts")
-    packings = [
-        {"values": row["values"], "says": row["says"]} | {key: row["result"].get(key) for key in keys} for row in rows
-    ]
+        for load in row["result"]["loads"]:
+            lines.append(known | {key: each for key, each in load.items() if key != "frequencies"})
+    for row in rows:
+        ends = {key: row["result"].get(key) for key in ("ends", "reach", "contacts")}
+        packings.append({"values": row["values"], "says": row["says"]} | ends)
     write_json(output / "modes.json", {"asked": sweep.as_dict(), "rows": lines, "packings": packings})
     write_csv(output / "modes.csv", COLUMNS, lines)
-    _draw(good, lines, output, say)
+    if lines:
+        _draw(good, lines, output, say)
+    else:
+        say("no packing bears any of the loads: there is nothing to draw")
     return _in_words(lines, packings, output)
 
 
 def _draw(good: Sequence[Row], lines: Sequence[Row], output: Path, say: Say) -> None:
     """Pictures of all packings over the load, and of the first packing in the plane of frequencies."""
-    if not lines:
-        say("no packing bears any of the loads: there is nothing to draw")
-        return
     from ..figures.style import report_failure, styled
 
     sizes = sorted({line["disks"] for line in lines if line["disks"] is not None})
     groups = {"all": list(good)}
     if len(sizes) > 1:
         groups = {str(n): [row for row in good if row["values"].get("packing.disks") == n] for n in sizes}
-    courses = {
-        name: medians_over_load(Table(name, tuple(row["result"] for row in group))) for name, group in groups.items()
-    }
+    tables = [Table(name, tuple(row["result"] for row in group)) for name, group in groups.items()]
+    courses = {table.name: medians_over_load(table) for table in tables}
     draw_all({"modes": lambda: over_load(courses)}, output, say)
     shown = [load for load in good[0]["result"]["loads"] if load["pairs"]]
     if not shown:
@@ -441,11 +419,11 @@ def _in_words(lines: Sequence[Row], packings: Sequence[Row], output: Path) -> li
     says.append(f"packings: {len(packings)}, failed: {len(failed)}; written: {output}/modes.json")
     says += [f"the first that failed: {sentence}" for sentence in failed[:1]]
     short = [each for each in packings if each["says"] is None and each["ends"] != "until"]
-    for each in short[:1]:
-        why = "an eigenvalue is negative" if each["ends"] == "turning point" else "there is no equilibrium"
+    if short:
+        why = "an eigenvalue is negative" if short[0]["ends"] == "turning point" else "there is no equilibrium"
         says.append(
             f"packings whose branch ends before the last load, so that loads are left out: {len(short)}; the first "
-            f"of them goes to F_x = {each['reach']:g}, and {why} at the next load"
+            f"of them goes to F_x = {short[0]['reach']:g}, and {why} at the next load"
         )
     return says
 

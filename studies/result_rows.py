@@ -11,7 +11,7 @@ import csv
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from importlib.util import find_spec
 from io import StringIO
@@ -21,8 +21,15 @@ from typing import Any
 import numpy as np
 
 from ..analysis.arrays import Floats
-from ..analysis.files.atomic_write import FORMAT, FORMAT_KEY, check_format, check_own, replace_whole, write_text
-from ..analysis.files.plain_file import read_plain
+from ..analysis.files.atomic_write import (
+    FORMAT,
+    FORMAT_KEY,
+    check_format,
+    check_own,
+    read_plain,
+    replace_whole,
+    write_text,
+)
 from ..pywrap import Scene, SceneError
 
 Row = dict[str, Any]
@@ -77,13 +84,6 @@ def append_row(path: Path, row: Mapping[str, Any]) -> None:
         os.fsync(file.fileno())
 
 
-def keep_rows(path: Path, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Rows as they come, each in the file before it is handed on."""
-    for row in rows:
-        append_row(path, row)
-        yield row
-
-
 class Rows:
     """Lines of one scene in a file, NAME.jsonl; lines of other scenes are left alone.
 
@@ -132,38 +132,33 @@ def check_table(names: list[str], folder: Path) -> None:
 
 def write_tables(rows: list[Row], names: list[str], folder: Path) -> None:
     """Write rows in the order of the table, with the swept keys by name: results.csv, results.parquet if it can be."""
-    found = dict.fromkeys([*names, *(name for row in rows for name in flat(row["result"]))])
-    columns = [*(name for name in found if name != "says"), "says"]
     table = [row["values"] | flat(row["result"]) | {"says": row["says"]} for row in rows]
+    columns = [name for name in dict.fromkeys([*names, *(name for row in table for name in row)]) if name != "says"]
     file = folder / "results.csv"
     stored = file.read_text().splitlines()[:1] if file.exists() and not names else []
-    write_csv(file, columns, table, "".join(stored) or ",".join(names))
+    write_csv(file, [*columns, "says"], table, "".join(stored) or ",".join(names))
     if find_spec("pandas") and find_spec("pyarrow"):
         import pandas as pd
 
-        frame = pd.DataFrame([{column: _plain(row.get(column)) for column in columns} for row in table])
+        frame = pd.DataFrame([{column: _plain(row.get(column)) for column in [*columns, "says"]} for row in table])
         frame.attrs[FORMAT_KEY] = FORMAT
         with replace_whole(folder / "results.parquet") as new:
             frame.to_parquet(new)
 
 
 def write_csv(path: Path, columns: Sequence[str], table: Iterable[Row], head: str | None = None) -> None:
-    """Write some columns of rows; the file is replaced as a whole, if it begins with `head`: by default all columns."""
+    """Write some columns of rows; the file is replaced as a whole, if it begins with `head`: by default all columns.
+
+    Numbers have all digits, lists are JSON, and nothing stands for None.
+    """
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows([_cell(row.get(column)) for column in columns] for row in table)
+    for row in table:
+        cells = [_plain(row.get(column)) for column in columns]
+        writer.writerow([str(cell).lower() if isinstance(cell, bool) else cell for cell in cells])
     write_text(path, text.getvalue(), head=",".join(columns) if head is None else head)
 
 
-def _cell(value: Any) -> Any:
-    """A value as CSV holds it: all digits of a number, lists as JSON, nothing for None."""
-    if value is None:
-        return ""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return json.dumps(value) if isinstance(value, (list, tuple)) else repr(value) if isinstance(value, float) else value
-
-
 def _plain(value: Any) -> Any:
-    return json.dumps(value) if isinstance(value, (list, tuple)) else value
+    return json.dumps(value) if isinstance(value, list | tuple) else value

@@ -14,19 +14,20 @@ functions: a scene with the section of a study imports the study's file.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mpi4py import MPI
+from mpi4py.futures import MPICommExecutor
 
 from ..analysis.files.atomic_write import make_folder, write_json, write_text
 from ..pywrap import Scene
 from ..pywrap.scenes.units import real_units
 from ..pywrap.scenes.validation import Section
-from .executors import MapRows, Progress, Say, open_executor
 from .packing_tools import Start
 from .result_rows import Row, Rows
 
@@ -34,6 +35,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .sweep.sweep_plan import Sweep
+
+Say = Callable[[str], None]
+"""A function that prints a line of text."""
+
+Progress = Callable[[Iterable[Any], int], Iterable[Any]]
+"""A function that takes results as they come, with their number, and passes them on."""
+
+MapRows = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
+"""`map`, whose results may come in any order."""
 
 Result = dict[str, Any]
 
@@ -151,8 +161,9 @@ class RegisteredStudy:
         assert self.compute is not None
         self.check(scene)
         pool: Any
-        with open_executor(workers=1) as pool:
-            if MPI.COMM_WORLD.rank != 0:
+        world = MPI.COMM_WORLD
+        with MPICommExecutor(world) if world.size > 1 else nullcontext() as pool:
+            if world.rank != 0:
                 return {}
             map_rows: MapRows = map if pool is None else partial(pool.map, unordered=True)
             make_folder(output, f"{self.name}.json", f"{self.name}.md")

@@ -19,8 +19,8 @@ The user gives v_0. The paper uses the largest velocity of the unperturbed run, 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from itertools import groupby
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -92,8 +92,7 @@ class Trigger(Section):
     on: Literal["layer", "floor"] = "layer"
 
 
-@dataclass(frozen=True, eq=False)
-class Wave:
+class Wave(NamedTuple):
     """A wave of a scene, of any amplitude, on a packing in equilibrium, with the linear response by K."""
 
     scene: Scene
@@ -126,8 +125,7 @@ def settings(scene: Scene) -> Trigger:
 
 def equilibria(scene: Scene, fx: Iterable[float]) -> dict[float, Packing]:
     """The packings in equilibrium at some loads, along the ramp of the scene."""
-    wanted = sorted(fx)
-    start = settle(scene, communicator=MPI.COMM_SELF)
+    wanted, start = sorted(fx), settle(scene, communicator=MPI.COMM_SELF)
     with path_from(start, scene) as path:
         for load in ramp_loads(scene):
             if start.fx < load <= wanted[-1]:
@@ -157,13 +155,11 @@ def predictions(scene: Scene, packing: Packing, distance: float, omegas: Floats)
             "or another seed"
         )
     wanted, v0 = settings(scene), threshold(scene)
-    force = layer_force(packing, 1.0) if wanted.on == "layer" else floor_force(packing)
-    response = impulse_response(packing, force)
+    response = impulse_response(packing, layer_force(packing, 1.0) if wanted.on == "layer" else floor_force(packing))
     velocity, when = response.largest(omegas, wanted.time)
-    stationary = np.abs(response.transfer(omegas))
-    columns = {"omega": omegas, "predicted": v0 / velocity, "stationary": v0 / stationary, "reached": when}
-    rows = (dict(zip(columns, row, strict=True)) for row in np.column_stack([*columns.values()]).tolist())
-    return [{"fx": packing.fx, "distance": distance} | row for row in rows]
+    columns = omegas, v0 / velocity, v0 / np.abs(response.transfer(omegas)), when
+    names, known = ("omega", "predicted", "stationary", "reached"), {"fx": packing.fx, "distance": distance}
+    return [known | dict(zip(names, row, strict=True)) for row in np.column_stack(columns).tolist()]
 
 
 def map_predictions(
@@ -171,23 +167,19 @@ def map_predictions(
 ) -> Iterator[tuple[float, list[Row]]]:
     """The predictions at each distance, the largest first, at the frequencies of the scene; where the scene names none,
     at those of the modes of the packing with the smallest load."""
-    if not packings:
-        return
-    wanted = settings(scene).omega
-    if wanted is None:
+    omegas = np.array(sorted(settings(scene).omega or ()))
+    if packings and not len(omegas):
         modes = np.sqrt(np.abs(spectrum(packings[min(packings)]).eigenvalues))
         slowest = modes[modes > 1e-3 * modes.max()].min()  # one without a restoring force has no frequency
         omegas = np.geomspace(0.1 * slowest, modes.max(), DEFAULT_FREQUENCIES)
-    else:
-        omegas = np.array(sorted(wanted))
     for distance in sorted(distances, reverse=True):
         yield distance, predictions(scene, packings[fx_c * (1 - distance)], distance, omegas)
 
 
 def spread_over_map(predicted: list[Row], runs: int) -> list[Row]:
     """So many points of the map, spread over distances and frequencies."""
-    distances = sorted({each["distance"] for each in predicted}, reverse=True)
-    rows = [sorted((p for p in predicted if p["distance"] == d), key=lambda p: p["omega"]) for d in distances]
+    ordered = sorted(predicted, key=lambda each: (-each["distance"], each["omega"]))
+    rows = [list(row) for _, row in groupby(ordered, key=lambda each: each["distance"])]
     share = [runs // len(rows) + (k < runs % len(rows)) for k in range(len(rows))]
     picked = []
     for k, (row, count) in enumerate(zip(rows, share, strict=True)):
@@ -256,19 +248,15 @@ def _row(scene: Scene, start: Start) -> Row:
     """
     threshold(scene)
     wave, first = settings(scene), onset_row(scene, start)
-    if first["ends"] != "onset":
-        return {"ends": first["ends"], "fx_c": None, "map": [], "measured": []}
-    packings = equilibria(scene, [first["fx_c"] * (1 - each) for each in wave.distance])
-    predicted = [row for _, rows in map_predictions(scene, packings, first["fx_c"], wave.distance) for row in rows]
-    measured = [
-        bisect_amplitude(Wave(scene, packings[each["fx"]], each)) for each in spread_over_map(predicted, wave.runs)
-    ]
-    return {
-        "ends": "onset",
-        "fx_c": first["fx_c"],
-        "map": predicted,
-        "measured": [each | {"amplitude": middle(each["below"], each["above"])} for each in measured],
-    }
+    row: Row = {"ends": first["ends"], "fx_c": first["fx_c"], "map": [], "measured": []}
+    if first["ends"] == "onset":
+        packings = equilibria(scene, [first["fx_c"] * (1 - each) for each in wave.distance])
+        for _, rows in map_predictions(scene, packings, first["fx_c"], wave.distance):
+            row["map"] += rows
+        for each in spread_over_map(row["map"], wave.runs):
+            found = bisect_amplitude(Wave(scene, packings[each["fx"]], each))
+            row["measured"].append(found | {"amplitude": middle(found["below"], found["above"])})
+    return row
 
 
 WAVE = {"layer": "amplitude of the force $a$", "floor": "acceleration of the floor $a$"}
@@ -343,15 +331,12 @@ def _figures(result: Result, _: Rows) -> Figures:
 
 
 def _page(result: Result) -> Result:
-    rows = result["map"]
-    distances = sorted({row["distance"] for row in rows}, reverse=True)
-    weakest = [min((r for r in rows if r["distance"] == d), key=lambda r: r["predicted"]) for d in distances]
-    slowest = [min((r for r in rows if r["distance"] == d), key=lambda r: r["omega"]) for d in distances]
-    return {
-        "runs": [row for row in rows if row["measured"] is not None],
-        "distances": list(zip(distances, weakest, slowest, strict=True)),
-        "damped": bool(result["scene"].get("damping")),
-    }
+    rows, distances = result["map"], []
+    for distance, group in groupby(rows, key=lambda row: row["distance"]):
+        slowest, *others = group  # by frequency
+        distances.append((distance, min([slowest, *others], key=lambda row: row["predicted"]), slowest))
+    runs = [row for row in rows if row["measured"] is not None]
+    return {"runs": runs, "distances": distances, "damped": bool(result["scene"].get("damping"))}
 
 
 def _check(scene: Scene) -> None:
@@ -414,16 +399,17 @@ def trigger(scene: Scene, work: Work) -> Result:
             work.say(f"{at}: triggers from {middle(bisected['below'], bisected['above']):.4g} on in LAMMPS")
     asked = {(each["fx"], each["omega"]) for each in wanted}
     real, table, off = real_units(scene), list[Row](), list[float]()
-    for each in sorted(predicted, key=lambda p: (-p["distance"], p["omega"])):
-        run, row = measured(each) if (each["fx"], each["omega"]) in asked else None, each | {"measured": None}
+    for row in sorted(predicted, key=lambda p: (-p["distance"], p["omega"])):
+        row = row | {"measured": None}
+        run = measured(row) if (row["fx"], row["omega"]) in asked else None
         if run is not None:
-            row["measured"] = middle(run["below"], run["above"])
-            row |= {key: run[key] for key in ("below", "above", "runs")} | {"triggers_at": run["reached"]}
-            off.append(abs(each["predicted"] / row["measured"] - 1))
+            row |= {"measured": middle(run["below"], run["above"]), "triggers_at": run["reached"]}
+            row |= {key: run[key] for key in ("below", "above", "runs")}
+            off.append(abs(row["predicted"] / row["measured"] - 1))
         if real is not None:
-            velocity = real.ground_velocity(each["predicted"], each["omega"], given.on)
-            row |= {"frequency_Hz": real.frequency(each["omega"]), "ground_velocity_m_per_s": velocity}
-            row |= {"strain": velocity / real.shear_wave, "stress_ratio": each["fx"] / real.fy}
+            velocity = real.ground_velocity(row["predicted"], row["omega"], given.on)
+            row |= {"frequency_Hz": real.frequency(row["omega"]), "ground_velocity_m_per_s": velocity}
+            row |= {"strain": velocity / real.shear_wave, "stress_ratio": row["fx"] / real.fy}
         table.append(row)
     return {
         **{key: first[key] for key in ("fx_c", "error", "undamped_fx_c")},

@@ -54,10 +54,7 @@ FLOORS = {
         ("runs",),
         ("onset",),
     ),
-    "faultgouge.assessment": (
-        ("timing",),
-        ("explain", "extremes", "work_precision"),
-    ),
+    "faultgouge.assessment": (("explain", "extremes", "work_precision"),),
 }
 """Rooms from the ground up. A room knows those below its floor, and none beside it."""
 
@@ -242,7 +239,6 @@ INSIDE = {
     "pywrap.runs.path_error": "the stated errors that a page compares with true ones, at the windows of its own search",
     "pywrap.runs.drive": "slips and clock advances from the rows of a drive.h5",
     "pywrap.scenes.drive_section": "the scale of the probe that a page states",
-    "pywrap.scenes.validation": "read_toml, as Python 3.10 has no reader; require_section",
 }
 """Modules behind the doors that research uses for all that, and what for."""
 
@@ -257,4 +253,4 @@ def test_research_uses_the_program_as_any_user_may():
         if module not in DOORS
     ]
     assert set(used) == INSIDE.keys()
-    assert len(used) <= 18  # imports, all told
+    assert len(used) <= 15  # imports, all told

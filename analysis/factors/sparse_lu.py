@@ -106,6 +106,14 @@ def symmetric_lu(
         raise SingularMatrixError(f"The sparse factors of a matrix of {matrix.shape[0]} rows: {error}.") from error
 
 
+def negative_pivots(matrix: csc_array, *, ordered: bool = False) -> int | None:
+    """How many eigenvalues of a symmetric matrix are negative; None if one is zero, and factors do not tell."""
+    try:
+        return symmetric_lu(matrix, ordered=ordered, symmetric=True).negative
+    except SingularMatrixError:
+        return None
+
+
 def general_lu(matrix: csc_array, *, ordered: bool = False) -> Factors:
     """The factors of any square matrix: without pivoting where the solutions are accurate, as they nearly always are.
 

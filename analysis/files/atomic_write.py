@@ -8,34 +8,47 @@ No file is replaced that this program has not written. It knows its own files by
 the format: ``faultgouge_format=1`` in a comment or another place that readers of the format skip, the key
 ``faultgouge_format`` of JSON, and of HDF5 the seal. A table in CSV has no place for a mark: its first line tells.
 
-A *sealed* file begins with a text header of 512 bytes: a description of the file, the SHA-256 of all following bytes,
-and its length. A single flipped byte is then detected. HDF5 looks for its superblock at the bytes 0, 512, 1024, ...
-(the header is a user block in the terms of HDF5), so that every reader of HDF5 can open a sealed file.
+A *sealed* file of HDF5 begins with a text header of 512 bytes: a description of the file, the SHA-256 of all following
+bytes, and its length. A single flipped byte is then detected. HDF5 looks for its superblock at the bytes 0, 512, 1024,
+... (the header is a user block in the terms of HDF5), so that every reader of HDF5 can open a sealed file. The checksum
+says that the content is what was written. It covers neither other files to which HDF5 may link, nor what a few bytes
+unpack to: both are refused.
+
+Files that users name for reading must be plain: a pipe or a device may never end, and cannot be read twice.
 """
+
+from __future__ import annotations
 
 import errno
 import fcntl
+import gzip
 import hashlib
 import json
+import math
 import os
 import secrets
 import stat
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from io import TextIOWrapper
+from os import PathLike
 from pathlib import Path
-from typing import IO, Any
+from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
 
 from ..errors import OutputError, PackingFileError
-from .plain_file import open_plain
+
+if TYPE_CHECKING:
+    import h5py
+
+GZIP = b"\x1f\x8b"
+"""How a file begins that is compressed by gzip: LAMMPS compresses a dump whose name ends in .gz."""
 
 HEADER_SIZE = 512
 """Bytes of the header: the smallest user block of HDF5."""
 
-SEAL = b"faultgouge run file, sealed\n"
-HDF5 = b"\x89HDF\r\n\x1a\n"
-BEGINNINGS = HDF5, SEAL
-"""How files of HDF5 begin: those of others, and those of this program."""
+SEAL, HDF5 = b"faultgouge run file, sealed\n", b"\x89HDF\r\n\x1a\n"
+"""How files of HDF5 begin: those of this program, and those of others."""
 
 FORMAT = 1
 """Number of the format of all files that this program writes. Files of a later one are refused."""
@@ -50,10 +63,9 @@ MARK_BYTES = 1 << 16
 """Bytes at the beginning and at the end of a file among which the mark is."""
 
 _COMMENT = f"{FORMAT_KEY}={FORMAT}".encode()
-_XML = b"<!-- " + _COMMENT + b" -->\n"
 _TEXT = b"tEXt" + b"Comment\0" + _COMMENT
 TRAILERS = {
-    **dict.fromkeys((".md", ".html", ".svg", ".vtp", ".pvd"), _XML),
+    **dict.fromkeys((".md", ".html", ".svg", ".vtp", ".pvd"), b"<!-- " + _COMMENT + b" -->\n"),
     ".pdf": b"%" + _COMMENT + b"\n",
     ".gif": _COMMENT,  # behind the last block, where no reader looks
     ".mp4": (8 + len(_COMMENT)).to_bytes(4, "big") + b"free" + _COMMENT,
@@ -69,7 +81,86 @@ LONGEST_NAME = 200
 """Letters of a name that other names beside it begin with: file systems take 255 bytes."""
 
 BYTES_AT_A_TIME = 1 << 20
-"""Bytes that are read at a time."""
+"""Bytes that are read at a time, and by which a file grows in memory."""
+
+LIBVER = "v110", "v110"
+"""HDF5's format with checksums on its own tables, which HDF5 1.10 and all later versions read."""
+
+LARGEST_CHUNK = 1 << 30
+"""Bytes of a chunk, unpacked: a frame of ten million disks has a quarter of these."""
+
+LARGEST_SHAPE = 1 << 45
+"""Bytes that a dataset would have with all of its rows written, 35 TB."""
+
+
+UNREADABLE = (
+    OSError, EOFError, zlib.error, ValueError, LookupError, TypeError, AttributeError, OverflowError, RuntimeError,
+    StopIteration,
+)  # fmt: skip
+"""What readers meet in files that are damaged, or of another format than their name says."""
+
+
+@contextmanager
+def telling(path: object, says: str, errors: tuple[type[Exception], ...] = UNREADABLE) -> Iterator[None]:
+    """Tell in one sentence, a PackingFileError, what fails within, unless it is one already.
+
+    Parameters
+    ----------
+    path : object
+        The file, or another source.
+    says : str
+        What of it, as in "is no readable GSD file"; the reason of the error follows.
+    errors : tuple of types
+        What is told.
+    """
+    try:
+        yield
+    except PackingFileError:
+        raise
+    except errors as error:
+        reason = (
+            str(getattr(error, "strerror", None) or error).strip().partition("\n")[0].rstrip(".") or "it breaks off"
+        )
+        reason = "its brackets are nested too deeply" if isinstance(error, RecursionError) else reason
+        lacks = "it lacks " if isinstance(error, KeyError) else ""
+        raise PackingFileError(f"{path} {says}: {lacks}{reason}.") from error
+
+
+def open_plain(path: str | PathLike[str]) -> BinaryIO:
+    """A plain file, opened for reading its bytes.
+
+    Raises OSError if the file cannot be read, or is a folder, a pipe, a socket or a device.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)  # a pipe without a writer opens at once
+    kind = os.fstat(descriptor).st_mode
+    if stat.S_ISREG(kind):
+        return os.fdopen(descriptor, "rb")
+    os.close(descriptor)
+    if stat.S_ISDIR(kind):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    raise OSError(errno.EINVAL, "it is a pipe or a device, and no plain file", str(path))
+
+
+def open_text(path: str | PathLike[str]) -> TextIO:
+    """The text of a plain file in UTF-8, for reading; decompressed if its first bytes are those of gzip.
+
+    Raises OSError as `open_plain` does. Who reads a damaged text meets an EOFError, a zlib.error or an OSError.
+    """
+    stream = open_plain(path)
+    compressed = stream.read(len(GZIP)) == GZIP
+    stream.seek(0)
+    return gzip.open(stream, "rt", encoding="utf-8") if compressed else TextIOWrapper(stream, encoding="utf-8")
+
+
+def read_plain(path: str | PathLike[str]) -> bytes:
+    """The bytes of a plain file; errors as those of `open_plain`."""
+    with open_plain(path) as stream:
+        return stream.read()
+
+
+def read_plain_text(path: str | PathLike[str]) -> str:
+    """The text of a plain file in UTF-8, its lines ended by line feeds; errors as those of `open_plain`."""
+    return read_plain(path).decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
 
 
 @contextmanager
@@ -96,7 +187,6 @@ def replace_whole(path: Path, head: str = "") -> Iterator[Path]:
         if target.exists() and not target.is_file():
             yield target
             return
-        _check_changeable(target)
         check_own(target, head)
         with part.open("xb") as stream:  # a file of its own, or an error
             if target.exists():
@@ -117,15 +207,13 @@ def replace_whole(path: Path, head: str = "") -> Iterator[Path]:
 
 def _add_trailer(path: Path) -> None:
     """Mark a new file, in a format that ends in a mark."""
-    trailer = TRAILERS.get(path.suffix.lower(), b"")
+    kind = path.suffix.lower()
     with path.open("r+b") as stream:
         size = stream.seek(0, os.SEEK_END)
-        last = b""
-        if path.suffix.lower() == ".png" and size > END_OF_PNG:
-            stream.seek(-END_OF_PNG, os.SEEK_END)
-            last = stream.read()
-            stream.seek(-END_OF_PNG, os.SEEK_END)
-        stream.write(trailer + last)
+        stream.seek(max(size - END_OF_PNG, 0) if kind == ".png" else size)
+        last = stream.read()
+        stream.seek(-len(last), os.SEEK_END)
+        stream.write(TRAILERS.get(kind, b"") + last)
 
 
 def _synchronise(path: Path) -> None:
@@ -140,40 +228,30 @@ def _synchronise(path: Path) -> None:
         os.close(descriptor)
 
 
-def is_own(path: Path, head: str = "") -> bool:
-    """Whether a file may be replaced: this program has written it, or it is empty, or there is none.
+def check_own(path: Path, head: str = "") -> None:
+    """Refuse to replace or to remove a file that is read-only, or that this program has not written.
 
-    Parameters
-    ----------
-    head : str
-        Of a format without a mark: how its files begin.
+    Raises an OutputError. `head` is how files of a format without a mark begin; an empty file is anybody's.
     """
     if not path.is_file():
-        return True
+        return
+    if not (path.stat().st_mode & 0o222 and os.access(path, os.W_OK)):  # root may write what is read-only
+        raise OutputError(f"{path} cannot be written: it is read-only; make it writeable, or give another name.")
     with path.open("rb") as stream:
         begin = stream.read(MARK_BYTES)
         stream.seek(-min(MARK_BYTES, path.stat().st_size), os.SEEK_END)
         end = stream.read()
-    known = begin.startswith((SEAL, OLD_DATA)) or any(FORMAT_KEY.encode() in part for part in (begin, end))
-    return not begin or known or bool(head and begin.startswith(head.encode()))
-
-
-def check_own(path: Path, head: str = "") -> None:
-    """Refuse to replace or to remove a file that this program has not written, with an OutputError."""
-    if not is_own(path, head):
-        raise OutputError(
-            f"{path} is there already, and faultgouge has not written it (or a version before its files had a number "
-            "of their format): give another name, or move the file away."
-        )
+    own = begin.startswith((SEAL, OLD_DATA)) or bool(head and begin.startswith(head.encode()))
+    if begin and not own and FORMAT_KEY.encode() not in begin + b"\n" + end:
+        says = f"{path} is there already, and faultgouge has not written it (or a version without numbers of formats)"
+        raise OutputError(f"{says}: give another name, or move the file away.")
 
 
 def check_format(number: object, where: object) -> None:
     """Refuse a file of a later format with a PackingFileError; files of older versions have no number, None."""
     if number is not None and not (str(number).isdecimal() and int(str(number)) <= FORMAT):
-        raise PackingFileError(
-            f"{where} has format {number} of faultgouge's files, and this version knows {FORMAT}: a later version "
-            "wrote it, so update faultgouge."
-        )
+        says = f"{where} has format {number} of faultgouge's files, and this version knows {FORMAT}"
+        raise PackingFileError(f"{says}: a later version wrote it, so update faultgouge.")
 
 
 def write_whole(path: Path, *parts: bytes, head: str = "") -> None:
@@ -198,80 +276,21 @@ def check_output(path: Path, *inputs: Path, head: str = "") -> None:
     Raises
     ------
     OutputError
-        If the folder of the file does not exist, or may not be written to, or the file is read-only, a folder, one
-        of the inputs, or not of this program (see `is_own` for `head`).
+        If the folder of the file does not exist, or may not be written to, or the file is a folder, one of the
+        inputs, read-only, or not of this program (see `check_own` for `head`).
     """
-    for each in inputs:
-        if path.exists() and each.exists() and path.samefile(each):
-            raise OutputError(f"{path} is read by this command, and its result would replace it: give another name.")
+    if any(path.exists() and each.exists() and path.samefile(each) for each in inputs):
+        raise OutputError(f"{path} is read by this command, and its result would replace it: give another name.")
+    folder, reason = path.absolute().parent, ""
     if path.is_dir():
-        raise OutputError(f"{path} is a folder: give the name of a file.")
-    try:
-        _check_changeable(path)
-    except OSError as error:
-        raise OutputError(
-            f"{path} cannot be written: {error.strerror}; make it writeable, or give another name."
-        ) from None
-    folder = path.absolute().parent
-    if not folder.is_dir():
-        raise OutputError(f"{path} cannot be written: there is no folder {folder}; make it first.")
-    if not os.access(folder, os.W_OK):
-        raise OutputError(f"{path} cannot be written: the folder {folder} may not be written to.")
+        reason = "it is a folder: give the name of a file"
+    elif not folder.is_dir():
+        reason = f"there is no folder {folder}; make it first"
+    elif not os.access(folder, os.W_OK):
+        reason = f"the folder {folder} may not be written to"
+    if reason:
+        raise OutputError(f"{path} cannot be written: {reason}.")
     check_own(path, head)
-
-
-def _check_changeable(path: Path) -> None:
-    """Refuse to replace a file that is read-only, also to root, whom the system lets."""
-    if path.is_file() and not (path.stat().st_mode & 0o222 and os.access(path, os.W_OK)):
-        raise PermissionError(errno.EACCES, "it is read-only", str(path))
-
-
-@contextmanager
-def lock_output(path: Path) -> Iterator[Path | None]:
-    """Keep other processes from writing a file, or into a folder: they find a lock, which goes with this process.
-
-    The lock is a file beside the file, or in the folder, which is yielded and removed in the end. A device has none.
-    Raises OutputError if another process has it.
-    """
-    lock = lock_of(path)
-    if lock is None:
-        yield None
-        return
-    stream = _take_lock(lock, path)
-    try:
-        yield lock
-    finally:
-        with suppress(OSError):
-            lock.unlink()
-        stream.close()
-
-
-def lock_of(path: Path) -> Path | None:
-    """The lock file of a file or a folder; a device has none."""
-    target = Path(os.path.realpath(path))
-    if target.exists() and not (target.is_file() or target.is_dir()):
-        return None
-    return target / ".lock" if target.is_dir() else target.with_name(f".{target.name[:LONGEST_NAME]}.lock")
-
-
-def _take_lock(lock: Path, path: Path) -> IO[bytes]:
-    """The lock file, locked, and still under its name: who had it before may just have removed it."""
-    while True:
-        try:
-            stream = os.fdopen(os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666), "r+b")
-        except OSError as error:
-            raise OutputError(f"{path} cannot be written: {error.strerror} ({lock}).") from None
-        try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if lock.exists() and os.path.samestat(os.fstat(stream.fileno()), lock.stat()):
-                return stream
-        except BlockingIOError:
-            stream.close()
-            says = "another run is writing it: wait for its end, or give another name"
-            raise OutputError(f"{path} cannot be written, since {says}.") from None
-        except OSError:  # a file system without locks
-            return stream
-        stream.close()
 
 
 def make_folder(path: Path, *names: str) -> None:
@@ -284,36 +303,127 @@ def make_folder(path: Path, *names: str) -> None:
         check_own(path / name)
 
 
-def add_checksum(content: bytes) -> bytes:
-    """The header of a content."""
-    return _header(hashlib.sha256(content).hexdigest(), len(content))
+@contextmanager
+def lock_output(path: Path) -> Iterator[None]:
+    """Keep other processes from writing a file, or into a folder: they find a lock, which goes with this process.
 
-
-def check_checksum(path: Path) -> None:
-    """Refuse a file without a header, or whose content has not the checksum of the header, with a PackingFileError."""
+    The lock is a file beside the file, or in the folder, and is removed in the end. A device has none. Raises
+    OutputError if another process has it.
+    """
+    lock, held = lock_of(path), False
+    if lock is None:
+        yield
+        return
+    while not held:
+        try:
+            descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+        except OSError as error:
+            raise OutputError(f"{path} cannot be written: {error.strerror} ({lock}).") from None
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # who had it before may just have removed it from under its name
+            held = lock.exists() and os.path.samestat(os.fstat(descriptor), lock.stat())
+        except BlockingIOError:
+            os.close(descriptor)
+            says = "another run is writing it: wait for its end, or give another name"
+            raise OutputError(f"{path} cannot be written, since {says}.") from None
+        except OSError:  # a file system without locks
+            held = True
+        if not held:
+            os.close(descriptor)
     try:
-        with open_plain(path) as stream:
-            header = stream.read(HEADER_SIZE)
-            if header.startswith(HDF5):
-                raise PackingFileError(
-                    f"{path} is an HDF5 file, and no run of faultgouge: it lacks the lines with which these begin."
-                )
-            if not header.startswith(SEAL):
-                convert = f"a packing of another code is converted by `faultgouge import {path} -o packing.h5`"
-                raise PackingFileError(f"{path} is not a readable HDF5 file, as it begins like none: {convert}.")
-            digest, size = hashlib.sha256(), 0
-            while block := stream.read(BYTES_AT_A_TIME):
-                digest.update(block)
-                size += len(block)
-    except OSError as error:
-        raise PackingFileError(f"{path} cannot be read: {error.strerror}.") from error
-    if header != _header(digest.hexdigest(), size):
-        raise PackingFileError(
-            f"{path} is damaged: its {size} bytes do not have the checksum that was written with them; take a copy of "
-            "the file, or make it again."
-        )
+        yield
+    finally:
+        with suppress(OSError):
+            lock.unlink()
+        os.close(descriptor)
+
+
+def lock_of(path: Path) -> Path | None:
+    """The lock file of a file or a folder; a device has none."""
+    target = Path(os.path.realpath(path))
+    if target.exists() and not (target.is_file() or target.is_dir()):
+        return None
+    return target / ".lock" if target.is_dir() else target.with_name(f".{target.name[:LONGEST_NAME]}.lock")
+
+
+def new_sealed() -> h5py.File:
+    """An empty file of HDF5 in memory."""
+    import h5py
+
+    return h5py.File("new", "w", driver="core", backing_store=False, block_size=BYTES_AT_A_TIME, libver=LIBVER)
+
+
+def write_sealed(path: Path, file: h5py.File) -> None:
+    """Write a file that is kept in memory, with its checksum and the number of its format."""
+    file.attrs[FORMAT_KEY] = FORMAT
+    file.flush()
+    image = file.id.get_file_image()
+    write_whole(path, _header(hashlib.sha256(image).hexdigest(), len(image)), image)
 
 
 def _header(digest: str, size: int) -> bytes:
     words = SEAL + f"sha256 {digest}\nbytes {size}\nHDF5 from byte {HEADER_SIZE} on\n".encode()
     return words.ljust(HEADER_SIZE - 1) + b"\n"
+
+
+def open_sealed(path: Path, writable: bool = False) -> h5py.File:
+    """Open a file that has been checked whole; its content in memory, if it is to be changed.
+
+    Raises PackingFileError if the file is missing, damaged, of a later format, or unpacks to what is not in it.
+    """
+    if not path.is_file():
+        raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
+    import h5py
+
+    with telling(path, "cannot be read", (OSError,)):
+        with open_plain(path) as stream:
+            header, digest, size = stream.read(HEADER_SIZE), hashlib.sha256(), 0
+            if not header.startswith(SEAL):
+                convert = f"a packing of another code is converted by `faultgouge import {path} -o packing.h5`"
+                says = f"is not a readable HDF5 file, as it begins like none: {convert}"
+                says = "is an HDF5 file, and no run of faultgouge" if header.startswith(HDF5) else says
+                raise PackingFileError(f"{path} {says}.")
+            while block := stream.read(BYTES_AT_A_TIME):
+                digest.update(block)
+                size += len(block)
+        if header != _header(digest.hexdigest(), size):
+            says = f"{path} is damaged: its {size} bytes do not have the checksum that was written with them"
+            raise PackingFileError(f"{says}; take a copy of the file, or make it again.")
+        if writable:
+            image = read_plain(path)[HEADER_SIZE:]
+            file = h5py.File(h5py.h5f.open_file_image(image, flags=h5py.h5f.FILE_IMAGE_OPEN_RW))
+        else:
+            try:
+                file = h5py.File(path, "r", locking=False)
+            except OSError:  # another reader in this process, such as MDAnalysis, has it open with locks
+                file = h5py.File(path, "r")
+    try:
+        check_format(file.attrs.get(FORMAT_KEY), "it")
+        _refuse_what_is_not_in_it(file)
+    except Exception as error:  # h5py raises nearly every exception there is
+        file.close()
+        said = str(error).strip().rstrip(".") or type(error).__name__
+        cannot = "" if isinstance(error, PackingFileError) else "it cannot be read: "
+        raise PackingFileError(f"{path} is refused: {cannot}{said}.") from error
+    return file
+
+
+def _refuse_what_is_not_in_it(file: h5py.File) -> None:
+    """Refuse links to other files, and datasets that would fill the memory of the machine."""
+    import h5py
+
+    links, unpacked = list[tuple[str, object]](), dict[int, int]()
+    file.visititems_links(lambda name, link: links.append((name, link)))
+    for name, link in links:
+        if isinstance(link, h5py.ExternalLink):
+            raise PackingFileError(f"/{name} is a link to another file")
+        if isinstance(item := file[name], h5py.Dataset):
+            if item.external or item.is_virtual:
+                raise PackingFileError(f"/{name} has its numbers in another file")
+            chunk = math.prod(item.chunks or ()) * item.dtype.itemsize
+            if item.nbytes > LARGEST_SHAPE or chunk > LARGEST_CHUNK:
+                raise PackingFileError(f"/{name} has the shape {item.shape}, and chunks of {chunk} bytes")
+            unpacked[h5py.h5o.get_info(item.id).addr] = item.id.get_num_chunks() * chunk if item.chunks else 0
+    if (size := sum(unpacked.values())) > os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"):
+        raise PackingFileError(f"its datasets unpack to {size} bytes, more than this machine has memory")

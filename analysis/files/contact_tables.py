@@ -1,7 +1,7 @@
 r"""Spheres and contact forces of other codes, from tables, as a Configuration.
 
-**Spheres**: CSV or blanks between columns, with names in the first line (x, y, z, radius or diameter; id, mass or
-density), as YADE's ``#format x_y_z_r`` has them; a LAMMPS or LIGGGHTS dump; a MercuryDPM .data.
+**Spheres**: any format of :mod:`.formats` that has x, y, z and radius or diameter (and id, mass or density): CSV,
+YADE's ``#format x_y_z_r``, a LAMMPS or LIGGGHTS dump, LAMMPS data, a MercuryDPM .data.
 
 **Contacts**: a table with names in the first line, a dump local, or a MercuryDPM .fstat. On the first particle of a
 row act :math:`f_n \mathbf n + \mathbf f_t`, with :math:`\mathbf n` from the second to the first and :math:`f_n` of a
@@ -29,8 +29,9 @@ not tell.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -44,8 +45,10 @@ from ..counted import counted
 from ..elasticity.material_spheres import Material, spheres_of_material
 from ..errors import BadInputError, PackingFileError
 from ..motion.stability import Stability, stability
-from .formats.lammps_dump import dump_frames
-from .formats.tables import lines_of, number_of
+from .atomic_write import telling
+from .formats import read_particles
+from .formats.disks import choose_frame, sorted_columns
+from .formats.tables import columns_of, contact_columns, lines_of, number_of, require_columns, strip_comments
 
 HALF_A_DIGIT = 5e-6
 """Largest relative error of a number that is rounded to six digits."""
@@ -60,16 +63,10 @@ BETTER_SIGN = 0.1
 ROUNDED_TABLES = 4
 """Draws of numbers within their rounding, beside the table itself, whose verdicts must agree."""
 
-FSTAT = ["time", "id1", "id2", "cx", "cy", "cz", "delta", "deltat", "fn", "ft", "nx", "ny", "nz", "tx", "ty", "tz"]
-DATA = {
-    14: ["x", "y", "z", "vx", "vy", "vz", "radius", "q1", "q2", "q3", "wx", "wy", "wz", "info"],
-    8: ["x", "y", "vx", "vy", "radius", "q", "w", "info"],
-}
-NAMES = {"r": "radius", "rad": "radius", "c_radius": "radius", "xu": "x", "yu": "y", "zu": "z", "force": "fn",
-         "p1": "ftx", "p2": "fty", "p3": "ftz", "i": "id1", "j": "id2", "patom1": "id1", "patom2": "id2",
-         "f_n": "fn", "f_t_x": "ftx", "f_t_y": "fty", "f_t_z": "ftz"}  # fmt: skip
+TOUCHING = 1.001
+"""Distance up to which spheres of a row touch, in sums of their radii: places are rounded."""
 
-
+FSTAT = ["time", "id1", "id2", "px", "py", "pz", "delta", "deltat", "fn", "ft", "nx", "ny", "nz", "tx", "ty", "tz"]
 FORCES = ["fn", "fx", "fy", "fz", *(f"{name}{axis}" for name in ("ft", "fn", "fs") for axis in "xyz")]
 """Names of columns with forces."""
 
@@ -89,14 +86,11 @@ class Spheres:
 
     def of_material(self, material: Material, **more: Any) -> Configuration:
         """The spheres with Hertz's contacts, or springs; in a sentence of their table where they form no packing."""
-        if material.density is not None:
-            self = replace(self, mass=None)
-        options = {"box": self.box, "origin": self.origin, "mass": self.mass} | more
-        options.setdefault("periodic", [False] * 3 if self.periodic is None else self.periodic)
-        try:
+        mass = self.mass if material.density is None else None
+        periodic = [False] * 3 if self.periodic is None else self.periodic
+        options = {"box": self.box, "origin": self.origin, "mass": mass, "periodic": periodic} | more
+        with telling(self.source, "describes no possible packing", (ValueError,)):
             return spheres_of_material(self.position, self.radius, material, **options)
-        except ValueError as error:
-            raise PackingFileError(f"{self.source} describes no possible packing: {error}") from error
 
 
 def material_of(text: str) -> Material:
@@ -110,118 +104,25 @@ def material_of(text: str) -> Material:
     return Material(**given).checked()
 
 
-def _table(path: Path, columns: Sequence[str] | None, frame: int = -1) -> tuple[dict[str, Floats], dict[str, Any]]:
-    """Columns by name and, of a dump, its box."""
-    lines, about = lines_of(path), dict[str, Any]()
-    if not any(line.strip() for line in lines):
-        raise PackingFileError(f"{path} is empty.")
-    if lines[0].startswith("ITEM:"):
-        shown = list(dump_frames(path))[frame]
-        names, rows = list(shown.columns), shown.rows
-        low, high = shown.bounds[:, :2].T.copy()
-        xy, xz, yz = shown.bounds[:, 2] if shown.bounds.shape[1] > 2 else (0.0, 0.0, 0.0)
-        low -= [min(0.0, xy, xz, xy + xz), min(0.0, yz), 0.0]  # the bounds are those of a box around the tilted one
-        high -= [max(0.0, xy, xz, xy + xz), max(0.0, yz), 0.0]
-        box = np.diag(high - low)
-        box[1, 0], box[2, :2] = xy, (xz, yz)
-        about = {"box": box, "origin": low, "periodic": np.array([each == "pp" for each in shown.boundary])}
-        if len(about["periodic"]) != 3:
-            about["periodic"] = None
-    else:
-        # the names stand in the first line, as of YADE behind a #, or in the first line that is no comment
-        plain = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), 0)
-        begin = plain if lines[plain].lstrip()[:1].isalpha() else 0
-        head = lines[begin].lstrip("#/ \t")
-        kept = [
-            (k, line)
-            for k, line in enumerate(lines[begin + 1 :], begin + 2)
-            if line.strip() and not line.lstrip().startswith("#")
-        ]
-        if head.split()[0] == "format":  # YADE: #format x_y_z_r
-            head, about = head.split()[-1].replace("_", " "), {"first": 0.0}  # O.bodies counts from 0
-        split = (lambda text: [each.strip() for each in text.split(",")]) if "," in head else str.split
-        names, rows = split(head), _rows(path, kept, split, len(split(head)))
-    if columns is not None:
-        if len(columns) != len(names):
-            raise BadInputError(f"--columns names {len(columns)} columns, and {path} has {len(names)}.")
-        names = list(columns)
-    found = {NAMES.get(name.lower(), name.lower()): column for name, column in zip(names, rows.T, strict=True)}
-    return found, about
+def read_spheres(path: Path, frame: int = -1) -> Spheres:
+    """Read the spheres of a table; a PackingFileError if a column is missing, or has what no sphere can have."""
+    found = read_particles(path, frame)
+    c, _ = sorted_columns(found)
+    position = np.column_stack([c[name] for name in ("x", "y", "z")[: 3 if "z" in c and np.ptp(c["z"]) else 2]])
+    origin = np.zeros(3) if found.origin is None else found.origin
+    periodic = None if found.periodic is None else np.array(found.periodic)
+    ids, mass = c["id"].astype(np.int64), c.get("mass")
+    return Spheres(found.source, ids, position, c["radius"], mass, found.box, origin, periodic)
 
 
-def _rows(path: Path, lines: Sequence[tuple[int, str]], split: Callable[[str], list[str]], width: int) -> Floats:
-    for number, line in lines:
-        if len(split(line)) != width:
-            raise PackingFileError(f"{path}, line {number}: it has {len(split(line))} columns, and the first {width}.")
-    rows = [[number_of(word, f"{path}, line {number}") for word in split(line)] for number, line in lines]
-    found = np.array(rows, dtype=np.float64).reshape(-1, width)
-    odd = np.flatnonzero(~np.isfinite(found).all(axis=1))
-    if len(odd):
-        raise PackingFileError(f"{path}, line {lines[odd[0]][0]}: it has a number that is not finite.")
-    return found
-
-
-def _blocks(path: Path, header: Callable[[list[str]], int | None], width: int | None, frame: int) -> tuple[Any, Any]:
-    """The header and the rows of a block of MercuryDPM's files."""
+def _fstat(path: Path, frame: int) -> dict[str, Floats]:
+    """The contacts of MercuryDPM at one time, whose lines follow a line "# time ...", and two more comments."""
     lines = lines_of(path)
-    starts = [k for k, line in enumerate(lines) if line.strip() and header(line.split()) is not None]
-    if not starts:
-        raise PackingFileError(f"{path} has no line that begins a block of MercuryDPM's.")
-    begin = starts[frame]
+    starts = [k for k, line in enumerate(lines) if re.match(r"#\s+\d", line)]
+    begin = starts[choose_frame(path, [0] * len(starts), frame)]
     end = next((k for k in starts if k > begin), len(lines))
-    kept = [(k + 1, lines[k]) for k in range(begin + 1, end) if lines[k].strip() and not lines[k].startswith("#")]
-    count = header(lines[begin].split())
-    if count and len(kept) < count:
-        raise PackingFileError(f"{path} breaks off: {count} particles are announced, and {len(kept)} follow.")
-    return lines[begin].split(), _rows(path, kept, str.split, width or (len(kept[0][1].split()) if kept else 1))
-
-
-def read_spheres(path: Path, frame: int = -1, columns: Sequence[str] | None = None) -> Spheres:
-    """Read the spheres of a table.
-
-    Raises
-    ------
-    PackingFileError
-        If a column is missing, or a number is none that a sphere can have.
-    """
-    about: dict[str, Any] = {}
-    if path.suffix == ".data":
-        head, rows = _blocks(path, lambda w: int(w[0]) if w[0].isdecimal() and len(w) in (6, 8) else None, None, frame)
-        if rows.shape[1] not in DATA:
-            raise PackingFileError(f"{path} has rows of {rows.shape[1]} columns: a .data of MercuryDPM has 14, or 8.")
-        table = dict(zip(DATA[rows.shape[1]], rows.T, strict=True)) | {"id": np.arange(len(rows), dtype=float)}
-        bounds = np.array([float(each) for each in head[2:]]).reshape(2, -1)
-        low, high = (
-            np.pad(each, (0, 3 - len(each)), constant_values=c) for each, c in zip(bounds, (0, 1), strict=True)
-        )
-        about = {"box": np.diag(high - low), "origin": low}
-    else:
-        table, about = _table(path, columns, frame)
-    if "diameter" in table:
-        table.setdefault("radius", table["diameter"] / 2)
-    for name in ("x", "y", "radius"):
-        if name not in table:
-            raise PackingFileError(f"{path} has no column {name} (its columns: {', '.join(table)}).")
-    radius = table["radius"]
-    if not len(radius):
-        raise PackingFileError(f"{path} has no spheres.")
-    for name in {"radius", "mass", "density"} & table.keys():
-        if np.any(table[name] <= 0):
-            k = int(np.argmin(table[name]))
-            raise PackingFileError(f"{path}: {name} of sphere {k + 1} is {table[name][k]:g}: it must be above 0.")
-    ids = table.get("id", np.arange(len(radius)) + about.get("first", 1.0))
-    twice = np.sort(ids)[1:][np.diff(np.sort(ids)) == 0]
-    if len(twice):
-        raise PackingFileError(f"{path} has sphere {twice[0]:g} twice: give each an ID of its own.")
-    mass = table.get("mass")
-    if mass is None and "density" in table:
-        mass = 4 / 3 * np.pi * radius**3 * table["density"]
-    in_plane = "z" not in table or not np.ptp(table["z"])
-    position = np.column_stack([table[name] for name in ("x", "y", "z")[: 2 if in_plane else 3]])
-    return Spheres(
-        str(path), ids.astype(np.int64), position, radius, mass, about.get("box"),
-        np.asarray(about.get("origin", np.zeros(3)), float), about.get("periodic"),
-    )  # fmt: skip
+    table = columns_of(path, strip_comments(lines[begin:end], begin + 1), FSTAT, f"{len(FSTAT)} are needed")
+    return table | {f"ft{axis}": table["ft"] * table[f"t{axis}"] for axis in "xyz"}
 
 
 def read_contacts(
@@ -235,66 +136,50 @@ def read_contacts(
         If a column is missing, a contact names a sphere that is not there or two that do not touch, or forces are out
         of balance.
     """
-    if path.suffix == ".fstat":
-        _, rows = _blocks(path, lambda w: 0 if w[0] == "#" and len(w) > 1 and w[1][0].isdigit() else None, 16, frame)
-        table = dict(zip(FSTAT, rows.T, strict=True))
-        table |= {f"ft{axis}": table["ft"] * table[f"t{axis}"] for axis in "xyz"}
-        table |= {f"p{axis}": table[f"c{axis}"] for axis in "xyz"}
-    else:
-        table, _ = _table(path, columns, frame)
-    for name in ("id1", "id2"):
-        if name not in table:
-            raise PackingFileError(
-                f"{path} has no column {name} (its columns: {', '.join(table)}); --columns names those of a dump local."
-            )
+    fstat = path.suffix == ".fstat"
+    table = _fstat(path, frame) if fstat else contact_columns(path, frame=frame, names=columns)
+    require_columns(path, table, "id1", "id2")
     # neighbours that do not touch have rows of zeros in pair/local
-    bears = np.any([table[name] != 0 for name in FORCES if name in table] or [np.ones(len(table["id1"]), bool)], axis=0)
+    forces = [table[name] != 0 for name in FORCES if name in table]
+    bears = np.any(forces, axis=0) if forces else np.ones(len(table["id1"]), bool)
     table = {name: column[bears] for name, column in table.items()}
-    where = {int(each): k for k, each in enumerate(spheres.id)}
-    i = np.array([where.get(int(each), -2) for each in table["id1"]], dtype=np.int64)
-    walls = (table["id2"] < 0) | ((table["id2"] == 0) & (0 not in where))
-    j = np.where(walls, WALL, [where.get(int(each), -2) for each in table["id2"]])
-    strange = np.where(i == -2, table["id1"], table["id2"])[(i == -2) | (j == -2)]
-    if len(strange):
-        raise PackingFileError(f"{path}: a contact names sphere {strange[0]:g}, which is not in {spheres.source}.")
-    if np.any(i == j):
-        raise PackingFileError(f"{path}: sphere {spheres.id[i[i == j][0]]} touches itself.")
+    ids = np.array([table["id1"], table["id2"]])
+    i, j = np.minimum(np.searchsorted(spheres.id, ids), len(spheres.id) - 1)
+    walls = (ids[1] < 0) | ((ids[1] == 0) & (0 not in spheres.id))
+    j[walls] = WALL
+    for strange in [*ids[0][spheres.id[i] != ids[0]], *ids[1][~walls & (spheres.id[j] != ids[1])]]:
+        raise PackingFileError(f"{path}: a contact names sphere {strange:g}, which is not in {spheres.source}.")
+    for itself in ids[0][i == j]:
+        raise PackingFileError(f"{path}: sphere {itself:g} touches itself.")
     branch, periodic = _branches(spheres, path, table, i, j)
     n = branch / np.linalg.norm(branch, axis=1)[:, None]
     fn, ft = _forces(path, table, n)
     # each contact once, though .fstat may have it from both sides
-    low, high = np.minimum(i, j), np.maximum(i, j)
     place = np.round(branch * np.where(i < j, 1, -1)[:, None] / spheres.radius.mean(), 3)
-    _, once = np.unique(np.column_stack([low, high, place]), axis=0, return_index=True)
-    kept = np.sort(once)
-    i, j, branch, fn, ft = i[kept], j[kept], branch[kept], fn[kept], ft[kept]
+    _, once = np.unique(np.column_stack([np.minimum(i, j), np.maximum(i, j), place]), axis=0, return_index=True)
+    i, j, branch, fn, ft = (each[np.sort(once)] for each in (i, j, branch, fn, ft))
+    size, bound = np.linalg.norm(ft, axis=1), material.friction * np.maximum(fn, 0.0)
+    for worst in np.flatnonzero(size > (1 + AT_REST) * bound):
+        says = (
+            f"|f_t| of {spheres.id[i[worst]]} is {size[worst] / max(fn[worst], 1e-300):.4g} f_n, beyond the coefficient"
+        )
+        raise PackingFileError(f"{path}: {says} of friction {material.friction:g}: give --material friction=.")
+    # what the digits do not tell from the bound is at the bound
+    ft = ft * np.divide(bound, size, out=np.ones_like(size), where=size > (1 - 3 * HALF_A_DIGIT) * bound)[:, None]
 
-    def packing(normal: Floats, tangential: Floats) -> Configuration:
-        size, bound = np.linalg.norm(tangential, axis=1), material.friction * np.maximum(normal, 0.0)
-        scale = np.divide(bound, size, out=np.ones_like(size), where=size > (1 - 3 * HALF_A_DIGIT) * bound)
-        over = size > (1 + AT_REST) * bound
-        if over.any():
-            worst = int(np.argmax(size / np.maximum(bound, np.finfo(float).tiny)))
-            raise PackingFileError(
-                f"{path}: |f_t| of {spheres.id[i[worst]]} is {size[worst] / max(normal[worst], 1e-300):.4g} f_n, "
-                f"beyond the coefficient of friction {material.friction:g}: give --material friction=."
-            )
-        return spheres.of_material(
-            material, contacts=(i, j, branch), normal_force=normal, tangential_force=tangential * scale[:, None],
-            periodic=periodic,
-        )  # fmt: skip
+    def packing(tangential: Floats) -> tuple[Configuration, float]:
+        forces = {"contacts": (i, j, branch), "normal_force": fn, "tangential_force": tangential}
+        found = spheres.of_material(material, periodic=periodic, **forces)
+        return found, _out_of_balance(found)
 
-    found, other = packing(fn, ft), packing(fn, -ft)
-    lacks, flipped = (_out_of_balance(each) for each in (found, other))
+    (found, lacks), (other, flipped) = packing(ft), packing(-ft)
     remarks = []
     if flipped < BETTER_SIGN * lacks:
         found, lacks = other, flipped
         remarks.append("tangential forces are those on the second particle: with the other sign they do not balance")
     if lacks > AT_REST:
-        raise PackingFileError(
-            f"{path}: forces are out of balance by {lacks:.2g} of the mean contact force, whatever gravity is: this is "
-            "no packing at rest, or a contact or a wall is missing."
-        )
+        says = f"forces are out of balance by {lacks:.2g} of the mean contact force, whatever gravity is"
+        raise PackingFileError(f"{path}: {says}: it does not rest, or a contact or a wall is missing.")
     remarks.append(f"forces balance to {lacks:.1g} of their mean but for gravity; a load takes what is left")
     return derive_frozen(found, remarks=tuple(remarks))
 
@@ -303,31 +188,27 @@ def _branches(
     spheres: Spheres, path: Path, table: Mapping[str, Floats], i: Indices, j: Indices
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Vectors from the second partner to the first, through the sides of the box where they do not touch otherwise."""
-    place = np.column_stack([spheres.position, np.zeros((len(spheres.id), 3 - spheres.position.shape[1]))])
-    wall = j < 0
-    branch = place[i] - place[np.maximum(j, 0)]
+    place = np.pad(spheres.position, ((0, 0), (0, 3 - spheres.position.shape[1])))
+    wall, second = j < 0, np.maximum(j, 0)
+    branch = place[i] - place[second]
     if wall.any():
         if "px" not in table:
             raise PackingFileError(f"{path} has contacts with walls, and no px, py, pz: where each wall is touched.")
-        touch = np.column_stack([table[f"p{axis}"] for axis in "xyz"])
         # a point in the middle of the overlap is on the line through the centre, whatever wall it is
-        branch[wall] = (place[i] - touch)[wall]
-    reach = np.where(wall, np.inf, spheres.radius[i] + spheres.radius[np.maximum(j, 0)])
-    near = np.linalg.norm(branch, axis=1) <= 1.001 * reach
-    sides = np.zeros(3, bool) if spheres.periodic is None else spheres.periodic.copy()
-    if not near.all() and spheres.box is not None and spheres.periodic is None:
-        sides[:] = True  # the file does not say: those that a contact needs
-    if not near.all() and spheres.box is not None:
-        images = np.where(sides, np.round(branch @ np.linalg.inv(spheres.box)), 0.0) * ~near[:, None]
+        branch[wall] = (place[i] - np.column_stack([table[f"p{axis}"] for axis in "xyz"]))[wall]
+    reach = np.where(wall, np.inf, spheres.radius[i] + spheres.radius[second])
+    apart = np.linalg.norm(branch, axis=1) > TOUCHING * reach
+    sides = np.zeros(3, bool) if spheres.periodic is None else spheres.periodic
+    if apart.any() and spheres.box is not None:
+        # where the file does not say which sides are periodic: those that a contact needs
+        may = np.ones(3, bool) if spheres.periodic is None else sides
+        images = np.where(may, np.round(branch @ np.linalg.inv(spheres.box)), 0.0) * apart[:, None]
         branch = branch - images @ spheres.box
         sides = sides if spheres.periodic is not None else images.any(axis=0)
-        near = np.linalg.norm(branch, axis=1) <= 1.001 * reach
-    if not near.all():
-        k = int(np.argmin(near))
-        raise PackingFileError(
-            f"{path}: spheres {spheres.id[i[k]]} and {spheres.id[j[k]]} have a contact and are "
-            f"{np.linalg.norm(branch[k]) - reach[k]:.3g} apart: give the places of the same moment, and the box."
-        )
+    gap = np.linalg.norm(branch, axis=1) - reach
+    for k in np.flatnonzero(gap > (TOUCHING - 1) * reach):
+        says = f"spheres {spheres.id[i[k]]} and {spheres.id[j[k]]} have a contact and are {gap[k]:.3g} apart"
+        raise PackingFileError(f"{path}: {says}: give the places of the same moment, and the box.")
     return branch, sides
 
 
@@ -335,31 +216,26 @@ def _forces(path: Path, table: Mapping[str, Floats], n: Floats) -> tuple[Floats,
     """f_n and f_t on the first partner."""
 
     def vectors(name: str) -> Floats | None:
-        parts = [table.get(f"{name}{axis}") for axis in "xyz"]
-        if parts[0] is None or parts[1] is None:
-            return None
-        return np.column_stack([np.zeros(len(n)) if each is None else each for each in parts])
+        parts = [table.get(f"{name}{axis}", np.zeros(len(n))) for axis in "xyz"]
+        return np.column_stack(parts) if {f"{name}x", f"{name}y"} <= table.keys() else None
 
     whole, elastic, shear, tangential = (vectors(name) for name in ("f", "fn", "fs", "ft"))
     if elastic is not None and shear is not None:  # YADE, on the second
         whole = -(elastic + shear)
     if whole is not None and "fn" not in table:
         normal = np.einsum("ca,ca->c", whole, n)
-        if np.sum(normal < 0) > 0.5 * len(normal):
-            whole, normal = -whole, -normal
-        return normal, whole - normal[:, None] * n
+        sign = -1 if np.sum(normal < 0) > 0.5 * len(normal) else 1
+        return sign * normal, sign * (whole - normal[:, None] * n)
     if "fn" not in table or tangential is None:
-        raise PackingFileError(
-            f"{path} says no forces: it needs fn, ftx, fty, ftz, or fx, fy, fz (its columns: {', '.join(table)})."
-        )
+        has = ", ".join(table)
+        raise PackingFileError(f"{path} says no forces: give fn, ftx, fty, ftz, or fx, fy, fz (its columns: {has}).")
     return table["fn"], tangential - np.einsum("ca,ca->c", tangential, n)[:, None] * n
 
 
 def _out_of_balance(c: Configuration) -> float:
     """The largest force or torque on a particle that is free to move, gravity taken out, over the mean f_n."""
-    force, weight = c.contact_force.copy(), c.mass / np.sum(c.mass**2)
-    touch = np.setdiff1d(np.arange(len(c)), c.rattlers)
-    gravity = (weight[:, None] * force[:, 0])[touch].sum(axis=0) * np.sum(c.mass**2) / np.sum(c.mass[touch] ** 2)
+    force, touch = c.contact_force.copy(), np.setdiff1d(np.arange(len(c)), c.rattlers)
+    gravity = c.mass[touch] @ force[touch, 0] / np.sum(c.mass[touch] ** 2)
     force[:, 0] -= c.mass[:, None] * gravity
     force[:, 1] /= c.radius[:, None]
     return float(np.abs(force[touch]).max(initial=0.0) / (c.normal_force.mean() if len(c.contacts) else 1.0))

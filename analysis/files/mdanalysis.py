@@ -17,18 +17,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from MDAnalysis.coordinates.H5MD import H5MDReader
+from MDAnalysis.core.topology import Topology
+from MDAnalysis.core.topologyattrs import Atomids, Atomtypes, Masses, Radii, Resids, Resnums, Segids
+from MDAnalysis.topology.base import TopologyReaderBase
 
 from .runfile import RunFile
-
-try:
-    from MDAnalysis.coordinates.H5MD import H5MDReader
-    from MDAnalysis.core.topology import Topology
-    from MDAnalysis.core.topologyattrs import Atomids, Atomtypes, Masses, Radii, Resids, Resnums, Segids
-    from MDAnalysis.topology.base import TopologyReaderBase
-except ImportError:
-    raise ImportError(
-        "faultgouge.analysis.files.mdanalysis needs the library MDAnalysis: pip install MDAnalysis"
-    ) from None
 
 FORMAT = "H5"
 """MDAnalysis's name of a format is the suffix of its files; its own suffix of H5MD is .h5md."""

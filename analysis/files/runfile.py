@@ -24,7 +24,7 @@ the run: readers of H5MD step through both. fx and fy are those of the equilibri
 frame are nan, or 0 for integers. ``/faultgouge/trajectory`` has its times, so that it counts these frames, and low
 parts of its positions.
 
-The stored file is complete at any moment and has a checksum over all its bytes (:mod:`.checksummed_file`). The
+The stored file is complete at any moment and has a checksum over all its bytes (:mod:`.atomic_write`). The
 attribute ``complete`` of the root is false until the run has ended; until then, an undamped run continues from the
 state in ``/checkpoint``.
 
@@ -34,12 +34,14 @@ of the root. One file contains one set of disks and one law.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
 from os import PathLike
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -50,31 +52,37 @@ from ..errors import PackingFileError
 from ..packing.contacts import Contacts
 from ..packing.law import MindlinLaw
 from ..packing.packing import Packing
-from .checksummed_file import SealedFile, new_file, write
+from .atomic_write import new_sealed, open_sealed, telling, write_sealed
 
 if TYPE_CHECKING:
     import h5py
 
-
 NONE_GIVEN = "none were given"
 """The attribute tangential_forces of older files, where slips are not known."""
 
-
 CREATOR = "faultgouge"
+
+SHARE_OF_SAVING = 0.05
+"""Share of the time that saving takes, at the most: a frame or a part of a series waits that long to be saved."""
 
 CHECKSUM = {"fletcher32": True}
 """A checksum for every chunk, for readers other than this one."""
-
-LAW_DEFAULTS = {field.name: field.default for field in fields(MindlinLaw) if field.default is not MISSING}
-"""Default parameters of the law, which a file need not have."""
 
 COMPACT = {"shuffle": True, "compression": "gzip", "compression_opts": 1, **CHECKSUM}
 """Filters of what is stored for every disk or contact: half the size, mostly from indices and equal leading bytes, at a
 few milliseconds for a thousand disks. Slower ones gain 3 % more."""
 
+LAW_DEFAULTS = {field.name: field.default for field in fields(MindlinLaw) if field.default is not MISSING}
+"""Default parameters of the law, which a file need not have."""
 
-class RunFile(SealedFile):
-    """A run.h5, open for reading or for appending; a context manager.
+POSITION, EDGES = "particles/disks/position", "particles/disks/box/edges"
+
+
+class RunFile:
+    """A run.h5, checked whole, open for reading or for appending; a context manager.
+
+    A file that is open for appending is kept in memory. When it is saved, all of it replaces the stored file; saving
+    takes at most a fixed share of the time, so that a file that grows for a long time is not written too often.
 
     Parameters
     ----------
@@ -90,15 +98,18 @@ class RunFile(SealedFile):
     """
 
     def __init__(self, path: str | PathLike[str], mode: Literal["r", "a"] = "r") -> None:
-        super().__init__(path, mode)
-        self._step = self._file["particles/disks/position/step"]
+        self.path, self._writable = Path(path), mode == "a"
+        self._unsaved, self._sound, self._next_save = False, True, 0.0
+        self._file = open_sealed(self.path, self._writable)
+        if "snapshot" in self._file:
+            self._file.close()
+            says = f"{self.path} holds a packing as LAMMPS left it, and no run of this program's own"
+            raise PackingFileError(f"{says}: spectrum, draw, movie, view and export take it.")
+        self._step = self._file[f"{POSITION}/step"]
 
     @classmethod
     def create(
-        cls,
-        path: str | PathLike[str],
-        packing: Packing,
-        attributes: Mapping[str, str | int | float] | None = None,
+        cls, path: str | PathLike[str], packing: Packing, attributes: Mapping[str, str | int | float] | None = None
     ) -> RunFile:
         """Start a new file for runs of the disks of a packing; an existing file is replaced.
 
@@ -122,18 +133,100 @@ class RunFile(SealedFile):
         OutputError
             If the file cannot be written.
         """
-        with new_file() as file:
-            write_header(file, packing)
-            file.attrs["complete"] = False
-            for name, value in (attributes or {}).items():
-                file.attrs[name] = value
-            write(Path(path), file)
+        with new_sealed() as file:
+            write_h5md(file)
+            disks, shape = file.create_group("particles/disks"), (len(packing), 3)
+            along = "none" if packing.box_length is None else "periodic"
+            disks.create_group("box").attrs.update({"dimension": 3, "boundary": np.array([along, *2 * ["none"]], "S8")})
+            position = disks.create_group("position")
+            position.create_dataset("step", (0,), np.int64, maxshape=(None,), **CHECKSUM)
+            position.create_dataset("time", (0,), np.float64, maxshape=(None,), **CHECKSUM)
+            layout: dict[str, Any] = {"maxshape": (None, *shape), "chunks": (1, *shape), **COMPACT}
+            position.create_dataset("value", (0, *shape), np.float64, **layout)
+            # readers of H5MD take positions as float32, and observables as they are: a link, which takes no room
+            file["observables/position"] = position
+            for name, value in parameters_of(packing).items():
+                file[f"parameters/{name}"] = value
+            disks["mass"] = file["parameters/mass"]
+            file.attrs.update({"complete": False, **(attributes or {})})
+            write_sealed(Path(path), file)
         return cls(path, "a")
 
     def __len__(self) -> int:
         """Number of equilibria; frames of a trajectory do not count."""
-        trajectory = self._file.get("faultgouge/trajectory/time", ())
-        return int(self._step.shape[0]) - len(trajectory)
+        return int(self._step.shape[0]) - len(self._file.get("faultgouge/trajectory/time", ()))
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of the root: scene, versions, seed, ranks."""
+        return {name: getattr(value, "tolist", lambda value=value: value)() for name, value in self._file.attrs.items()}
+
+    def put_attribute(self, name: str, value: str) -> None:
+        """Set an attribute of the root."""
+        with self.change():
+            self._file.attrs[name] = value
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run has come to its end."""
+        return bool(self._file.attrs["complete"])
+
+    @complete.setter
+    def complete(self, value: bool) -> None:
+        if self.complete != value:
+            self._file.attrs["complete"] = value
+            self._unsaved = True
+
+    @property
+    def saved(self) -> bool:
+        """Whether the stored file has all changes."""
+        return not self._unsaved
+
+    def save(self) -> None:
+        """Write all changes to the file on the disk."""
+        if self._writable and self._unsaved and self._sound:
+            begin = monotonic()
+            write_sealed(self.path, self._file)
+            self._unsaved, self._next_save = False, monotonic() + (monotonic() - begin) / SHARE_OF_SAVING
+
+    @contextmanager
+    def change(self) -> Iterator[None]:
+        """Changes that belong together: all of them are saved, or none.
+
+        What an error leaves is not saved any more.
+        """
+        if not self._writable:
+            raise ValueError(f"{self.path} is open for reading alone.")
+        outer, self._sound, self._unsaved = self._sound, False, True
+        yield
+        self._sound = outer
+        if outer and monotonic() >= self._next_save:
+            self.save()
+
+    def close(self) -> None:
+        """Save and close the file."""
+        if self._file:
+            self.save()
+            self._file.close()
+
+    def __enter__(self) -> RunFile:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def put_checkpoint(self, **arrays: NDArray | int) -> None:
+        """Keep the state of a run that is under way, in place of the last one; none for a run that is over."""
+        with self.change():
+            if "checkpoint" in self._file:
+                del self._file["checkpoint"]
+            for name, value in arrays.items():
+                self._file[f"checkpoint/{name}"] = value
+
+    @property
+    def checkpoint(self) -> dict[str, NDArray]:
+        """The state of a run that is under way, by name; empty if there is none."""
+        return {name: item[()] for name, item in self._file.get("checkpoint", {}).items()}
 
     @property
     def fx(self) -> Floats:
@@ -171,61 +264,57 @@ class RunFile(SealedFile):
         ValueError
             If disks, law or box are not those of the file, or the names differ from those of earlier frames.
         """
-        self._check_same(packing)
-        count = len(self)
+        known, own, count = self._parameters, parameters_of(packing), len(self)
+        other = [name for name in known | own if not np.array_equal(known.get(name, np.nan), own.get(name, np.nan))]
+        if other:
+            raise ValueError(f"{self.path} was begun for a packing with another {other[0]}.")
         if count < self._step.shape[0]:
             raise ValueError(f"{self.path} has a trajectory, behind which no equilibrium can follow.")
-        columns = [packing.contacts.i, packing.contacts.j, packing.contacts.slip]
-        if packing.contacts.slip_low is not None:
-            columns.append(packing.contacts.slip_low)
-        contacts = np.column_stack(columns)
-        frame: dict[str, ArrayLike] = {
-            "angle": packing.angle,
-            "fx": packing.fx,
-            "fy": packing.fy,
-            "residual": packing.residual,
-            "contacts": contacts,
-        }
-        if packing.position_low is not None:
-            frame["position_low"] = packing.position_low
-        taken = frame.keys() & scalars.keys()
-        if taken:
-            raise ValueError(f"The name {min(taken)} is taken: the packing itself says it.")
+        c = packing.contacts
+        contacts = [each for each in (c.i, c.j, c.slip, c.slip_low) if each is not None]
+        frame = {name: getattr(packing, name) for name in ("angle", "fx", "fy", "residual")}
+        frame |= {"contacts": np.column_stack(contacts)}
+        frame |= {} if packing.position_low is None else {"position_low": packing.position_low}
+        for name in frame.keys() & scalars.keys():
+            raise ValueError(f"The name {name} is taken: the packing itself says it.")
         frame |= scalars
         if count and set(frame) != set(self.observables):
             raise ValueError(f"Frames of {self.path} have the observables {', '.join(self.observables)}, not others.")
         with self.change():
-            self._put_frame(packing, frame, count)
+            for name, value in frame.items():
+                self._put(f"observables/{name}", np.asarray(value), count)
+            self._put(POSITION, np.pad(packing.position, ((0, 0), (0, 1))), count)
+            if packing.box_length is not None:
+                # twice the height: readers that take every axis as periodic see no neighbours across it
+                height = 2 * (packing.position[:, 1] + packing.radius).max()
+                self._put(EDGES, np.array([packing.box_length, height, 2 * packing.radius.max()]), count)
+            for clock in ("time", "step"):
+                _extend(self._file[f"{POSITION}/{clock}"], np.array([count]), count)
+
+    def _put(self, name: str, value: NDArray, frame: int) -> None:
+        """Write one element of one frame."""
+        if name not in self._file:
+            group = self._file.create_group(name)
+            number = np.int64 if np.issubdtype(value.dtype, np.integer) else np.float64
+            layout: dict[str, Any] = COMPACT if value.ndim else CHECKSUM
+            layout = layout | {
+                "maxshape": (None,) * (value.ndim + 1),
+                "fillvalue": np.nan if number is np.float64 else 0,
+            }
+            chunks = (1, *value.shape) if value.size > 1 else True
+            group.create_dataset("value", (0, *value.shape), number, chunks=chunks, **layout)
+            for clock in ("step", "time"):
+                group[clock] = self._file[f"{POSITION}/{clock}"]
+        _extend(self._file[name]["value"], value[None], frame)
 
     def cut(self, count: int) -> None:
         """Remove the frames from a number on; of a file without a trajectory."""
-        observables = self._file["observables"]
+        datasets = [self._file["observables"][name]["value"] for name in self.observables]
+        datasets += [self._file[f"{POSITION}/{name}"] for name in ("value", "time", "step")]
+        datasets += [self._file[EDGES]["value"]] if EDGES in self._file else []
         with self.change():
-            for data in [observables[name]["value"] for name in self.observables]:
+            for data in datasets:
                 data.resize(count, axis=0)
-            disks = self._file["particles/disks"]
-            for name in ("position/value", "position/time", "position/step", "box/edges/value"):
-                if name in disks:
-                    disks[name].resize(count, axis=0)
-
-    def _put_frame(self, packing: Packing, frame: Mapping[str, ArrayLike], count: int) -> None:
-        for name, value in frame.items():
-            self._put(f"observables/{name}", np.asarray(value), count)
-        flat = np.column_stack([packing.position, np.zeros(len(packing))])
-        self._put("particles/disks/position", flat, count)
-        if packing.box_length is not None:
-            edges = [
-                packing.box_length,
-                # twice the height: readers that take every axis as periodic see no neighbours across it
-                2 * (packing.position[:, 1] + packing.radius).max(),
-                2 * packing.radius.max(),
-            ]
-            self._put("particles/disks/box/edges", np.array(edges), count)
-        time = self._file["particles/disks/position/time"]
-        time.resize(count + 1, axis=0)
-        time[count] = count
-        self._step.resize(count + 1, axis=0)
-        self._step[count] = count
 
     def packing(self, frame: int = -1) -> Packing:
         """The packing of a frame, bitwise as it was stored.
@@ -243,38 +332,24 @@ class RunFile(SealedFile):
         count = len(self)
         if not -count <= frame < count:
             raise PackingFileError(f"{self.path} has {count} frames; there is no frame {frame}.")
-        try:
-            return self._packing(frame % count)
-        except ValueError as error:  # numbers that no packing has
-            raise PackingFileError(f"{self.path} is damaged: {error}") from error
-
-    def _packing(self, frame: int) -> Packing:
-        rows = self._file["observables/contacts/value"][frame]
-        rows = rows[~np.isnan(rows[:, 0])]
-        parameters = self._parameters
+        frame, given = frame % count, dict(self._parameters)
+        seen = {name: self._file[f"observables/{name}/value"][frame] for name in ("contacts", "angle", "fx", "fy")}
+        rows = seen["contacts"][~np.isnan(seen["contacts"][:, 0])]
         low = self._file.get("observables/position_low")
-        return Packing(
-            position=self._file["particles/disks/position/value"][frame, :, :2],
-            radius=parameters["radius"],
-            angle=self._file["observables/angle/value"][frame],
-            mass=parameters["mass"],
-            inertia_factor=parameters["inertia_factor"],
-            box_length=parameters.get("box_length"),
-            top=parameters["top"].astype(np.bool_),
-            contacts=Contacts(
-                rows[:, 0].astype(np.int64),
-                rows[:, 1].astype(np.int64),
-                rows[:, 2],
-                rows[:, 3] if rows.shape[1] > 3 else None,
-            ),
-            law=law_of_parameters(parameters),
-            drag_time=parameters.get("drag_time"),
-            fx=self._file["observables/fx/value"][frame],
-            fy=self._file["observables/fy/value"][frame],
-            position_low=low["value"][frame] if low is not None else None,
-            spring=parameters.get("spring", 0.0),
-            slips_known="slips_known" not in parameters and self.attributes.get("tangential_forces") != NONE_GIVEN,
-        )
+        known = "slips_known" not in given and self.attributes.get("tangential_forces") != NONE_GIVEN
+        with telling(self.path, "is damaged", (ValueError,)):  # numbers that no packing has
+            i, j = rows[:, :2].T.astype(np.int64)
+            return Packing(
+                position=self._file[f"{POSITION}/value"][frame, :, :2],
+                contacts=Contacts(i, j, rows[:, 2], rows[:, 3] if rows.shape[1] > 3 else None),
+                law=law_of_parameters(given),
+                top=given["top"].astype(np.bool_),
+                position_low=None if low is None else low["value"][frame],
+                slips_known=known,
+                **{name: seen[name] for name in ("angle", "fx", "fy")},
+                **{name: given[name] for name in ("radius", "mass", "inertia_factor")},
+                **{name: given[name] for name in ("box_length", "drag_time", "spring") if name in given},
+            )
 
     def append_trajectory(self, time: ArrayLike, position: ArrayLike, position_low: ArrayLike | None = None) -> None:
         """Add frames of the undamped run that began at the last equilibrium.
@@ -288,23 +363,19 @@ class RunFile(SealedFile):
         position_low : array_like, shape (S, N, 2), optional
             Their low parts.
         """
-        low = {} if position_low is None else {"position_low": position_low}
-        place = np.asarray(position, dtype=np.float64)
-        flat = np.concatenate([place, np.zeros((*place.shape[:2], 1))], axis=2)
-        begin, group = self._step.shape[0], self._file["particles/disks/position"]
-        end, last = begin + len(flat), len(self) - 1
+        begin, last, place = self._step.shape[0], len(self) - 1, np.asarray(position, dtype=np.float64)
+        end = begin + len(place)
         with self.change():
-            self.append_series("trajectory", time=time, **low)
-            rows = {"position/value": flat, "position/time": time, "position/step": np.arange(begin, end)}
+            self.append_series(
+                "trajectory", time=time, **({} if position_low is None else {"position_low": position_low})
+            )
+            rows = {"value": np.pad(place, ((0, 0), (0, 0), (0, 1))), "time": time, "step": np.arange(begin, end)}
             for name, values in rows.items():
-                group.parent[name].resize(end, axis=0)
-                group.parent[name][begin:] = values
-            repeated = [self._file[f"observables/{name}/value"] for name in ("fx", "fy")]
-            if "box/edges" in group.parent:
-                repeated.append(group.parent["box/edges/value"])
-            for data in (item["value"] for item in self._file["observables"].values()):
-                data.resize(end, axis=0)
-            for data in repeated:
+                _extend(self._file[f"{POSITION}/{name}"], np.asarray(values), begin)
+            for item in self._file["observables"].values():
+                item["value"].resize(end, axis=0)
+            for name in ("observables/fx", "observables/fy", *([EDGES] if EDGES in self._file else [])):
+                data = self._file[name]["value"]
                 data.resize(end, axis=0)
                 data[begin:] = data[last]
 
@@ -325,21 +396,17 @@ class RunFile(SealedFile):
         """
         group = self._file.require_group(f"faultgouge/{name}")
         arrays = {column: np.asarray(value) for column, value in columns.items()}
-        lengths = {array.shape[0] if array.ndim else -1 for array in arrays.values()}
-        if len(lengths) != 1 or -1 in lengths:
+        if not all(array.ndim for array in arrays.values()) or len({len(array) for array in arrays.values()}) != 1:
             raise ValueError(f"The columns of the series {name} must be lists of one length.")
         if len(group) and set(group) != set(arrays):
             raise ValueError(f"The series {name} has the columns {', '.join(group)}, not others.")
-        start, rows = _rows(group), lengths.pop()
+        start = _rows(group)
         with self.change():
             for column, array in arrays.items():
                 if column not in group:
-                    shape = array.shape[1:]
-                    group.create_dataset(
-                        column, (0, *shape), array.dtype, maxshape=(None, *shape), chunks=True, **CHECKSUM
-                    )
-                group[column].resize(start + rows, axis=0)
-                group[column][start:] = array
+                    layout: dict[str, Any] = {"maxshape": (None, *array.shape[1:]), "chunks": True, **CHECKSUM}
+                    group.create_dataset(column, (0, *array.shape[1:]), array.dtype, **layout)
+                _extend(group[column], array, start)
 
     @property
     def names_of_series(self) -> tuple[str, ...]:
@@ -359,42 +426,22 @@ class RunFile(SealedFile):
             raise PackingFileError(f"{self.path} has no series {name}.")
         columns = {column: group[column][: _rows(group)] for column in group}
         if name == "trajectory":
-            columns["position"] = self._file["particles/disks/position/value"][len(self) :, :, :2]
+            columns["position"] = self._file[f"{POSITION}/value"][len(self) :, :, :2]
         return columns
-
-    def _put(self, name: str, value: NDArray, frame: int) -> None:
-        """Write one element of one frame; the contacts' second axis grows as it must, others stay."""
-        if name not in self._file:
-            group = self._file.create_group(name)
-            number = np.int64 if np.issubdtype(value.dtype, np.integer) else np.float64
-            group.create_dataset(
-                "value",
-                (0, *value.shape),
-                number,
-                maxshape=(None,) * (value.ndim + 1),
-                chunks=(1, *value.shape) if value.size > 1 else True,
-                fillvalue=np.nan if number is np.float64 else 0,
-                **(COMPACT if value.ndim else CHECKSUM),
-            )
-            for clock in ("step", "time"):
-                group[clock] = self._file[f"particles/disks/position/{clock}"]
-        data = self._file[name]["value"]
-        size = [max(have, need) for have, need in zip(data.shape[1:], value.shape, strict=True)]
-        data.resize((frame + 1, *size))
-        row = np.full(size, data.fillvalue, data.dtype)
-        row[tuple(slice(extent) for extent in value.shape)] = value
-        data[frame] = row
 
     @cached_property
     def _parameters(self) -> dict[str, Any]:
         """What all frames share: written once, when the file is made."""
         return {name: item[()] for name, item in self._file["parameters"].items()}
 
-    def _check_same(self, packing: Packing) -> None:
-        parameters, values = self._parameters, parameters_of(packing)
-        for name in parameters.keys() | values.keys():
-            if not (name in parameters and name in values and np.array_equal(parameters[name], values[name])):
-                raise ValueError(f"{self.path} was begun for a packing with another {name}.")
+
+def _extend(data: h5py.Dataset, rows: NDArray, start: int) -> None:
+    """Write rows from a number on, in place of what is there; further axes grow as they must."""
+    size = [max(have, need) for have, need in zip(data.shape[1:], rows.shape[1:], strict=True)]
+    data.resize((start + len(rows), *size))
+    filled = np.full((len(rows), *size), data.fillvalue, data.dtype)
+    filled[tuple(map(slice, rows.shape))] = rows
+    data[start:] = filled
 
 
 def _rows(group: h5py.Group) -> int:
@@ -415,52 +462,19 @@ def law_of_parameters(given: Mapping[str, Any]) -> MindlinLaw:
 
 
 def parameters_of(packing: Packing) -> dict[str, Any]:
-    """The constants of a run, by their names below /parameters."""
+    """The constants of a run, by their names below /parameters; what is absent or zero is left out."""
     values: dict[str, Any] = {name: getattr(packing, name) for name in ("radius", "mass", "top", "inertia_factor")}
-    values |= law_parameters(packing.law)
-    if packing.drag_time is not None:
-        values["drag_time"] = packing.drag_time
-    if packing.spring:
-        values["spring"] = packing.spring
-    if not packing.slips_known:
-        values["slips_known"] = 0.0
-    if packing.box_length is not None:
-        values["box_length"] = packing.box_length
-    return values
-
-
-def program_version() -> str:
-    """The program's version; empty where the analysis runs without being installed."""
-    try:
-        return version(CREATOR)
-    except PackageNotFoundError:
-        return ""
+    values |= law_parameters(packing.law) | ({} if packing.slips_known else {"slips_known": 0.0})
+    more = {name: getattr(packing, name) for name in ("drag_time", "spring", "box_length")}
+    return values | {name: value for name, value in more.items() if value}
 
 
 def write_h5md(file: h5py.File) -> None:
-    """The version of H5MD, and what has written the file."""
-    h5md = file.create_group("h5md")
-    h5md.attrs["version"] = np.array([1, 1])
-    h5md.create_group("author").attrs["name"] = CREATOR
-    h5md.create_group("creator").attrs.update({"name": CREATOR, "version": program_version()})
-
-
-def write_header(file: h5py.File, packing: Packing) -> None:
-    """The groups and parameters of a file without frames, for the disks of a packing."""
-    write_h5md(file)
-    disks = file.create_group("particles/disks")
-    box = disks.create_group("box")
-    box.attrs["dimension"] = 3
-    periodic = packing.box_length is not None
-    box.attrs["boundary"] = np.array(["periodic" if periodic else "none", "none", "none"], dtype="S8")
-    position = disks.create_group("position")
-    position.create_dataset("step", (0,), np.int64, maxshape=(None,), **CHECKSUM)
-    position.create_dataset("time", (0,), np.float64, maxshape=(None,), **CHECKSUM)
-    shape = (len(packing), 3)
-    position.create_dataset("value", (0, *shape), np.float64, maxshape=(None, *shape), chunks=(1, *shape), **COMPACT)
-    # readers of H5MD take positions as float32, and observables as they are: a link, which takes no room
-    file["observables/position"] = position
-    parameters = file.create_group("parameters")
-    for name, value in parameters_of(packing).items():
-        parameters[name] = value
-    disks["mass"] = parameters["mass"]
+    """The version of H5MD, and what has written the file; no version where it is not installed."""
+    try:
+        program = version(CREATOR)
+    except PackageNotFoundError:
+        program = ""
+    file.create_group("h5md").attrs["version"] = np.array([1, 1])
+    file.create_group("h5md/author").attrs["name"] = CREATOR
+    file.create_group("h5md/creator").attrs.update({"name": CREATOR, "version": program})

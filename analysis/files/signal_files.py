@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import PackingFileError
 from ..responses.signals import Signal, SignalError
-from .plain_file import open_plain, read_plain_text
+from .atomic_write import open_plain
+from .formats.tables import columns_of, lines_of, strip_comments
 
 BEGINNING_BYTES = 4096
 """Bytes at the beginning of a file that tell a table of numbers from a record."""
@@ -40,11 +42,14 @@ def read_signal(path: str | Path, channel: str | None = None) -> Signal:
     except OSError as error:
         raise SignalError(f"{path} cannot be read ({error.strerror}): correct its name") from None
     try:
-        if _is_table(head):
-            if channel is not None:
-                raise SignalError("a table of two columns has no channels: leave channel out")
-            return _table(path)
-        return _record(path, channel)
+        if not _is_table(head):
+            return of_trace(_record(path, channel))
+        if channel is not None:
+            raise SignalError("a table of two columns has no channels: leave channel out")
+        rows = strip_comments((line.replace(",", " ") for line in lines_of(path)), 1)
+        return Signal(*columns_of(path, rows, ("time", "value"), "two are needed, time and value", more=False).values())
+    except PackingFileError as error:
+        raise SignalError(str(error).rstrip(".")) from None
     except SignalError as error:
         raise SignalError(f"{path}: {error}") from None
 
@@ -58,44 +63,33 @@ def _is_table(head: bytes) -> bool:
     """Whether the first line that is no comment begins with a number."""
     try:
         # the last line may be cut off, also within a letter
-        lines = head.decode("ascii", "strict" if len(head) < BEGINNING_BYTES else "ignore").splitlines()
-        words = next((words for line in lines if (words := line.split("#")[0].replace(",", " ").split())), [])
+        text = head.decode("ascii", "strict" if len(head) < BEGINNING_BYTES else "ignore").replace(",", " ")
+        _, words = next(strip_comments(text.splitlines(), 1))
         float(words[0])
-    except (UnicodeDecodeError, ValueError, IndexError):
+    except (ValueError, StopIteration):
         return False
     return b"\0" not in head
 
 
-def _table(path: Path) -> Signal:
-    rows = []
-    for number, line in enumerate(read_plain_text(path).splitlines(), start=1):
-        words = line.split("#")[0].replace(",", " ").split()
-        if not words:
-            continue
-        try:
-            time, value = (float(word) for word in words)
-        except ValueError:
-            raise SignalError(f"line {number} has something else than two numbers, time and value: mend it") from None
-        rows.append((time, value))
-    return Signal(*np.array(rows).T)
-
-
-def _record(path: Path, channel: str | None) -> Signal:
+def _record(path: Path, channel: str | None) -> Any:
+    """The trace of a record that is meant."""
     try:
         from obspy import read
+
+        traces = list(read(str(path)))
     except ImportError:
-        raise SignalError(
-            'it is no table of two columns, and ObsPy, which reads records, is not installed: pip install "faultgouge'
-            '[seismic]"'
-        ) from None
-    try:
-        stream = read(str(path))
+        needs = 'and ObsPy, which reads records, is not installed: pip install "faultgouge[seismic]"'
+        raise SignalError(f"it is no table of two columns, {needs}") from None
     except Exception as error:  # whatever the reader of the format raises on a broken file
         reason = str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__
-        raise SignalError(
-            f"it is no table of two columns, and ObsPy cannot read it ({reason}): give another file"
-        ) from None
-    return of_trace(_choose_component(list(stream), channel))
+        says = f"it is no table of two columns, and ObsPy cannot read it ({reason}): give another file"
+        raise SignalError(says) from None
+    names = ", ".join(dict.fromkeys(trace.id for trace in traces))
+    found = [trace for trace in traces if channel is None or trace.id.endswith(channel)]
+    if len(found) != 1:
+        fits = "it has" if channel is None else f'channel = "{channel}" fits {len(found) or "none"} of'
+        raise SignalError(f"{fits} the traces {names or 'none'}: name one of them with channel")
+    return found[0]
 
 
 def of_trace(trace: Any) -> Signal:
@@ -103,16 +97,3 @@ def of_trace(trace: Any) -> Signal:
     if np.ma.is_masked(trace.data):
         raise SignalError(f"the trace {trace.id} has gaps: fill them, or cut them off")
     return Signal(trace.times(), np.asarray(trace.data, dtype=np.float64))
-
-
-def _choose_component(traces: list[Any], channel: str | None) -> Any:
-    names = ", ".join(dict.fromkeys(trace.id for trace in traces))
-    if channel is None:
-        if len(traces) != 1:
-            raise SignalError(f"it has the traces {names or 'none'}: name one of them with channel")
-        return traces[0]
-    found = [trace for trace in traces if trace.id.endswith(channel)]
-    if len(found) != 1:
-        says = "no trace" if not found else "more than one trace"
-        raise SignalError(f'channel = "{channel}" fits {says} of {names}: name one of them')
-    return found[0]

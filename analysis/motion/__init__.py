@@ -1,13 +1,10 @@
 """Small motion about an equilibrium: eigenvalues, and what grows.
 
 - `stability`, `verdict`: does a packing at rest move? In three parts: `linear`; `one_sided`, `pushes` and
-`rising_load`,
-  with contacts at Coulomb's bound; `reach`, up to which push that holds;
-- `linear`: LAPACK, `certificate` (no fast motion grows, and slow ones one by one), `growing` (the fastest growing
-  motion), `random_state` (does motion decay, where there is no certificate);
-- `motion`: the matrices of small motion; `eigenvalues`: what grows beyond rounding; `energy_norm`: the energy as a sum
-of
-  squares;
+  `rising_load`, with contacts at Coulomb's bound; `reach`, up to which push that holds;
+- `linear`: LAPACK, `certificate` (no fast motion grows, and slow ones one by one), `random_state` (what grows in any
+  number of coordinates, and whether motion decays where there is no certificate);
+- `motion`: the matrices of small motion, and its energy as a sum of squares; `eigenvalues`: what grows beyond rounding;
 - `spectrum`, `modes`, `all_eigenvalues`, `buckling`: eigenvalues of K and their vectors, of large packings in slices,
   nearest to a shift, and negative; `stable_timestep`: the time step; `hysteresis`: loading there and back.
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from ..factors.sparse_lu import DIAGONAL_PIVOT, SingularMatrixError, symmetric_lu
+from ..factors.sparse_lu import DIAGONAL_PIVOT, negative_pivots, symmetric_lu
 from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats
 from .eigenvalues import (
@@ -29,12 +29,6 @@ from .eigenvalues import (
 )
 from .modes import Modes
 from .spectrum import DENSE_LARGEST, dynamical_matrix, spectrum
-
-BOUND_FACTOR = 4.0
-"""Factor from one bound that is tried to the next: each costs factors, and a loose one more eigenvalues."""
-
-FIRST_COUNT = 16
-"""Eigenvalues that are asked for at first; twice as many until the interval is covered."""
 
 
 def negative_eigenvalues(packing: HasConfiguration) -> Floats:
@@ -63,8 +57,8 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
         return spectrum(packing).negative
     bound = max(float(shifts.max()), np.finfo(float).eps ** 0.5 * float(np.abs(matrix.data).max()))
     while not _is_positive(symmetric, bound):
-        bound *= BOUND_FACTOR
-    count = FIRST_COUNT
+        bound *= 4  # each costs factors, and a loose one more eigenvalues
+    count = 16
     while True:
         count = min(count, size - 2)
         found = nearest_modes(packing, -0.5 * bound, count)
@@ -90,15 +84,8 @@ def surely_positive(matrix: csr_array) -> bool:
 
 def _is_positive(symmetric: csc_array, shift: Floats | float) -> bool:
     """Whether S + shift has positive pivots alone; shift is a number, or the entries of a diagonal."""
-    size = symmetric.shape[0]
-    if size == 0:
-        return True
-    try:
-        return (
-            symmetric_lu(csc_array(symmetric + diags_array(np.broadcast_to(shift, size))), symmetric=True).negative == 0
-        )
-    except SingularMatrixError:
-        return False
+    shifts = diags_array(np.broadcast_to(shift, symmetric.shape[0]))
+    return not symmetric.shape[0] or negative_pivots(csc_array(symmetric + shifts)) == 0
 
 
 def nearest_modes(packing: HasConfiguration, near: complex, count: int, tolerance: float = 0.0) -> Modes:

@@ -62,11 +62,6 @@ class Linear:
     reasons: tuple[str, ...] = ()
 
 
-IN_BALANCE = 1e-4
-"""Residual force over the largest force up to which a packing is in equilibrium. Dumps with few digits leave
-1e-6; a packing before it is brought to rest, 1e-2 and more."""
-
-
 def mass_weighted(stiffness: csr_array, packing: HasConfiguration) -> csr_array:
     """M^(-1/2) K M^(-1/2), zero rows and all; 1 / time^2."""
     scale = 1.0 / np.sqrt(packing.coordinate_mass)
@@ -97,7 +92,8 @@ def in_balance(packing: HasConfiguration) -> bool:
     force = packing.configuration.largest_force
     if not force and packing.configuration.stiffness is not None:
         return True  # no force is known to compare with; whoever measured K has looked
-    return packing.residual <= IN_BALANCE * force
+    # dumps with few digits leave 1e-6; a packing before it is brought to rest, 1e-2 and more
+    return packing.residual <= 1e-4 * force
 
 
 def imbalance(packing: HasConfiguration) -> Floats:
@@ -192,8 +188,7 @@ def growing_undamped(
     zero : float or ndarray
         The uncertainty of an eigenvalue of zero, of all modes alike or of each, 1 / time^2.
     """
-    oscillates = np.array([exceeds_rounding(v, o, rounding) for v, o in zip(values, overlap, strict=True)], dtype=bool)
-    return oscillates, is_negative(values, overlap, rounding, zero)
+    return np.abs(values.imag) * overlap > SAFETY * rounding, is_negative(values, overlap, rounding, zero)
 
 
 def exponential(rate: float, digits: int, at_least: bool = False) -> str:

@@ -15,16 +15,13 @@ increments.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from ..arrays import Floats
 from ..packing.geometry import nearest_image
 from ..packing.packing import Packing
-
-DISPLACEMENT_ROUNDING = 1e-9
-"""Share of the displacement of a layer: coordinates have 1e-16, which is 1e-12 of a displacement of 1e-4 diameters, and
-soft modes magnify it some hundred times."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +39,7 @@ class Hysteresis:
     work : float
         Of the loads on all disks of the layer since then, force length.
     closes : bool
-        Whether what remains is no more than rounding: `DISPLACEMENT_ROUNDING` of how far the layer has moved in
+        Whether what remains is no more than rounding: 1e-9 of how far the layer has moved in
         between.
     """
 
@@ -63,13 +60,12 @@ def layer_displacement(packings: Sequence[Packing]) -> Floats:
     """
     first = packings[0]
     upper = first.top if first.top.any() else np.ones(len(first), dtype=bool)
-    moved = np.zeros((len(packings), 2))
-    for k in range(1, len(packings)):
-        here, there = packings[k - 1], packings[k]
+    moved = [np.zeros(2)]
+    for here, there in pairwise(packings):
         step = nearest_image(there.position[upper] - here.position[upper], first.box_length)
         if here.position_low is not None and there.position_low is not None:
             step = step + (there.position_low[upper] - here.position_low[upper])
-        moved[k] = step.mean(axis=0)
+        moved.append(step.mean(axis=0))
     return np.cumsum(moved, axis=0)
 
 
@@ -97,5 +93,6 @@ def hysteresis(packings: Sequence[Packing]) -> Hysteresis | None:
     mean = 0.5 * (fx[begin + 1 :] + fx[begin:-1])
     work = mean @ np.diff(moved[:, 0]) - last.fy * (moved[-1, 1] - moved[0, 1])
     remaining = float(moved[-1, 0] - moved[0, 0])
-    closes = abs(remaining) <= DISPLACEMENT_ROUNDING * float(np.ptp(moved[:, 0]))
+    # coordinates have 1e-16, which is 1e-12 of a displacement of 1e-4 diameters, and soft modes magnify it
+    closes = abs(remaining) <= 1e-9 * float(np.ptp(moved[:, 0]))
     return Hysteresis(last.fx, begin, remaining, disks * float(work), closes)

@@ -1,17 +1,19 @@
 r"""Does linear motion grow? The verdict at any size, with the packing's dissipation.
 
 **Up to** `LAPACK_UP_TO` **coordinates** LAPACK computes all eigenvalues s of the first-order matrix Z in coordinates of
-the energy (:mod:`~faultgouge.analysis.motion.energy_norm`), or all eigenvalues of A where there is no dissipation. What
+the energy (:mod:`~faultgouge.analysis.motion.motion`), or all eigenvalues of A where there is no dissipation. What
 grows beyond rounding is said by :mod:`~faultgouge.analysis.motion.eigenvalues`. A motion that no force opposes has s =
 0 twice, in one Jordan block, which rounding turns into a pair of either sign. It belongs to a left vector y with
 :math:`y^T A = y^T G = 0`: for every other motion :math:`s^2\, y^T z = 0`, so that z is orthogonal to y. So these y are
 taken out first, exactly.
 
-**Beyond**, the fastest growing motion is looked for (:mod:`~faultgouge.analysis.motion.growing`). If none is found,
+**Beyond**, a motion that grows is looked for (:mod:`~faultgouge.analysis.motion.random_state`). If none is found,
 a certificate says that no fast motion grows, and slow ones are found one by one
 (:mod:`~faultgouge.analysis.motion.certificate`). Where there is no certificate, as with dashpots that are too weak for
-the asymmetry of the law, a random state is followed (:mod:`~faultgouge.analysis.motion.random_state`). Without
-dissipation only a symmetric K, or all its eigenvalues, say that nothing grows.
+the asymmetry of the law, a random state is followed until it has decayed. Without
+dissipation only a symmetric K, or all its eigenvalues (:mod:`~faultgouge.analysis.motion.spectrum`), say that nothing
+grows. Groups of particles that touch none of another group have a verdict each: many spheres that lie on a plane by
+themselves have the same eigenvalues, of which a block of vectors sees a few.
 """
 
 from dataclasses import replace
@@ -23,8 +25,7 @@ from scipy.sparse import block_diag, csc_array, csr_array, eye_array, vstack
 from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Complexes, Floats
-from ..factors.sparse_lu import SingularMatrixError, symmetric_lu
-from .all_eigenvalues import SpectrumError, all_eigenvalues
+from ..factors.sparse_lu import negative_pivots
 from .certificate import NoProofError, prove
 from .eigenvalues import (
     SAFETY,
@@ -37,14 +38,9 @@ from .eigenvalues import (
     zero_uncertainties,
     zero_uncertainty,
 )
-from .energy_norm import EnergyNorm
-from .growing import fastest_growing
 from .modes import Modes
-from .motion import Motion
-from .random_state import follow_decay
-
-TINY = 8
-"""Coordinates in which there is nothing to search by products."""
+from .motion import EnergyNorm, Motion
+from .random_state import fastest_growing, follow_decay
 
 LAPACK_FIRST = 1000
 """Coordinates up to which LAPACK computes all s with dissipation at once, some seconds; a certificate takes less time
@@ -52,22 +48,6 @@ of more."""
 
 LAPACK_UP_TO = 2000
 """Coordinates up to which LAPACK is asked at all: without dissipation, or where there is no certificate, 20 s."""
-
-SLICES_UP_TO = 6000
-"""Coordinates up to which all eigenvalues of A are found in slices, two minutes."""
-
-PERIODS_OF_LARGE = 2e6
-"""Periods of the fastest motion in which growth is looked for, times the number of coordinates: some seconds."""
-
-FIRST_SEARCH, LONGEST_SEARCH = 30.0, 300.0
-"""Periods of the fastest motion at first, which show fast growth in a tenth of the time, and at the most."""
-
-LARGEST_LOSS = 4.0
-"""Loss of dashpots over the fastest frequency beyond which no fast growth is sought: the search takes short steps, and
-strong dashpots leave slow growth alone. Both are bounds, by sums of rows."""
-
-FREE_ROW = 1e-10
-"""Force along a vector of one particle, as a share of the largest entry of A, and of G, that is no force."""
 
 
 def linear_verdict(motion: Motion, *, decides: bool = True, time: float | None = None) -> Linear:
@@ -86,84 +66,77 @@ def linear_verdict(motion: Motion, *, decides: bool = True, time: float | None =
     -------
     Linear
     """
-    size = len(motion.active)
+    size, a, g, packing = len(motion.active), motion.stiffness, motion.damping, motion.configuration
     if not size:
         return Linear(True, 0.0)
-    if size <= max(TINY, LAPACK_FIRST if motion.dissipative else LAPACK_UP_TO):
+    if size <= max(8, LAPACK_FIRST if motion.dissipative else LAPACK_UP_TO):
         return _by_lapack(motion)
-    if motion.dissipative and len(parts := _parts(motion)) > 1:
-        return _of_parts([linear_verdict(each, decides=decides, time=time) for each in parts])
-    found = _fast_growth(motion, final=not decides or not motion.dissipative)
+    if motion.dissipative and (found := _of_groups(motion, decides, time)) is not None:
+        return found
+    # strong dashpots leave slow growth alone, and make the search take short steps; 2e6 periods take some seconds
+    fastest, loss = (float(abs(each).sum(axis=1).max(initial=0.0)) for each in (a, g))
+    found = Linear(None, 0.0, searched=2 * float(np.sqrt(fastest)))  # nothing is faster than K alone would have it
+    if loss <= 4 * np.sqrt(fastest):
+        longest = 30.0 if decides and motion.dissipative else min(300.0, 2e6 / size)
+        found = fastest_growing(a, g if motion.dissipative else None, (min(30.0, longest), longest))
     if found.stable is False or not decides:
         return found
+    rounding = operator_rounding(packing, a.data)
+    zero = zero_uncertainty(packing, rounding)
     if not motion.dissipative:
-        return _without_loss(motion, found)
-    kept = opposed(motion)
-    a, g = (csr_array(kept.T @ each @ kept) for each in (motion.stiffness, motion.damping))
-    alone = size - kept.shape[1]
-    zero = zero_uncertainty(motion.configuration, operator_rounding(motion.configuration, motion.stiffness.data))
-    try:
-        proof = prove(a, g, zero)
-    except NoProofError as failure:
-        return (
-            _by_lapack(motion)
-            if size <= LAPACK_UP_TO
-            else follow_decay(motion, kept, str(failure), time, found.searched)
+        if abs(a - a.T).max() <= SAFETY * rounding:
+            shifts = (csc_array(0.5 * (a + a.T) + shift * eye_array(size)) for shift in (zero, -zero))
+            below, above = map(negative_pivots, shifts)
+            if below == 0 and above is not None:
+                said = "the stiffness is symmetric, and its energy positive (proved)"
+                return Linear(True, 0.0, free=above, said=said)
+        why = (
+            f"without dissipation growth of D slower than exp({found.searched:.2g} t) may not have been seen in a "
+            f"packing of {size} coordinates: give the packing its dashpots, or search it in slices by `onset`"
         )
-    free, proved = alone + proof.free, "shown" if proof.shown else "proved"
-    fast = f"no motion faster than {proof.frequency:.3g} grows ({proved})"
-    if not len(proof.values):
-        return Linear(True, -2 * proof.decay, 2 * proof.decay, free, said=fast)
-    fastest = int(np.argmax(proof.values.real))
-    s, error = complex(proof.values[fastest]), float(proof.errors[fastest])
-    slow = f"of {proof.slow} slower ones, known one by one, the slowest decays with D as exp({2 * s.real:.6g} t)"
-    if s.real > error:
-        return Linear(False, 2 * s.real, 2 * error, free, s, at_least=not proof.all_slow)
-    doubt = float((proof.values.real + proof.errors).max())
-    if doubt >= 0:
-        why = f"of {proof.slow} slow motions the slowest has 2 Re s = {2 * s.real:.3g} with an error of {2 * error:.2g}"
-        return Linear(None, 2 * s.real, 2 * error, free, s, searched=2 * doubt, reasons=(f"{fast}, but {why}",))
-    more = max(error, doubt - s.real, -s.real - proof.decay, 1e-14 * proof.largest)
-    return Linear(True, 2 * s.real, 2 * more, free, s, f"{fast}, and {slow}")
+        return replace(found, reasons=(why,))
+    kept = opposed(motion)
+    try:
+        found = prove(csr_array(kept.T @ a @ kept), csr_array(kept.T @ g @ kept), zero)
+    except NoProofError as failure:
+        why = str(failure)
+        return _by_lapack(motion) if size <= LAPACK_UP_TO else follow_decay(motion, kept, why, time, found.searched)
+    return replace(found, free=found.free + size - kept.shape[1])
 
 
-def _parts(motion: Motion) -> list[Motion]:
-    """The motions of groups of particles that touch none of another group, the largest first.
-
-    Many spheres that lie on a plane by themselves have the same eigenvalues, of which a block of vectors sees a few.
-    """
+def _of_groups(motion: Motion, decides: bool, time: float | None) -> Linear | None:
+    """The verdict on groups of particles that touch none of another group; None of one group."""
     places = np.unique(motion.particle, return_inverse=True)[1]
     of_particle = csr_array((np.ones(len(places)), (np.arange(len(places)), places)))
     touches = of_particle.T @ (abs(motion.stiffness) + abs(motion.damping)) @ of_particle
     count, group = connected_components(touches, directed=False)
-    group = group[places]
-    members = np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group, minlength=count))[:-1])
-    return [
-        replace(
-            motion,
-            active=motion.active[rows],
-            root_mass=motion.root_mass[rows],
-            stiffness=csr_array(motion.stiffness[rows][:, rows]),
-            damping=csr_array(motion.damping[rows][:, rows]),
-        )
-        for rows in sorted(members, key=len, reverse=True)
-    ]
-
-
-def _of_parts(parts: list[Linear]) -> Linear:
-    """The verdict on motions that know nothing of each other, the largest first."""
-    free = sum(each.free for each in parts)
-    moves = [each for each in parts if each.s or each.growth_rate or not each.stable] or parts  # others drift
+    if count == 1:
+        return None
+    found = []
+    for each in np.argsort(-np.bincount(group[places]), kind="stable"):  # the largest first
+        rows = np.flatnonzero(group[places] == each)
+        a, g = (csr_array(matrix[rows][:, rows]) for matrix in (motion.stiffness, motion.damping))
+        part = replace(motion, active=motion.active[rows], root_mass=motion.root_mass[rows], stiffness=a, damping=g)
+        found.append(linear_verdict(part, decides=decides, time=time))
+    free = sum(each.free for each in found)
+    moves = [each for each in found if each.s or each.growth_rate or not each.stable] or found  # others drift
     worst = max(moves, key=lambda each: (each.stable is False, each.stable is None, each.growth_rate))
     if not worst.stable:
-        return replace(worst, free=free, searched=max(each.searched for each in parts))
-    more = max(each.growth_rate + each.error for each in moves) - worst.growth_rate
-    said = parts[0].said
-    if said and worst is not parts[0]:
-        said = (
-            f"{said}; of {len(parts) - 1} groups of other particles one decays with D as exp({worst.growth_rate:.6g} t)"
-        )
-    return replace(worst, error=max(worst.error, more), free=free, said=said)
+        return replace(worst, free=free, searched=max(each.searched for each in found))
+    said, error = found[0].said, max(each.growth_rate + each.error for each in moves) - worst.growth_rate
+    if said and worst is not found[0]:
+        other = f"of {count - 1} groups of other particles one decays with D as exp({worst.growth_rate:.6g} t)"
+        said = f"{said}; {other}"
+    return replace(worst, error=max(worst.error, error), free=free, said=said)
+
+
+def _by_lapack(motion: Motion) -> Linear:
+    values, grows, free, error = all_rates(motion)
+    if not len(values):
+        return Linear(True, 0.0, free=free)
+    s = complex(values[int(np.argmax(grows))])  # the first of those that grow, or the slowest
+    known = grows.any() or abs(s.real) > error
+    return Linear(not grows.any(), 2 * s.real if known else 0.0, 2 * error, free, s)
 
 
 def all_rates(motion: Motion) -> tuple[Complexes, NDArray[np.bool_], int, float]:
@@ -180,33 +153,46 @@ def all_rates(motion: Motion) -> tuple[Complexes, NDArray[np.bool_], int, float]
     error : float
         Of Re s that is perfectly conditioned, 1 / time.
     """
-    if not motion.dissipative:
-        return _undamped_rates(motion, Modes.of_matrix(motion.stiffness))
+    packing, rounding = motion.configuration, operator_rounding(motion.configuration, motion.stiffness.data)
+    if motion.dissipative:
+        s, grows, free, error = _damped_rates(motion, rounding)
+    else:
+        modes, alike = Modes.of_matrix(motion.stiffness), zero_uncertainty(packing, rounding)
+        zero = zero_uncertainties(packing, rounding, motion.particle, modes.left, modes.right)
+        oscillates, buckles = growing_undamped(modes.values, modes.overlap, rounding, zero)
+        grows = oscillates | buckles
+        drifts = ~grows & is_zero(modes.values, modes.overlap, alike, zero)
+        s = 1j * np.sqrt(np.where(grows, modes.values, np.abs(modes.values.real)).astype(complex))
+        kept, free = ~drifts & (modes.values.imag >= 0), int(drifts.sum())
+        s, grows = np.where(s.real < 0, -s, s)[kept], grows[kept]
+        fastest = float(abs(motion.stiffness).sum(axis=1).max(initial=0.0))
+        error = SAFETY * rounding / np.sqrt(max(fastest, np.finfo(float).tiny))
+    order = np.argsort(-s.real, kind="stable")
+    return s[order], grows[order], free, float(error)
+
+
+def _damped_rates(motion: Motion, rounding: float) -> tuple[Complexes, NDArray[np.bool_], int, float]:
+    """The same with dissipation, in any order."""
     a, g, packing = motion.stiffness.toarray(), motion.damping.toarray(), motion.configuration
-    size, rounding_of_a = len(a), operator_rounding(packing, motion.stiffness.data)
-    free, turned = _unopposed(motion, a, rounding_of_a)
-    driven = g.T @ free  # but for what forces out of balance turn these vectors by
-    driven -= free @ (free.T @ driven)
-    held = np.zeros((free.shape[1], 0))
-    if free.shape[1]:  # those that no dashpot opposes, either: zero is double
-        _, sizes, turn = svd(driven, full_matrices=False)
+    free, turned = _unopposed(motion, a, rounding)
+    count, others = free.shape[1], np.eye(len(a))
+    if count:  # those that no dashpot opposes, either: zero is double
+        driven = g.T @ free  # but for what forces out of balance turn these vectors by
+        _, sizes, turn = svd(driven - free @ (free.T @ driven), full_matrices=False)
         held = turn[sizes <= SAFETY * unit_rounding(g) + turned * np.linalg.norm(g)].T
-    others = qr(free @ held)[0][:, held.shape[1] :] if held.shape[1] else np.eye(size)
+        count -= held.shape[1]
+        if held.shape[1]:
+            others = qr(free @ held)[0][:, held.shape[1] :]
     a, g = others.T @ a @ others, others.T @ g @ others
-    norm = EnergyNorm.of(csr_array(a))
-    z = norm.first_order(csr_array(a), csr_array(g))
-    values, rounding = eigvals(z, check_finite=False), operator_rounding(packing, z)
-    grows = values.real > np.sqrt(SAFETY * rounding * np.abs(values).max(initial=0.0))  # no double one is as uncertain
+    z = EnergyNorm.of(a).first_order(a, g)
+    values, of_z = eigvals(z, check_finite=False), operator_rounding(packing, z)
+    grows = values.real > np.sqrt(SAFETY * of_z * np.abs(values).max(initial=0.0))  # no double one is as uncertain
     if np.any(~grows & (values.real > 0)):  # vectors take three times as long as eigenvalues
         values, left, right = eig(z, left=True, check_finite=False)
-        grows = growing(values, np.abs(np.sum(left.conj() * right, axis=0)), rounding)
-    # of motions that dashpots alone oppose one s is zero, once
-    still = np.argsort(np.abs(values))[: free.shape[1] - held.shape[1]]
+        grows = growing(values, np.abs(np.sum(left.conj() * right, axis=0)), of_z)
     counts = values.imag >= 0
-    counts[still] = False
-    order = np.flatnonzero(counts)
-    order = order[np.argsort(-values[order].real, kind="stable")]
-    return values[order], grows[order], free.shape[1], SAFETY * rounding
+    counts[np.argsort(np.abs(values))[:count]] = False  # of motions that dashpots alone oppose one s is zero, once
+    return values[counts], grows[counts], free.shape[1], SAFETY * of_z
 
 
 def _unopposed(motion: Motion, a: Floats, rounding: float) -> tuple[Floats, float]:
@@ -228,74 +214,6 @@ def _unopposed(motion: Motion, a: Floats, rounding: float) -> tuple[Floats, floa
     return vectors[:, sizes <= zero], alike / float(pivots[rank - 1]) if rank else 0.0
 
 
-def _undamped_rates(motion: Motion, modes: Modes) -> tuple[Complexes, NDArray[np.bool_], int, float]:
-    """From the eigenvalues of A that are known with vectors."""
-    packing, rounding = motion.configuration, operator_rounding(motion.configuration, motion.stiffness.data)
-    zero = zero_uncertainties(packing, rounding, motion.particle, modes.left, modes.right)
-    oscillates, buckles = growing_undamped(modes.values, modes.overlap, rounding, zero)
-    grows = oscillates | buckles
-    free = ~grows & is_zero(modes.values, modes.overlap, zero_uncertainty(packing, rounding), zero)
-    s = 1j * np.sqrt(np.where(grows, modes.values, np.abs(modes.values.real)).astype(complex))
-    s = np.where(s.real < 0, -s, s)
-    order = np.flatnonzero(~free & (modes.values.imag >= 0))
-    order = order[np.argsort(-s[order].real, kind="stable")]
-    error = SAFETY * rounding / np.sqrt(max(float(abs(motion.stiffness).sum(axis=1).max()), np.finfo(float).tiny))
-    return s[order], grows[order], int(free.sum()), float(error)
-
-
-def _by_lapack(motion: Motion) -> Linear:
-    values, grows, free, error = all_rates(motion)
-    if not len(values):
-        return Linear(True, 0.0, free=free)
-    fastest = int(np.argmax(np.where(grows, values.real, -np.inf))) if grows.any() else 0
-    s = complex(values[fastest])
-    known = grows.any() or abs(s.real) > error
-    return Linear(not grows.any(), 2 * s.real if known else 0.0, 2 * error, free, s)
-
-
-def _fast_growth(motion: Motion, *, final: bool) -> Linear:
-    """What surely grows; `final` says whether nothing else is looked at."""
-    a, g = motion.stiffness, motion.damping
-    fastest, loss = (float(abs(each).sum(axis=1).max(initial=0.0)) for each in (a, g))
-    if loss > LARGEST_LOSS * np.sqrt(fastest):  # nothing grows faster than K alone would have it
-        return Linear(None, 0.0, searched=2 * float(np.sqrt(fastest)))
-    longest = min(LONGEST_SEARCH, PERIODS_OF_LARGE / len(motion.active)) if final else FIRST_SEARCH
-    damping = motion.in_blocks(g) if motion.dissipative else None
-    return fastest_growing(motion.in_blocks(a), damping, (min(FIRST_SEARCH, longest), longest))
-
-
-def _without_loss(motion: Motion, found: Linear) -> Linear:
-    """Of a large packing without dissipation in which no fast growth was found."""
-    a, packing = motion.stiffness, motion.configuration
-    rounding = operator_rounding(packing, a.data)
-    zero = zero_uncertainty(packing, rounding)
-    if abs(a - a.T).max() <= SAFETY * rounding:
-        shifts = (csc_array(0.5 * (a + a.T) + shift * eye_array(a.shape[0])) for shift in (zero, -zero))
-        try:
-            below, above = (symmetric_lu(each, symmetric=True).negative for each in shifts)
-            if not below:
-                said = "the stiffness is symmetric, and its energy positive (proved)"
-                return Linear(True, 0.0, free=above, said=said)
-        except SingularMatrixError:
-            pass
-    if len(motion.active) <= SLICES_UP_TO:
-        try:
-            every = all_eigenvalues(a)
-        except SpectrumError as failure:
-            return Linear(None, 0.0, searched=found.searched, reasons=(str(failure).rstrip("."),))
-        s, grows, free, error = _undamped_rates(motion, every.marked)
-        free += int(
-            np.count_nonzero(np.abs(every.values) <= zero) - np.count_nonzero(np.abs(every.marked.values) <= zero)
-        )
-        fastest = 2 * float(s[grows].real.max(initial=0.0))
-        return Linear(not grows.any(), fastest, 2 * error, free, complex(s[grows][0]) if grows.any() else 0j)
-    why = (
-        f"without dissipation growth of D slower than exp({found.searched:.2g} t) may not have been seen in a packing "
-        f"of {len(motion.active)} coordinates: give the packing its dashpots, or search it in slices by `onset`"
-    )
-    return Linear(None, 0.0, searched=found.searched, reasons=(why,))
-
-
 def opposed(motion: Motion) -> csr_array:
     """An orthonormal basis of all motion but that of one particle each that no force drives, shape (n, n - k).
 
@@ -305,14 +223,13 @@ def opposed(motion: Motion) -> csr_array:
     matrices = (motion.stiffness, motion.damping)
     parts = (each.T / max(abs(each).max(), np.finfo(float).tiny) for each in matrices if each.nnz)
     both, particle = vstack(list(parts), format="csc"), motion.particle
-    begins = np.flatnonzero(np.diff(particle, prepend=-1))
-    blocks = []
+    begins, blocks = np.flatnonzero(np.diff(particle, prepend=-1)), []
     for first, last in zip(begins, [*begins[1:], len(particle)], strict=True):
-        entries = slice(both.indptr[first], both.indptr[last])
-        rows, row = np.unique(both.indices[entries], return_inverse=True)
-        columns = np.zeros((max(len(rows), last - first), last - first))
-        columns[row, np.repeat(np.arange(last - first), np.diff(both.indptr[first : last + 1]))] = both.data[entries]
+        here = both[:, first:last]
+        rows, row = np.unique(here.indices, return_inverse=True)
+        shape = max(len(rows), last - first), last - first
+        columns = csc_array((here.data, row, here.indptr), shape=shape).toarray()
         _, sizes, vectors = np.linalg.svd(columns, full_matrices=False)
-        # as given where all of it is opposed, so that the matrices stay sparse
-        blocks.append(np.eye(last - first) if sizes.min() > FREE_ROW else vectors[sizes > FREE_ROW].T)
+        # as given where all of it is opposed, so that the matrices stay sparse; 1e-10 of the largest entry is no force
+        blocks.append(np.eye(last - first) if sizes.min() > 1e-10 else vectors[sizes > 1e-10].T)
     return csr_array(block_diag(blocks, format="csr"))

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import eig
 from scipy.sparse import csr_array
 
@@ -42,12 +43,6 @@ class Mode:
     overlap: float
     participation: float
     rotation: float
-
-    @classmethod
-    def of(cls, eigenvalue: complex, overlap: float, right: Complexes, axes: int) -> "Mode":
-        """The mode of a right vector, shape (axes N, 1), in mass-weighted coordinates."""
-        participation, rotation = participation_ratio(right, axes)[0], rotation_share(right, axes)[0]
-        return cls(eigenvalue, overlap, float(participation), float(rotation))
 
     @property
     def condition(self) -> float:
@@ -122,6 +117,10 @@ class Modes:
         right, left = np.zeros((2, size, len(self)), dtype=np.complex128)
         right[places], left[places] = self.right, self.left
         return Modes(self.values, right, left, self.axes)
+
+    def chosen(self, which: NDArray) -> "Modes":
+        """Some of them, by a mask or by numbers."""
+        return Modes(self.values[which], self.right[:, which], self.left[:, which], self.axes, self.solves)
 
     def __len__(self) -> int:
         return len(self.values)
@@ -216,11 +215,11 @@ def participation_ratio(right: Complexes | Floats, axes: int = 3) -> Floats:
     -------
     ndarray, shape (k,)
     """
-    energy = (np.abs(right) ** 2).reshape(axes, -1, right.shape[1]).sum(axis=0)
+    energy = (np.abs(right) ** 2).reshape(axes, len(right) // axes, right.shape[1]).sum(axis=0)
     return energy.sum(axis=0) ** 2 / (len(energy) * (energy**2).sum(axis=0))
 
 
 def rotation_share(right: Complexes | Floats, axes: int = 3) -> Floats:
     """Share of rotation in the kinetic energy of modes, shape (k,); as of :func:`participation_ratio`."""
-    energy = (np.abs(right) ** 2).reshape(axes, -1, right.shape[1]).sum(axis=1)
+    energy = (np.abs(right) ** 2).reshape(axes, len(right) // axes, right.shape[1]).sum(axis=1)
     return energy[axes // 2 + axes % 2 :].sum(axis=0) / energy.sum(axis=0)

@@ -9,13 +9,29 @@ A motion :math:`e^{st}` has :math:`s^2 + s G + A` singular; the mean square disp
 (:mod:`~faultgouge.analysis.operators.sliders`). Two linear systems are their neighbours: all stick, with K and C; or
 all slide on for ever, with :math:`K + G Y` and :math:`C + G Z`, since then the play :math:`p = Y q + Z \dot q`.
 Neither bounds what contacts do that stick and slide in turn.
+
+**The norm of the energy.** Let the symmetric part of A have the eigenvectors Q and the eigenvalues :math:`\Lambda`, and
+put :math:`p = W z`, :math:`W = |\Lambda|^{1/2} Q^T`, :math:`v = \dot z` with :math:`z = M^{1/2} q`. Then
+
+.. math::
+
+    \frac{\mathrm d}{\mathrm dt} \begin{pmatrix} p \\ v \end{pmatrix} = Z \begin{pmatrix} p \\ v \end{pmatrix},
+    \qquad Z = \begin{pmatrix} 0 & W \\ -A W^{-1} & -G \end{pmatrix}, \qquad
+    \tfrac12 (|p|^2 + |v|^2) = \tfrac12 \dot q^T M \dot q + \tfrac12 q^T K_s q,
+
+the kinetic energy and the energy of the symmetric part :math:`K_s` of K, where :math:`K_s` is positive. If K is
+symmetric and there is no dissipation, Z is antisymmetric: every eigenvalue is perfectly conditioned, and no state grows
+in the norm of the energy. Any other part of Z comes from the antisymmetric part of K, or from dissipation. An
+eigenvalue s of Z is an eigenvalue of :math:`s^2 M + s C + K`, and the upper half of its eigenvector belongs to the
+displacement.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array
+from scipy.linalg import eigh
+from scipy.sparse import csr_array
 
 from ..arrays import Floats, Indices
 from ..configuration import Configuration
@@ -23,7 +39,36 @@ from ..has_configuration import HasConfiguration
 from ..operators.sliders import sliders_of, with_sticking_contacts
 from ..operators.stiffness import stiffness_matrix
 from .eigenvalues import active_coordinates, mass_weighted
-from .energy_norm import EnergyNorm
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyNorm:
+    """The coordinates p = W z of a stiffness A.
+
+    Attributes
+    ----------
+    weight, unweight : ndarray, shape (E, E)
+        W, 1 / time, and its inverse.
+    positive : bool
+        Whether the symmetric part of A is positive definite, so that the norm of a state is twice its energy.
+    """
+
+    weight: Floats
+    unweight: Floats
+    positive: bool
+
+    @classmethod
+    def of(cls, stiffness: Floats) -> "EnergyNorm":
+        """The norm of A, shape (E, E)."""
+        values, vectors = eigh(0.5 * (stiffness + stiffness.T)) if len(stiffness) else (np.zeros(0), stiffness)
+        # a mode without a restoring force has no energy of its own: it weighs as much as one of this share
+        least = 1e-6 * np.abs(values).max(initial=0.0)
+        size = np.sqrt(np.maximum(np.abs(values), least))
+        return cls(size[:, None] * vectors.T, vectors / size, bool(np.all(values > least)))
+
+    def first_order(self, stiffness: Floats, damping: Floats) -> Floats:
+        """Z of A and G, shape (2E, 2E), 1 / time."""
+        return np.block([[np.zeros_like(self.weight), self.weight], [-stiffness @ self.unweight, -damping]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,32 +136,16 @@ class Motion:
         return self.active % len(self.configuration)
 
     @property
-    def translating_mass(self) -> Floats:
-        """Masses of the coordinates among these that are translations."""
-        c = self.configuration
-        return np.asarray(self.root_mass[self.active < c.dimension * len(c)] ** 2)
-
-    @property
     def dissipative(self) -> bool:
         """Whether there is dissipation."""
         return self.damping.nnz > 0
 
-    def in_blocks(self, matrix: csr_array) -> bsr_array:
-        """A matrix of these coordinates in dense blocks, one a contact, if of each particle as many take part.
-
-        A product with one vector takes half of the time.
-        """
-        counts = np.bincount(self.particle)
-        counts = np.unique(counts[counts > 0])
-        size = int(counts[0]) if len(counts) == 1 else 1
-        return bsr_array(matrix, blocksize=(size, size))
-
     @cached_property
     def energy_norm(self) -> EnergyNorm:
         """The coordinates in which the energy is a sum of squares."""
-        return EnergyNorm.of(self.stiffness)
+        return EnergyNorm.of(self.stiffness.toarray())
 
     @property
     def first_order(self) -> Floats:
         """Z, the dense matrix of the first-order system in coordinates of the energy, shape (2E, 2E), 1 / time."""
-        return self.energy_norm.first_order(self.stiffness, self.damping)
+        return self.energy_norm.first_order(self.stiffness.toarray(), self.damping.toarray())

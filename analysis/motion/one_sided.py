@@ -20,22 +20,23 @@ contacts is stable, and rest where the packing with sliding contacts is unstable
 with a load that rises slowly are those of rate-independent plasticity; self-sustained vibration of sliding contacts is
 known as flutter (Bigoni and Noselli, J. Mech. Phys. Solids 59, 2208, 2011).
 
-The motion is followed in steps of velocity Verlet, with dashpots at the velocity of the half step, as in LAMMPS.
-Without a contact that remembers the motion is linear, and the exponential function of the first-order matrix gives the
-motion to rounding.
+The motion is followed in steps of velocity Verlet, with dashpots at the velocity of the half step, as in LAMMPS. A
+`Look` says what motions did in a span of time. Without a contact that remembers the motion is linear, and the
+exponential function of the first-order matrix gives the motion to rounding.
 """
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import expm
-from scipy.sparse import block_array, bsr_array, csr_array, eye_array
+from scipy.sparse import block_array, csr_array, eye_array
 from scipy.sparse.linalg import expm_multiply
 
-from ..arrays import Floats, Indices, Matrix, floats
+from ..arrays import Floats, Matrix, floats
 from ..configuration import Configuration
 from ..has_configuration import HasConfiguration
 from ..operators.contact_changes import ContactChanges
@@ -51,11 +52,16 @@ decades; with twice the step, to some 8 per cent."""
 VERDICT_STEP = 0.3
 """The same where a verdict is wanted: D then is right to 2 %, rates of growth to 3 %, in a third of the time of 0.1."""
 
+CHUNK, LOOKS_PER_CHUNK = 300, 10
+"""Stable time steps between two looks at whether a motion has settled, some ten periods of a slow mode; and the looks
+that these have."""
+
 WORK_OF_MOTION = 2e11
 """Multiplications with entries of the operators that one motion may take: three minutes."""
 
-DENSE_ENTRIES = 150**2
-"""Entries up to which a product with the dense matrix is as fast: ten times as fast for 60 coordinates and fewer."""
+PUSH_OVER_RESIDUAL = 10.0
+"""Displacement by a push over that by the residual forces, from which on the push counts: D then is right to a fifth,
+and to a hundredth where the two displacements have nothing in common."""
 
 
 @dataclass
@@ -70,270 +76,306 @@ class OneSidedState:
     r: Floats
 
 
-@dataclass(frozen=True, eq=False)
 class OneSidedSystem:
-    """The equations of one configuration, assembled once.
+    """The equations of one configuration, in mass-weighted coordinates.
+
+    Parameters
+    ----------
+    motion : Motion
+        K and C of sticking contacts, `Motion.of(packing, sliding=False)`.
 
     Attributes
     ----------
-    motion : Motion
-        K and C of sticking contacts.
-    step_share : float
-        Time step, as a share of the largest stable one.
+    stable_step : float
+        The largest stable time step.
+    grip, excess, viscous_excess : shapes (E, B), (B, E) and (B, E)
+        G, Y and Z of the sliders.
+    rates, wear : shapes (R, E) and (E, R)
+        Rates of the overlaps of contacts with two derivatives, and B.
+    changes : ContactChanges
+        Which motions take contacts to another state.
+    missing : ndarray, shape (B, 1)
+        What contacts that count as at Coulomb's bound lack to the bound, force.
+    residual_force : ndarray, shape (E, 1)
+        What is left where the packing is said to rest.
     """
 
-    motion: Motion
-    step_share: float = MOTION_STEP
+    def __init__(self, motion: Motion) -> None:
+        c, active = motion.configuration, motion.active
+        contacts, size = c.contacts, len(active)
+        self.motion, self.configuration = motion, c
+        self.stable_step = float(stable_timestep(c)) if size else 1.0
+        self.weight = csr_array((1 / motion.root_mass, (active, np.arange(size))), shape=(c.coordinates, size))
+        back = csr_array(self.weight.T)
+        self.residual_force = np.asarray(back @ c.coordinate_force[:, None])
+        self._stiffness, self._damping = fast(motion.stiffness), fast(motion.damping)
+        s = sliders_of(c)
+        self.grip, self.excess = fast(back @ s.force), fast(s.excess @ self.weight)
+        self.viscous_excess = fast(s.viscous_excess @ self.weight * float(motion.dissipative))
+        self._rectified, self._viscous = s.rectified[:, None], s.viscous[:, None]
+        two, bound = np.flatnonzero(contacts.two_derivatives), s.contact
+        rates, forces = rescaling_operators(c)
+        self.rates, self.wear = fast(rates[two] @ self.weight), fast(back @ forces[:, two])
+        self._worn = fast(csr_array((bound[:, None] == two).astype(float)))  # shape (B, R)
+        changes = ContactChanges.of(c)
+        rows, viscous = fast(changes.rows @ self.weight), fast(changes.viscous @ self.weight)
+        self.changes = replace(changes, rows=rows, viscous=viscous)
+        bears = contacts.friction - np.linalg.norm(contacts.tangential_force, axis=1)
+        self.missing = np.maximum(bears, 0.0)[bound, None]
+        whole = self.weight if c.constraint is None else c.constraint @ self.weight
+        self._translations = fast(csr_array(whole)[: c.dimension * len(c)])
 
     @classmethod
-    def of(cls, packing: HasConfiguration, step_share: float = MOTION_STEP) -> "OneSidedSystem":
-        """Assemble the equations, with the packing's own dashpots and drag."""
-        return cls(Motion.of(packing, sliding=False), step_share)
+    def of(cls, packing: HasConfiguration) -> "OneSidedSystem":
+        """Of a configuration, with its own dashpots and drag."""
+        return cls(Motion.of(packing, sliding=False))
 
-    @cached_property
-    def time_step(self) -> float:
-        """Longest time step of `advance`, time."""
-        configuration = self.motion.configuration
-        return self.step_share * float(stable_timestep(configuration)) if len(self.motion.active) else 1.0
-
-    @cached_property
-    def mass_weight(self) -> csr_array:
-        """M^(-1/2) on the active coordinates, shape (coordinates, E)."""
-        m = self.motion
-        shape = (m.configuration.coordinates, len(m.active))
-        return csr_array((1 / m.root_mass, (m.active, np.arange(len(m.active)))), shape=shape)
-
-    @cached_property
-    def _weight_transposed(self) -> csr_array:
-        """Its transpose, in rows."""
-        return csr_array(self.mass_weight.T)
-
-    @cached_property
-    def residual_force(self) -> Floats:
-        """Mass-weighted forces that are left where the packing is said to rest, shape (E, 1)."""
-        return self.on_active(self.motion.configuration.coordinate_force[:, None])
-
-    def on_active(self, forces: Floats) -> Floats:
-        """Mass-weighted forces, shape (E, P), of forces on all coordinates, shape (coordinates, P)."""
-        return np.asarray(self._weight_transposed @ forces)
-
-    @cached_property
-    def _two_derivatives(self) -> Indices:
-        """Numbers of the contacts whose derivatives differ while they close and while they part."""
-        return np.flatnonzero(self.motion.configuration.contacts.two_derivatives)
-
-    @cached_property
-    def sliders(self) -> tuple[Matrix, Matrix, Matrix, Floats, NDArray[np.bool_]]:
-        """G, shape (E, B), Y and Z, shape (B, E), h, and which p remembers dashpots, shape (B, 1)."""
-        s = sliders_of(self.motion.configuration)
-        if not self.motion.dissipative:
-            s.viscous_excess.data[:] = 0.0
-        grip = _for_products(self._weight_transposed @ s.force)
-        excess, viscous = (_for_products(rows @ self.mass_weight) for rows in (s.excess, s.viscous_excess))
-        return grip, excess, viscous, s.rectified[:, None], s.viscous[:, None]
-
-    @cached_property
-    def missing_forces(self) -> Floats:
-        """What contacts that count as at Coulomb's bound lack to the bound, shape (B, 1), force."""
-        c = self.motion.configuration.contacts
-        return np.maximum(c.friction - np.linalg.norm(c.tangential_force, axis=1), 0.0)[c.one_sided, None]
-
-    @cached_property
-    def contact_changes(self) -> ContactChanges:
-        """Which mass-weighted motions take contacts to another state."""
-        changes = ContactChanges.of(self.motion.configuration)
-        rows, viscous = (_for_products(each @ self.mass_weight) for each in (changes.rows, changes.viscous))
-        return replace(changes, rows=rows, viscous=viscous)
-
-    @cached_property
-    def sideways(self) -> Matrix:
-        """Forces of sliders across f_t by displacements, over the roots of twice the bounds, shape (B, E). Their
-        squares are forces by which sliders pass the bound, of second order."""
-        changes = self.contact_changes
-        rows, weight = len(changes.bound) + changes.slides, 1 / np.sqrt(2 * changes.bound[changes.slides])
-        return _for_products(csr_array(weight * changes.rows[rows]))
-
-    @cached_property
-    def rescaled(self) -> tuple[Matrix, Matrix, Matrix]:
-        """N, shape (R, E), and B, shape (E, R), of the R contacts with two derivatives; h selects, shape (B, R)."""
-        rates, forces = rescaling_operators(self.motion.configuration)
-        contacts = self.motion.configuration.contacts
-        two = self._two_derivatives
-        bound = np.flatnonzero(contacts.one_sided)
-        here, place = np.isin(bound, two), np.searchsorted(two, bound)
-        select = csr_array((np.ones(here.sum()), (np.flatnonzero(here), place[here])), shape=(len(bound), len(two)))
-        rows, columns = rates[two] @ self.mass_weight, self._weight_transposed @ forces[:, two]
-        return _for_products(rows), _for_products(columns), _for_products(select)
-
-    @cached_property
-    def _operators(self) -> tuple[Matrix | bsr_array, Matrix | bsr_array | None]:
-        """A and, if there is dissipation, G."""
-        m = self.motion
-        in_blocks = m.configuration.dimension == 3 and len(m.active) ** 2 > DENSE_ENTRIES
-        form = m.in_blocks if in_blocks else _for_products
-        return form(m.stiffness), form(m.damping) if m.dissipative else None
+    @property
+    def remembers_nothing(self) -> bool:
+        """Whether motion is linear: no contact at the bound, and none with two derivatives."""
+        return not self.excess.shape[0] and not self.rates.shape[0]
 
     def start(self, velocity: Floats) -> OneSidedState:
         """At rest in the equilibrium, but for velocities of all coordinates, shape (coordinates, P)."""
-        v = np.asfortranarray(self.motion.root_mass[:, None] * velocity[self.motion.active])
-        count = v.shape[1]
-        p, r = (np.zeros((matrix.shape[0], count)) for matrix in (self.sliders[1], self.rescaled[0]))
+        v = self.motion.root_mass[:, None] * velocity[self.motion.active]
+        p, r = (np.zeros((matrix.shape[0], v.shape[1])) for matrix in (self.excess, self.rates))
         return OneSidedState(0.0, np.zeros_like(v), v, p, r)
 
-    def advance(self, state: OneSidedState, time: float, rise: Floats | None = None) -> None:
-        """Go on to a time, in equal steps no longer than `time_step`.
+    def steps(
+        self, state: OneSidedState, time_step: float, rise: Floats | None = None, constant: Floats | float = 0.0
+    ) -> Iterator[OneSidedState]:
+        """One step of velocity Verlet after the other, each of which changes the state.
 
         Parameters
         ----------
-        state : OneSidedState
-            Changes in place.
-        time : float
-            Not before the time of the state.
-        rise : ndarray, shape (coordinates, P), optional
-            Forces that rise, per time: the load is t times these.
-        """
-        count = int(np.ceil((time - state.time) / self.time_step - 1e-9))
-        if count < 1:
-            return
-        load = None if rise is None else self.on_active(rise)
-        self.take_steps(state, (time - state.time) / count, count, rise=load)
-        state.time = time
-
-    def take_steps(
-        self,
-        state: OneSidedState,
-        time_step: float,
-        count: int,
-        *,
-        rise: Floats | None = None,
-        constant: Floats | float = 0.0,
-        extrapolates: bool = False,
-        look: Callable[[OneSidedState], None] | None = None,
-    ) -> None:
-        """Take steps of velocity Verlet.
-
-        Parameters
-        ----------
-        state : OneSidedState
-            Changes in place.
-        time_step : float
-            Of each step, time.
-        count : int
-            Number of steps.
         rise, constant : ndarray, shape (E, P), optional
             Mass-weighted forces, per time, and those that are always there.
-        extrapolates : bool
-            Whether dashpots feel 2 v(n + 1/2) - v(n), as those of mindlin/smooth do, in place of v(n + 1/2).
-        look : callable, optional
-            What looks at the state after each step.
         """
-        force = self._force(state, state.v, rise) + constant
-        for _ in range(count):
-            before = state.v.copy() if extrapolates else 0.0
+        force = self._force(state, rise) + constant
+        while True:
             state.v += 0.5 * time_step * force
             change = time_step * state.v
             state.z += change
             state.time += time_step
             if len(state.r):
-                state.r += np.abs(self.rescaled[0] @ change)
-            force = self._force(state, 2 * state.v - before if extrapolates else state.v, rise) + constant
+                state.r += np.abs(self.rates @ change)
+            force = self._force(state, rise) + constant
             state.v += 0.5 * time_step * force
-            if look is not None:
-                look(state)
+            yield state
 
-    @property
-    def remembers_nothing(self) -> bool:
-        """Whether motion is linear: no contact at the bound, and none with two derivatives."""
-        return not self.sliders[1].shape[0] and not self.rescaled[0].shape[0]
+    def _force(self, state: OneSidedState, load: Floats | None) -> Floats:
+        """Mass-weighted forces; sliders give way."""
+        force = -(self._stiffness @ state.z)
+        if self.motion.dissipative:
+            force -= self._damping @ state.v
+        if load is not None:
+            force += state.time * load
+        if len(state.r):
+            force += self.wear @ state.r
+        if len(state.p):
+            springs = self.excess @ state.z
+            if len(state.r):
+                springs += self._rectified * (self._worn @ state.r)
+            whole = springs + self.viscous_excess @ state.v
+            np.maximum(state.p, np.where(self._viscous, whole, springs), out=state.p)
+            force -= self.grip @ np.maximum(state.p, whole)
+        return np.asarray(force)
+
+    def advance(self, state: OneSidedState, time: float, share: float, rise: Floats | None = None) -> None:
+        """Go on to a time, in equal steps of no more than a share of the stable one; `rise` as of `steps`."""
+        count = int(np.ceil((time - state.time) / (share * self.stable_step) - 1e-9))
+        if count > 0:
+            for _ in islice(self.steps(state, (time - state.time) / count, rise), count):
+                pass
+            state.time = time
 
     def advance_exactly(self, state: OneSidedState, time: float, rise: Floats | None = None) -> None:
         """As `advance`, of a linear motion: by the exponential of (z, v, t, 1), to rounding."""
-        a, g = self.motion.stiffness, self.motion.damping
-        size, columns = state.z.shape
+        a, g, (size, columns) = self.motion.stiffness, self.motion.damping, state.z.shape
         omega = float(np.sqrt(abs(a).sum(axis=1).max(initial=0.0))) or 1.0  # so that both halves weigh as much
-        load = np.zeros((size, columns)) if rise is None else self.on_active(rise)
         clock = csr_array([[0.0, 1.0], [0.0, 0.0]])  # of t and 1
         for k in range(columns):
-            pull = csr_array(np.column_stack([load[:, k], np.zeros(size)]))
+            pull = csr_array(np.column_stack([np.zeros(size) if rise is None else rise[:, k], np.zeros(size)]))
             system = block_array([[None, omega * eye_array(size), None], [-a / omega, -g, pull], [None, None, clock]])
             before = np.concatenate([omega * state.z[:, k], state.v[:, k], [state.time, 1.0]])
             after = expm_multiply((time - state.time) * csr_array(system), before)
             state.z[:, k], state.v[:, k] = after[:size] / omega, after[size : 2 * size]
         state.time = time
 
-    def _force(self, state: OneSidedState, velocity: Floats, load: Floats | None) -> Floats:
-        """Mass-weighted forces; sliders give way."""
-        stiffness, damping = self._operators
-        force = -_product(stiffness, state.z)
-        if damping is not None:
-            force -= _product(damping, velocity)
-        if load is not None:
-            force += state.time * load
-        if len(state.r):
-            force += self.rescaled[1] @ state.r
-        if len(state.p):
-            grip, excess, viscous_excess, rectified, viscous = self.sliders
-            springs = excess @ state.z
-            if len(state.r):
-                springs += rectified * (self.rescaled[2] @ state.r)
-            whole = springs if damping is None else springs + viscous_excess @ velocity
-            np.maximum(state.p, np.where(viscous, whole, springs), out=state.p)
-            force -= grip @ np.maximum(state.p, whole)
-        return force
+    def displacement(self, z: Floats) -> Floats:
+        """Displacements of the particles, shape (N, d, P), of mass-weighted coordinates in columns."""
+        c = self.configuration
+        return np.asarray((self._translations @ z).reshape(c.dimension, len(c), -1).transpose(1, 0, 2))
 
     def mean_square_displacement(self, z: Floats) -> Floats:
         """D of mass-weighted coordinates in columns, shape (P,)."""
-        return np.asarray(np.sum(self.displacement(z) ** 2, axis=1).mean(axis=0))
-
-    def free_flight(self, velocity: Floats, rise: Floats | None, time: float) -> Floats:
-        """Displacements and velocities of the coordinates that no contact acts on, zero of the others.
-
-        Parameters
-        ----------
-        velocity : ndarray, shape (coordinates, P)
-            At t = 0.
-        rise : ndarray, shape (coordinates, P), optional
-            Forces per time.
-        time : float
-            After which time, shape of the result (2, coordinates, P).
-        """
-        c = self.motion.configuration
-        flies = c.coordinate_free.copy()
-        flies[self.motion.active] = False
-        drag = c.drag_rate if self.motion.dissipative else 0.0
-        of_both = expm(time * np.array([[0, 1, 0, 0], [0, -drag, 1, 0], [0, 0, 0, 1], [0, 0, 0, 0]]))[:2]
-        gain = np.zeros_like(velocity) if rise is None else rise / c.coordinate_mass[:, None]
-        return np.array([np.where(flies[:, None], v * velocity + g * gain, 0.0) for _, v, _, g in of_both])
-
-    @cached_property
-    def _translations(self) -> Matrix:
-        """Displacements of the particles along the axes, shape (d N, E), by mass-weighted coordinates."""
-        c = self.motion.configuration
-        whole = self.mass_weight if c.constraint is None else c.constraint @ self.mass_weight
-        return _for_products(csr_array(whole)[: c.dimension * len(c)])
-
-    def displacement(self, z: Floats, flight: Floats | None = None) -> Floats:
-        """Displacements of the particles, shape (N, d, P), of mass-weighted coordinates, and of `free_flight`."""
-        c = self.motion.configuration
-        q = self._translations @ z
-        if flight is not None:
-            q += (flight if c.constraint is None else c.constraint @ flight)[: len(q)]
-        return np.asarray(q.reshape(c.dimension, len(c), -1).transpose(1, 0, 2))
+        return np.asarray(np.sum((self._translations @ z) ** 2, axis=0) / len(self.configuration))
 
 
-def _for_products(matrix: csr_array) -> Matrix:
+def fast(matrix: csr_array) -> Matrix:
     """A sparse matrix in the form that is faster for products with a few columns."""
-    return matrix.toarray() if np.prod(matrix.shape) <= DENSE_ENTRIES else csr_array(matrix)
+    # ten times as fast for 60 coordinates and fewer
+    return matrix.toarray() if np.prod(matrix.shape) <= 150**2 else csr_array(matrix)
 
 
-def _product(matrix: Matrix | bsr_array, columns: Floats) -> Floats:
-    """Products with columns: of blocks one by one, which takes less than half of the time of all at once."""
-    if not isinstance(matrix, bsr_array):
-        return np.asarray(matrix @ columns)
-    made = np.empty(columns.shape, order="F")
-    for k in range(columns.shape[1]):
-        made[:, k] = matrix @ columns[:, k]
-    return made
+class Look(NamedTuple):
+    """Motions in a span of time: when it ends; mean kinetic energies and largest D of the motions, shape (P,); p and r
+    at the end; and the smallest multiples of the motions that take a contact to another state, shape (P,), with the D
+    that these have there."""
+
+    time: float
+    energy: Floats
+    size: Floats
+    slid: Floats
+    paths: Floats
+    first: Floats
+    size_at_first: Floats
+
+
+def looks(
+    system: OneSidedSystem, velocity: Floats, span: float, rise: Floats | None = None, beside: bool = False
+) -> Iterator[Look]:
+    """One look after the other, each at a span of motions that go on; every stable step is looked at.
+
+    Parameters
+    ----------
+    system : OneSidedSystem
+        The equations.
+    velocity : ndarray, shape (coordinates, P)
+        Of the start.
+    span : float
+        Time of a look.
+    rise : ndarray, shape (E, P), optional
+        Mass-weighted forces that rise, per time.
+    beside : bool
+        Whether two more motions are followed from rest: of what contacts lack to the bound, as a force; and of the
+        residual forces.
+    """
+    if beside:
+        velocity = np.hstack([velocity, np.zeros((len(velocity), 2))])
+        rise = None if rise is None else np.hstack([rise, np.zeros((len(rise), 2))])
+    state = system.start(velocity)
+    constant = np.zeros_like(state.z)
+    if beside:
+        constant[:, -2:] = np.hstack([-(system.grip @ system.missing), system.residual_force])
+    count, every = max(int(np.ceil(span / (VERDICT_STEP * system.stable_step) - 1e-9)), 1), round(1 / VERDICT_STEP)
+    while True:
+        steps = system.steps(state, span / count, rise, constant)
+        seen = []
+        for k in range(1, count + 1):
+            next(steps)
+            if k % every == 0 or k == count:
+                seen.append([each.copy() for each in (state.z, state.v, state.p, state.r)])
+        z, v, p, r = (np.hstack(each) for each in zip(*seen, strict=True))
+        sizes = system.mean_square_displacement(z).reshape(len(seen), -1)
+        first = system.changes.first(z, v, p, r).reshape(len(seen), -1)
+        energy = np.sum(v**2, axis=0).reshape(len(seen), -1).mean(axis=0)
+        at = first.argmin(axis=0), np.arange(sizes.shape[1])
+        yield Look(state.time, energy, sizes.max(axis=0), state.p.copy(), state.r.copy(), first[at], sizes[at])
+
+
+def least_scale(seen: list[Look]) -> float:
+    """The multiple of some motions from which on neither what contacts lack to the bound nor residual forces count, by
+    looks `beside` the motions; infinite if residual forces alone take a contact to another state."""
+    if min(look.first[-1] for look in seen) < 1:
+        return np.inf
+    size = np.max([look.size for look in seen], axis=0)
+    return PUSH_OVER_RESIDUAL * float(np.sqrt(size[-2:].max() / size[:-2].min())) if size[-2:].any() else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class OneSidedMotion:
+    """Displacements of the particles from the equilibrium, for the push or the rate of loading as it was given.
+
+    Attributes
+    ----------
+    times : ndarray, shape (T,)
+        Times.
+    displacement, velocity : ndarray, shape (T, N, d)
+        Length, and length / time.
+    slid : ndarray, shape (T, B)
+        p of each contact at the bound: the tangential force that its slider has taken away, force.
+    scales : tuple of float
+        Between which multiples of the push, or of the rate, the motion holds, as it was seen in the first `CHUNK`
+        stable steps and at these times: with smaller ones contacts that count as at the bound do not reach it, or the
+        residual forces move the packing as well, and with larger ones other contacts reach the bound, open or close, or
+        the force of one at the bound turns.
+    """
+
+    times: Floats
+    displacement: Floats
+    velocity: Floats
+    slid: Floats
+    scales: tuple[float, float]
+
+    @property
+    def mean_square_displacement(self) -> Floats:
+        """D: mean over the particles of |displacement|^2, length^2, shape (T,)."""
+        return np.asarray(np.sum(self.displacement**2, axis=2).mean(axis=1))
+
+
+def one_sided_motion(
+    packing: HasConfiguration,
+    velocity: ArrayLike | None = None,
+    rise: str | ArrayLike | None = None,
+    times: ArrayLike = (0.0,),
+) -> OneSidedMotion:
+    """Small motion of a configuration after a push, or under a load that rises, contacts at the bound as they are.
+
+    Parameters
+    ----------
+    packing : Configuration or Packing
+        The equilibrium, with its dashpots and drag.
+    velocity : array_like, shape (N, d), optional
+        Velocities at t = 0, length / time; none by default. The motion is homogeneous, so that numbers of order one do.
+    rise : "fx" or array_like, shape (N, d), optional
+        Forces per unit of time that are added to the load, or a unit force on each particle of the upper layer along x;
+        none by default.
+    times : array_like, shape (T,)
+        When to look, increasing, not negative.
+
+    Returns
+    -------
+    OneSidedMotion
+        Particles that touch nothing fly on, with their drag.
+
+    Raises
+    ------
+    ValueError
+        If a shape does not fit, times are not finite and increasing, or rise is "fx" without an upper layer.
+    """
+    time = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    if time.ndim != 1 or not np.all(np.isfinite(time)) or np.any(np.diff(time, prepend=0.0) < 0):
+        raise ValueError("The times of a motion are finite, not negative, and in increasing order.")
+    system = OneSidedSystem.of(packing)
+    c, active, dissipative = system.configuration, system.motion.active, system.motion.dissipative
+    push = _on_all_coordinates(c, "velocity", velocity)
+    load = np.zeros_like(push) if rise is None else forces_on_coordinates(c, rise)
+    pull = np.asarray(system.weight.T @ load)
+    least, most, end = 0.0, np.inf, min(CHUNK * system.stable_step, float(time[-1]))
+    if end:
+        beginning = list(islice(looks(system, push, end / LOOKS_PER_CHUNK, pull, beside=True), LOOKS_PER_CHUNK))
+        least, most = least_scale(beginning), float(min(look.first[0] for look in beginning))
+    flies = c.coordinate_free.copy()
+    flies[active] = False
+    free = np.array([push, load / c.coordinate_mass[:, None]]) * flies[:, None]
+    drag = c.drag_rate if dissipative else 0.0
+    flight = np.array([[0, 1, 0, 0], [0, -drag, 1, 0], [0, 0, 0, 1], [0, 0, 0, 0]])  # of x, v, t g and g
+    state, seen = system.start(push), []
+    for each in time:
+        if system.remembers_nothing:
+            system.advance_exactly(state, float(each), pull)
+        else:
+            system.advance(state, float(each), MOTION_STEP, pull)
+        most = min(most, float(system.changes.first(state.z, state.v, state.p, state.r)[0]))
+        moved = []
+        for z, row in zip((state.z, state.v), expm(each * flight)[:2], strict=True):
+            whole = system.weight @ z + row[1] * free[0] + row[3] * free[1]
+            whole = whole if c.constraint is None else c.constraint @ whole
+            moved.append(whole[: c.dimension * len(c)].reshape(c.dimension, len(c)).T)
+        seen.append((*moved, state.p[:, 0].copy()))
+    moved_by, speed, slid = (np.array(each) for each in zip(*seen, strict=True))
+    return OneSidedMotion(time, moved_by, speed, slid, (least, most))
 
 
 def forces_on_coordinates(configuration: Configuration, rise: str | ArrayLike) -> Floats:
@@ -350,11 +392,11 @@ def forces_on_coordinates(configuration: Configuration, rise: str | ArrayLike) -
         if rise != "fx" or not configuration.top.any():
             raise ValueError('rise is "fx" of a packing with an upper layer, or an array of forces, shape (N, d).')
         rise = np.outer(configuration.top, np.eye(configuration.dimension)[0])
-    whole = on_all_coordinates(configuration, "rise", rise)
+    whole = _on_all_coordinates(configuration, "rise", rise)
     return whole if configuration.constraint is None else np.asarray((configuration.constraint != 0).T @ whole)
 
 
-def on_all_coordinates(configuration: Configuration, name: str, values: ArrayLike | None) -> Floats:
+def _on_all_coordinates(configuration: Configuration, name: str, values: ArrayLike | None) -> Floats:
     """Vectors of the particles, shape (N, d), on all coordinates, shape (coordinates, 1); zero by default."""
     whole = np.zeros((configuration.axes, len(configuration)))
     if values is not None:

@@ -1,4 +1,4 @@
-r"""Does linear motion from a random state decay? A verdict where there is no certificate.
+r"""Does linear motion from a random state grow, or decay? Any number of coordinates, by products with matrices alone.
 
 The state :math:`u = (\omega_0 z, \dot z)` of :math:`\ddot z + G \dot z + A z = 0` obeys :math:`\dot u = Z u`. Let l be
 the unit left vector of an eigenvalue s of Z. Then
@@ -16,18 +16,29 @@ This holds for every :math:`\omega_0`. With a low :math:`\omega_0` :math:`|u|` f
 last. **One state serves best.** Of n states each may miss :math:`\delta^{1/n}`. The time until one has fallen so far is
 in proportion to :math:`\ln |u(0)| + \frac1n \ln \frac1\delta`, and n states cost n times that.
 
+**Growth.** Once :math:`|u|^2` has risen by five decades, the fastest motion has left most others behind. Two states,
+one after the other, span its plane nearly, and Newton's steps find its eigenvalue s and its shape z from there:
+
+.. math:: P(s) = s^2 + s G + A, \qquad P(s)\, y = P'(s)\, z, \qquad s \to s - \frac{z^H z}{z^H y}, \quad z \to y .
+
+If the state grows faster than that, s is a lower bound: another of many motions that grow alike is faster.
+
 Motion of one particle that no force opposes is left out, and common motion of all particles along an axis on which no
 force opposes it, as in a periodic box. Any other motion that no force opposes leaves the answer open.
 
 **Steps** are those of velocity Verlet with dashpots at the velocity of the half step. Motion without loss neither grows
-nor decays in these steps; motion that grows in spite of dashpots grows faster in longer steps. So growth is measured
-once more in shorter ones, and both give the rate with its error.
+nor decays in these steps; motion that grows in spite of dashpots grows faster in longer steps, which s does not.
 """
 
-import numpy as np
-from scipy.sparse import csr_array
+from dataclasses import replace
 
-from ..arrays import Floats
+import numpy as np
+from scipy.linalg import eig, qr
+from scipy.sparse import csc_array, csr_array, eye_array
+
+from ..arrays import Complexes, Floats
+from ..errors import BadInputError
+from ..factors.sparse_lu import SingularMatrixError, general_lu
 from ..progress import report_progress
 from .eigenvalues import Linear
 from .motion import Motion
@@ -36,34 +47,147 @@ from .stable_timestep import stable_timestep
 CHANCE = 1e-3
 """delta: the probability that a motion which grows is overlooked."""
 
-REFERENCE = 0.1
-"""omega_0 as a share of the largest frequency: about the slowest motions that are left in the end."""
 
-STATE_WORK, OVERHEAD = 2e11, 2e4
-"""Multiplications with entries of A and G, three minutes, and those that could be done in the time that a step
-takes."""
+def follow(
+    a: csr_array, g: csr_array, limit: float, state: Floats, looks: float, patience: float = np.inf
+) -> tuple[Linear, float, float]:
+    """Follow a motion until it has decayed, or grows.
 
-GIVEN_UP, WITHIN = 0.1, 3.0
-"""Share of the work after which the motion is given up that would take so many times the work to decay."""
+    Parameters
+    ----------
+    a, g : scipy.sparse.csr_array, shape (n, n)
+        A, 1 / time^2, and G, 1 / time.
+    limit : float
+        The largest stable time step.
+    state : ndarray, shape (n, 2)
+        Normal random numbers, but for motion that is left out.
+    looks : float
+        How often a hundred steps are taken at the most.
+    patience : float
+        How many times that motion may need to decay: otherwise it is given up after a tenth.
 
-STEP, FINER = 0.6, 4
-"""Time step as a share of the largest stable one, and the part of it in which growth is measured once more. Of fifty
-spheres growth at 82 of 190, the largest frequency, is 0.169 in place of 0.122, and slow decay is right to a
-hundredth."""
+    Returns
+    -------
+    Linear
+        Stable, unstable, or not known; D then grows no faster than as exp(`searched` t).
+    float
+        How long it was followed.
+    float
+        After which time the motion may have decayed.
+    """
+    # omega_0 is about that of the slowest motions that are left in the end
+    reference, step, wanted = 0.1 * 2 / limit, 0.6 * limit, 2 * np.log(CHANCE)
+    z, v, span, scale = state[:, 0] / reference, state[:, 1].copy(), 100 * step, 0.0
+    logs, needed = [float(np.log(reference**2 * (z @ z) + v @ v))], np.inf
+    while len(logs) <= max(looks, 8):
+        size = float(np.abs(v).max(initial=0.0)) or 1.0  # growth may be beyond all numbers
+        before, squares, scale = (z / size, v / size), [], scale + 2 * float(np.log(size))
+        z, v = before[0].copy(), before[1].copy()
+        v -= 0.5 * step * (a @ z + g @ v)
+        for k in range(1, 101):
+            z += step * v
+            v -= (step if k < 100 else 0.5 * step) * (a @ z + g @ v)
+            if k % 7 == 0:  # a mean, as |u|^2 of one motion oscillates; seven steps divide no period for long
+                squares.append(reference**2 * (z @ z) + v @ v)
+        logs.append(scale + float(np.log(np.mean(squares))))
+        now, after = span * (len(logs) - 1), np.array(logs[int(np.argmin(logs)) :])
+        falls = _slope(logs, span)
+        if logs[-1] <= wanted:
+            said = f"motion from a random state decayed in t = {now:.4g} so far that any growth would be seen"
+            return Linear(True, falls, abs(falls), said=said), now, now
+        if len(after) > 8 and after[-1] - after[0] > 5 * np.log(10) and after[-1] > after.max() - 1:
+            coarse = _slope(list(after), span)
+            # as the square of the time, by motion that no force opposes, this is 3; by so many decades it is 11
+            if coarse * now > 8:
+                s, _, error = motion_near(a, g, _of_plane(a, g, before, (z, v)), z)
+                if s.real > 10 * error:
+                    at_least = coarse > 4 * s.real  # steps make up to a half of that
+                    return Linear(False, 2 * s.real, 2 * error, s=s, at_least=at_least), now, np.inf
+            break
+        needed = now - (logs[-1] - wanted) / falls if falls * now < -1 else np.inf
+        if len(logs) % 10 == 0:
+            report_progress(f"motion from a random state: t = {now:.4g} of {min(needed, span * looks):.4g}")
+        if len(logs) > max(0.1 * looks, 8) and needed > patience * looks * span:
+            break
+    return Linear(None, falls, searched=float(logs[-1] - wanted) / now), now, needed
 
-STEPS, BETWEEN = 100, 7
-"""Steps between two looks, and between two values of |u|^2 of which a look has the mean; the second divides no period
-for long."""
 
-GROWN, FOLDS = 5.0, 4.0
-"""Decades of |u|^2 above its least from which growth is looked at, and e-folds for which it is measured once more."""
+def _of_plane(a: csr_array, g: csr_array, *states: tuple[Floats, Floats]) -> complex:
+    """s of the plane of two states (z, v), in which one motion is most of both."""
+    scale = float(np.linalg.norm(states[1][1]) / np.linalg.norm(states[1][0]))
+    basis = qr(np.column_stack([np.concatenate([scale * z, v]) for z, v in states]), mode="economic")[0]
+    z, v = np.split(basis, 2)
+    image = np.vstack([scale * v, -(a @ z) / scale - g @ v])
+    s, x = eig(basis.T @ image)
+    residuals = np.linalg.norm(image @ x - (basis @ x) * s, axis=0)
+    return complex(s[int(np.argmin(residuals))])
 
-ALGEBRAIC = 8.0
-"""Growth rate times the time below which |u|^2 may grow as the square of the time, by motion that no force opposes:
-that has 3, and exponential growth by so many decades 11."""
 
-FREE_FORCE = 1e-12
-"""Force on a common displacement, as a share of the largest entry of A, that is no force."""
+def motion_near(a: csr_array, g: csr_array, s: complex, shape: Floats) -> tuple[complex, Complexes, float]:
+    """The motion with the eigenvalue next to a number: s, its shape z of norm 1, and the error of s by its residual."""
+    identity, z = eye_array(a.shape[0]), shape.astype(complex)
+    for _ in range(4):
+        try:
+            factors = general_lu(csc_array(s**2 * identity + s * g + a.astype(complex)))
+        except SingularMatrixError:
+            break
+        for _ in range(3):
+            y = factors.solve(2 * s * z + g @ z)
+            step = np.vdot(z, z) / np.vdot(z, y)
+            z = y / np.linalg.norm(y)
+        s -= complex(step)
+        if abs(step) < 1e-9 * abs(s):
+            break
+    s = s.conjugate() if s.imag < 0 else s
+    left, slope = s**2 * z + s * (g @ z) + a @ z, 2 * s * z + g @ z
+    rounding = 1e-14 * np.sqrt(np.abs(a.data).max(initial=0.0))
+    return s, z, float(np.linalg.norm(left) / np.linalg.norm(slope) + rounding)
+
+
+def fastest_growing(
+    stiffness: csr_array, damping: csr_array | None = None, periods: tuple[float, float] = (30.0, 1000.0)
+) -> Linear:
+    """Find the fastest growing motion.
+
+    Parameters
+    ----------
+    stiffness : scipy.sparse.csr_array, shape (n, n)
+        A = M^(-1/2) K M^(-1/2), 1 / time^2, of the coordinates that feel a force.
+    damping : scipy.sparse.csr_array, shape (n, n), optional
+        G = M^(-1/2) C M^(-1/2), 1 / time.
+    periods : tuple of (float, float)
+        The first and the longest time that is looked at, in periods of the fastest motion, of which ten are followed.
+        What grows more slowly than about 3 over the longest time is not looked for.
+
+    Returns
+    -------
+    Linear
+        Unstable, or not known; then nothing is likely to grow at a rate above `searched`. Stable where all motion
+        decays.
+
+    Raises
+    ------
+    BadInputError
+        If the times are out of range, or the operator is too small to need products.
+
+    Examples
+    --------
+    >>> from scipy.sparse import csr_array, diags_array
+    >>> found = fastest_growing(csr_array(diags_array([-0.25, *range(1, 40)])))
+    >>> found.stable, round(found.growth_rate, 6)
+    (False, 1.0)
+    """
+    size = stiffness.shape[0]
+    if not 0 < periods[0] <= periods[1]:
+        raise BadInputError(f"{periods[0]:g} to {periods[1]:g} periods are not ascending: give times above zero.")
+    if size <= 8:
+        raise BadInputError(f"An operator of {size} coordinates is for `spectrum`: products serve more than 8.")
+    g = csr_array(stiffness.shape) if damping is None else damping
+    k, c = (float(abs(each).sum(axis=1).max(initial=0.0)) for each in (stiffness, g))
+    limit = 4 / (c + np.sqrt(c * c + 4 * k))  # stable for certain, by the largest sums of rows
+    state = np.random.Generator(np.random.PCG64(0)).standard_normal((size, 2))
+    # k is twice the square of the largest frequency, or so
+    return follow(stiffness, g, limit, state, 10 * periods[1] * 2 * np.pi / np.sqrt(0.5 * k) / (60 * limit))[0]
 
 
 def follow_decay(
@@ -72,7 +196,7 @@ def follow_decay(
     why: str,
     time: float | None = None,
     searched: float = np.inf,
-    work: float = STATE_WORK,
+    work: float = 2e11,
 ) -> Linear:
     """Follow the motion from a random state until it has decayed, or grows.
 
@@ -89,74 +213,30 @@ def follow_decay(
     searched : float
         Growth rate of D, 1 / time, above which nothing grows, as is known already.
     work : float
-        Multiplications.
+        Multiplications with entries of A and G; three minutes by default.
     """
-    a, g = motion.in_blocks(motion.stiffness), motion.in_blocks(motion.damping)
-    limit = float(stable_timestep(motion.configuration))
-    reference, dt = REFERENCE * 2 / limit, STEP * limit
-    state = np.random.Generator(np.random.PCG64(0)).standard_normal((len(motion.active), 2))
-    state = kept @ (kept.T @ state)
-    drifts = _free_translations(motion)
-    for common in drifts:
-        state -= np.outer(common, common @ state)
-    z, v = state[:, 0] / reference, state[:, 1].copy()
-    free = len(motion.active) - kept.shape[1] + len(drifts)
-
-    def look(step: float) -> float:
-        """Take some steps: the logarithm of the mean |u|^2 on the way, as that of one motion oscillates."""
-        nonlocal z, v
-        squares = []
-        v -= 0.5 * step * (a @ z + g @ v)
-        for k in range(STEPS):
-            z += step * v
-            v -= (step if k < STEPS - 1 else 0.5 * step) * (a @ z + g @ v)
-            if k % BETWEEN == BETWEEN - 1:
-                squares.append(reference**2 * (z @ z) + v @ v)
-        return float(np.log(np.mean(squares)))
-
-    span, wanted = STEPS * dt, 2 * np.log(CHANCE)
-    most = work / (STEPS * (OVERHEAD + a.nnz + g.nnz)) if time is None else time / span
-    logs = [float(np.log(reference**2 * (z @ z) + v @ v))]
-    while len(logs) <= max(most, 8):
-        logs.append(look(dt))
-        now, after = span * (len(logs) - 1), np.array(logs[int(np.argmin(logs)) :])
-        falls = _slope(logs, span)
-        if logs[-1] <= wanted:
-            said = f"motion from a random state decayed in t = {now:.4g} so far that any growth would be seen"
-            return Linear(True, falls, abs(falls), free, said=said)
-        if len(after) > 8 and after[-1] - after[0] > GROWN * np.log(10) and after[-1] > after.max() - 1:
-            coarse = _slope(list(after), span)
-            count = int(np.ceil(FOLDS / max(coarse, 1 / now) / span * FINER)) + 1
-            fine = _slope([look(dt / FINER) for _ in range(2 * count)], span / FINER)
-            rate, error = fine + (fine - coarse) / (FINER**2 - 1), abs(fine - coarse)
-            if rate > error and rate * now > ALGEBRAIC:
-                return Linear(False, rate, error, free, said="motion from a random state grows")
-            break
-        needed = now - (logs[-1] - wanted) / falls if falls * now < -1 else np.inf
-        if len(logs) % 10 == 0:
-            report_progress(f"decay of a random state: t = {now:.4g} of {needed:.4g}")
-        if time is None and len(logs) > max(GIVEN_UP * most, 8) and needed > WITHIN * most * span:
-            break
-    bound = min(searched, (logs[-1] - wanted) / now)
+    a, g, c, size = motion.stiffness, motion.damping, motion.configuration, len(motion.active)
+    state = np.random.Generator(np.random.PCG64(0)).standard_normal((size, 2))
+    state, free = kept @ (kept.T @ state), size - kept.shape[1]
+    for axis in range(c.dimension):  # common motion along an axis on which no force opposes it
+        along = (motion.active // len(c) == axis) * motion.root_mass
+        if along.any() and np.abs(a @ along).max() <= 1e-12 * np.linalg.norm(along) * np.abs(a.data).max(initial=0.0):
+            along /= np.linalg.norm(along)
+            state -= np.outer(along, along @ state)
+            free += 1
+    limit = float(stable_timestep(c))
+    # a step takes the time of 2e4 multiplications at the least
+    looks = work / (100 * (2e4 + a.nnz + g.nnz)) if time is None else time / (60 * limit)
+    found, now, needed = follow(a, g, limit, state, looks, 3.0 if time is None else np.inf)
+    if found.stable is not None:
+        return replace(found, free=free)
+    bound = min(searched, found.searched)
     would = f"`time` = {needed:.2g} would do" if np.isfinite(needed) else "in which motion did not decay"
     reason = (
         f"{why}; no motion was found to grow, and D grows no faster than exp({bound:.2g} t), as motion from a random "
         f"state shows within t = {now:.4g}; {would}"
     )
-    return Linear(None, falls, free=free, searched=bound, reasons=(reason,))
-
-
-def _free_translations(motion: Motion) -> list[Floats]:
-    """Unit vectors of the common motions along an axis that no force opposes, mass-weighted."""
-    configuration, count = motion.configuration, len(motion.configuration)
-    largest, found = np.abs(motion.stiffness.data).max(initial=0.0), []
-    for axis in range(configuration.dimension):
-        along = (motion.active // count == axis) * motion.root_mass
-        if along.any():
-            common = along / np.linalg.norm(along)
-            if np.abs(motion.stiffness @ common).max() <= FREE_FORCE * largest:
-                found.append(common)
-    return found
+    return replace(found, free=free, searched=bound, reasons=(reason,))
 
 
 def _slope(logs: list[float], between: float) -> float:

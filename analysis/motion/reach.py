@@ -24,7 +24,7 @@ and distances as above.
 **The gain.** In coordinates whose square is 2 E the motion is :math:`e^{Zt}`. Its norm at :math:`2\tau` and
 :math:`3\tau`, times its bound up to :math:`\tau`, bounds it up to :math:`4\tau`, and so on; once the norm is below one,
 for ever. Without dissipation the energies of the modes of :math:`S + N` are constant, and bound E. Of more than
-`DENSE_GAIN` coordinates :math:`\mathcal G = e` up to the time :math:`1 / |S^{-1/2} N|` (the numerical abscissa;
+600 coordinates :math:`\mathcal G = e` up to the time :math:`1 / |S^{-1/2} N|` (the numerical abscissa;
 Trefethen and Embree, *Spectra and Pseudospectra*, 2005, chapter 14).
 
 **Motions that no force opposes** have no energy of their own: :math:`S + \epsilon` with :math:`\epsilon = 1/t^2` stands
@@ -38,47 +38,22 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky, eig, eigh, expm, solve_triangular
 from scipy.sparse import csc_array, csr_array, eye_array
-from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.sparse.linalg import LinearOperator, eigsh, svds
 
-from ..arrays import Complexes, Floats
-from ..factors.sparse_lu import Factors, SingularMatrixError, general_lu, symmetric_lu
-from ..operators.contact_changes import ContactChanges
+from ..arrays import Floats, Indices
+from ..factors.sparse_lu import Factors, SingularMatrixError, symmetric_lu
 from ..progress import report_progress
 from .motion import Motion
 from .one_sided import OneSidedSystem
-from .stable_timestep import stable_timestep
-
-DENSE_GAIN = 600
-"""Coordinates up to which the gain is computed: two seconds."""
+from .random_state import motion_near
 
 FREE_TIME = 500.0
 """Up to which time a bound holds of a packing with motions that no force opposes, in stable time steps: some hundred
 periods of the fastest motion, twenty of a slow one."""
 
-OCTAVES = 22
-"""Doublings of a quarter of the stable time step until the norm is to fall below one."""
-
-LARGEST_GAIN = 1e4
-"""Gain of the energy beyond which no longer time is looked at."""
-
-SYMMETRIC = 1e-12
-"""Share of the largest entry of S below which N is rounding."""
-
-CONTACTS_TOGETHER = 64
-"""Contacts whose columns are solved for together."""
-
-ANGLES, ZOOMS = 32, 4
-"""Angles of the cone that are looked at, and how often more closely about the best."""
-
-PHASES = 64
-"""Phases of a motion that grows."""
-
 OVERLAP_CHANGE = 0.1
 """Share by which an overlap of Hertz's law may change. The error of D rises in proportion: with a quarter it was up to
 2.6 % after pushes of one particle and of all in twenty disks, of LAMMPS's own motion."""
-
-SAFE = 2.0
-"""By which factor the stiffness of a contact alone may be lower in the packing, as normal forces soften it."""
 
 
 @dataclass(frozen=True)
@@ -95,28 +70,28 @@ class PushBound:
         Up to which time this holds; infinite if for ever.
     residual_energy : float
         Energy of the displacement by the residual forces.
-    unsettled : bool
-        Whether the residual forces alone may take a contact to another state.
+    unsettled : ndarray of int
+        Numbers of the contacts that the residual forces alone may take to another state; -1 for a gap that closes.
     """
 
     energy: float
     gain: float
     time: float
     residual_energy: float
-    unsettled: bool
+    unsettled: Indices
 
 
-def reach_of(motion: Motion, free: int = 0) -> PushBound | None:
+def reach_of(system: OneSidedSystem, free: int = 0) -> PushBound | None:
     """The bound for all pushes of a linear motion that does not grow; None if its energy is not positive.
 
     Parameters
     ----------
-    motion : Motion
-        With sticking contacts, none of them at Coulomb's bound.
+    system : OneSidedSystem
+        Of a configuration without contacts at Coulomb's bound.
     free : int
         Motions that no force opposes.
     """
-    step = float(stable_timestep(motion.configuration))
+    motion, step, changes = system.motion, system.stable_step, system.changes
     shift = (1 / (FREE_TIME * step)) ** 2 if free else 0.0
     symmetric = csc_array(0.5 * (motion.stiffness + motion.stiffness.T) + shift * eye_array(len(motion.active)))
     try:
@@ -126,41 +101,40 @@ def reach_of(motion: Motion, free: int = 0) -> PushBound | None:
     if factors.negative:
         return None
     gain, time = _gain(motion, symmetric, factors, step, FREE_TIME * step if free else np.inf)
-    system = OneSidedSystem(motion)
-    force = system.residual_force
-    moved = factors.solve(force)
-    residual = 0.5 * float(np.sum(force * moved))
-    if motion.configuration.stiffness is not None:  # the bounds of contacts are not known
-        return PushBound(np.inf, gain, time, residual, False)
-    changes = ContactChanges.of(motion.configuration)
-    radius, none = _radius(system, changes, factors), np.zeros((0, 1))
+    moved = factors.solve(system.residual_force)
+    residual = 0.5 * float(np.sum(system.residual_force * moved))
+    if system.configuration.stiffness is not None:  # the bounds of contacts are not known
+        return PushBound(np.inf, gain, time, residual, np.zeros(0, int))
     # a force that begins to act displaces twice as far as one at rest
-    paths = np.abs(system.rescaled[0] @ moved) if len(changes.wears) else none
-    first = system.contact_changes.first(2 * moved, np.zeros_like(moved), none, paths)
-    return PushBound(0.5 * radius**2 / gain, gain, time, residual, bool(first.min() < 1))
+    multiples = changes.multiples(2 * moved, 0 * moved, np.zeros((0, 1)), np.abs(system.rates @ moved))
+    unsettled = np.flatnonzero(np.minimum(multiples.reaches, multiples.opens).min(axis=1) < 1)
+    if multiples.closes.min(initial=np.inf) < 1:
+        unsettled = np.append(unsettled, -1)
+    return PushBound(0.5 * _radius(system, factors) ** 2 / gain, gain, time, residual, unsettled)
 
 
-def _radius(system: OneSidedSystem, changes: ContactChanges, factors: Factors) -> float:
+def _radius(system: OneSidedSystem, factors: Factors) -> float:
     """The smallest root of 2 E with which a contact changes.
 
     Contacts alone bound their share of S^-1, so that only those are solved for that may be the first.
     """
-    c, count, weight = system.motion.configuration.contacts, len(changes.bound), system.mass_weight
-    rows, viscous = csr_array(changes.rows @ weight), csr_array(changes.viscous @ weight)
-    dashpots = [[viscous[i * count : (i + 1) * count] for i in range(3)]] * 2
-    lost = np.array([[np.asarray(a.multiply(b).sum(axis=1)).ravel() for a in dashpots[0]] for b in dashpots[1]])
+    c, changes = system.configuration.contacts, system.changes
+    count, rows, viscous = len(c), csr_array(changes.rows), csr_array(changes.viscous)
+    dashpots = [viscous[i * count : (i + 1) * count] for i in range(3)]
+    lost = np.array([[np.asarray(a.multiply(b).sum(axis=1)).ravel() for a in dashpots] for b in dashpots])
     slope, bound, force = (each[:, 0] for each in (changes.bound_slope, changes.bound, changes.tangential))
     coupling = np.linalg.norm(0.5 * (c.closing + c.parting), axis=1) + slope
     sticks, closed = changes.sticks[:, 0], changes.overlap[:, 0].copy()
     closed[c.normal_stiffness * c.overlap > 1.01 * c.normal_force] *= OVERLAP_CHANGE
+    safe, together = 2.0, 64  # normal forces soften the stiffness of a contact alone, by less than this factor
     with np.errstate(divide="ignore", invalid="ignore"):
         alone = c.tangential_stiffness + np.nan_to_num(coupling**2 / c.normal_stiffness, nan=0.0, posinf=np.inf)
-        least = np.where(sticks, (bound - force) / np.sqrt(SAFE * alone + np.trace(lost)), np.inf)
-        least = np.minimum(least, np.where(closed > 0, closed * np.sqrt(c.normal_stiffness / SAFE), np.inf))
+        least = np.where(sticks, (bound - force) / np.sqrt(safe * alone + np.trace(lost)), np.inf)
+        least = np.minimum(least, np.where(closed > 0, closed * np.sqrt(c.normal_stiffness / safe), np.inf))
     least = np.nan_to_num(least, nan=0.0, posinf=np.inf)
     order, best = np.argsort(least, kind="stable"), np.inf
-    for begin in range(0, len(order), CONTACTS_TOGETHER):
-        here = order[begin : begin + CONTACTS_TOGETHER]
+    for begin in range(0, len(order), together):
+        here = order[begin : begin + together]
         if least[here[0]] >= best:
             break
         report_progress(f"largest push: {begin} of {len(order)} contacts looked at")
@@ -174,8 +148,8 @@ def _radius(system: OneSidedSystem, changes: ContactChanges, factors: Factors) -
         both = product * turned * turned.transpose(1, 0, 2) + lost[:, :, here]
         reaches = np.where(sticks[here], _cone_distance(both, force[here], bound[here]), np.inf)
         best = min(best, float(opens.min(initial=np.inf)), float(reaches.min(initial=np.inf)))
-    for begin in range(3 * count, rows.shape[0], 3 * CONTACTS_TOGETHER):
-        columns = rows[begin : begin + 3 * CONTACTS_TOGETHER].toarray().T
+    for begin in range(3 * count, rows.shape[0], 3 * together):
+        columns = rows[begin : begin + 3 * together].toarray().T
         size = np.sqrt(np.sum(columns * factors.solve(columns), axis=0))
         gap = changes.gap[begin - 3 * count : begin - 3 * count + len(size), 0]
         with np.errstate(divide="ignore"):
@@ -188,25 +162,21 @@ def _cone_distance(product: Floats, force: Floats, bound: Floats) -> Floats:
 
     Norms are those of the products, shape (3, 3, C).
     """
-    middle, half = np.zeros(len(force)), np.pi
-    for _ in range(1 + ZOOMS):
-        angle = middle[:, None] + half * np.linspace(-1, 1, ANGLES + 1)
-        n = np.stack([np.cos(angle), np.sin(angle), -np.ones_like(angle)])
-        size = np.sqrt(np.maximum(np.einsum("ica,ijc,jca->ca", n, product, n), 0.0))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            distance = np.nan_to_num((bound[:, None] - force[:, None] * n[0]) / size, nan=np.inf, posinf=np.inf)
-        best = distance.argmin(axis=1)
-        middle, half = np.take_along_axis(angle, best[:, None], axis=1)[:, 0], 2 * half / ANGLES
-    return np.asarray(distance.min(axis=1))
+    angle = np.linspace(-np.pi, np.pi, 4097)  # half of the way from one to the next counts for 1e-6
+    n = np.stack([np.cos(angle), np.sin(angle), -np.ones_like(angle)])
+    size = np.sqrt(np.maximum(np.einsum("ia,ijc,ja->ca", n, product, n, optimize=True), 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (bound[:, None] - force[:, None] * n[0]) / size
+    return np.asarray(np.nan_to_num(distance, nan=np.inf, posinf=np.inf).min(axis=1))
 
 
 def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, end: float) -> tuple[float, float]:
     """A bound of the gain of energy, and up to which time it holds: up to the end, if it can."""
     skew = csr_array(motion.stiffness - symmetric)  # N, and the shift of free motions
     largest = float(np.abs(symmetric.data).max(initial=0.0))
-    if float(np.abs(skew.data).max(initial=0.0)) <= SYMMETRIC * largest:
+    if float(np.abs(skew.data).max(initial=0.0)) <= 1e-12 * largest:
         return 1.0, end
-    if symmetric.shape[0] > DENSE_GAIN:
+    if symmetric.shape[0] > 600:  # two seconds
 
         def twice(x: Floats) -> Floats:
             return np.asarray(skew.T @ factors.solve(skew @ x))
@@ -229,12 +199,14 @@ def _gain(motion: Motion, symmetric: csc_array, factors: Factors, step: float, e
     time, one = 0.25 * step, expm(0.25 * step * z)
     two = one @ one
     before, after = np.exp(fastest * time), np.exp(2 * fastest * time)  # up to time, and to 2 time
-    for _ in range(OCTAVES):
-        sizes = _norm(two), _norm(one @ two)
+    for _ in range(22):  # doublings until the norm is to fall below one
+        sizes = [
+            svds(each, 1, v0=np.ones(2 * size), tol=1e-3, return_singular_vectors=False)[0] for each in (two, one @ two)
+        ]
         before, after = after, max(after, max(sizes) * before)
         if min(sizes) <= 1:
             return float(after**2), end
-        if after**2 > LARGEST_GAIN or 4 * time >= end:
+        if after**2 > 1e4 or 4 * time >= end:
             break
         time, one, two = 2 * time, two, two @ two
     return float(after**2), min(end, 4 * time)
@@ -253,29 +225,19 @@ def _gain_of_modes(stiffness: Floats, root: Floats) -> float:
     return float((larger * smaller) ** 2)
 
 
-def _norm(matrix: Floats) -> float:
-    """The largest singular value: a Ritz value errs by the square of the tolerance."""
-    square = LinearOperator(matrix.shape, lambda x: matrix.T @ (matrix @ x), dtype=float)
-    return float(np.sqrt(eigsh(square, 1, v0=np.ones(len(matrix)), tol=1e-6, return_eigenvectors=False)[0]))
-
-
-def change_of_growing(motion: Motion, s: complex) -> float | None:
+def change_of_growing(system: OneSidedSystem, s: complex) -> float | None:
     """D at which the linear motion with the eigenvalue s takes the first contact to another state; None if none is
     known that changes."""
-    if motion.configuration.stiffness is not None:
+    if system.configuration.stiffness is not None:
         return None
-    system, identity = OneSidedSystem(motion), eye_array(len(motion.active))
-    near = s * (1 + 1e-7)  # the vector of the nearest eigenvalue comes out in two steps
-    factors = general_lu(csc_array(near**2 * identity + near * motion.damping + motion.stiffness.astype(complex)))
-    shape: Complexes = np.random.default_rng(0).standard_normal(len(motion.active)).astype(complex)
-    for _ in range(3):
-        shape = factors.solve(shape)
-        shape /= np.linalg.norm(shape)
-    turns = np.exp(2j * np.pi * np.arange(PHASES) / PHASES)
+    motion = system.motion
+    start = np.random.default_rng(0).standard_normal(len(motion.active))
+    s, shape, _ = motion_near(motion.stiffness, motion.damping, s * (1 + 1e-7), start)
+    turns = np.exp(2j * np.pi * np.arange(64) / 64)
     z = np.real(shape[:, None] * turns)
     v = np.real(s * shape[:, None] * turns)
-    paths = np.zeros((system.rescaled[0].shape[0], PHASES))
-    first = system.contact_changes.first(z, v, np.zeros((system.sliders[1].shape[0], PHASES)), paths)
+    slid, paths = (np.zeros((matrix.shape[0], 64)) for matrix in (system.excess, system.rates))
+    first = system.changes.first(z, v, slid, paths)
     at = int(first.argmin())
     found = float(first[at] ** 2 * system.mean_square_displacement(z)[at])
     return found if np.isfinite(found) else None

@@ -28,8 +28,10 @@ then moves on until other contacts bear this.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count, islice
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, diags_array, eye_array
 
 from ..arrays import Floats
@@ -41,26 +43,17 @@ from ..progress import report_progress
 from .eigenvalues import operator_rounding, zero_uncertainty
 from .linear import linear_verdict
 from .motion import Motion
-from .one_sided import WORK_OF_MOTION, OneSidedSystem
+from .one_sided import PUSH_OVER_RESIDUAL, WORK_OF_MOTION, OneSidedSystem
 
 LOAD_STEP = 0.1
 """Time step of motion under a load, as a share of the largest stable one."""
 
-ERROR_OF_STEPS = 0.02
-"""Relative error of drift and vibration by these steps."""
-
 WINDOW, WINDOWS = 300, 40
 """Stable time steps of a window, some ten periods of a slow mode, and how many windows are followed at the most."""
-
-SAMPLES_OF_WINDOW = 400
-"""Velocities that a window has."""
 
 HALVES_DIFFERENCE, TREND = 0.2, 0.1
 """Relative differences of the vibrations of two halves below which a motion is steady: of the last half of the time,
 and of all of it, which then counts. In a packing whose vibration grew slowly for a third of the time it is 0.18."""
-
-VIBRATION_ERROR = 0.1
-"""Relative error of the vibration from which on a motion is not followed any longer."""
 
 FADE_WINDOWS = 4
 """Windows in which the drag fades out."""
@@ -68,40 +61,8 @@ FADE_WINDOWS = 4
 DRAG = 20.0
 """The drag at first, 1/tau in units of 1/window: it leaves exp(-DRAG FADE_WINDOWS/6) = 2e-6 of a mode's amplitude."""
 
-ONE_START = 6000
-"""Coordinates beyond which one start stands for two: each takes a minute or more."""
-
 VIBRATION_SHARE = 0.05
 """Vibration over drift above which a packing vibrates, and below which it follows the load."""
-
-VIBRATION_ROUNDING = 1e-6
-"""Vibration over drift that may be rounding: the root of a difference of squares, whose digits are 1e-13 of these."""
-
-LEAST_WINDOWS = 8
-"""Windows of a span whose halves and quarters can be compared."""
-
-ACCELERATION_POWER = 0.5
-"""Power of the time, as which the mean velocity rises, from which on a motion has no constant drift. Half of the power
-1 of particles whose dashpots alone bear a load that rises; particles that nothing bears have 2."""
-
-LARGEST_GROWTH = 1e12
-"""Growth of the vibration of a motion that has no drift."""
-
-DIAGONAL_SHIFT, REFINEMENTS = 1e-11, 3
-"""Share of the largest entry of K that is added to its diagonal, so that free motions do not divide by zero, and steps
-of refinement, each of which takes this shift out once more."""
-
-UNBORNE_SHARE = 1e-6
-"""Share of the load that may be left over where K bears the load."""
-
-WAY_CHANGES = 60
-"""How often the ways that contacts go may be changed: a few times are enough where the solution is unique."""
-
-LOAD_OVER_RESIDUAL = 10.0
-"""Displacement by the load over that by the residual forces, from which on the load counts."""
-
-TURNED_SHARE = 0.1
-"""Change of the drift by forces that have turned, from which on it is another drift."""
 
 EVENTS = "reaches Coulomb's bound", "opens", "closes", "at Coulomb's bound turns its force", "slides back"
 
@@ -130,6 +91,12 @@ class DriftAndVibration(FieldsByName):
     vibration_error: float | None
     steady: bool
 
+    @property
+    def known(self) -> bool:
+        """Whether the motion vibrates steadily, with a vibration that is known to a tenth."""
+        precise = self.vibration_error is not None and self.vibration_error <= 0.1 * self.vibration
+        return self.steady and self.vibration > VIBRATION_SHARE * self.drift and precise
+
     def vibrates_like(self, other: "DriftAndVibration") -> bool:
         """Whether the motion from another start is steady as well, or neither is, and vibrates as much."""
         least, most = sorted((self.vibration, other.vibration))
@@ -137,14 +104,9 @@ class DriftAndVibration(FieldsByName):
         return self.steady is other.steady and alike
 
     def __str__(self) -> str:
-        drift, vibration = (
-            f"{name} {size:.3g}" + (f" \u00b1 {error:.1g}" if error else "")
-            for name, size, error in (
-                ("drift", self.drift, self.drift_error),
-                ("vibration", self.vibration, self.vibration_error),
-            )
-        )
-        return f"{drift}, {vibration}{'' if self.steady else ', not steady yet'}"
+        errors = [f" \u00b1 {error:.1g}" if error else "" for error in (self.drift_error, self.vibration_error)]
+        known = f"drift {self.drift:.3g}{errors[0]}, vibration {self.vibration:.3g}{errors[1]}"
+        return known + ("" if self.steady else ", not steady yet")
 
 
 @dataclass(frozen=True)
@@ -178,8 +140,7 @@ class RisingMotion(DriftAndVibration):
     next_event: str | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Span:
+class Span(NamedTuple):
     """Sums over a span of time, of motions from S starts.
 
     Attributes
@@ -207,9 +168,7 @@ class Span:
     @classmethod
     def joined(cls, windows: Sequence["Span"]) -> "Span":
         """Of windows that follow each other."""
-        names = "displacement", "paths", "velocities", "squares", "slid"
-        sums = (np.sum([getattr(each, name) for each in windows], axis=0) for name in names)
-        return cls(sum(each.time for each in windows), *sums)
+        return cls(**{name: sum(getattr(each, name) for each in windows) for name in cls._fields})
 
     def drift_and_vibration(self, system: OneSidedSystem) -> Floats:
         """Root mean squares over particles and axes, shape (2, S)."""
@@ -219,7 +178,7 @@ class Span:
 
 
 def motion_under_load(
-    motion: Motion,
+    system: OneSidedSystem,
     direction: Floats,
     time: float | None = None,
     *,
@@ -231,8 +190,8 @@ def motion_under_load(
 
     Parameters
     ----------
-    motion : Motion
-        With sticking contacts, of a configuration in which no small motion is known to grow.
+    system : OneSidedSystem
+        Of a configuration in which no small motion is known to grow.
     direction : ndarray, shape (coordinates, 1)
         Forces per unit of time.
     time : float, optional
@@ -240,56 +199,65 @@ def motion_under_load(
     free : int
         Motions that no force opposes.
     decays : bool
-        Whether it is known that no motion grows with sticking contacts.
+        Whether it is known that no motion grows with sticking contacts: otherwise motion is followed.
     residual : float
         Root mean square displacement of the particles by the residual forces, length.
 
     Raises
     ------
     NotFollowedError
-        If the load accelerates a motion that no force opposes, or particles that touch nothing.
+        If the load accelerates a motion that no force opposes, or particles that touch nothing, or if no load is large
+        enough.
     """
-    system = OneSidedSystem(motion, LOAD_STEP)
-    loaded = motion.configuration.coordinate_free & (direction[:, 0] != 0)
-    loaded[motion.active] = False
-    if flying := len(np.unique(np.flatnonzero(loaded) % len(motion.configuration))):
+    c, load = system.configuration, np.asarray(system.weight.T @ direction)
+    loaded = c.coordinate_free & (direction[:, 0] != 0)
+    loaded[system.motion.active] = False
+    if flying := len(np.unique(np.flatnonzero(loaded) % len(c))):
         raise NotFollowedError(
             f"the load accelerates {counted(flying, 'particle')} that nothing touches: give no forces on these"
         )
-    velocity = _steady_velocity(system, direction, free) if decays else None
+    velocity = _steady_velocity(system, load, free) if decays and not len(system.missing) else None
     if velocity is None:
-        return follow_load(system, direction, time, residual)
-    paths = np.abs(system.rescaled[0] @ velocity)
-    moves = system.displacement(velocity)
-    still = Span(1.0, velocity, paths, moves, moves**2, np.zeros((0, 1)))
-    drift = float(still.drift_and_vibration(system)[0, 0])
-    return _with_range(DriftAndVibration(drift, 0.0, 0.0, 0.0, True), system, still, residual)
+        span, found = _followed(system, load, time)
+    else:
+        moves, nothing = system.displacement(velocity), np.zeros((0, 1))
+        span = Span(1.0, velocity, np.abs(system.rates @ velocity), moves, moves**2, nothing)
+        found = RisingMotion(float(span.drift_and_vibration(system)[0, 0]), 0.0, 0.0, 0.0, True)
+    velocity, paths, slid = (each[:, :1] / span.time for each in (span.displacement, span.paths, span.slid))
+    counts = slid > 0.1 * slid.max(initial=0.0)
+    reached = float((system.missing[counts] / slid[counts]).max(initial=0.0))
+    change, event = next_change(system, velocity, slid, paths)
+    drift = float(np.sqrt(system.mean_square_displacement(velocity)[0]))
+    moved = PUSH_OVER_RESIDUAL * residual / drift if drift else 0.0
+    least = max(reached, moved)
+    if change is not None and least >= change:
+        what = "contacts that count as at Coulomb's bound reach it" if reached > moved else "residual forces count less"
+        raise NotFollowedError(
+            f"{what} once the load has risen by {least:.1g}, and another contact {event} before, at {change:.1g}: "
+            "bring the packing to rest more closely"
+        )
+    return replace(found, least_rise=least, next_change=change, next_event=event)
 
 
-def _steady_velocity(system: OneSidedSystem, direction: Floats, free: int) -> Floats | None:
+def _steady_velocity(system: OneSidedSystem, load: Floats, free: int) -> Floats | None:
     """The drift, mass-weighted, shape (E, 1); None if the motion is to be followed.
 
     Raises NotFollowedError if the load accelerates a motion that no force opposes.
     """
-    if system.sliders[1].shape[0]:
-        return None
-    motion, load = system.motion, system.on_active(direction)
-    rates, forces, _ = system.rescaled
-    way = np.zeros(rates.shape[0])
-    for _ in range(WAY_CHANGES):
-        a = csr_array(motion.stiffness - forces @ diags_array(way) @ rates) if len(way) else motion.stiffness
+    motion, way = system.motion, np.zeros(system.rates.shape[0])
+    for _ in range(60):  # a few times are enough where the solution is unique
+        a = motion.stiffness
+        if len(way):
+            a = csr_array(a - csr_array(system.wear) @ diags_array(way) @ csr_array(system.rates))
         velocity = static_response(replace(motion, stiffness=a), load, free)
-        if np.linalg.norm(load - a @ velocity) > UNBORNE_SHARE * np.linalg.norm(load):
+        if np.linalg.norm(load - a @ velocity) > 1e-6 * np.linalg.norm(load):
             moves = f"{counted(free, 'motion')} that no" if free else "a motion that next to no"
             raise NotFollowedError(f"the load accelerates {moves} force opposes")
-        before, way = way, np.sign(rates @ velocity)[:, 0]
+        before, way = way, np.sign(system.rates @ velocity)[:, 0]
         if np.array_equal(before, way):
-            break
-    else:
-        return None
-    if len(way) and linear_verdict(replace(motion, stiffness=a)).stable is not True:
-        return None
-    return velocity
+            steady = not len(way) or linear_verdict(replace(motion, stiffness=a)).stable is True
+            return velocity if steady else None
+    return None
 
 
 def static_response(motion: Motion, load: Floats, free: int = 0) -> Floats:
@@ -305,74 +273,118 @@ def static_response(motion: Motion, load: Floats, free: int = 0) -> Floats:
         Motions that no force opposes.
     """
     matrix = motion.stiffness
-    shift = DIAGONAL_SHIFT * float(np.abs(matrix.data).max(initial=0.0))
+    shift = 1e-11 * float(np.abs(matrix.data).max(initial=0.0))  # free motions do not divide by zero
     if free:
         rounding = operator_rounding(motion.configuration, matrix.data)
         shift = max(shift, 10 * zero_uncertainty(motion.configuration, rounding))
     factors = general_lu(csc_array(matrix + shift * eye_array(matrix.shape[0])))
     moved = np.zeros_like(load)
-    for _ in range(1 + REFINEMENTS):
+    for _ in range(4):  # each but the first takes the shift out once more
         moved += factors.solve(load - matrix @ moved)
     return moved
 
 
-def follow_load(
-    system: OneSidedSystem, direction: Floats, time: float | None = None, residual: float = 0.0
-) -> RisingMotion:
-    """Drift and vibration of a motion that is followed, as of `motion_under_load`; `residual` as there."""
-    length = WINDOW * system.time_step / system.step_share
+def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple[Span, RisingMotion]:
+    """The last part of a motion that is followed, and its drift and vibration."""
+    length = WINDOW * system.stable_step
     entries = system.motion.stiffness.nnz + system.motion.damping.nnz
-    most = int(np.clip(WORK_OF_MOTION / (entries * WINDOW / system.step_share), 4, WINDOWS))
+    most = int(np.clip(WORK_OF_MOTION / (entries * WINDOW / LOAD_STEP), 4, WINDOWS))
     if time is not None:
         most = max(16, int(np.ceil(time / length)))
         length = time / most
     windows: list[Span] = []
-    for window in islice(windows_under_load(system, direction, length), most):
+    for window in islice(windows_under_load(system, load, length), most):
         windows.append(window)
-        seen = window.drift_and_vibration(system)[1].max()
-        report_progress(f"under the rising load: t = {length * len(windows):.4g}, vibration {seen:.3g}")
-        if not seen < LARGEST_GROWTH * windows[0].drift_and_vibration(system).max():
-            raise NotFollowedError(
-                f"the motion grows without end: within t = {length * len(windows):.4g} by {LARGEST_GROWTH:g}"
-            )
-        if time is None and 2 * len(windows) >= most and _is_known(system, windows):
+        seen, now = window.drift_and_vibration(system)[1].max(), length * len(windows)
+        report_progress(f"under the rising load: t = {now:.4g}, vibration {seen:.3g}")
+        if not seen < 1e12 * windows[0].drift_and_vibration(system).max():
+            raise NotFollowedError(f"the motion grows without end: within t = {now:.4g} by 1e12")
+        if time is None and 2 * len(windows) >= most and all(each.known for each in _of_starts(system, windows)[1]):
             break
-    _refuse_acceleration(system, windows, length)
-    span, (first, *others) = _of_starts(system, windows)
-    motion = _with_range(first, system, span, residual)
-    return replace(motion, time=length * len(windows), span=span.time, other_start=others[0] if others else None)
-
-
-def _refuse_acceleration(system: OneSidedSystem, windows: list[Span], length: float) -> None:
-    """Refuse a motion whose mean velocity rises on, as of contacts that slide on and on."""
-    span = windows[FADE_WINDOWS:] or windows
-    quarters, time = _parts(system, span)[0, 3:, 0], length * len(windows)
-    first, last = len(windows) - np.array([0.875, 0.125]) * len(span)  # the middles of two quarters
-    if np.all(np.diff(quarters) > 0) and quarters[-1] > (last / first) ** ACCELERATION_POWER * quarters[0]:
+    after = windows[FADE_WINDOWS:] or windows
+    quarters = _in_parts(system, after)[0, 3:, 0]
+    # the middles of two quarters; of particles whose dashpots alone bear the load the mean velocity rises as the time,
+    # and of particles that nothing bears as its square
+    first, last = len(windows) - np.array([0.875, 0.125]) * len(after)
+    if np.all(np.diff(quarters) > 0) and quarters[-1] > (last / first) ** 0.5 * quarters[0]:
         raise NotFollowedError(
             f"no constant drift is seen: the mean velocity over the rate rises from {quarters[0]:.3g} to "
-            f"{quarters[-1]:.3g} within t = {time:.4g}, as where the load accelerates particles whose contacts slide "
+            f"{quarters[-1]:.3g} within t = {now:.4g}, as where the load accelerates particles whose contacts slide "
             "on, or where the packing is slower than that: give more time"
         )
+    span, (one, *others) = _of_starts(system, windows)
+    return span, RisingMotion(**one, time=now, span=span.time, other_start=others[0] if others else None)
 
 
-def _with_range(moves: DriftAndVibration, system: OneSidedSystem, span: Span, residual: float) -> RisingMotion:
-    """A motion with the increases of the load between which the motion of a span holds; NotFollowedError if there are
-    none."""
-    velocity, paths, slid = (each[:, :1] / span.time for each in (span.displacement, span.paths, span.slid))
-    counts = slid > 0.1 * slid.max(initial=0.0)
-    reached = float((system.missing_forces[counts] / slid[counts]).max(initial=0.0))
-    change, event = next_change(system, velocity, slid, paths)
-    drift = float(np.sqrt(system.mean_square_displacement(velocity)[0]))
-    moved = LOAD_OVER_RESIDUAL * residual / drift if drift else 0.0
-    least = max(reached, moved)
-    if change is not None and least >= change:
-        what = "contacts that count as at Coulomb's bound reach it" if reached > moved else "residual forces count less"
-        raise NotFollowedError(
-            f"{what} once the load has risen by {least:.1g}, and another contact {event} before, at {change:.1g}: "
-            "bring the packing to rest more closely"
-        )
-    return RisingMotion(**moves, least_rise=least, next_change=change, next_event=event)
+def windows_under_load(system: OneSidedSystem, load: Floats, length: float) -> Iterator[Span]:
+    """One window after the other under a load that rises, from two starts: with a drag on all coordinates, and on all
+    but rotations, as one packing may vibrate in two ways. Large packings, and bodies, whose coordinates are of another
+    kind, have one start.
+
+    Parameters
+    ----------
+    system : OneSidedSystem
+        Of the configuration.
+    load : ndarray, shape (E, 1)
+        Mass-weighted forces per unit of time.
+    length : float
+        Time of a window; the drag fades out in `FADE_WINDOWS` of them.
+    """
+    c = system.configuration
+    spins = system.motion.active[:, None] >= c.dimension * len(c)
+    one = c.constraint is not None or c.coordinates > 6000 or not spins.any()
+    drag = np.ones((len(spins), 1))
+    if not one:
+        drag = np.hstack([drag, ~spins])
+    starts = drag.shape[1]
+    state, load = system.start(np.zeros((c.coordinates, starts))), np.repeat(load, starts, axis=1)
+    for number in count():
+        place, way, slid = state.z.copy(), state.r.copy(), state.p.copy()
+        velocities, squares = np.zeros((2, *system.displacement(place).shape))
+        samples = 400
+        for sample in range(samples):
+            now = number + (sample + 1) / samples
+            system.advance(state, length * now, LOAD_STEP, load)
+            state.v *= np.exp(-DRAG / samples * max(0.0, 1 - now / FADE_WINDOWS) ** 2 * drag)
+            velocity = system.displacement(state.v)
+            velocities += velocity
+            squares += velocity**2
+        share = length / samples
+        yield Span(length, state.z - place, state.r - way, share * velocities, share * squares, state.p - slid)
+
+
+def _of_starts(system: OneSidedSystem, windows: list[Span]) -> tuple[Span, list[DriftAndVibration]]:
+    """The longest span that is steady from every start, or the last half; and what each start does in this span."""
+    after = windows[FADE_WINDOWS:] or windows[-1:]
+    for span, differs in ((after, TREND), (after[len(after) // 2 :], HALVES_DIFFERENCE)):
+        found = []
+        for parts in _in_parts(system, span):
+            (drift, vibration), before, late = parts[:3]
+            alike = abs(late[1] - before[1]) <= differs * late[1] and late[1] > VIBRATION_SHARE * late[0]
+            vanishes = (
+                late[1] <= VIBRATION_SHARE * late[0]
+                and late[1] <= max(2 * before[1], 1e-6 * late[0])  # rounding of the root
+                and vibration <= 2 * VIBRATION_SHARE * drift
+            )
+            # of the mean of four, doubled, since quarters of a slow cycle are not independent
+            spread = np.hypot(parts[3:].std(axis=0, ddof=1), 0.02 * parts[0]).tolist()  # and of time steps
+            errors = spread if np.all(np.isfinite(parts)) else [None, None]
+            steady = bool(alike or vanishes)
+            found.append(DriftAndVibration(float(drift), errors[0], float(vibration), errors[1], steady))
+        if all(each.steady for each in found):
+            break
+    return Span.joined(span), found
+
+
+def _in_parts(system: OneSidedSystem, span: list[Span]) -> Floats:
+    """Drift and vibration of a span, of its two halves and of its four quarters, shape (S, 7, 2)."""
+    size = len(span)
+    edges = [0, size // 4, size // 2, 3 * size // 4, size]
+    slices = [(0, 4), (0, 2), (2, 4), *((k, k + 1) for k in range(4))]
+    if size < 8:  # too few to compare parts
+        slices = slices[:1]
+    parts = np.array([Span.joined(span[edges[a] : edges[b]]).drift_and_vibration(system) for a, b in slices])
+    return np.pad(parts, ((0, 7 - len(parts)), (0, 0), (0, 0)), constant_values=np.nan).transpose(2, 0, 1)
 
 
 def next_change(
@@ -390,15 +402,10 @@ def next_change(
         Mean rates at which contacts at the bound slide, force.
     paths : ndarray, shape (R, 1)
         Mean rates of the paths of the overlaps of contacts with two derivatives.
-
-    Raises
-    ------
-    NotFollowedError
-        If nothing holds the particles after the force of a contact has turned.
     """
-    if system.motion.configuration.stiffness is not None:
+    if system.configuration.stiffness is not None:
         return None, None
-    changes, slowly = system.contact_changes, np.zeros_like(velocity)  # dashpots do not count
+    changes, slowly = system.changes, np.zeros_like(velocity)  # dashpots do not count
     multiples = changes.multiples(velocity, slowly, slid, paths)
     back = multiples.reaches[changes.slides].min(initial=np.inf)
     multiples.reaches[changes.slides] = np.inf
@@ -409,107 +416,17 @@ def next_change(
     return (first, event) if first < np.inf else (None, None)
 
 
-def _change_by_turning(system: OneSidedSystem, velocity: Floats, turns: np.ndarray) -> float:
-    """Increase of the load at which contacts that slide on, since their forces have turned, change the drift."""
-    grip, excess = (csr_array(each) for each in system.sliders[:2])
-    load = grip @ np.where(turns[:, None], system.sideways @ velocity, 0.0) ** 2
+def _change_by_turning(system: OneSidedSystem, velocity: Floats, turns: NDArray[np.bool_]) -> float:
+    """Increase of the load at which contacts that slide on, as their forces have turned, change the drift by a tenth;
+    NotFollowedError if nothing holds the particles then."""
+    grip, excess, changes = csr_array(system.grip), csr_array(system.excess), system.changes
+    sideways = csr_array(changes.rows)[len(changes.bound) + changes.slides] @ velocity
+    load = grip @ np.where(turns[:, None], sideways**2 / (2 * changes.bound[changes.slides]), 0.0)
     a = csr_array(system.motion.stiffness + grip[:, turns] @ excess[turns])
     moves = static_response(replace(system.motion, stiffness=a), load, 1)
-    if np.linalg.norm(load - a @ moves) > UNBORNE_SHARE * np.linalg.norm(load):
+    if np.linalg.norm(load - a @ moves) > 1e-6 * np.linalg.norm(load):
         raise NotFollowedError(
             "the load turns the forces of contacts at Coulomb's bound, and nothing holds the particles that slide then"
         )
     size, change = (system.mean_square_displacement(each)[0] for each in (velocity, moves))
-    return float(TURNED_SHARE * np.sqrt(size / change)) if change else np.inf
-
-
-def windows_under_load(system: OneSidedSystem, direction: Floats, length: float) -> Iterator[Span]:
-    """One window after the other under a load that rises.
-
-    Parameters
-    ----------
-    system : OneSidedSystem
-        Of the configuration.
-    direction : ndarray, shape (coordinates, 1)
-        Forces per unit of time.
-    length : float
-        Time of a window; the drag fades out in `FADE_WINDOWS` of them.
-    """
-    drag = _drag_of_starts(system)
-    direction = np.repeat(direction, drag.shape[1], axis=1)
-    state = system.start(np.zeros_like(direction))
-    for number in count():
-        place, way, slid = state.z.copy(), state.r.copy(), state.p.copy()
-        velocities, squares = np.zeros((2, *system.displacement(place).shape))
-        for sample in range(SAMPLES_OF_WINDOW):
-            now = number + (sample + 1) / SAMPLES_OF_WINDOW
-            system.advance(state, length * now, direction)
-            state.v *= np.exp(-DRAG / SAMPLES_OF_WINDOW * max(0.0, 1 - now / FADE_WINDOWS) ** 2 * drag)
-            velocity = system.displacement(state.v)
-            velocities += velocity
-            squares += velocity**2
-        share = length / SAMPLES_OF_WINDOW
-        yield Span(length, state.z - place, state.r - way, share * velocities, share * squares, state.p - slid)
-
-
-def _drag_of_starts(system: OneSidedSystem) -> Floats:
-    """Which coordinates the drag at the beginning acts on, shape (E, S): on all; and on all but rotations.
-
-    One packing may vibrate in two ways, by its start. Large packings, and bodies, whose
-    coordinates are of another kind, have one start.
-    """
-    configuration = system.motion.configuration
-    spins = system.motion.active >= configuration.dimension * len(configuration)
-    one = configuration.constraint is not None or configuration.coordinates > ONE_START or not spins.any()
-    every = np.ones((len(spins), 1))
-    return every if one else np.hstack([every, ~spins[:, None]])
-
-
-def _is_known(system: OneSidedSystem, windows: list[Span]) -> bool:
-    """Whether every start vibrates steadily, with a vibration that is known precisely enough."""
-    return all(
-        each.steady
-        and each.vibration > VIBRATION_SHARE * each.drift
-        and each.vibration_error is not None
-        and each.vibration_error <= VIBRATION_ERROR * each.vibration
-        for each in _of_starts(system, windows)[1]
-    )
-
-
-def _of_starts(system: OneSidedSystem, windows: list[Span]) -> tuple[Span, list[DriftAndVibration]]:
-    """The longest span that is steady from every start, or the last half; and what each start does in this span."""
-    after = windows[FADE_WINDOWS:] or windows[-1:]
-    for span, differs in ((after, TREND), (after[len(after) // 2 :], HALVES_DIFFERENCE)):
-        found = [_of_parts(each, differs) for each in _parts(system, span)]
-        if all(each.steady for each in found):
-            break
-    return Span.joined(span), found
-
-
-def _parts(system: OneSidedSystem, span: list[Span]) -> Floats:
-    """Drift and vibration of a span, of its two halves and of its four quarters, shape (S, 7, 2)."""
-    edges = [0, len(span) // 4, len(span) // 2, 3 * len(span) // 4, len(span)]
-    slices = [(0, 4), (0, 2), (2, 4), *((k, k + 1) for k in range(4))]
-    if len(span) < LEAST_WINDOWS:
-        known = Span.joined(span).drift_and_vibration(system)
-        return np.stack([known, *(np.full_like(known, np.nan) for _ in slices[1:])]).transpose(2, 0, 1)
-    parts = [Span.joined(span[edges[a] : edges[b]]).drift_and_vibration(system) for a, b in slices]
-    return np.array(parts).transpose(2, 0, 1)
-
-
-def _of_parts(parts: Floats, differs: float) -> DriftAndVibration:
-    """The motion of a span, from drift and vibration of the span and of its parts, shape (7, 2); halves that differ by
-    no more than `differs` are steady."""
-    (drift, vibration), before, after = parts[:3]
-    alike = abs(after[1] - before[1]) <= differs * after[1] and after[1] > VIBRATION_SHARE * after[0]
-    vanishes = (
-        after[1] <= VIBRATION_SHARE * after[0]
-        and after[1] <= max(2 * before[1], VIBRATION_ROUNDING * after[0])
-        and vibration <= 2 * VIBRATION_SHARE * drift
-    )
-    errors: list[float | None] = [None, None]
-    if np.all(np.isfinite(parts)):
-        # of the mean of four, doubled, since quarters of a slow cycle are not independent
-        spread = parts[3:].std(axis=0, ddof=1)
-        errors = np.hypot(spread, ERROR_OF_STEPS * parts[0]).tolist()
-    return DriftAndVibration(float(drift), errors[0], float(vibration), errors[1], bool(alike or vanishes))
+    return float(0.1 * np.sqrt(size / change)) if change else np.inf

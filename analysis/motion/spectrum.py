@@ -50,16 +50,12 @@ from ..has_configuration import HasConfiguration
 from ..operators.stiffness import stiffness_matrix
 from ..packing.disk_operators import Form
 from ..packing.packing import Floats, Indices
-from ..progress import report_progress
 from ..table_display import TableDisplay
-from .all_eigenvalues import SpectrumError, all_eigenvalues
+from .all_eigenvalues import all_eigenvalues
 from .eigenvalues import (
     SAFETY,
     Complexes,
-    Linear,
     active_coordinates,
-    exceeds_rounding,
-    exponential,
     is_negative,
     is_zero,
     mass_weighted,
@@ -67,7 +63,7 @@ from .eigenvalues import (
     zero_uncertainties,
     zero_uncertainty,
 )
-from .modes import Mode, Modes, growth_rate
+from .modes import Mode, Modes, growth_rate, participation_ratio, rotation_share
 from .motion import Motion
 from .no_verdict import no_verdict
 
@@ -77,9 +73,6 @@ SLICED = 2000
 
 DENSE_LARGEST = 900
 """Coordinates up to which all eigenvalues are computed to know the largest: a second, as `spectrum` does it anyway."""
-
-LAPACK_INSTEAD = 20_000
-"""Coordinates up to which LAPACK takes over where slices are incomplete: two hours, and 13 GB."""
 
 LIMIT = 1e-4
 """Relative error of the largest eigenvalue of more coordinates. It bounds time steps, that are far below the bound; to
@@ -110,8 +103,6 @@ class Spectrum(TableDisplay):
         and not negative: no force opposes such a motion, which drifts.
     packing : Configuration or Packing
         Whose eigenvalues they are.
-    remark : str
-        Why LAPACK computed the eigenvalues of a large packing; empty otherwise.
     """
 
     eigenvalues: Complexes
@@ -122,54 +113,18 @@ class Spectrum(TableDisplay):
     rounding: float
     free: int
     packing: HasConfiguration
-    remark: str = ""
 
     def __repr__(self) -> str:
+        pairs, negative = counted(len(self.pairs), "complex pair"), counted(len(self.negative), "negative eigenvalue")
+        counts = f"{pairs} and {negative}" if len(self.negative) else pairs
+        grows = f", D as exp({self.growth_rate():.6g} t)" if len(self.unstable) else ""
+        verdict = {None: "eigenvalues do not decide", True: "no motion grows", False: "unstable"}[self.is_stable]
+        if doubts := "; ".join(no_verdict(self.packing.configuration)):
+            verdict = f"not known whether the packing is stable: {doubts}"
         real = self.eigenvalues.real
         span = f" from {real.min():.6g} to {real.max():.6g}" if len(real) else ""
         numbers = f"{counted(len(real), 'eigenvalue')} of K{span}, {counted(len(self.rattlers), 'rattler')}"
-        remark = f"; {self.remark}" if self.remark else ""
-        return f"<Spectrum: {self._verdict}; {numbers}{remark}>"
-
-    @property
-    def _verdict(self) -> str:
-        """What eigenvalues say, and that contacts have two derivatives, if they do."""
-        two = not self._doubts and self.packing.configuration.contacts.two_derivatives.any()
-        more = "; contacts have two derivatives, of which K has the mean (`stability` says what that leaves out)"
-        return self._growth + (more if two else "")
-
-    @property
-    def _growth(self) -> str:
-        """Growth with dissipation first, without it second; with contacts at the bound the rates of both neighbours."""
-        contacts = self.packing.configuration.contacts
-        pairs, negative = counted(len(self.pairs), "complex pair"), counted(len(self.negative), "negative eigenvalue")
-        counts = f"{pairs} and {negative}" if len(self.negative) else pairs
-        grows = len(self.pairs) + len(self.negative) > 0
-        alone = f"K alone has {counts}" + (f", D as exp({self.growth_rate():.6g} t)" if grows else "")
-        if self._doubts:
-            return f"not known whether the packing is stable: {'; '.join(self._doubts)}; {alone}"
-        if contacts.one_sided.any():
-            from .linear import linear_verdict
-
-            rates = (linear_verdict(Motion.of(self.packing, sliding=on), decides=not on) for on in (False, True))
-            stick, slide = (exponential(each.growth_rate, 4, each.at_least) for each in rates)
-            count = int(contacts.one_sided.sum())
-            slides = "slides on ahead and sticks" if count == 1 else "slide on ahead and stick"
-            return (
-                f"{counted(count, 'contact')} at Coulomb's bound {slides} on the way back: "
-                f"neither linear motion decides: {stick} if all stuck, {slide} if all "
-                f"slid (`stability` follows them); {alone}"
-            )
-        damped = self._damped
-        if damped is None:
-            return "no motion grows" if self.is_stable else f"unstable, D as exp({self.growth_rate():.6g} t): {counts}"
-        if damped.stable is None:
-            return f"not known whether the packing is stable: {'; '.join(damped.reasons)}; {alone}"
-        verdict = "every motion decays" if self.is_stable else "unstable"
-        if self.is_stable and damped.growth_rate == 0:
-            return f"no motion grows with the packing's dissipation; {alone}"
-        rate = exponential(damped.growth_rate, 6, damped.at_least)
-        return f"{verdict} with the packing's dissipation, {rate}; {alone}"
+        return f"<Spectrum: {verdict} (`stability` says more); K alone has {counts}{grows}; {numbers}>"
 
     def _rows(self) -> dict[str, str]:
         rows = {
@@ -182,7 +137,7 @@ class Spectrum(TableDisplay):
         rows |= {f"{value:.10g}": f"2 |Im \u03c9| = {growth_rate(value):.6g}, negative" for value in self.negative}
         return rows or {"complex pairs and negative eigenvalues of K": "none"}
 
-    @property
+    @cached_property
     def is_stable(self) -> bool | None:
         """Whether no motion grows beyond rounding, with the packing's dissipation.
 
@@ -194,26 +149,12 @@ class Spectrum(TableDisplay):
         :func:`~faultgouge.analysis.stability` follows their motion. None, too, where no verdict is possible, as of a
         packing that moves.
         """
-        if self._doubts or self.packing.configuration.contacts.one_sided.any():
-            return None
-        if self._damped is not None:
-            return self._damped.stable
-        return not self.pairs and not len(self.negative)
-
-    @cached_property
-    def _doubts(self) -> tuple[str, ...]:
-        return tuple(no_verdict(self.packing.configuration))
-
-    @property
-    def damped_growth_rate(self) -> float | None:
-        """Largest 2 Re s with dashpots and drag, 1 / time; None without dissipation."""
-        return None if self._damped is None else self._damped.growth_rate
-
-    @cached_property
-    def _damped(self) -> Linear | None:
         from .linear import linear_verdict
 
-        return linear_verdict(Motion.of(self.packing)) if self.packing.configuration.damped else None
+        c = self.packing.configuration
+        if any(no_verdict(c)) or c.contacts.one_sided.any():
+            return None
+        return linear_verdict(Motion.of(c)).stable if c.damped else not len(self.unstable)
 
     @property
     def least_q(self) -> float:
@@ -285,13 +226,11 @@ def eigenvalues(packing: HasConfiguration, form: Form = "consistent") -> Complex
     ndarray of complex, shape (E,)
         Sorted by real part, then imaginary part, 1 / time^2. Coordinates that feel no force are left out.
     """
-    matrix = dynamical_matrix(packing, form)[0].toarray()
-    return _sort_eigenvalues(
-        eigvals(matrix.T, overwrite_a=True, check_finite=False) if len(matrix) else np.zeros(0, complex)
-    )
+    dense = dynamical_matrix(packing, form)[0].toarray()
+    return _sort_eigenvalues(eigvals(dense.T, overwrite_a=True, check_finite=False) if len(dense) else np.zeros(0))
 
 
-def _sort_eigenvalues(values: Complexes) -> Complexes:
+def _sort_eigenvalues(values: Complexes | Floats) -> Complexes:
     return np.asarray(values[np.lexsort((values.imag, values.real))], dtype=np.complex128)
 
 
@@ -299,8 +238,7 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     """Compute every eigenvalue, and left and right vectors of those that are complex or negative.
 
     LAPACK's dense solver serves up to `SLICED` coordinates. Beyond, :mod:`~faultgouge.analysis.motion.all_eigenvalues`
-    takes one slice of the spectrum after the other. If these are found to be incomplete, LAPACK serves up to
-    `LAPACK_INSTEAD` coordinates, and the result says so in its `remark`.
+    takes one slice of the spectrum after the other.
 
     Parameters
     ----------
@@ -316,15 +254,16 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     Raises
     ------
     SpectrumError
-        If the slices are incomplete, and the packing is too large for LAPACK.
+        If the slices of a large packing are incomplete.
 
     Examples
     --------
 
     >>> start = faultgouge.settle("three_disks.toml").packing
-    >>> faultgouge.spectrum(start)
-    <Spectrum: no motion grows; 9 eigenvalues of K from 383.589 to 24057.3, 0 rattlers>
-    >>> faultgouge.spectrum(start).eigenvalues[:3].real.round(3)
+    >>> found = faultgouge.spectrum(start)
+    >>> len(found.pairs), len(found.negative), len(found.rattlers)
+    (0, 0, 0)
+    >>> found.eigenvalues[:3].real.round(3)
     array([ 383.589, 1188.882, 1484.786])
     """
     with np.errstate(over="ignore", invalid="ignore"):
@@ -333,7 +272,7 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     if not np.isfinite(rounding):
         raise BadInputError("Stiffnesses overflow, and nothing can be said: take units in which numbers are smaller.")
     alike = zero_uncertainty(packing, rounding)
-    values, marked, remark = _values_and_vectors(matrix, SAFETY * rounding, alike)
+    values, marked = _values_and_vectors(matrix, SAFETY * rounding, alike)
     overlap, particle = marked.overlap, active % len(packing.configuration)
     zero = zero_uncertainties(packing, rounding, particle, marked.left, marked.right)
     below = is_negative(marked.values, overlap, rounding, zero)
@@ -342,56 +281,36 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     free = int(near_zero.sum() - not_free.sum())
     below &= marked.values.imag >= 0
     negative = np.sort(np.repeat(marked.values[below].real, np.where(marked.values[below].imag > 0, 2, 1)))
-    pairs: list[Mode] = []
-    noise = 0
-    for k in np.flatnonzero(marked.values.imag > 0):
-        vector = np.zeros((packing.coordinates, 1), dtype=np.complex128)
-        vector[active, 0] = marked.right[:, k]
-        pair = Mode.of(complex(marked.values[k]), float(overlap[k]), vector, packing.axes)
-        if exceeds_rounding(pair.eigenvalue, pair.overlap, rounding):
-            pairs.append(pair)
-        else:
-            noise += 1
+    noise = int(np.count_nonzero(marked.values.imag > 0))
+    grows = np.flatnonzero(marked.values.imag * overlap > SAFETY * rounding)
+    right = np.zeros((packing.coordinates, len(grows)), dtype=np.complex128)
+    right[active] = marked.right[:, grows]
+    shares = participation_ratio(right, packing.axes).tolist(), rotation_share(right, packing.axes).tolist()
+    pairs = [Mode(*each) for each in zip(marked.values[grows].tolist(), overlap[grows].tolist(), *shares, strict=True)]
     pairs.sort(key=lambda pair: -pair.growth_rate)
     return Spectrum(
-        eigenvalues=_sort_eigenvalues(values),
-        pairs=tuple(pairs),
-        negative=negative,
-        noise_pairs=noise,
-        rattlers=packing.rattlers,
-        rounding=rounding,
-        free=free,
-        packing=packing,
-        remark=remark,
-    )
+        _sort_eigenvalues(values), tuple(pairs), negative, noise_pairs=noise - len(pairs),
+        rattlers=packing.rattlers, rounding=rounding, free=free, packing=packing,
+    )  # fmt: skip
 
 
-def _values_and_vectors(matrix: csr_array, rounding: float, alike: float) -> tuple[Complexes, Modes, str]:
-    """All eigenvalues, and those with vectors; and why LAPACK took over.
+def _values_and_vectors(matrix: csr_array, rounding: float, alike: float) -> tuple[Complexes, Modes]:
+    """All eigenvalues, and those with vectors.
 
     Vectors are known at least of eigenvalues that are complex, or negative beyond rounding, and up to `SLICED`
     coordinates of those that may be zero by forces that are out of balance: up to `alike`, but not by rounding.
     """
-    remark = ""
     if matrix.shape[0] > SLICED:
-        try:
-            found = all_eigenvalues(matrix)
-        except SpectrumError as error:
-            if matrix.shape[0] > LAPACK_INSTEAD:
-                raise
-            remark = f"by LAPACK, as slices were incomplete: {str(error).rstrip('.')}"
-            report_progress(f"{error} LAPACK takes over, which needs {32e-9 * matrix.shape[0] ** 2:.2g} GB")
-        else:
-            return found.values, found.marked, remark
+        return all_eigenvalues(matrix)
     dense = matrix.toarray()
     # vectors take three times as long as eigenvalues: a large packing under a load has complex pairs, and needs both
     alone = len(dense) <= DENSE_LARGEST or (matrix != matrix.T).nnz == 0
     values = eigvals(dense) if len(dense) and alone else np.zeros(0, complex)
     doubtful = (values.imag != 0) | (values.real < -rounding) | ((values.real > rounding) & (values.real <= alike))
     if alone and not doubtful.any():
-        return values, Modes.none(len(dense)), remark
+        return values, Modes.none(len(dense))
     values, left, right = eig(dense, left=True, right=True)
-    return values, Modes(values, right, left), remark
+    return values, Modes(values, right, left)
 
 
 def discrete_frequency(eigenvalue: ArrayLike, dt: float) -> Complexes:
@@ -428,10 +347,9 @@ def largest_frequency(packing: HasConfiguration) -> float:
         If the iteration does not converge.
     """
     matrix, _ = dynamical_matrix(packing)
-    size = matrix.shape[0]
-    if size <= DENSE_LARGEST:
+    if matrix.shape[0] <= DENSE_LARGEST:
         return spectrum(packing).omega_max
     # always the same one, for a result that is reproducible; without the symmetry that a crystal's fastest mode lacks
-    start = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
+    start = np.random.Generator(np.random.PCG64(0)).standard_normal(matrix.shape[0])
     largest = eigs(matrix, 1, which="LM", v0=start, tol=LIMIT, return_eigenvectors=False)
     return float(np.sqrt(np.abs(largest).max()))

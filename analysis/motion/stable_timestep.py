@@ -48,7 +48,7 @@ The step 2/mu of this bound is stable for certain, and shorter than the limit.
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import eigvals
+from scipy.linalg import eig
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
@@ -59,27 +59,13 @@ from ..operators.damping import coordinate_mass, damping_matrix
 from ..operators.stiffness import stiffness_matrix
 from ..packing.packing import Floats
 
-EXACT_COORDINATES, COARSE_COORDINATES = 40, 10_000
-"""Coordinates up to which a time step is that of all eigenvalues, and from which on it has fewer digits."""
+COARSE_COORDINATES, PRODUCTS = 10_000, 24
+"""Coordinates from which on a time step has fewer digits, and the dimension of the space for these. Packings have many
+modes near the fastest one: of 200,000 coordinates 24 products miss 0.3 % of mu^2, and 150 products miss 0.006 %. Nobody
+runs so near to the limit."""
 
 TIMESTEP_TOLERANCE = 1e-8
-"""Relative error of mu^2 for a time step of up to COARSE_COORDINATES coordinates."""
-
-FIRST_ERROR = 0.1
-"""Relative error of the first mu^2 with dashpots, from which the steps begin."""
-
-PRODUCTS = 24
-"""Dimension of the space for more coordinates. Packings have many modes near the fastest one: of 200,000 coordinates 24
-products miss 0.3 % of mu^2, and 150 products miss 0.006 %. Nobody runs so near to the limit."""
-
-TIMESTEP_CHANCE = 1e-3
-"""Probability that the fastest motion of many coordinates is beyond the error."""
-
-HERTZ_DEVIATION = 1e-3
-"""Deviation of d ln f_n / d ln delta from 3/2 up to which a force is Hertz's."""
-
-SQUARINGS = 6
-"""Steps of the iteration for mu: each squares its error."""
+"""Relative error of mu^2 for a time step of fewer coordinates."""
 
 
 class StableTimestep(float):
@@ -153,7 +139,7 @@ def stable_timestep(
     if damping is not None:
         damping = DASHPOT_WEIGHT[dashpot_velocity or ("extrapolated" if ours else "half-step")] * damping
     scale = 1.0 / np.sqrt(coordinate_mass(of))
-    found = (_of_all_eigenvalues if len(scale) <= EXACT_COORDINATES else _of_arnoldi)(scale, stiffness, damping)
+    found = _limit(scale, stiffness, damping)
     # rounding may take the limit below the bound where the two are the same
     return StableTimestep(found, found.error, min(float(found), 2.0 / _largest_mu(scale, stiffness, damping)))
 
@@ -181,7 +167,7 @@ def rayleigh_timestep(configuration: Configuration) -> float | None:
     c = configuration.contacts
     if configuration.dimension == 2 or not len(c) or np.any(c.normal_force <= 0):
         return None
-    if np.any(np.abs(c.normal_stiffness * c.overlap / c.normal_force - 1.5) > HERTZ_DEVIATION):
+    if np.any(np.abs(c.normal_stiffness * c.overlap / c.normal_force - 1.5) > 1e-3):  # Hertz's force has 3/2
         return None
     first, second = configuration.radius[c.i], np.where(c.wall, np.inf, configuration.radius[c.j])
     modulus = c.normal_stiffness / (2 * np.sqrt(c.overlap / (1 / first + 1 / second)))
@@ -195,40 +181,29 @@ def rayleigh_timestep(configuration: Configuration) -> float | None:
 
 def _largest_mu(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> float:
     """Upper bound of mu by the largest sums of rows, 1 / time."""
-    k, c = (0.0 if matrix is None else _largest_row_sum(scale, matrix) for matrix in (stiffness, damping))
-    return 0.5 * (c + float(np.sqrt(c * c + 4 * k)))
+    sums = [0.0, 0.0]
+    for k, matrix in enumerate((stiffness, damping)):
+        if matrix is not None:  # abs(matrix) would copy the indices, too
+            absolute = csr_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
+            sums[k] = float(np.max(scale * (absolute @ scale)))
+    return 0.5 * (sums[1] + float(np.sqrt(sums[1] ** 2 + 4 * sums[0])))
 
 
-def _largest_row_sum(scale: Floats, matrix: csr_array) -> float:
-    """The largest sum of absolute values of a row, with the masses; abs(matrix) would copy the indices, too."""
-    absolute = csr_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
-    return float(np.max(scale * (absolute @ scale)))
-
-
-def _of_all_eigenvalues(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> StableTimestep:
-    """2/mu by LAPACK."""
-    weight = np.outer(scale, scale)
-    a = weight * stiffness.toarray()
+def _limit(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> StableTimestep:
+    """2/mu by the largest eigenvalue: mu^2 = lambda + c (mu - before) with the slope c; each step squares the error."""
     if damping is None:
-        return StableTimestep(2.0 / float(np.sqrt(np.abs(eigvals(a)).max())))
-    one = np.eye(len(scale))
-    pencil = np.block([[weight * damping.toarray(), a], [one, np.zeros_like(one)]])
-    return StableTimestep(2.0 / float(eigvals(pencil).real.max()))
-
-
-def _of_arnoldi(scale: Floats, stiffness: csr_array, damping: csr_array | None) -> StableTimestep:
-    """2/mu by Arnoldi's iteration."""
-    mu = change = 0.0
-    if damping is not None:
+        value, _, error = _largest_eigenvalue(scale, stiffness, TIMESTEP_TOLERANCE)
+        step = 2.0 / float(np.sqrt(value))
+        return StableTimestep(step, 0.5 * step * error)
+    mu, error, change = 0.0, 0.0, np.inf
+    for k in range(7):
         # a rough mu of K alone is where the steps begin
-        value, moved, _ = _largest_eigenvalue(scale, stiffness, FIRST_ERROR)
-        mu = _next_mu(0.0, value, moved, damping)
-    for _ in range(SQUARINGS):
-        matrix = stiffness if damping is None else _sum_of(stiffness, mu, damping)
-        value, moved, error = _largest_eigenvalue(scale, matrix, TIMESTEP_TOLERANCE)
-        before, mu = mu, _next_mu(mu, value, moved, damping)
-        change = 0.0 if damping is None else abs(mu - before) / mu
-        if change <= max(error, TIMESTEP_TOLERANCE):
+        tolerance = TIMESTEP_TOLERANCE if k else 0.1
+        value, moved, error = _largest_eigenvalue(scale, csr_array(stiffness + mu * damping), tolerance)
+        slope = float(moved @ (damping @ moved))
+        before, mu = mu, 0.5 * (slope + float(np.sqrt(slope**2 + 4 * abs(value - slope * mu))))
+        change = abs(mu - before) / mu
+        if k and change <= max(error, TIMESTEP_TOLERANCE):
             break
     return StableTimestep(2.0 / mu, 2.0 / mu * (0.5 * error + change))
 
@@ -236,35 +211,26 @@ def _of_arnoldi(scale: Floats, stiffness: csr_array, damping: csr_array | None) 
 def _largest_eigenvalue(scale: Floats, matrix: csr_array, tolerance: float) -> tuple[float, Floats, float]:
     """The largest eigenvalue of a matrix over the masses, its mode as displacements (of norm 1 by mass), its error."""
     size = len(scale)
+    if size <= 40:  # too few for a Krylov space
+        values, every = eig(np.outer(scale, scale) * matrix.toarray())
+        first = int(np.argmax(np.abs(values)))
+        vector = np.real(every[:, first])
+        return float(abs(values[first])), scale * vector / np.linalg.norm(vector), 0.0
 
     def product(x: Floats) -> Floats:
         return np.asarray(scale * (matrix @ (scale * x.reshape(size))))
 
     start = np.random.Generator(np.random.PCG64(0)).standard_normal(size)
     # one space without restart: whatever it has found is within the tolerance
-    coarse = size > COARSE_COORDINATES and tolerance < FIRST_ERROR
+    coarse = size > COARSE_COORDINATES and tolerance == TIMESTEP_TOLERANCE
     space = {"ncv": PRODUCTS, "tol": 1.0} if coarse else {"ncv": 12, "tol": tolerance}
     operator = LinearOperator((size, size), matvec=product, dtype=np.float64)
     (value,), vectors = eigs(operator, 1, which="LM", v0=start, **space)
     real = abs(value.imag) < 1e-3 * abs(value)
     vector = np.ascontiguousarray(vectors[:, 0].real if real else vectors.sum(axis=1).real)
-    if size > COARSE_COORDINATES:
-        error = (np.log(1.648 * np.sqrt(size) / TIMESTEP_CHANCE) / (2 * PRODUCTS - 1)) ** 2
+    if size > COARSE_COORDINATES:  # that the fastest motion is beyond the error has a probability of 1e-3
+        error = (np.log(1.648 * np.sqrt(size) / 1e-3) / (2 * PRODUCTS - 1)) ** 2
     else:
         residual = product(vectors[:, 0].real) + 1j * product(vectors[:, 0].imag) - value * vectors[:, 0]
         error = np.linalg.norm(residual) / abs(value)
     return float(abs(value)), scale * vector / np.linalg.norm(vector), float(error)
-
-
-def _next_mu(mu: float, value: float, moved: Floats, damping: csr_array | None) -> float:
-    """The mu at which mu^2 = lambda + c (mu - before), c being the slope of lambda; exact for symmetric matrices."""
-    c = 0.0 if damping is None else float(moved @ (damping @ moved))
-    return 0.5 * (c + float(np.sqrt(c * c + 4 * abs(value - c * mu))))
-
-
-def _sum_of(stiffness: csr_array, mu: float, damping: csr_array) -> csr_array:
-    """K + mu C; K and C of a Configuration have one pattern, so that the sum takes a tenth of the time."""
-    if np.array_equal(stiffness.indptr, damping.indptr) and np.array_equal(stiffness.indices, damping.indices):
-        data = stiffness.data + mu * damping.data
-        return csr_array((data, stiffness.indices, stiffness.indptr), shape=stiffness.shape)
-    return stiffness + mu * damping

@@ -2,18 +2,20 @@
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from itertools import chain
 from typing import Any
 
 import numpy as np
 
 from ..counted import counted
 from .eigenvalues import Linear, exponential
-from .pushes import PUSH_OVER_RESIDUAL, Creep, OneSidedOutcome
+from .one_sided import PUSH_OVER_RESIDUAL
+from .pushes import Creep, OneSidedOutcome
 from .rising_load import RisingMotion
 
 WORN = "contacts bear less after they have closed and parted, so that vibration carries particles on"
 """The sentence on contacts with two derivatives."""
+
+ENDS = {"vibrates": "vibrates at", "creeps": "creeps on, at", "flows": "flows, at"}
 
 
 class NoVerdictError(ValueError):
@@ -122,7 +124,7 @@ class Stability:
 
     def __bool__(self) -> bool:
         if self.stable is None:
-            raise NoVerdictError(f"{self._verdict}: ask for .stable, which is None here.")
+            raise NoVerdictError(f"{self.sentences[0]}: ask for .stable, which is None here.")
         return self.stable
 
     def __str__(self) -> str:
@@ -132,119 +134,103 @@ class Stability:
     __repr__ = __str__
 
     @property
-    def searched(self) -> float:
-        """Growth rate of D, 1 / time, below which linear growth may not have been seen; 0 if nothing is hidden."""
-        return self.sticking.searched
-
-    @property
     def sentences(self) -> tuple[str, ...]:
         """The verdict, what holds without dissipation, what contacts at the bound do, and remarks on the origin."""
-        parts = (
-            self._without_loss, self._at_the_bound, self._by_vibration, self._range, self._when_it_grows,
-            self._under_the_load, self.remarks,
-        )  # fmt: skip
-        return (self._verdict, *chain.from_iterable(parts))
+        parts = self._at_rest(), self._range(), self._beyond()
+        return (self._verdict(), *(each for part in parts for each in part), *self.remarks)
 
-    @property
-    def _rate(self) -> str:
-        """D as an exponential, with the digits that are known."""
-        return exponential(self.growth_rate, _digits(self.growth_rate, self.error), self.at_least)
-
-    @property
     def _verdict(self) -> str:
+        outcome = self.one_sided
         free = f", except for {counted(self.free, 'motion')} that no force opposes" if self.free else ""
+        rate = exponential(self.growth_rate, _digits(self.growth_rate, self.error), self.at_least)
         if not self.contacts:
             return "no particle touches another or a wall: stability is not defined"
         if self.stable is None:
             return f"not known whether the packing is stable: {'; '.join(self.reasons)}"
         if not self.stable:
-            how = " in spite of the dissipation" if self.dissipative else ""
-            return f"unstable: small motion grows{how}, {self._rate}"
-        if self.one_sided is not None:
-            return f"stable: {self._comes_to_rest(self.one_sided, free)}"
+            return f"unstable: small motion grows{' in spite of the dissipation' * self.dissipative}, {rate}"
+        if outcome is not None:
+            left = f", where {outcome.slip_left:.1%} of their slip is left" if outcome.slip_left else ""
+            ends = "comes to rest" if self.growth_rate < 0 else "ends in vibration that goes on, but does not grow"
+            known = f"; with sticking contacts, {self.sticking.said}" if self.sticking.said else ""
+            size = f"D reaches {outcome.amplification:.3g} times the mean square velocity of the push"
+            while_sliding = f"while contacts slide (followed for t = {outcome.time:.4g}{left})"
+            return f"stable: each of {outcome.pushes} pushes {ends}{free}; {size} {while_sliding}{known}"
         if self.sticking.said:
             return f"stable: {self.sticking.said}{free}"
         if self.dissipative and self.growth_rate < 0:
-            motion = "every vibration" if self.creep else "every motion"
-            return f"stable: {motion} decays, the slowest with {self._rate}{free}"
+            return f"stable: every {'vibration' if self.creep else 'motion'} decays, the slowest with {rate}{free}"
         if self.creep and not self.dissipative:
             return f"stable but for creep: no motion grows exponentially{free}"
         return f"stable: no motion grows{free}"
 
-    def _comes_to_rest(self, outcome: OneSidedOutcome, free: str) -> str:
-        left = f", where {outcome.slip_left:.1%} of their slip is left" if outcome.slip_left else ""
-        ends = "comes to rest" if self.growth_rate < 0 else "ends in vibration that goes on, but does not grow"
-        size = as_known(outcome.least_amplification, outcome.amplification)
-        return (
-            f"each of {outcome.pushes} pushes {ends}{free}; D reaches {size} times the mean square velocity of the "
-            f"push while contacts slide (followed for t = {outcome.time:.4g}{left})"
-            + (f"; with sticking contacts, {self.sticking.said}" if self.sticking.said else "")
-        )
-
-    @property
-    def _without_loss(self) -> Iterator[str]:
-        u = self.undamped
+    def _at_rest(self) -> Iterator[str]:
+        """Without dissipation, with contacts at the bound, and with those that vibration wears down."""
+        u, sided = self.undamped, self.one_sided is not None or self.sliding != self.sticking
         if self.dissipative and u.growth_rate > 0:
             counts = {"complex pair": u.pairs, "negative eigenvalue": u.negative}
             what = " and ".join(counted(count, name) for name, count in counts.items() if count)
-            yield (f"without dissipation: {what or 'small motion grows'}, {exponential(u.growth_rate, 6, u.at_least)}")
-
-    @property
-    def _at_the_bound(self) -> Iterator[str]:
-        if self.at_bound == 0:
+            yield f"without dissipation: {what or 'small motion grows'}, {exponential(u.growth_rate, 6, u.at_least)}"
+        if self.at_bound:
+            lone = self.at_bound == 1
+            slide = ": each slides on ahead and sticks on the way back" if sided else f" and slide{'s' * lone}"
+            count = f"{self.at_bound} of {counted(self.contacts, 'contact')} {'is' if lone else 'are'}"
+            yield f"{count} at Coulomb's bound{slide}"
+            if sided:
+                on = max(self.sliding.free - self.sticking.free, 0)
+                ever = f"{counted(on, 'motion')} would go on for ever, and " if on else ""
+                yield (
+                    f"neither of two linear motions decides: if all of them stuck, {_neighbour(self.sticking)}; if all "
+                    f"slid on, {ever}{_neighbour(self.sliding)}"
+                )
+        if not self.stable:
             return
-        sided = self.one_sided is not None or self.sliding != self.sticking
-        slide = "slides" if self.at_bound == 1 else "slide"
-        yield (
-            f"{self.at_bound} of {counted(self.contacts, 'contact')} {'is' if self.at_bound == 1 else 'are'} at "
-            f"Coulomb's bound{': each slides on ahead and sticks on the way back' if sided else f' and {slide}'}"
-        )
-        if sided:
-            on = max(self.sliding.free - self.sticking.free, 0)
-            ever = f"{counted(on, 'motion')} would go on for ever, and " if on else ""
-            yield (
-                f"neither of two linear motions decides: if all of them stuck, {_neighbour(self.sticking)}; if all "
-                f"slid on, {ever}{_neighbour(self.sliding)}"
-            )
-
-    @property
-    def _by_vibration(self) -> Iterator[str]:
         creep = self.creep
-        if self.stable and self.one_sided is not None and self.one_sided.wears:
+        if self.one_sided is not None and self.one_sided.wears:
             yield WORN + ": as long as vibration lasts, contacts may slide again, and D may rise further"
-        if creep is None or not self.stable:
-            return
-        if self.dissipative:
+        if creep is not None and self.dissipative:
+            later = "" if creep.settled else ", and farther later"
+            if not creep.settled and creep.limit is not None:
+                later = f"; D may reach {creep.limit:.2g} times before the slowest motion has decayed"
             yield (
                 f"{WORN}, and they stay displaced, by D up to {creep.amplification:.2g} times the mean square velocity "
-                f"of the push within t = {creep.time:.4g}{_later(creep)}"
+                f"of the push within t = {creep.time:.4g}{later}"
             )
-            return
-        yield (
-            f"{WORN}: D as ({as_known(creep.least_velocity, creep.velocity)} t)^2 times the mean square velocity of "
-            "the push"
-        )
+        elif creep is not None:
+            yield f"{WORN}: D as ({creep.velocity:.2g} t)^2 times the mean square velocity of the push"
 
-    @property
     def _range(self) -> Iterator[str]:
-        least, most = PUSH_OVER_RESIDUAL * self.residual_push, self.largest_push
-        if self.one_sided is not None:
-            yield from _range_of_pushes(self.one_sided, bool(self.stable))
-        elif self.stable and most is None and not self.asymmetry:
-            above = (
-                f" from {least:.1g} on (velocity of one particle), below which residual forces count" if least else ""
-            )
+        """Between which pushes this holds."""
+        least, most, outcome = PUSH_OVER_RESIDUAL * self.residual_push, self.largest_push, self.one_sided
+        if outcome is not None:
+            least, most = outcome.scales
+            if outcome.grows and np.isfinite(least):
+                yield (
+                    f"this growth is seen after pushes from {least:.1g} on (velocity along an axis): after smaller "
+                    "ones contacts that count as at the bound may stay below it, or residual forces count"
+                )
+            elif self.stable and least < most:
+                yield (
+                    f"this is the motion after these pushes from {least:.1g} on (velocity along an axis), where "
+                    "contacts that count as at the bound reach it and residual forces do not count, up to "
+                    f"{most:.1g}, where another contact changes or one of these turns; other pushes may differ"
+                )
+        elif not self.stable:
+            return
+        elif most is None and not self.asymmetry:
+            above = f" from {least:.1g} on (velocity of one particle), below which residual forces count"
             says = "which push changes a contact, K by differences of forces does not say"
-            yield f"holds for small pushes{above}: {says}"
-        elif self.stable and most is None:
-            if self.contacts and not self.residual_push:
-                yield "which push changes a contact is not known, since K's symmetric part is not positive"
-        elif self.stable and most is not None and least >= most:
+            yield f"holds for small pushes{above if least else ''}: {says}"
+        elif most is None and not least:
+            yield "which push changes a contact is not known, since K's symmetric part is not positive"
+        elif most is None:
+            return
+        elif least >= most:
             yield (
                 f"holds for no push: below {least:.1g} (velocity of one particle) residual forces count, and above "
                 f"{most:.1g} a contact may open, close or slide"
             )
-        elif self.stable:
+        else:
             below = f"; below a velocity of {least:.1g} residual forces count" if least else ""
             worn = ", but for what vibration wears down" if self.creep else ""
             within = f", until t = {self.push_time:.3g}" if self.push_time else ""
@@ -252,24 +238,15 @@ class Stability:
                 f"holds for every push of an energy up to {self.largest_energy:.2g}, as of one particle at {most:.2g}"
                 f"{within}: no contact opens, closes or slides{worn}{below}"
             )
-            if self.creep and np.isfinite(self.creep.first_change[1]):
-                yield (
-                    f"of random pushes, a contact changes from {self.creep.first_change[0]:.1g} to "
-                    f"{self.creep.first_change[1]:.1g} on (velocity along an axis)"
-                )
 
-    @property
-    def _when_it_grows(self) -> Iterator[str]:
-        if self.stable is not False:
-            return
-        if self.first_change is not None:
+    def _beyond(self) -> Iterator[str]:
+        """Where a motion that grows ends, and under a load that rises."""
+        if self.stable is False and self.first_change is not None:
             size = self.first_change**0.5
             yield f"as it grows, the first contact changes at a displacement of {size:.2g} (root of D)"
-        if self.follow is not None:
-            yield f"LAMMPS goes on from there, and {_ENDS[self.follow['ends']]} {self.follow['displacement']:.2g}"
-
-    @property
-    def _under_the_load(self) -> Iterator[str]:
+        if self.stable is False and self.follow is not None:
+            ends, size = ENDS[self.follow["ends"]], self.follow["displacement"]
+            yield f"LAMMPS goes on from there, and {ends} a displacement of {size:.2g}"
         if self.not_followed:
             yield f"under a load that rises: not followed, since {self.not_followed}"
         if self.rising is not None:
@@ -289,22 +266,8 @@ class Stability:
             found[name] = None if found[name] is None else found[name].as_dict()
         for name in ("sticking", "sliding"):
             found[name] = {key: value for key, value in asdict(found[name]).items() if key != "s"}
-        return found | {
-            "undamped": vars(self.undamped), "searched": self.searched, "reasons": list(self.reasons),
-            "remarks": list(self.remarks),
-        }  # fmt: skip
-
-
-_ENDS = {
-    "vibrates": "vibrates at a displacement of",
-    "creeps": "creeps on, at a displacement of",
-    "flows": "flows, at a displacement of",
-}
-
-
-def as_known(least: float, most: float) -> str:
-    """The larger of two numbers, with as many digits as these agree in."""
-    return f"{most:.{_digits(most, most - least)}g}"
+        found |= {name: list(found[name]) for name in ("reasons", "remarks")}
+        return found | {"undamped": vars(self.undamped), "searched": self.sticking.searched}
 
 
 def _digits(number: float, error: float) -> int:
@@ -320,31 +283,3 @@ def _neighbour(linear: Linear) -> str:
     if linear.growth_rate == 0:
         return "D neither grows nor decays"
     return exponential(linear.growth_rate, 4, linear.at_least)
-
-
-def _later(creep: Creep) -> str:
-    """How far vibration may carry particles after the time that was followed."""
-    if creep.settled:
-        return ""
-    if creep.limit is None:
-        return ", and farther later"
-    return f"; D may reach {creep.limit:.2g} times before the slowest motion has decayed"
-
-
-def _range_of_pushes(outcome: OneSidedOutcome, stable: bool) -> Iterator[str]:
-    """Between which pushes one-sided motion is what was followed."""
-    (least, most), changes = outcome.scales, outcome.first_change
-    if outcome.grows:
-        yield (
-            f"this growth is seen after pushes from {least:.1g} on (velocity along an axis): after smaller ones "
-            "contacts that count as at the bound may stay below it, or residual forces count"
-            if np.isfinite(least)
-            else "from which push on this growth is seen is not known: residual forces alone change a contact"
-        )
-    elif stable and least < most:
-        upto = f"{most:.1g}" if changes[1] < 1.5 * most or np.isinf(changes[1]) else f"{most:.1g} to {changes[1]:.1g}"
-        yield (
-            f"this is the motion after these pushes from {least:.1g} on (velocity along an axis), where contacts that "
-            f"count as at the bound reach it and residual forces do not count, up to {upto}, where another contact "
-            "changes or one of these turns; other pushes may differ"
-        )

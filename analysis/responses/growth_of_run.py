@@ -136,79 +136,59 @@ def growth_of_run(
     """
     t, d = np.asarray(time, dtype=np.float64), np.asarray(msd, dtype=np.float64)
     mu = np.full(len(t), packing.law.mu) if friction is None else np.asarray(friction, dtype=np.float64)
-    weaker = mu < packing.law.mu
-    weakened = float(mu.min()) if weaker.any() else None
-    if weakened is not None:
+    weaker, weakened, begin = mu < packing.law.mu, None, 0.0
+    if weaker.any():
+        weakened = float(mu.min())
         packing = _with_friction(packing, weakened)
-        begin = int(np.argmax(weaker))
-        t, d = t[begin:], d[begin:]
-    predicted = _predict(packing, dt)
-    rate = predicted.rate
-    length = float(t[-1] - (t[0] if weakened is not None else 0.0))
+        t, d = t[int(np.argmax(weaker)) :], d[int(np.argmax(weaker)) :]
+        begin = float(t[0])
+    disks, length = len(packing), float(t[-1]) - begin
+    rate, pairs, negative, needed = None, 0, 0, None
+    if packing.damped and disks <= DISKS_BY_LAPACK // 2:
+        grows = unstable_rates(packing)
+        rate = 2 * float(grows.real.max(initial=0.0))
+        pairs, negative = int(np.count_nonzero(grows.imag > 0)), int(np.count_nonzero(grows.imag == 0))
+    elif not packing.damped and disks <= DISKS_BY_LAPACK:
+        modes = spectrum(packing)
+        rate, pairs, negative = modes.growth_rate(dt), len(modes.pairs), len(modes.negative)
+    if rate:
+        needed = float(np.log(10 * NOISE_FACTOR * max(1, 3 * disks) / NOISE_SHARE) / rate)
     fitted: Growth | None = None
     if rate != 0 and len(t) > 1:
         try:
             fitted = fit_growth(t, d, *_bounds(packing, t, d, rate, jumped=weakened is not None))
         except ValueError:
             fitted = None
-    why = "" if fitted is not None else _why_not(packing, d, predicted, length, weakened)
-    return GrowthOfRun(fitted, rate, predicted.pairs, predicted.negative, length, predicted.needed, weakened, why)
-
-
-@dataclass(frozen=True)
-class _Prediction:
-    """What the spectrum of the start says: the growth rate of D if it was computed, and the numbers of what grows."""
-
-    disks: int
-    rate: float | None
-    pairs: int = 0
-    negative: int = 0
-
-    @property
-    def needed(self) -> float | None:
-        """About how long a run has to be for D to leave the noise and be followed; None where nothing grows."""
-        return (
-            float(np.log(10 * NOISE_FACTOR * max(1, 3 * self.disks) / NOISE_SHARE) / self.rate) if self.rate else None
-        )
-
-
-def _predict(packing: Packing, dt: float | None) -> _Prediction:
-    """The growth of D by LAPACK, of packings of some hundred disks."""
-    disks = len(packing)
-    if disks > (DISKS_BY_LAPACK // 2 if packing.damped else DISKS_BY_LAPACK):
-        return _Prediction(disks, None)
-    if packing.damped:
-        return _Prediction(disks, *_damped_growth(packing))
-    modes = spectrum(packing)
-    return _Prediction(disks, modes.growth_rate(dt), len(modes.pairs), len(modes.negative))
-
-
-def _why_not(packing: Packing, msd: Floats, predicted: _Prediction, length: float, weakened: float | None) -> str:
-    """Why a run shows no growth, in a sentence without its full stop."""
-    now = f"with the friction weakened to mu = {weakened:.6g}" if weakened is not None else f"at F_x = {packing.fx:g}"
-    rate, needed = predicted.rate, predicted.needed
-    if rate is None:
-        return (
-            f"D did not grow by a decade above its noise; for more than {DISKS_BY_LAPACK} disks the spectrum is not "
-            "computed"
-        )
-    if needed is None:
-        loss = ", dissipation damps all motion" if packing.damped else ""
+    now = f"at F_x = {packing.fx:g}" if weakened is None else f"with the friction weakened to mu = {weakened:.6g}"
+    if fitted is not None:
+        why = ""
+    elif rate is None:
+        less = f"for more than {DISKS_BY_LAPACK} disks the spectrum is not computed"
+        why = f"D did not grow by a decade above its noise; {less}"
+    elif needed is None:
         found = "no motion grows" if packing.damped else "no complex pair and no negative eigenvalue"
-        bounded = "D jumps to the new equilibrium and stays bounded" if weakened is not None else "D stays bounded"
-        return (
-            f"nothing grows: {now} the packing is linearly stable ({found}){loss}, and {bounded}, however long the run"
+        loss = ", dissipation damps all motion" if packing.damped else ""
+        jumps = "" if weakened is None else " jumps to the new equilibrium and"
+        stays = f"D{jumps} stays bounded, however long the run"
+        why = f"nothing grows: {now} the packing is linearly stable ({found}){loss}, and {stays}"
+    else:
+        unstable = f"{now} the packing is unstable ({_in_words(pairs, negative)}, rate {rate:.6g})"
+        short = (
+            f"but the run was too short to see it: {length * rate:.1f} e-foldings in t = {length:.4g}; D leaves the "
+            f"noise, and can be followed over a decade, after about t = {needed:.4g}"
         )
-    unstable = f"{now} the packing is unstable ({_in_words(predicted.pairs, predicted.negative)}, rate {rate:.6g})"
-    if length < needed:
-        return (
-            f"{unstable}, but the run was too short to see it: {length * rate:.1f} e-foldings in t = {length:.4g}; D "
-            f"leaves the noise, and can be followed over a decade, after about t = {needed:.4g}"
+        other = (
+            f"but D did not rise by a decade above its noise at one rate: it reached {d.max():.2g} in t = {length:.4g}."
+            " The motion is small compared with other motion, or has left the range in which K holds"
         )
-    return (
-        f"{unstable}, but D did not rise by a decade above its noise at one rate: it reached {msd.max():.2g} in "
-        f"t = {length:.4g}. The motion is small compared with other motion, or has left the range in which K holds"
-    )
+        why = f"{unstable}, {short if length < needed else other}"
+    return GrowthOfRun(fitted, rate, pairs, negative, length, needed, weakened, why)
+
+
+def unstable_rates(packing: Packing) -> Complexes:
+    """The eigenvalues s with Re s > 0 beyond rounding of a packing with dissipation; 1 / time."""
+    values, grows, *_ = all_rates(Motion.of(packing))
+    return values[grows]
 
 
 def _in_words(pairs: int, negative: int) -> str:
@@ -228,19 +208,6 @@ def _bounds(packing: Packing, time: Floats, msd: Floats, rate: float | None, jum
     late = time[int(np.argmax(msd >= 0.1 * top))]
     grows_on = rate is not None and (time[-1] - late) * rate < 2 * np.log(10)
     return growing_range(time, msd, min(ceiling, np.nextafter(top, np.inf) if grows_on else PLATEAU_SHARE * top))
-
-
-def unstable_rates(packing: Packing) -> Complexes:
-    """The eigenvalues s with Re s > 0 beyond rounding of a packing with dissipation; 1 / time."""
-    values, grows, *_ = all_rates(Motion.of(packing))
-    return values[grows]
-
-
-def _damped_growth(packing: Packing) -> tuple[float, int, int]:
-    """Growth rate of D, and the motions that grow: with and without oscillation."""
-    grows = unstable_rates(packing)
-    fastest = 2 * float(grows.real.max(initial=0.0))
-    return fastest, int(np.count_nonzero(grows.imag > 0)), int(np.count_nonzero(grows.imag == 0))
 
 
 def _with_friction(packing: Packing, mu: float) -> Packing:

@@ -19,7 +19,7 @@ half angle. The formulas give the positions at the steps exactly, and also the v
 x_{n-1})/2dt`.
 
 **First order.** A motion with dissipation is a function of the first-order matrix Z
-(:mod:`~faultgouge.analysis.motion.energy_norm`): `released_motion` or `driven_motion` of its eigenvalues s.
+(:mod:`~faultgouge.analysis.motion.motion`): `released_motion` or `driven_motion` of its eigenvalues s.
 """
 
 from dataclasses import dataclass

@@ -8,7 +8,7 @@ Without dissipation the motion is a function of one matrix, that of one oscillat
 (:mod:`~faultgouge.analysis.responses.oscillator`).
 
 **Dissipation** (:mod:`~faultgouge.analysis.operators.damping`): dashpots have no modes in common with K. The motion is
-then that of the first-order system of :mod:`~faultgouge.analysis.motion.energy_norm`, whose eigenvalues s give
+then that of the first-order system of :mod:`~faultgouge.analysis.motion.motion`, whose eigenvalues s give
 :math:`e^{st}` and, under the force, :math:`(e^{i\omega t} - e^{st}) / (i\omega - s)`. If all Re s < 0, the motion
 finally is the stationary response with the transfer function :math:`H(\omega) = (K - \omega^2 M + i\omega C)^{-1}`
 (`transfer` in :mod:`~faultgouge.analysis.responses.forcing`).
@@ -132,7 +132,7 @@ class LinearMotion:
             displacement, velocity = self.modes.apply(second, time, vector, observed)
             return displacement.real, velocity.real
         norm, rest, size = self.system.energy_norm, np.zeros_like(vector), len(observed)
-        start = norm.state(rest, vector) if forced else norm.state(vector, rest)
+        start = np.concatenate([rest, vector] if forced else [norm.weight @ vector, rest])
         rows = np.block([[observed @ norm.unweight, 0 * observed], [0 * observed, observed]])
         first = partial(driven_motion, oscillator.omega) if forced else released_motion
         (value,) = self.modes.apply(first, time, start, rows)

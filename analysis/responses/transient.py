@@ -12,7 +12,7 @@ largest growth over all starts and over the time t,
 
 **Energy.** The start is any displacement and any velocity, and the norm is the energy :math:`\tfrac12 \dot q^T M \dot q
 + \tfrac12 q^T K_s q` with the symmetric part :math:`K_s` of K; P(t) is :math:`e^{Zt}` of
-:mod:`~faultgouge.analysis.motion.energy_norm`. If K were symmetric, both gains would be 1: only the antisymmetric part
+:mod:`~faultgouge.analysis.motion.motion`. If K were symmetric, both gains would be 1: only the antisymmetric part
 of K makes them larger. (For properties of such matrices that eigenvalues do not show, see Trefethen and Embree,
 *Spectra and Pseudospectra*, 2005.)
 

@@ -1,5 +1,1 @@
-"""Stiff and extreme cases: tried, drawn and written."""
-
-from .compute import CASES, ExtremeCasesError, check, extremes
-
-__all__ = ["CASES", "ExtremeCasesError", "check", "extremes"]
+"""Stiff and extreme cases: `packings` and `cases` say what is tried, `run` tries, draws and writes."""

@@ -1,5 +1,2 @@
-"""Error against run time: computed by `work_precision`, drawn and written here."""
-
-from .compute import SCENE, STUDIES, ReportError, machine, report, stem
-
-__all__ = ["SCENE", "STUDIES", "ReportError", "machine", "report", "stem"]
+"""Error against run time. `run` computes, draws and writes the report; a study is a function from `Settings` to a dict
+that it makes with `study_of`, and its texts are in words.toml."""

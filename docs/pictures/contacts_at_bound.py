@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from faultgouge.analysis import Configuration, Packing, one_sided_motion
 from faultgouge.analysis.arrays import Floats, derive_frozen
-from faultgouge.figures.packing_artist import PackingArtist
+from faultgouge.figures.packing import PackingArtist
 from faultgouge.figures.style import INK, STYLE, save_as
 
 HERE = Path(__file__).parent

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...analysis import PackingFileError
 from ...analysis.files import formats
 from ...analysis.files.formats import Disks
-from ...analysis.files.formats.disks import of_columns
+from ...analysis.files.formats.disks import ParticleTable, disks_of
 from .instance import lammps_instance
 from .plain_file_names import plain_name
 
@@ -55,8 +55,8 @@ def read_restart(path: Path) -> Disks:
         place = np.array(lammps.numpy.extract_atom("x")[:count], dtype=np.float64)
         columns |= dict(zip("xyz", place.T, strict=True))
         low, high, _, _, _, periodic, _ = lammps.extract_box()
-        groups = _groups(lammps, np.argsort(columns["id"]))
-        return of_columns(str(path), columns, box_length=high[0] - low[0] if periodic[0] else None, groups=groups)
+        box, groups = np.diag(np.subtract(high, low)), _groups(lammps, np.argsort(columns["id"]))
+        return disks_of(ParticleTable(str(path), columns, box, np.array(low), [*map(bool, periodic)], groups=groups))
     finally:
         lammps.close()
 

@@ -18,7 +18,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from ...analysis import BadInputError
 from ...analysis.arrays import LARGEST, SMALLEST
-from ...analysis.files.plain_file import read_plain, read_plain_text
+from ...analysis.files.atomic_write import read_plain, read_plain_text
 
 if sys.version_info >= (3, 11):
     import tomllib

@@ -12,7 +12,7 @@ import numpy as np
 
 from faultgouge.analysis import NoEquilibriumError
 from faultgouge.pywrap import Scene
-from faultgouge.studies.result_rows import keep_rows
+from faultgouge.studies.result_rows import append_row
 from research.dissipation.compute import RATIOS, over_distance, over_strength, ramped, weak_cases
 from research.packing_tools import with_seed
 from research.tables import read_rows
@@ -82,7 +82,8 @@ def main(what: str, seeds: list[int]) -> None:
     path = HERE / "tables" / f"{what}.jsonl"
     done = read_rows(path) if path.exists() else []
     records = weak(done, seeds) if what == "weak" else gain(done) if what == "gain" else strength(what, done)
-    for record in keep_rows(path, records):
+    for record in records:
+        append_row(path, record)
         print(record, flush=True)
 
 

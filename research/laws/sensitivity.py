@@ -38,11 +38,12 @@ def rows(seed: int) -> Iterator[dict[str, Any]]:
         except ValueError:  # the onset is not known well enough for three distances
             yield known | {"exponent": None}
             continue
+        amplitudes = [pair.amplitude() for pair in found.pairs]
         yield known | {
             "exponent": found.fit.exponent,
             "error": found.fit.error,
             "distances": [float(found.distance.min()), float(found.distance.max())],
-            "amplitudes": [float(found.amplitude.min()), float(found.amplitude.max())],
+            "amplitudes": [float(min(amplitudes)), float(max(amplitudes))],
         }
 
 

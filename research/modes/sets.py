@@ -16,8 +16,8 @@ from math import ceil, sqrt
 from pathlib import Path
 from typing import Any
 
-from faultgouge.pywrap.scenes.validation import read_toml
 from faultgouge.studies.sweep import Sweep
+from research.tables import read_toml
 
 SIZES = {50: 100, 100: 100, 200: 50, 400: 30, 1000: 15}
 """Packings by number of disks, with a fixed force on each disk of the layer and mu = 1."""
@@ -106,7 +106,7 @@ def _first(most: int, share: float) -> str:
 
 def quartz(depth: str, disks: int = 100) -> dict[str, Any]:
     """The shipped scene of quartz spheres under an overburden, such as "10 MPa", with so many disks."""
-    scene = read_toml(Path(str(files("faultgouge.scenes") / f"quartz_{depth.replace(' ', '')}.toml")), "scene")
+    scene = read_toml(Path(str(files("faultgouge.scenes") / f"quartz_{depth.replace(' ', '')}.toml")))
     scene["packing"]["disks"] = disks
     return scene
 

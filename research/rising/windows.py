@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from faultgouge.analysis import Configuration, Floats, Packing, Signal
+from faultgouge.analysis import Configuration, Floats, Packing, Signal, stable_timestep
 from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
-from faultgouge.analysis.motion.rising_load import DRAG, FADE_WINDOWS, LOAD_STEP, WINDOW, windows_under_load
+from faultgouge.analysis.motion.rising_load import DRAG, FADE_WINDOWS, WINDOW, windows_under_load
 from faultgouge.pywrap import Engine
 
 STEPS_OF_LOOK, LOOKS = 15, 400
@@ -46,7 +46,7 @@ class Windows:
     @classmethod
     def of(cls, configuration: Configuration, rising: Mapping[str, Any]) -> Windows:
         """Those of one-sided motion, `Stability.rising`."""
-        length = _length(OneSidedSystem.of(configuration, LOAD_STEP))
+        length = _length(configuration)
         if rising["time"] is None:
             return cls(length, *DEFAULT)
         return cls(length, round(rising["time"] / length), round(rising["span"] / length))
@@ -57,18 +57,16 @@ class Windows:
         return self.length / (STEPS_OF_LOOK * LOOKS)
 
 
-def _length(system: OneSidedSystem) -> float:
-    return WINDOW * system.time_step / system.step_share
+def _length(configuration: Configuration) -> float:
+    return WINDOW * float(stable_timestep(configuration))
 
 
 def follow_one_sided(packing: Packing, count: int) -> tuple[float, Floats]:
     """Length of a window, and drift and vibration of a layer in each window after the drag, shape (windows, 2, S)."""
-    system = OneSidedSystem.of(packing.configuration, LOAD_STEP)
-    force = np.zeros((len(packing), 2))
-    force[:, 0] = packing.top
-    direction = forces_on_coordinates(packing.configuration, force)
-    followed = list(islice(windows_under_load(system, direction, _length(system)), count))[FADE_WINDOWS:]
-    return _length(system), np.array([window.drift_and_vibration(system) for window in followed])
+    system, length = OneSidedSystem.of(packing), _length(packing.configuration)
+    load = system.weight.T @ forces_on_coordinates(packing.configuration, "fx")
+    followed = list(islice(windows_under_load(system, load, length), count))[FADE_WINDOWS:]
+    return length, np.array([window.drift_and_vibration(system) for window in followed])
 
 
 def rise_in_plugin(packing: Packing, rate: float, windows: Windows, spins: bool) -> list[tuple[Floats, Floats]]:

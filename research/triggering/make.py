@@ -11,14 +11,12 @@ python -m research.triggering.make [FIRST] > research/triggering/triggered.jsonl
 import json
 import sys
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict
 from itertools import count
 from pathlib import Path
 from typing import Any
 
 from faultgouge.analysis import NoEquilibriumError, OnsetError
 from faultgouge.pywrap import Scene, SceneError, onset_run, reach
-from faultgouge.pywrap.scenes.validation import require_section
 from faultgouge.studies.triggering import Forecast, forecast
 from research.packing_tools import with_seed
 
@@ -58,7 +56,10 @@ def choose_seed(scene: Scene, seeds: Iterable[int]) -> Iterator[dict[str, Any]]:
 
 
 def _try_seed(scene: Scene, seed: int) -> dict[str, Any]:
-    friction, time = require_section(scene.friction, "friction"), require_section(scene.perturb, "perturb").time
+    friction, perturb = scene.friction, scene.perturb
+    assert friction is not None
+    assert perturb is not None
+    time = perturb.time
     mu = scene.law.mus[0]
     try:
         fx = float(f"{(1 - BELOW) * onset_run(scene, mu).fx_c:.5g}")
@@ -69,7 +70,7 @@ def _try_seed(scene: Scene, seed: int) -> dict[str, Any]:
             says = "the onset of the weakened friction is not below it"
     except (OnsetError, NoEquilibriumError, SceneError) as error:
         return {"seed": seed, "says": str(error), "fx": None, "forecast": None}
-    return {"seed": seed, "says": says, "fx": fx, "forecast": asdict(foreseen)}
+    return {"seed": seed, "says": says, "fx": fx, "forecast": foreseen._asdict()}
 
 
 def _falls_short(foreseen: Forecast) -> str:

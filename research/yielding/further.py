@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from faultgouge.pywrap import Engine, Equilibrium, Scene, settle, time_step
-from faultgouge.pywrap.scenes.validation import read_toml
 from faultgouge.studies.result_rows import append_row
 from research.laws.both_laws import as_slider
 from research.modes.loss import with_dashpots
 from research.packing_tools import distance_of_bearing_disks, shake_disks
+from research.tables import read_toml
 from research.yielding.compute import INCREMENTS, NOISE, SHARES, dashpots, dynamic, dynamic_runs, noise_seed
 from research.yielding.static import Branch, branch, layer_slip
 
@@ -46,7 +46,7 @@ LARGE = {"disks": 400, "width": 23.8, "top": 20}
 
 def scene(seed: int, **packing: Any) -> Scene:
     """The scene of the sweep with another seed and other packings."""
-    given = read_toml(SCENE, "sweep")["scene"]
+    given = read_toml(SCENE)["scene"]
     given["packing"] |= {"seed": seed} | packing
     return Scene.from_mapping(given)
 

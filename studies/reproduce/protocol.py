@@ -1,25 +1,114 @@
-"""The paper's protocol on one packing, from the scene to a folder with its figures, numbers and report."""
+r"""The paper's protocol on one packing, from the scene to a folder with its figures, numbers and report.
+
+Settle, raise F_x from equilibrium to equilibrium for each friction coefficient, find the onset F_x^c at which two real
+eigenvalues coalesce; then start undamped dynamics from an equilibrium above the onset and compare the growth of the
+mean square displacement D(t), which starts from rounding noise, with the rate 2 |Im omega| of the spectrum. If the
+scene asks for it, a minute perturbation just below the onset follows (:mod:`~faultgouge.studies.triggering`).
+"""
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from ...analysis import Onset, OnsetError
-from ...analysis.files.atomic_write import make_folder, write_json, write_text
+import numpy as np
+
+from ...analysis import Growth, Onset, OnsetError, Packing, RunFile, Spectrum, fit_growth, spectrum
+from ...analysis.arrays import Floats
+from ...analysis.counted import counted
+from ...analysis.files.atomic_write import check_own, make_folder, write_json, write_text
+from ...analysis.packing.solid_fraction import solid_fraction, solid_fraction_below_top
+from ...analysis.responses.growth import growing_range
+from ...analysis.responses.growth_of_run import PLATEAU_SHARE
+from ...analysis.responses.response import Response, layer_force, linear_response
 from ...figures import PairCurve
-from ...pywrap import Scene, SceneError
-from ...pywrap.onset import load_at_onset
+from ...figures.packing import draw_packing
+from ...figures.pages import render
+from ...figures.pair import draw_pair
+from ...figures.series import draw_growth
+from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
+from ...pywrap.onset import ONSET_DISTANCES, load_at_onset, onset_run
+from ...pywrap.runs.undamped import ACCURATE_SHARE, perturb, time_step
+from ...pywrap.scenes.sections import Perturb
+from ...pywrap.scenes.units import dashpot, real_units
 from ...pywrap.scenes.validation import require_section
 from ...pywrap.settling.settle import settle_bed
-from ..executors import Say
-from ..study import draw_all
-from ..triggering import Triggering
-from ..triggering import summary as triggering_summary
-from .compute import growth_run, recorded_ramp, summary_of, triggering_run
-from .draw import figures
-from .page import report
-from .triggering_figures import figures as triggering_figures
+from ..packing_tools import unit_of_time
+from ..study import Figures, Say, draw_all
+from ..triggering import (
+    GROWTH_FACTOR,
+    Sensitivity,
+    Series,
+    Triggering,
+    equilibrium_at,
+    follow,
+    largest,
+    sensitivity,
+    series_of,
+    weakened_rate,
+)
+from .triggering_figures import triggering_figures
+
+EFOLDS = 48.0
+"""Length of the undamped run in units of 1/rate: D grows by up to 20 decades in it."""
+
+MOST_RUN_STEPS = 3_000_000
+"""Steps of the undamped run, at the most: about 20 s for 100 disks."""
+
+EARLY_SAMPLES = 2000, 20_000
+"""Samples of the triggered runs at times that grow geometrically. The friction falls within some twenty time steps
+after a thousand; so many samples of that run include each step up to there."""
+
+ABOVE_NOISE = 1e3
+"""Factor of the perturbation that is compared with the linear response: a million times in D."""
+
+COMPARED_TIME = 50.0
+"""Length of the run that is compared with linear response, in `unit_of_time`: a few hundred periods of the pair."""
+
+
+@dataclass(frozen=True, eq=False)
+class GrowthRun:
+    """An undamped run above the onset.
+
+    Attributes
+    ----------
+    start : Equilibrium
+        Where it began.
+    time, msd : ndarray, shape (T,)
+        D(t).
+    spectrum : Spectrum
+        Of the equilibrium.
+    time_step : float
+        Of the run.
+    predicted : float
+        Growth rate of D from the spectrum and the time step's dispersion, 1/time.
+    measured : Growth or None
+        Fitted to D(t); None where D does not grow far enough between its noise and where it levels off.
+    """
+
+    start: Equilibrium
+    time: Floats
+    msd: Floats
+    spectrum: Spectrum
+    time_step: float
+    predicted: float
+    measured: Growth | None
+
+
+@dataclass(frozen=True, eq=False)
+class Triggered:
+    """What is triggered: the runs, of which "strong" has a perturbation `ABOVE_NOISE` as strong, for a shorter time:
+    its D stands out of the noise of doubles; the linear response to that, time step included; the growth rate of D
+    with the weakened friction where the control starts, from the spectrum, 0 if it is stable; and the response on the
+    way to the onset."""
+
+    found: Triggering
+    response: Response
+    control_rate: float | None
+    sensitive: Sensitivity
 
 
 def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | None = None) -> dict[str, Any]:
@@ -50,7 +139,7 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     say(f"growth rate of D: {rate} measured, {growth.predicted:.6g} predicted")
     summary = summary_of(scene, runs, growth)
     write_json(output / "summary.json", summary)  # what follows may fail
-    draw_all(figures([PairCurve.of_onset(run) for run in runs], growth), output, say)
+    draw_all(_figures(runs, growth), output, say)
     shaken, found, another = triggered or scene, None, None
     if shaken.perturb is not None and shaken.friction is not None:
         path = output / ("run.h5" if triggered is None else "triggered.h5")
@@ -62,7 +151,7 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
             say(f"{found.rstrip('.')}: no figures 2, 5 and 6")
             summary["triggering"] = {"says": found}
         else:
-            draw_all(triggering_figures(found), output, say)
+            draw_all(triggering_figures(found.found, found.response, found.sensitive), output, say)
             summary["triggering"] = triggering_summary(found)
         if another is not None:
             onsets = [{"mu": run.mu, "onset": run.as_dict()} for run in another]
@@ -74,18 +163,14 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     return summary
 
 
-def _trigger(scene: Scene, runs: list[Onset], path: Path, say: Say) -> Triggering | str:
-    """The triggering at perturb.fx, or where the onsets say without it; or why there is nothing to trigger."""
-    perturb = require_section(scene.perturb, "perturb")
-    fx = perturb.fx
-    if fx is None:
-        try:
-            fx = load_at_onset(scene, {run.mu: run for run in runs})
-        except (SceneError, OnsetError) as error:
-            return str(error)
-        scene = scene.model_copy(update={"perturb": perturb.model_copy(update={"fx": fx})})
-    say(f"triggering at F_x = {fx:g}")
-    return triggering_run(scene, runs, path)
+def _figures(runs: list[Onset], growth: GrowthRun) -> Figures:
+    """The paper's figures 1, 3 and, where D grew far enough to measure its rate, 4."""
+    fitted, curves = growth.measured, [PairCurve.of_onset(run) for run in runs]
+    first: Figures = {"figure1": partial(draw_packing, growth.start.packing), "figure3": partial(draw_pair, curves)}
+    last = (
+        {} if fitted is None else {"figure4": partial(draw_growth, growth.time, growth.msd, growth.predicted, fitted)}
+    )
+    return {**first, **last}
 
 
 def _ramps(scene: Scene, path: Path, say: Say) -> list[Onset]:
@@ -101,3 +186,216 @@ def _ramps(scene: Scene, path: Path, say: Say) -> list[Onset]:
         runs.append(recorded_ramp(scene, mu, here, bed))
         say(f"mu = {mu:g}: {runs[-1].describe()}")
     return runs
+
+
+def recorded_ramp(scene: Scene, mu: float, path: Path, bed: Packing | None = None) -> Onset:
+    """Ramp and onset for one friction coefficient, from a settled bed; every equilibrium goes to the file."""
+    one = scene.model_copy(update={"law": scene.law.model_copy(update={"mu": mu})})
+    near = ONSET_DISTANCES * require_section(scene.ramp, "ramp").first
+    check_own(path)
+    path.unlink(missing_ok=True)
+    with Record(path, one) as record:
+        run = onset_run(one, mu, reached=record.append, near_onset=near, bed=bed)
+        record.finish()
+    return run
+
+
+def growth_run(scene: Scene, run: Onset, path: Path) -> GrowthRun:
+    """An undamped run where the ramp shows the fastest growth by one pair."""
+    candidates = [each for each in run.equilibria if each.fx > run.fx_c]
+    spectra = [spectrum(each.packing) for each in candidates]
+    best = int(np.argmax([_dominance(each) for each in spectra]))
+    start, modes = candidates[best], spectra[best]
+    if not _dominance(modes):
+        first = run.windows[0]
+        raise SceneError(
+            f"no load of the ramp lies in a window of complex eigenvalues, of which the first begins at "
+            f"F_x = {first.fx_onset:.6g}: take a smaller ramp.step, so that a run above the onset has where to start"
+        )
+    dt = time_step(start.packing)
+    predicted = modes.growth_rate(dt)
+    settings = Perturb(
+        fx=start.fx, time=min(EFOLDS / predicted, MOST_RUN_STEPS * dt), inertia_factor=scene.inertia_factor
+    )
+    # disks that have moved by a tenth of the smallest overlap certainly move otherwise than the spectrum says
+    ceiling = (0.1 * start.packing.smallest_overlap) ** 2
+    samples: list[Sample] = []
+    with RunFile(path, "a") as file:
+        for sample in perturb(scene.model_copy(update={"perturb": settings}), start, samples=4000, early=0):
+            samples.append(sample)
+            if sample.msd > 1e6 * ceiling:
+                break
+        series = series_of(samples)
+        file.append_series("undamped", **series)
+    time, msd = series["time"], series["msd"]
+    try:
+        measured = fit_growth(time, msd, *growing_range(time, msd, min(ceiling, PLATEAU_SHARE * float(msd.max()))))
+    except ValueError:
+        measured = None
+    return GrowthRun(start, time, msd, modes, dt, predicted, measured)
+
+
+def _dominance(modes: Spectrum) -> float:
+    """Growth rate of the fastest pair less the rate of the second pair; 0 of a packing that buckles."""
+    if len(modes.negative):
+        return 0.0
+    rates = sorted((pair.growth_rate for pair in modes.pairs), reverse=True)
+    return rates[0] - (rates[1] if len(rates) > 1 else 0.0) if rates else 0.0
+
+
+def _trigger(scene: Scene, runs: list[Onset], path: Path, say: Say) -> Triggered | str:
+    """A perturbation between the onsets of the weakened and of the static friction, at perturb.fx, or where the onsets
+    say without it; or why there is nothing to trigger. The series go to the file."""
+    settings, mu_ss = require_section(scene.perturb, "perturb"), require_section(scene.friction, "friction").mu_ss
+    run, fx = runs[0], settings.fx
+    if fx is None:
+        try:
+            fx = load_at_onset(scene, {run.mu: run for run in runs})
+        except (SceneError, OnsetError) as error:
+            return str(error)
+        settings = settings.model_copy(update={"fx": fx})
+        scene = scene.model_copy(update={"perturb": settings})
+    say(f"triggering at F_x = {fx:g}")
+    # exact but for the product's rounding
+    weakened = [each for each in runs if np.isclose(each.mu, run.mu * mu_ss, rtol=1e-12)]
+    if weakened and weakened[0].windows[0].kind != "start" and fx <= weakened[0].fx_c:
+        return (
+            f"F_x = {fx:g} is below the onset {weakened[0].fx_c:g} of the weakened friction, too: no "
+            "window between the two, and nothing to erupt."
+        )
+    *_, start = reach(scene, fx)  # to the bit the equilibrium of `perturb`, with its v_0
+    modes = spectrum(start.packing)
+    if modes.is_stable is False:
+        what = f"{counted(len(modes.pairs), 'complex pair')} and {counted(len(modes.negative), 'negative eigenvalue')}"
+        return f"At F_x = {fx:g} the packing has {what} already: nothing is stable there to be triggered."
+    below = equilibrium_at(scene, run.equilibria, max(0.0, 2 * weakened[0].fx_c - fx)) if weakened else None
+
+    def store(name: str, series: Series) -> None:
+        with RunFile(path, "a") as file:
+            file.append_series(name, **series)
+
+    found = follow(scene, start, below, EARLY_SAMPLES, store=store)
+    packing, amplitude = start.packing, ABOVE_NOISE * settings.amplitude
+    time = min(settings.time, COMPARED_TIME * unit_of_time(packing))
+    strong = scene.model_copy(update={"perturb": settings.model_copy(update={"amplitude": amplitude, "time": time})})
+    found.runs["strong"] = series_of(perturb(strong, start, early=EARLY_SAMPLES[0]))
+    store("strong", found.runs["strong"])
+    response = linear_response(
+        packing,
+        found.runs["strong"]["time"],
+        force=layer_force(packing, amplitude),
+        omega=settings.omega or 0.0,
+        dt=time_step(packing, settings.time_step),
+    )
+    rate = None if below is None else weakened_rate(below.packing, mu_ss)
+    return Triggered(found, response, rate, sensitivity(run))
+
+
+def summary_of(scene: Scene, runs: list[Onset], growth: GrowthRun) -> dict[str, Any]:
+    """Numbers for summary.json."""
+    return {
+        "scene": scene.resolved(),
+        "ramps": [
+            {
+                "mu": run.mu,
+                "equilibria": len(run.equilibria),
+                "evaluations": [each.evaluations for each in run.equilibria],
+                "largest_residual": max(each.residual for each in run.equilibria),
+                "floor": run.equilibria[-1].floor,
+                "contacts": len(run.equilibria[0].packing.contacts),
+                "rattlers": run.equilibria[0].packing.rattlers.tolist(),
+                "solid_fraction": solid_fraction(run.equilibria[0].packing),
+                "flows_beyond": run.flows_beyond,
+                "onset": run.as_dict(),
+            }
+            for run in runs
+        ],
+        "growth": {
+            "fx": growth.start.fx,
+            "time_step": growth.time_step,
+            "predicted_rate": growth.predicted,
+            "measured": asdict(growth.measured) if growth.measured else None,
+            "deviation": growth.measured.rate / growth.predicted - 1 if growth.measured else None,
+        },
+    }
+
+
+def triggering_summary(triggered: Triggered) -> dict[str, Any]:
+    """Numbers of the triggering for summary.json."""
+    found, sensitive = triggered.found, triggered.sensitive
+    runs, outcome, strong = found.runs, found.outcome, found.runs["strong"]["msd"]
+    most = {name: largest(runs[name]) for name in ("unperturbed", "perturbed", "erupting")}
+    near, plateaus = sensitive.near, None
+    if len(near) > 1:  # undamped amplitudes of the nearest and the farthest pair, and the ratio of epsilon^(-1/2)
+        one, far = sorted((near[0], near[-1]), key=lambda pair: pair.epsilon)
+        theory = float(np.sqrt(far.epsilon / one.epsilon))
+        plateaus = {"measured": one.amplitude() / far.amplitude(), "theory": theory}
+    return {
+        "fx": found.start.fx,
+        "v0": found.weakening.v0,
+        "v_ss": found.weakening.v_ss,
+        "largest_D": most,
+        "rise_in_decades": float(np.log10(most["erupting"] / most["perturbed"])),
+        "perturbation_shows": most["perturbed"] >= GROWTH_FACTOR * most["unperturbed"],
+        "verdict": outcome.verdict,
+        "weakens_at": outcome.crossing,
+        "jump": outcome.jump,
+        "growth_in_decades": outcome.growth,
+        "growth_after_the_jump": None if outcome.fitted is None else asdict(outcome.fitted),
+        "forecast": found.foreseen._asdict(),
+        "largest_D_of_the_control": largest(runs["control"]) if "control" in runs else None,
+        "rate_of_the_control": triggered.control_rate,
+        "linear_response_deviation": float(np.abs(strong - triggered.response.msd).max() / strong.max()),
+        "smallest_mu": float(runs["erupting"]["friction"].min()),
+        "amplitude_exponent": sensitive.fit.exponent,
+        "amplitude_exponent_error": sensitive.fit.error,
+        "distances": [float(sensitive.distance.min()), float(sensitive.distance.max())],
+        "half_gain_time_over_tau_d": [pair.half_gain_time() / pair.tau_d for pair in near],
+        "plateaus": plateaus,
+    }
+
+
+def report(
+    scene: Scene,
+    runs: list[Onset],
+    growth: GrowthRun,
+    found: Triggered | str | None,
+    another: list[Onset] | None,
+) -> str:
+    """report.md of ramps for each friction coefficient, the run above the onset, and the triggering below it.
+
+    `found` is a sentence where there is nothing to trigger, and None if no scene asks for it; `another` has the ramps
+    of the packing that is triggered, if it is another one.
+    """
+    settled, real, units = runs[0].equilibria[0].packing, real_units(scene), scene.units
+    earlier = []  # whether an onset comes before that of larger friction; None where their errors do not tell
+    for one, other in pairwise(sorted(runs, key=lambda run: run.mu)):
+        apart = other.fx_c - one.fx_c
+        earlier.append(None if abs(apart) <= one.error + other.error else apart > 0)
+    names: dict[str, Any] = {"real": real, "scene": scene, "dashpot": None}
+    if isinstance(found, Triggered):
+        numbers = triggering_summary(found)
+        jump = numbers["jump"]
+        jumped = None if jump is None else float(np.log10(jump / numbers["largest_D"]["perturbed"]))
+        names |= {"numbers": numbers, "sensitive": found.sensitive, "jumped": jumped, "above_noise": ABOVE_NOISE}
+    if real is not None and units is not None and units.restitution is not None:
+        impact = units.si("impact_velocity") / real.velocity(1.0)
+        names["dashpot"] = dashpot(scene.law.kn, units.restitution, 1.0, impact)
+    return render(
+        __package__ or "",
+        "report.md.j2",
+        packing=settled,
+        solid_fraction=(solid_fraction(settled), solid_fraction_below_top(settled)),
+        ramp=scene.ramp,
+        runs=runs,
+        last=runs[0].equilibria[-1],
+        residual=max(each.residual for run in runs for each in run.equilibria),
+        earlier=earlier,
+        growth=growth,
+        triggering=found.found if isinstance(found, Triggered) else None,
+        says=found,
+        another=another,
+        time_step_share=ACCURATE_SHARE,
+        settled_with_friction=getattr(scene.packing, "settle_friction", False),
+        **names,
+    )

@@ -12,17 +12,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.ticker import LogLocator
 from numpy.typing import ArrayLike
 
 from ...analysis.arrays import Floats
 from ...analysis.responses.normal_form import NormalForm
+from ...analysis.responses.response import Response
 from ...analysis.uncertain_digits import with_uncertainty
 from ...figures.series import draw_series, few_decades, positive, scientific
 from ...figures.style import INK, styled
@@ -30,7 +31,7 @@ from ...pywrap.lammps.dynamics import Weakening
 from ..study import Figures
 from ..triggering import Sensitivity, Triggering
 
-GrowthCurve = tuple[Floats, Floats]
+Curve = tuple[Floats, Floats]
 """Times, and D at these, length^2."""
 
 UNPERTURBED, PERTURBED, WEAKENING, CONTROL = "C1", "C2", "C0", "C3"
@@ -39,30 +40,27 @@ DAMPING_TIMES = np.geomspace(1e-2, 1e2, 33)
 """Damping times of a curve, in units of tau_d."""
 
 
-def figures(found: Triggering) -> Figures:
+def triggering_figures(found: Triggering, response: Response, sensitive: Sensitivity) -> Figures:
     """The paper's figures 2, 5 and 6, and three of the response: in time, over the distance from the onset, and over
     damping."""
-    weak, mu, near, erupting = found.weakening, found.start.packing.law.mu, found.sensitive.near, found.runs["erupting"]
+    weak, mu, near, erupting = found.weakening, found.start.packing.law.mu, sensitive.near, found.runs["erupting"]
     runs = {name: (run["time"], run["msd"]) for name, run in found.runs.items()}
     three = runs["unperturbed"], runs["perturbed"], runs["erupting"]
-    chosen = [near[k] for k in np.unique(np.linspace(0, len(near) - 1, 4).astype(int))] if near else []
-    return {
-        "figure2": lambda: friction_law_figure(replace(weak, v0=0.0, v_ss=1.0), mu),
-        "figure5a": lambda: eruption_figure(*three, runs.get("control"), found.outcome.crossing),
-        "figure5b": lambda: weakening_figure(np.abs(erupting["layer_velocity"]), erupting["friction"], weak, mu),
+    speed, chosen = np.abs(erupting["layer_velocity"]), np.unique(np.linspace(0, len(near) - 1, 4).astype(int))
+    drawn: Figures = {
+        "figure2": partial(friction_law_figure, replace(weak, v0=0.0, v_ss=1.0), mu),
+        "figure5a": partial(eruption_figure, *three, runs.get("control"), found.outcome.crossing),
+        "figure5b": partial(weakening_figure, speed, erupting["friction"], weak, mu),
         "figure6": measured_friction_figure,
-        "response": lambda: response_figure(runs["strong"], found.response.msd),
-        "amplitude": lambda: amplitude_figure(found.sensitive),
-    } | ({"damping": lambda: damping_figure(chosen)} if chosen else {})
+        "response": partial(response_figure, runs["strong"], response.msd),
+        "amplitude": partial(amplitude_figure, sensitive),
+    }
+    return {**drawn, "damping": partial(damping_figure, [near[k] for k in chosen])} if near else drawn
 
 
 @styled
 def eruption_figure(
-    unperturbed: GrowthCurve,
-    perturbed: GrowthCurve,
-    weakening: GrowthCurve,
-    control: GrowthCurve | None = None,
-    crossing: float | None = None,
+    unperturbed: Curve, perturbed: Curve, weakening: Curve, control: Curve | None = None, crossing: float | None = None
 ) -> Figure:
     """D(t) below the onset: left alone, perturbed, and perturbed with weakening friction (the paper's figure 5a).
 
@@ -85,8 +83,8 @@ def eruption_figure(
         if crossing is not None:
             axes.axvline(crossing, color=INK, linewidth=0.6, linestyle=":")
     if crossing is not None:  # the name to the left of the line: before the crossing D is small
-        place, head = (crossing, 0.97), {"ha": "right", "va": "top", "rotation": 90, "fontsize": 7}
-        _note(early, "$|v| > v_0$", place, (-2, 0), early.get_xaxis_transform(), **head)
+        place: dict[str, Any] = {"ha": "right", "va": "top", "rotation": 90, "fontsize": 7}
+        early.text(0.97 * crossing, 0.97, "$|v| > v_0$", transform=early.get_xaxis_transform(), **place)
     early.set_xscale("log")
     late.set_ylabel("")
     late.set_xlim(0, float(weakening[0][-1]))
@@ -96,13 +94,6 @@ def eruption_figure(
     # Above the axes: three curves over thirty decades leave no corner that stays free for every packing.
     figure.legend(*early.get_legend_handles_labels(), loc="outside upper center", ncols=2, columnspacing=1.0)
     return figure
-
-
-def _note(
-    axes: Axes, words: str, place: tuple[float, float], off: tuple[int, int], of: Any = "data", **style: Any
-) -> None:
-    """Words so many points off a place, which is in the coordinates `of`."""
-    axes.annotate(words, place, xycoords=of, xytext=off, textcoords="offset points", **style)
 
 
 def share(law: Weakening, velocity: ArrayLike) -> Floats:
@@ -148,7 +139,7 @@ def weakening_figure(velocity: ArrayLike, mu: ArrayLike, law: Weakening, mu_0: f
     for value, name in ((law.v0, "$v_0$"), (law.v_ss, "$v_{ss}$")):
         if velocity.min() < value < velocity.max():
             axes.axvline(value, color=INK, linewidth=0.6, linestyle=":")
-            _note(axes, name, (value, 0.03), (2, 0), axes.get_xaxis_transform())
+            axes.text(1.1 * value, 0.03, name, transform=axes.get_xaxis_transform())
     steady = mu_0 * law.mu_ss
     axes.set_ylim(steady - 0.12 * (mu_0 - steady), mu_0 + 0.12 * (mu_0 - steady))
     axes.xaxis.set_major_locator(LogLocator(numticks=7))
@@ -175,16 +166,9 @@ def measured_friction_figure() -> Figure:
     axes.set(xlim=(0, 1), ylim=(0.72, 1.02))
     legend = axes.legend(loc="upper right", title="$B = 0.22$, $w = 4$, $v_0 = 0.05\\,v_{ss}$")
     legend.get_title().set_fontsize(matplotlib.rcParams["legend.fontsize"])
-    axes.text(
-        0.96,
-        0.47,
-        "the paper's fits; the measured points\nare not public and are not drawn",
-        transform=axes.transAxes,
-        ha="right",
-        va="center",
-        fontstyle="italic",
-        color=INK,
-    )
+    words = "the paper's fits; the measured points\nare not public and are not drawn"
+    at: dict[str, Any] = {"ha": "right", "va": "center", "fontstyle": "italic", "color": INK}
+    axes.text(0.96, 0.47, words, transform=axes.transAxes, **at)
     return figure
 
 
@@ -198,7 +182,7 @@ def amplitude_figure(found: Sensitivity) -> Figure:
     axes.plot(ends, fit.factor * ends**fit.exponent, color="C0", linewidth=0.6, linestyle=":")
     axes.plot(ends, fit.factor * ends**fit.exponent, color="C0", linewidth=0.8)
     label = f"slope ${with_uncertainty(fit.exponent, fit.error)}$"
-    axes.plot(found.distance, found.amplitude, "o", color="C0", label=label)
+    axes.plot(found.distance, [pair.amplitude() for pair in found.pairs], "o", color="C0", label=label)
     few_decades(axes)
     figure.legend(loc="outside upper center", handletextpad=0.2)
     return figure
@@ -221,25 +205,18 @@ def damping_figure(pairs: Sequence[NormalForm]) -> Figure:
         axes.plot(damping, amplitude, color=colour, linewidth=0.9)
         axes.plot([pair.tau_d, last], [undamped] * 2, color=colour, linewidth=0.6, linestyle=":")
         at = np.exp(np.interp(np.log(pair.tau_d), np.log(damping), np.log(amplitude)))
-        axes.plot([pair.tau_d], [at], "o", color=colour, label=r"$\tau = \tau_d$")
-        axes.plot([pair.half_gain_time()], [0.5 * undamped], "o", color=colour, fillstyle="none", label="half")
+        axes.plot([pair.tau_d], [at], "o", color=colour)
+        axes.plot([pair.half_gain_time()], [0.5 * undamped], "o", color=colour, fillstyle="none")
         words = rf"$\varepsilon = {scientific(pair.epsilon)}$"
-        _note(axes, words, (last, undamped), (-2, 2), ha="right", va="bottom", color=colour)
+        axes.text(0.9 * last, 1.1 * undamped, words, ha="right", va="bottom", color=colour)
     axes.set_xlim(min(pair.tau_d * DAMPING_TIMES[0] for pair in pairs), last)
     axes.set_ylim(top=3 * max(pair.amplitude() for pair in pairs))
     few_decades(axes)
-    handles = axes.get_legend_handles_labels()[0][:2]
-    names = [r"$\tau = \tau_d = 1/(\delta\sqrt{\varepsilon})$", r"half of the undamped amplitude"]
-    title = r"the pair at $\varepsilon = 1 - \eta/\delta$ from its coalescence"
-    key = figure.legend(handles, names, title=title, loc="outside upper center", ncols=2, columnspacing=1.0)
-    key.get_title().set_fontsize(7.5)
-    for handle in key.legend_handles:
-        handle.set_color(INK)  # type: ignore[union-attr]  # matplotlib types it as any artist; these are lines
     return figure
 
 
 @styled
-def response_figure(run: GrowthCurve, linear: Floats) -> Figure:
+def response_figure(run: Curve, linear: Floats) -> Figure:
     """D of the linear response of a packing, from K, at the times of a run of LAMMPS, over D of the run.
 
     Panel (a) both, panel (b) the difference in units of the largest D so far: D itself passes close to zero.
@@ -262,8 +239,7 @@ def response_figure(run: GrowthCurve, linear: Floats) -> Figure:
     lower.annotate(r"1 %", (0.99, 0.01), xycoords=lower.get_yaxis_transform(), ha="right", va="bottom", color="C0")
     lower.set(xlabel="$t$", ylabel=r"$|\Delta D|/\max D$")
     lower.set_ylim(top=1.0)
-    lower.yaxis.set_major_locator(LogLocator(numticks=5))
-    lower.yaxis.set_minor_locator(NullLocator())
+    few_decades(lower, 5)
     lower.margins(x=0)
     for axes, name in ((upper, "(a)"), (lower, "(b)")):
         axes.set_title(name, loc="left", fontsize=8.5, pad=3)

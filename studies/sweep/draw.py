@@ -8,9 +8,8 @@ onset up to F_x (Kaplan and Meier), and a median with its 95 % interval from res
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,8 +20,6 @@ from ...analysis.arrays import Floats
 from ...figures.style import report_failure, save, styled
 from ..result_rows import Row
 from ..statistics import Bools, course, median_interval
-
-SEED = "packing.seed"
 
 STYLE_COLOURS = 6
 """Colours of the style: more scenes cannot be told apart."""
@@ -36,6 +33,24 @@ FEWEST_SCENES = 6
 
 OnsetOrBound = tuple[float, bool]
 """The largest F_x up to which there is no window, and whether that is the onset."""
+
+
+class SeedSample(NamedTuple):
+    """Scenes that differ in their seeds alone.
+
+    Attributes
+    ----------
+    values : dict
+        Swept keys with more than one value, but for the seed, and the values of these scenes.
+    reach : ndarray, shape (M,)
+        The onset, or the largest F_x up to which there is none.
+    onset : ndarray of bool, shape (M,)
+        Which of the two.
+    """
+
+    values: dict[str, Any]
+    reach: Floats
+    onset: Bools
 
 
 def draw_sweep(rows: Sequence[Row], folder: Path, say: Callable[[str], None]) -> str:
@@ -63,44 +78,18 @@ def _dicts(value: Any) -> list[dict[str, Any]]:
     return [each for each in value if isinstance(each, dict)] if isinstance(value, list) else []
 
 
-@dataclass(frozen=True)
-class SeedSample:
-    """Scenes that differ in their seeds alone.
-
-    Attributes
-    ----------
-    values : dict
-        Swept keys with more than one value, but for the seed, and the values of these scenes.
-    reach : ndarray, shape (M,)
-        The onset, or the largest F_x up to which there is none.
-    onset : ndarray of bool, shape (M,)
-        Which of the two.
-    """
-
-    values: dict[str, Any]
-    reach: Floats
-    onset: Bools
-
-    @property
-    def label(self) -> str:
-        """The swept values of this sample, in words."""
-        return ", ".join(f"{key} = {value}" for key, value in self.values.items())
-
-
 def samples_of(found: Sequence[tuple[Row, OnsetOrBound]]) -> list[SeedSample]:
     """The samples of a sweep, in the order of their first rows."""
-    keys = _varied_keys([row for row, _ in found])
+    swept = [key for key in found[0][0]["values"] if key != "packing.seed"]
+    keys = [key for key in swept if len({str(row["values"][key]) for row, _ in found}) > 1]
     groups: dict[str, list[tuple[Row, OnsetOrBound]]] = {}
     for row, reach in found:
         groups.setdefault(str([row["values"][key] for key in keys]), []).append((row, reach))
-    return [
-        SeedSample(
-            {key: rows[0][0]["values"][key] for key in keys},
-            np.array([reach for _, (reach, _) in rows]),
-            np.array([onset for _, (_, onset) in rows]),
-        )
-        for rows in groups.values()
-    ]
+    samples = []
+    for rows in groups.values():
+        reaches, onsets = (np.array(column) for column in zip(*(each for _, each in rows), strict=True))
+        samples.append(SeedSample({key: rows[0][0]["values"][key] for key in keys}, reaches, onsets))
+    return samples
 
 
 @styled
@@ -112,7 +101,13 @@ def onsets_figure(found: Sequence[tuple[Row, OnsetOrBound]]) -> Figure:
     end within what the ramps reached. Above stands how many scenes have an onset, and how many have none.
     """
     samples = samples_of(found)
-    keys, labels = list(samples[0].values), _labels(samples)
+    keys = list(samples[0].values)
+    # colours mean samples, or, of too many for colours, the values of the key that has most of them
+    shown, counts = keys, {key: len({str(sample.values[key]) for sample in samples}) for key in keys}
+    if len(samples) > STYLE_COLOURS:
+        few = [key for key in keys if counts[key] <= STYLE_COLOURS]
+        shown = sorted(few, key=lambda key: -counts[key])[:1]
+    labels = [", ".join(f"{key} = {sample.values[key]}" for key in shown) for sample in samples]
     names = list(dict.fromkeys(labels))
     colours = [f"C{names.index(label)}" for label in labels]
     figure = Figure(figsize=(3.4, 2.2 * (1 + len(keys)) + 0.15 * len(names)), layout="constrained")
@@ -123,69 +118,62 @@ def onsets_figure(found: Sequence[tuple[Row, OnsetOrBound]]) -> Figure:
     count = sum(int(np.count_nonzero(sample.onset)) for sample in samples)
     share.set_title(f"{len(found)} scenes: {count} with an onset, {len(found) - count} without", fontsize=8)
     if len(names) > 1:
-        shown = [Line2D([], [], color=f"C{number}", label=name) for number, name in enumerate(names)]
-        share.legend(handles=shown, loc="upper center", bbox_to_anchor=(0.5, -0.25))
+        handles = [Line2D([], [], color=f"C{number}", label=name) for number, name in enumerate(names)]
+        share.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.25))
     for axes, key in zip(panels, keys, strict=True):
         _draw_onsets(axes, key, samples, colours)
     if panels:
-        panels[0].legend(handles=_symbols(), loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+        small: dict[str, Any] = {"linestyle": "none", "mfc": "none", "ms": 2.5, "color": "0.4"}
+        symbols = [
+            Line2D([], [], marker="o", label="onset", **small),
+            Line2D([], [], marker="^", label="none up to here", **small),
+            Line2D([], [], marker="D", ms=4.5, color="0.4", linewidth=1.6, label="median, 95 %"),
+        ]
+        panels[0].legend(handles=symbols, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     return figure
-
-
-def _labels(samples: Sequence[SeedSample]) -> list[str]:
-    """The meaning of the colours: the sample, or, of too many samples for colours, the value of one key."""
-    if len(samples) <= STYLE_COLOURS:
-        return [sample.label for sample in samples]
-    counts = {key: len({str(sample.values[key]) for sample in samples}) for key in samples[0].values}
-    key = max((key for key in counts if counts[key] <= STYLE_COLOURS), key=lambda each: counts[each], default=None)
-    return ["" if key is None else f"{key} = {sample.values[key]}" for sample in samples]
 
 
 def _draw_onsets(axes: Axes, key: str, samples: Sequence[SeedSample], colours: Sequence[str]) -> None:
     """The onsets of each sample over a key, and its median with its interval; samples of one value side by side."""
-    places = _places(axes, key, [sample.values[key] for sample in samples])
     highest = max(float(sample.reach.max()) for sample in samples)
-    for place, sample, colour in zip(_side_by_side(axes, places), samples, colours, strict=True):
+    places = _places(axes, key, [sample.values[key] for sample in samples])
+    for place, sample, colour in zip(places, samples, colours, strict=True):
         for shown, marker in ((sample.onset, "o"), (~sample.onset, "^")):
             x, y = np.full(shown.sum(), place), sample.reach[shown]
             axes.plot(x, y, marker, color=colour, mfc="none", ms=2.5, alpha=0.5)
-        if len(sample.onset) >= FEWEST_SCENES:
-            _draw_median(axes, place, sample, highest, colour)
+        middle, low, high = median_interval(sample.reach, sample.onset)
+        if len(sample.onset) < FEWEST_SCENES or low is None:  # no draw has a median within the ramps
+            continue
+        end = highest if high is None else high
+        axes.plot([place, place], [low, end], "-", color=colour, linewidth=1.6, zorder=3)
+        if high is None:
+            axes.plot(place, 1.03 * end, marker=r"$\uparrow$", color=colour, markersize=6, zorder=3)
+        if middle is not None:
+            axes.plot(place, middle, "D", color=colour, markersize=4.5, zorder=4)
     axes.set(ylabel="$F_x^c$", ylim=(0, 1.1 * highest))
 
 
-def _side_by_side(axes: Axes, places: Floats) -> Floats:
-    """Places on the axis of a key, samples of one value next to each other; the axis becomes wide enough for all."""
-    logarithmic = axes.get_xscale() == "log"
-    along = np.log(places) if logarithmic else places
+def _places(axes: Axes, key: str, values: Sequence[Any]) -> Floats:
+    """Where samples stand on the axis of a key, which becomes wide enough: at a number, or at the number of a value
+    that is none; samples of one value next to each other."""
+    axes.set_xlabel(key)
+    if all(isinstance(value, int | float) for value in values):
+        places = np.array(values, float)
+        if min(values) > 0 and max(values) > 20 * min(values):
+            axes.set_xscale("log")
+        elif len(set(values)) <= STYLE_COLOURS:
+            axes.set_xticks(sorted(set(values)))
+    else:
+        names = list(dict.fromkeys(map(str, values)))
+        axes.set_xticks(range(len(names)), names)
+        places = np.array([names.index(str(value)) for value in values], float)
+    there, back = (np.log, np.exp) if axes.get_xscale() == "log" else (np.array, np.array)
+    along = there(places)
     span = float(np.ptp(along)) or 1.0
     same = along[:, None] == along
-    rank = np.tril(same, -1).sum(axis=1) - 0.5 * (same.sum(axis=1) - 1)
-    aside = along + SAMPLE_DISTANCE * span * rank
-    ends = aside.min() - EDGE_MARGIN * span, aside.max() + EDGE_MARGIN * span
-    axes.set_xlim(*np.exp(ends) if logarithmic else ends)
-    return np.exp(aside) if logarithmic else aside
-
-
-def _draw_median(axes: Axes, place: float, sample: SeedSample, highest: float, colour: str) -> None:
-    middle, low, high = median_interval(sample.reach, sample.onset)
-    if low is None:
-        return  # no draw has a median within the ramps
-    end = highest if high is None else high
-    axes.plot([place, place], [low, end], "-", color=colour, linewidth=1.6, zorder=3)
-    if high is None:
-        axes.plot(place, 1.03 * end, marker=r"$\uparrow$", color=colour, markersize=6, zorder=3)
-    if middle is not None:
-        axes.plot(place, middle, "D", color=colour, markersize=4.5, zorder=4)
-
-
-def _symbols() -> list[Line2D]:
-    """The symbols of the legend."""
-    return [
-        Line2D([], [], linestyle="none", marker="o", mfc="none", ms=2.5, color="0.4", label="onset"),
-        Line2D([], [], linestyle="none", marker="^", mfc="none", ms=2.5, color="0.4", label="none up to here"),
-        Line2D([], [], marker="D", ms=4.5, color="0.4", linewidth=1.6, label="median, 95 %"),
-    ]
+    aside = along + SAMPLE_DISTANCE * span * (np.tril(same, -1).sum(axis=1) - 0.5 * (same.sum(axis=1) - 1))
+    axes.set_xlim(*back([aside.min() - EDGE_MARGIN * span, aside.max() + EDGE_MARGIN * span]))
+    return np.asarray(back(aside))
 
 
 @styled
@@ -196,32 +184,12 @@ def eruptions_figure(found: Sequence[tuple[Row, dict[str, float]]]) -> Figure:
     """
     figure = Figure(figsize=(3.4, 2.6), layout="constrained")
     axes = figure.add_subplot(xlabel="$F_x$", ylabel="largest $D$", yscale="log")
-    numbers: dict[str, int] = {}
-    for row, run in found:
-        new = row["key"] not in numbers
-        number = numbers.setdefault(row["key"], len(numbers))
-        label = ", ".join(f"{key} = {value}" for key, value in row["values"].items()) if new else None
-        axes.plot(run["fx"], run["msd"], "o", color=f"C{number % STYLE_COLOURS}", markersize=3, label=label)
-    if 1 < len(numbers) <= STYLE_COLOURS:
+    scenes = {row["key"]: row["values"] for row, _ in found}
+    for number, (key, values) in enumerate(scenes.items()):
+        runs = [run for row, run in found if row["key"] == key]
+        label = ", ".join(f"{name} = {value}" for name, value in values.items())
+        fx, msd = [run["fx"] for run in runs], [run["msd"] for run in runs]
+        axes.plot(fx, msd, "o", color=f"C{number % STYLE_COLOURS}", markersize=3, label=label)
+    if 1 < len(scenes) <= STYLE_COLOURS:
         axes.legend()
     return figure
-
-
-def _varied_keys(rows: Sequence[Row]) -> list[str]:
-    """The swept keys with more than one value, but for the seed, which is a sample and no axis."""
-    keys = [key for key in rows[0]["values"] if key != SEED]
-    return [key for key in keys if len({str(row["values"][key]) for row in rows}) > 1]
-
-
-def _places(axes: Axes, key: str, values: Sequence[Any]) -> Floats:
-    """Where values stand on the axis of a key: at a number, or at the number of a value that is none."""
-    axes.set_xlabel(key)
-    if all(isinstance(value, int | float) for value in values):
-        if min(values) > 0 and max(values) > 20 * min(values):
-            axes.set_xscale("log")
-        elif len(set(values)) <= STYLE_COLOURS:
-            axes.set_xticks(sorted(set(values)))
-        return np.array(values, float)
-    names = list(dict.fromkeys(map(str, values)))
-    axes.set_xticks(range(len(names)), names)
-    return np.array([names.index(str(value)) for value in values], float)

@@ -15,7 +15,7 @@ version stay in results.jsonl, and are not in the table.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
 from importlib.metadata import version
@@ -26,14 +26,20 @@ from typing import Any
 from mpi4py import MPI
 
 from ...analysis import FaultgougeError
-from ...analysis.files.atomic_write import FORMAT, FORMAT_KEY, check_format, lock_output, make_folder, write_json
-from ...analysis.files.plain_file import read_plain_text
+from ...analysis.files.atomic_write import (
+    FORMAT,
+    FORMAT_KEY,
+    check_format,
+    lock_output,
+    make_folder,
+    read_plain_text,
+    write_json,
+)
 from ...pywrap import SceneError
-from .. import result_rows
-from ..executors import Progress, Say, open_executor
-from ..result_rows import Row, check_table, write_tables
+from ..result_rows import Row, append_row, check_table, read_keyed_rows, write_tables
+from ..study import Progress, Say
 from .sweep_plan import Sweep, SweepPoint, points_of
-from .workers import compute_points
+from .workers import compute_points, open_executor
 
 RESULTS_FILE, REQUEST_FILE = "results.jsonl", "sweep.json"
 
@@ -137,50 +143,44 @@ def run_sweep(
         with lock_output(output):
             known = read_results(output / RESULTS_FILE)
             missing = missing_points(points, known)
-            _write_request(sweep, output, part)
+            # the keys recognise the rows wherever the files of the scenes and of the task are
+            keys = [point.key for point in sweep.points]
+            about = {"version": version("faultgouge"), "keys": keys, "shard": list(part)}
+            write_json(output / REQUEST_FILE, sweep.as_dict() | about)
             if len(missing) < len(points):
                 say(f"{len(points) - len(missing)} of {len(points)} points are in {output / RESULTS_FILE} already")
-            if others := known.keys() - {point.key for point in sweep.points}:
+            if others := known.keys() - set(keys):
                 say(f"{len(others)} rows there are of other scenes, code or versions, and are not in the table")
             with closing(compute_points(pool, sweep.located_task, missing)) as ended:
-                rows = result_rows.keep_rows(output / RESULTS_FILE, ({FORMAT_KEY: FORMAT, **row} for row in ended))
-                for row in progress(rows, len(missing)):
-                    del row[FORMAT_KEY]
+                for row in progress(_store(ended, output / RESULTS_FILE), len(missing)):
                     known[row["key"]] = row
             table = [known[point.key] for point in points]
             write_tables(table, sweep.names, output)
     return table
 
 
-def _write_request(sweep: Sweep, output: Path, part: tuple[int, int]) -> None:
-    """Write sweep.json; its keys recognise the rows wherever the files of the scenes and of the task are."""
-    keys = [point.key for point in sweep.points]
-    request = sweep.as_dict() | {"version": version("faultgouge"), "keys": keys, "shard": list(part)}
-    write_json(output / REQUEST_FILE, request)
+def _store(rows: Iterable[Row], path: Path) -> Iterator[Row]:
+    """Rows as they come, each in the file before it is handed on."""
+    for row in rows:
+        append_row(path, {FORMAT_KEY: FORMAT, **row})
+        yield row
 
 
 def missing_points(points: Iterable[SweepPoint], known: dict[str, Row]) -> list[SweepPoint]:
     """The points to compute: those without a row, and those whose failure may have passed."""
-
-    def is_known(point: SweepPoint) -> bool:
-        row = known.get(point.key)
-        return row is not None and (row["says"] is None or row["final"])
-
-    return [point for point in points if not is_known(point)]
+    answered = {key for key, row in known.items() if row["says"] is None or row["final"]}
+    return [point for point in points if point.key not in answered]
 
 
 def remaining_work(points: Sequence[SweepPoint], known: Iterable[Row] = ()) -> list[str]:
     """Lines about the points that are not known yet: how many, and how long they take if the known rows are typical."""
-    scenes = [point.scene for point in points if point.scene is not None]
-    settlings = {point.settling_key for point in points if point.scene is not None}
+    scenes = [point for point in points if point.scene is not None]
+    settlings = {point.settling_key for point in scenes}
     seconds = [row["cpu_seconds"] for row in known if row["says"] is None]
     time = "how long a scene takes is not known before the first of them: begin, and ask again"
     if seconds:
-        one = median(seconds)
-        time = (
-            f"about {_span(one * len(scenes))} of one core, if a scene takes {_span(one)} as in the {len(seconds)} "
-            "rows that are there"
-        )
+        one, each = median(seconds), f"if a scene takes {_span(median(seconds))} as in the {len(seconds)} rows"
+        time = f"about {_span(one * len(scenes))} of one core, {each} that are there"
     refused = [f"{len(points) - len(scenes)} points make no scene, and will say why"] * (len(scenes) < len(points))
     return [f"{len(scenes)} scenes to compute, {len(settlings)} packings to settle", *refused, time]
 
@@ -215,10 +215,9 @@ def read_results(*paths: Path) -> dict[str, Row]:
     SceneError
         If a line is no row, or two good rows of a key have different results.
     """
-    rows: dict[str, Row] = {}
-    places: dict[str, Path] = {}
+    rows, places = dict[str, Row](), dict[str, Path]()
     for path in paths:
-        for number, row in enumerate(result_rows.read_keyed_rows(path, "key", "a sweep"), 1):
+        for number, row in enumerate(read_keyed_rows(path, "key", "a sweep"), 1):
             key = row["key"]
             if not (isinstance(key, str) and {"values", "says", "final", "result"} <= row.keys()):
                 raise SceneError(f"{path}: line {number} is no result of a sweep: take it out, or give another folder")
@@ -273,7 +272,7 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
         write_json(output / REQUEST_FILE, request | {"shard": [1, 1]})
         for row in table:
             if _as_text(kept.get(row["key"])) != _as_text(row):
-                result_rows.append_row(output / RESULTS_FILE, {FORMAT_KEY: FORMAT, **row})
+                append_row(output / RESULTS_FILE, {FORMAT_KEY: FORMAT, **row})
         sweep = Sweep(request["task"], request["sweep"], request["scene"])
         write_tables(table, sweep.names, output)
     count = len(request["keys"])
@@ -286,43 +285,36 @@ def merge(parts: Sequence[Path], output: Path, say: Say = print) -> tuple[Sweep,
 def _common_request(folders: Sequence[Path]) -> dict[str, Any]:
     """The request of the folders of one sweep, whose shards may differ; SceneError if the requests differ."""
     asked = [_read_request(folder) for folder in folders]
+    first = asked[0]
     for folder, each in zip(folders, asked, strict=True):
-        if each["version"] != asked[0]["version"]:
+        if each["version"] != first["version"]:
             raise SceneError(
-                f"{folder} is of version {each['version']}, and {folders[0]} of {asked[0]['version']}: run the same "
+                f"{folder} is of version {each['version']}, and {folders[0]} of {first['version']}: run the same "
                 "sweep there again with one version"
             )
-        if (each["task"], each["sweep"], each["keys"]) != tuple(asked[0][name] for name in ("task", "sweep", "keys")):
+        if any(each[name] != first[name] for name in ("task", "sweep", "keys")):
             raise SceneError(
                 f"{folder} is of another sweep than {folders[0]}, of other scenes or other code: merge parts of one "
                 "sweep, into a new folder or one of this sweep"
             )
-    return asked[0]
+    return first
 
 
 def _read_request(folder: Path) -> dict[str, Any]:
     """The contents of sweep.json; SceneError if the folder is none of a sweep."""
-    if not (folder / REQUEST_FILE).is_file():
+    path = folder / REQUEST_FILE
+    if not path.is_file():
         raise SceneError(
             f"{folder} is no folder of a sweep (it has no {REQUEST_FILE}): give folders of `faultgouge sweep`"
         )
-    request = _read(folder / REQUEST_FILE)
+    try:
+        request = dict(json.loads(read_plain_text(path)))
+    except (OSError, ValueError, TypeError, RecursionError) as error:
+        raise SceneError(f"{path} cannot be read ({error}): give a folder that faultgouge has written") from None
+    check_format(request.pop(FORMAT_KEY, None), path)
     if not {"task", "sweep", "scene", "version", "keys"} <= request.keys():
         raise SceneError(
             f"{folder} is of version 1.0.0 or before, whose rows this version does not know: merge it with the version "
             "that wrote it, or run the same sweep again"
         )
     return request
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        value = json.loads(read_plain_text(path))
-    except OSError as error:
-        raise SceneError(f"{path} cannot be read ({error.strerror}): correct its path") from None
-    except (ValueError, RecursionError) as error:
-        raise SceneError(f"{path} is not valid JSON ({error}): give a file that faultgouge has written") from None
-    if not isinstance(value, dict):
-        raise SceneError(f"{path} is no result of faultgouge: give a file that it has written")
-    check_format(value.pop(FORMAT_KEY, None), path)
-    return value

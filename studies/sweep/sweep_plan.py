@@ -34,7 +34,7 @@ from ...pywrap import Scene, SceneError
 from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.validation import read_toml
 from ...pywrap.settling.settle import law_of, settling_units
-from .user_function import is_user_function, locate, user_function
+from .user_function import locate, user_function
 
 MOST_POINTS = 1_000_000
 """Points of a sweep at the most: more is a slip of the pen."""
@@ -131,21 +131,21 @@ class Sweep:
         if unknown:
             raise SceneError(f"{name}: {unknown[0]} is no key of a sweep: it has task, [sweep] and [scene.SECTION].")
         task, code = mapping.get("task"), ""
-        if isinstance(task, str) and is_user_function(task):
+        if isinstance(task, str) and ":" in task:
             code = user_function(locate(task, folder)).code
         elif task not in registered.tasks():
             raise SceneError(
                 f"{name}: task = {task!r} is refused: give one of {', '.join(registered.tasks())}, or a function of "
                 'yours as "file.py:function".'
             )
-        for section in ("sweep", "scene"):
-            if not isinstance(mapping.get(section, {}), Mapping):
+        axes, scene = mapping.get("sweep", {}), mapping.get("scene", {})
+        for section, given in (("sweep", axes), ("scene", scene)):
+            if not isinstance(given, Mapping):
                 raise SceneError(f"{name}: {section} is not a section: write [{section}] and its keys below.")
-        axes = {key: _values(key, values, name) for key, values in mapping.get("sweep", {}).items()}
-        count = prod(map(len, axes.values()))
+        sweep = cls(str(task), {key: _values(key, each, name) for key, each in axes.items()}, dict(scene), code, folder)
+        count = prod(map(len, sweep.axes.values()))
         if count > MOST_POINTS:
             raise SceneError(f"{name}: {count} scenes are more than {MOST_POINTS}: make several sweeps of it.")
-        sweep = cls(str(task), axes, dict(mapping.get("scene", {})), code, folder)
         # what is wrong with every scene is refused before any work is done; the first good one is enough to know
         if all(point.says is not None for point in sweep._each_point()):
             raise SceneError(f"{name}: no point of the sweep is a scene that can be run: {sweep.points[0].says}")
@@ -167,30 +167,25 @@ class Sweep:
         return tuple(self._each_point())
 
     def _each_point(self) -> Iterator[SweepPoint]:
-        return (self._point(number, values) for number, values in enumerate(product(*self.axes.values())))
-
-    def _point(self, number: int, chosen: tuple[Any, ...]) -> SweepPoint:
-        values: dict[str, Any] = {}
-        for key, value in zip(self.axes, chosen, strict=True):
-            names = _split_keys(key)
-            values.update(zip(names, value if len(names) > 1 else [value], strict=True))
-        mapping = {name: dict(part) if isinstance(part, Mapping) else part for name, part in self.scene.items()}
-        for name, value in values.items():
-            section, _, key = name.rpartition(".")
-            (mapping.setdefault(section, {}) if section else mapping)[key] = value
-        try:
-            scene = Scene.from_mapping(mapping, self.folder, command=self.task)
-        except SceneError as error:
-            return SweepPoint(
-                number, values, None, str(error).removeprefix("scene: "), digest([*self._known_as, mapping])
-            )
-        return SweepPoint(number, values, scene, None, digest([*self._known_as, with_contents(scene)]))
-
-    @cached_property
-    def _known_as(self) -> tuple[str, str]:
-        """Task and program in the keys of rows; of a user's function its name and code, without its folder."""
+        # a user's function is known by its name and code, without its folder
         task = f"{self.task.rpartition(':')[2]} {self.code}" if self.code else self.task
-        return task, version("faultgouge")
+        known_as = task, version("faultgouge")
+        for number, chosen in enumerate(product(*self.axes.values())):
+            values: dict[str, Any] = {}
+            for key, value in zip(self.axes, chosen, strict=True):
+                names = _split_keys(key)
+                values.update(zip(names, value if len(names) > 1 else [value], strict=True))
+            mapping = {name: dict(part) if isinstance(part, Mapping) else part for name, part in self.scene.items()}
+            for name, value in values.items():
+                section, _, key = name.rpartition(".")
+                (mapping.setdefault(section, {}) if section else mapping)[key] = value
+            try:
+                scene = Scene.from_mapping(mapping, self.folder, command=self.task)
+            except SceneError as error:
+                says = str(error).removeprefix("scene: ")
+                yield SweepPoint(number, values, None, says, digest([*known_as, mapping]))
+            else:
+                yield SweepPoint(number, values, scene, None, digest([*known_as, with_contents(scene)]))
 
     def as_dict(self) -> dict[str, Any]:
         """The sweep as JSON holds it."""

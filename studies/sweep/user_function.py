@@ -11,10 +11,13 @@ With a second parameter the function also receives the packing settled with the 
 A row is identified by the scene and by the code of the function: its file, and the modules in the folder of this file
 that it imports, or that these import. Of "package.module:function" these are the modules of the package. After a change
 of the code, the sweep computes its rows again; comments, docstrings and the layout of a file do not count as code.
+Modules imported by a computed name, and data that a program reads, are not found.
 """
 
 from __future__ import annotations
 
+import ast
+import hashlib
 import importlib.util
 import inspect
 import json
@@ -31,7 +34,6 @@ from ...analysis import FaultgougeError
 from ...analysis.errors import place_in_user_code
 from ...pywrap import Scene, SceneError
 from ..packing_tools import Start
-from .imported_code import code_digest
 
 
 class UserFunctionError(FaultgougeError):
@@ -44,8 +46,6 @@ class UserFunction:
 
     Attributes
     ----------
-    name : str
-        "file.py:function" with the path of the file from the root, or "package.module:function".
     function : callable
         Takes a scene, and the settled packing if `takes_settled`.
     takes_settled : bool
@@ -54,28 +54,30 @@ class UserFunction:
         Sixteen hexadecimal digits: a hash of the code of its file, and of its own modules that the file imports.
     """
 
-    name: str
     function: Callable[..., Any]
     takes_settled: bool
     code: str
 
     def run(self, scene: Scene, start: Start) -> dict[str, Any]:
-        """The row of a scene; UserFunctionError if the function fails, or returns something else."""
-        given = (scene, start(scene.law.mus[0])) if self.takes_settled else (scene,)
+        """The row of a scene as JSON holds it; UserFunctionError if the function fails, or returns something else."""
+        given, name = (scene, start(scene.law.mus[0])) if self.takes_settled else (scene,), self.function.__name__
         try:
             row = self.function(*given)
         except FaultgougeError:
             raise
         except (Exception, SystemExit) as error:  # whatever it is, the other scenes are computed
             raise UserFunctionError(
-                f"{self.function.__name__} failed with {type(error).__name__}: {error}{place_in_user_code(error)}"
+                f"{name} failed with {type(error).__name__}: {error}{place_in_user_code(error)}"
             ) from error
-        return _as_row(row, self.function.__name__)
-
-
-def is_user_function(task: str) -> bool:
-    """Whether a task is named as a function of the user's."""
-    return ":" in task
+        if not isinstance(row, dict):
+            raise UserFunctionError(f"{name} returned {type(row).__name__}: return a dict of numbers, words and lists")
+        try:
+            plain: dict[str, Any] = json.loads(json.dumps(row, default=lambda value: value.tolist()))
+        except (AttributeError, TypeError, ValueError) as error:
+            raise UserFunctionError(
+                f"{name} returned what JSON cannot hold ({error}): give numbers, words, lists"
+            ) from None
+        return plain
 
 
 def locate(task: str, folder: Path) -> str:
@@ -91,76 +93,78 @@ def user_function(name: str) -> UserFunction:
     Raises SceneError if there is no such file, module or function, or it cannot be called with a scene.
     """
     place, _, wanted = name.rpartition(":")
-    module = _module(place, name)
+    if place.endswith(".py") and not Path(place).is_file():
+        raise SceneError(f'task = "{name}": there is no file {place}: correct its path')
+    try:
+        module = _import_file(Path(place)) if place.endswith(".py") else importlib.import_module(place)
+    except (Exception, SystemExit) as error:
+        raise SceneError(f'task = "{name}": {place} cannot be imported ({type(error).__name__}: {error})') from None
     function = getattr(module, wanted, None)
     if not callable(function):
         raise SceneError(f'task = "{name}": {place} has no function {wanted}: name one that it defines')
-    count = _parameters(function)
+    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    parameters = inspect.signature(function).parameters.values()
+    count = sum(each.kind in kinds and each.default is inspect.Parameter.empty for each in parameters)
     if count not in (1, 2):
         raise SceneError(
             f'task = "{name}": {wanted} takes {count} arguments: a task is {wanted}(scene) or {wanted}(scene, settled)'
         )
-    return UserFunction(name, function, count == 2, code_digest(*_own_modules(module, place)))
+    return UserFunction(function, count == 2, code_digest(module, place))
 
 
-def _own_modules(module: ModuleType, place: str) -> tuple[Path, Path, str | None]:
-    """The file of a task, the folder in which its own modules are, and their package; None for all of the folder."""
-    file = Path(str(module.__file__))
-    if place.endswith(".py"):
-        return file, file.parent, None
-    above = len(place.split(".")) - (file.name != "__init__.py")
-    return file, file.parents[above], place.partition(".")[0]
-
-
-def _module(place: str, name: str) -> ModuleType:
-    """The module of a file, or of a dotted name, imported."""
+def _import_file(path: Path) -> ModuleType:
+    """The module of a file, which can import what lies beside it."""
+    own = "faultgouge_task_" + re.sub(r"\W", "_", str(path))  # a name that no other file has
+    spec = importlib.util.spec_from_file_location(own, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[own] = module  # dataclasses of the file look themselves up there
+    sys.path.insert(0, str(path.parent))
     try:
-        if not place.endswith(".py"):
-            return importlib.import_module(place)
-        path = Path(place)
-        if not path.is_file():
-            raise SceneError(f'task = "{name}": there is no file {place}: correct its path')
-        # a name that no other file has; workers unpickle nothing of it
-        own = "faultgouge_task_" + re.sub(r"\W", "_", place)
-        spec = importlib.util.spec_from_file_location(own, path)
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[own] = module  # dataclasses of the file look themselves up there
-        sys.path.insert(0, str(path.parent))  # what lies beside the file can be imported by it
-        try:
-            spec.loader.exec_module(module)
-        finally:
-            sys.path.remove(str(path.parent))
-    except SceneError:
-        raise
-    except (Exception, SystemExit) as error:
-        raise SceneError(f'task = "{name}": {place} cannot be imported ({type(error).__name__}: {error})') from None
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(path.parent))
     return module
 
 
-def _parameters(function: Callable[..., Any]) -> int:
-    """How many arguments a call must have."""
-    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    parameters = inspect.signature(function).parameters.values()
-    return sum(each.kind in kinds and each.default is inspect.Parameter.empty for each in parameters)
+def code_digest(module: ModuleType, place: str) -> str:
+    """Sixteen hexadecimal digits that stand for the code of a module and of its own modules that it imports, directly
+    or not, and wherever in a function; they are read from the text, and nothing is run."""
+    file, package = Path(str(module.__file__)), "" if place.endswith(".py") else place.partition(".")[0]
+    folder = file.parents[len(place.split(".")) - (file.name != "__init__.py") if package else 0]
+    code, waiting = dict[str, str](), [file]
+    while waiting:
+        each = waiting.pop()
+        name = str(each.relative_to(folder))
+        if name in code:
+            continue
+        try:
+            tree = ast.parse(each.read_bytes())
+        except (SyntaxError, ValueError):  # a module that only some call imports, which will say so
+            code[name] = each.read_bytes().hex()
+            continue
+        for node in ast.walk(tree):
+            at, dotted = folder, list[str]()
+            if isinstance(node, ast.Import):
+                dotted = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                at = each.parents[node.level - 1] if node.level else folder
+                dotted = [f"{node.module or ''}.{alias.name}".strip(".") for alias in node.names]
+            for names in (each.split(".") for each in dotted):
+                if at.is_relative_to(folder) and (at != folder or not package or names[0] == package):
+                    # an import of a.b.c runs a, a.b and a.b.c
+                    paths = [at.joinpath(*names[: count + 1]) for count in range(len(names))]
+                    files = [found for path in paths for found in (Path(f"{path}.py"), path / "__init__.py")]
+                    waiting += [found for found in files if found.is_file()]
+        code[name] = _without_words(tree)
+    return hashlib.sha256(repr(sorted(code.items())).encode()).hexdigest()[:16]
 
 
-def _as_row(row: Any, name: str) -> dict[str, Any]:
-    """The result of a function as JSON stores it."""
-    if not isinstance(row, dict):
-        raise UserFunctionError(f"{name} returned {type(row).__name__}: return a dict of numbers, words and lists")
-    try:
-        plain: dict[str, Any] = json.loads(json.dumps(row, default=_plain))
-    except (TypeError, ValueError) as error:
-        raise UserFunctionError(
-            f"{name} returned what JSON cannot hold ({error}): give numbers, words, lists"
-        ) from None
-    return plain
-
-
-def _plain(value: Any) -> Any:
-    """Numbers and arrays of NumPy as Python's."""
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    raise TypeError(f"a {type(value).__name__}")
+def _without_words(tree: ast.Module) -> str:
+    """Code without comments, docstrings and layout; changes the tree."""
+    for node in ast.walk(tree):
+        kinds = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+        if isinstance(node, kinds) and ast.get_docstring(node) is not None:
+            node.body[0] = ast.Pass()
+    return ast.dump(tree)

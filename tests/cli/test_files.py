@@ -2,7 +2,6 @@
 
 import errno
 import os
-import signal
 import subprocess
 import sys
 from xml.etree import ElementTree
@@ -26,36 +25,28 @@ STRANGE = """a 'b' "c" & <d> $x ${y} #"""
 """What a file may be called."""
 
 
-@pytest.mark.parametrize("packing", ["pipe.json", "pipe.csv", "pipe.data", "pipe.dump", "pipe.xyz", "pipe.h5"])
-def test_a_pipe_is_no_file(refusal, tmp_path, packing):
-    os.mkfifo(tmp_path / packing)
-    (tmp_path / "scene.toml").write_text(SCENE.replace(str(REFERENCE), packing))
-    assert "pipe" in refusal("onset", "scene.toml")
-    assert "no plain file" in refusal("onset", "scene.toml")
+PIPES = [f"onset scene.toml:pipe.{suffix}" for suffix in ("json", "csv", "data", "dump", "xyz", "h5")]
+PIPES += [f"{command}.disks" for command in ("spectrum pipe", "draw pipe", "export pipe")]
+PIPES += [f"{verb} {name} -o x{suffix}" for name in ("pipe", "pipe.h5") for verb, suffix in
+          (("draw", ".png"), ("movie", ".gif"), ("view", ".html"), ("export", ".vtp"), ("import", ".h5"))]  # fmt: skip
+PIPES += ["spectrum pipe", "spectrum pipe.h5", "onset pipe", "perturb scene.toml:pipe"]
+"""Commands with a pipe as their file, or as the packing or the signal of their scene."""
 
 
-def test_a_pipe_is_no_scene_and_no_signal(refusal, tmp_path):
-    os.mkfifo(tmp_path / "pipe")
-    assert "no plain file" in refusal("onset", "pipe")
-    (tmp_path / "scene.toml").write_text(LAYER + toml({"perturb": {"fx": 0.0, "time": 1.0, "signal": "pipe"}}))
-    assert "no plain file" in refusal("perturb", "scene.toml")
-
-
-@pytest.mark.parametrize("name", ["pipe", "pipe.h5"])
-@pytest.mark.parametrize(
-    "command", ["spectrum", "draw -o x.png", "movie -o x.gif", "view -o x.html", "export -o x.vtp", "import -o x.h5"]
-)
-def test_a_pipe_is_no_stored_packing(refusal, tmp_path, command, name):
-    os.mkfifo(tmp_path / name)
-    verb, *more = command.split()
-    assert "is no file" in (said := refusal(verb, name, *more)) or "no plain file" in said
-    assert [path.name for path in tmp_path.iterdir()] == [name]
-
-
-@pytest.mark.parametrize("command", ["spectrum", "draw", "export"])
-def test_a_pipe_is_no_dump(refusal, tmp_path, command):
-    os.mkfifo(tmp_path / "pipe.disks")
-    assert "no plain file" in refusal(command, "pipe.disks")
+@pytest.mark.parametrize("command", PIPES)
+def test_a_pipe_is_no_file(refusal, tmp_path, command):
+    """Nothing waits for a pipe, and nothing is written."""
+    words, _, named = command.partition(":")
+    pipe = named or next(word for word in words.split() if word.startswith("pipe"))
+    os.mkfifo(tmp_path / pipe)
+    scene = SCENE.replace(str(REFERENCE), named)
+    if words.startswith("perturb"):
+        scene = LAYER + toml({"perturb": {"fx": 0.0, "time": 1.0, "signal": named}})
+    (tmp_path / "scene.toml").write_text(scene)
+    said = refusal(*words.split())
+    assert pipe in said
+    assert "is no file" in said or "no plain file" in said
+    assert {path.name for path in tmp_path.iterdir()} == {pipe, "scene.toml"}
 
 
 def test_no_pipe_is_read_beside_a_file(refusal, tmp_path, reference_packing):
@@ -338,32 +329,21 @@ def test_no_link_is_followed_and_the_mode_is_kept(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("number", "code", "says"),
+    ("kept", "sends", "code", "says"),
     [
-        (signal.SIGHUP, 129, "the terminal or the connection was closed: "),
-        (signal.SIGXCPU, 152, "the limit of CPU time (ulimit -t) is reached: "),
+        ("", "os.getppid(), 1", 129, "the terminal or the connection was closed: all is kept."),
+        # to the process that works, the child of the one that the shell started
+        ("", "os.getpid(), signal.SIGXCPU", 152, "the limit of CPU time (ulimit -t) is reached: all is kept."),
+        ("gone", "os.getppid(), 15", 143, "is not there, and the same command starts from the beginning."),
     ],
 )
-def test_signals_of_the_system_end_in_a_sentence(tmp_path, number, code, says):
-    """SIGXCPU comes to the process that works, the child of the one that the shell started."""
-    work = (
-        f"import os, signal, time; os.kill(os.getp{'p' * (number == signal.SIGHUP)}id(), {int(number)}); time.sleep(9)"
-    )
-    script = "from faultgouge.signal_guard import guarded, keeps\n"
-    script += f"def work():\n keeps('all is kept')\n {work}\nguarded(work)"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (code, f"Error: {says}all is kept.\n")
-
-
-@pytest.mark.slow
-def test_a_folder_that_is_gone_keeps_nothing(tmp_path):
+def test_signals_end_in_a_sentence_of_what_is_kept(tmp_path, kept, sends, code, says):
+    place = f", {str(tmp_path / kept)!r}" if kept else ""
     script = (
         "import os, signal, time; from faultgouge.signal_guard import guarded, keeps\n"
-        f"def work(): keeps('all is kept', {str(tmp_path / 'gone')!r}); os.kill(os.getppid(), 15); time.sleep(9)\n"
-        "guarded(work)"
+        f"def work(): keeps('all is kept'{place}); os.kill({sends}); time.sleep(9)\nguarded(work)"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30, cwd=tmp_path)
-    assert (
-        done.stderr
-        == f"Error: terminated: {tmp_path / 'gone'} is not there, and the same command starts from the beginning.\n"
-    )
+    assert done.returncode == code
+    assert done.stderr.startswith("Error: ")
+    assert done.stderr.endswith(f"{says}\n")

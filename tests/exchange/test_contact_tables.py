@@ -15,6 +15,7 @@ from faultgouge.analysis import (
     stiffness_matrix,
 )
 from faultgouge.analysis.files.contact_tables import material_of, read_contacts, read_spheres, verdict_within_digits
+from faultgouge.analysis.files.formats import write_packing
 from faultgouge.pywrap import from_lammps
 
 LAW = "kn=1000,kt=800,friction=0.5,rescales=1,gamma=100,gamma_t=100"
@@ -157,11 +158,11 @@ CONTACTS = "id1,id2,fn,ftx,fty,ftz\n1,2,1.0,0,0.1,0\n"
 @pytest.mark.parametrize(
     ("spheres", "contacts", "material", "word"),
     [
-        ("", CONTACTS, "young=1", "is empty"),
+        ("", CONTACTS, "young=1", "is no table"),
         (SPHERES.replace("radius", "size"), CONTACTS, "young=1", "no column radius"),
-        (SPHERES.replace("0.999,0,0,0.5", "0.999,0,0,-0.5"), CONTACTS, "young=1", "radius of sphere 2 is -0.5"),
-        (SPHERES.replace("\n2,", "\n1,"), CONTACTS, "young=1", "sphere 1 twice"),
-        (SPHERES.replace("0.999", "nan"), CONTACTS, "young=1", "line 3: it has a number that is not finite"),
+        (SPHERES.replace("0.999,0,0,0.5", "0.999,0,0,-0.5"), CONTACTS, "young=1", "radius of particle 2 is -0.5"),
+        (SPHERES.replace("\n2,", "\n1,"), CONTACTS, "young=1", "particle 1 twice"),
+        (SPHERES.replace("0.999", "nan"), CONTACTS, "young=1", "line 3: 'nan' is no number"),
         (SPHERES.replace("0.999,0", "0.999"), CONTACTS, "young=1", "line 3: it has 5 columns"),
         (SPHERES.replace("0.999", "near"), CONTACTS, "young=1", "'near' is no number"),
         (SPHERES, CONTACTS.replace("id2", "other"), "young=1", "no column id2"),
@@ -182,6 +183,18 @@ def test_a_bad_table_is_refused_in_one_sentence(tmp_path, spheres, contacts, mat
     with pytest.raises(FaultgougeError, match=word) as raised:
         read_contacts(read_spheres(tmp_path / "s.csv"), tmp_path / "c.csv", material_of(material))
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("suffix", [".data", ".xyz"])
+def test_spheres_come_from_any_format_with_radii(live, tmp_path, suffix):
+    """With their box, and the numbers of the packing to the bit."""
+    _, packing = live
+    write_packing(tmp_path / f"spheres{suffix}", packing)
+    found, order = read_spheres(tmp_path / f"spheres{suffix}"), np.argsort(packing.ids)
+    np.testing.assert_array_equal(found.position, packing.position[order])
+    np.testing.assert_array_equal(found.radius, packing.radius[order])
+    np.testing.assert_allclose(found.mass, packing.mass[order], rtol=1e-15)
+    np.testing.assert_allclose(found.box, packing.box, rtol=1e-15)
 
 
 def test_comments_before_the_names_of_a_table_are_passed_over(tmp_path):

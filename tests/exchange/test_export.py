@@ -292,36 +292,30 @@ def test_ase_reads_extended_xyz(tmp_path, ramp, configuration):
 LATER = "format 2 of faultgouge's files, and this version knows 1: a later version wrote it, so update faultgouge"
 
 
-@pytest.mark.parametrize("module", ["xyz", "lammps_data", "libraries", "checksummed_file", "configuration_file"])
-def test_a_file_of_a_later_format_is_refused(tmp_path, sheared, configuration, monkeypatch, module):
+@pytest.mark.parametrize("kind", ["formats.xyz", "formats.lammps_data", "formats.libraries", "run", "configuration"])
+def test_a_file_of_a_later_format_is_refused(tmp_path, sheared, configuration, monkeypatch, kind):
     """And one without a number, of an older version, is read."""
-    suffix = {"xyz": "xyz", "lammps_data": "data", "libraries": "gsd"}.get(module, "h5")
-    path = tmp_path / f"a.{suffix}"
-    place = "faultgouge.analysis.files." + (f"formats.{module}" if suffix != "h5" else "checksummed_file")
+    suffixes = {"formats.xyz": "xyz", "formats.lammps_data": "data", "formats.libraries": "gsd"}
+    path = tmp_path / f"a.{suffixes.get(kind, 'h5')}"
+    place = f"faultgouge.analysis.files.{kind if kind in suffixes else 'atomic_write'}"
 
-    def write():
-        if module == "configuration_file":
-            write_configuration(path, configuration)
-        elif suffix == "h5":
-            with RunFile(path, "a") as file:
-                file.append(sheared)
-        else:
-            write_packing(path, sheared)
+    def write(**changed):
+        with monkeypatch.context() as version:
+            for name, value in changed.items():
+                version.setattr(f"{place}.{name}", value)
+            path.unlink(missing_ok=True)
+            if kind == "configuration":
+                write_configuration(path, configuration)
+            elif kind == "run":
+                with RunFile.create(path, sheared) as file:
+                    file.append(sheared)
+            else:
+                write_packing(path, sheared)
 
-    RunFile.create(tmp_path / "a.h5", sheared).close()
-    with monkeypatch.context() as later:
-        later.setattr(f"{place}.FORMAT", 2)
-        write()
+    write(FORMAT=2)
     with pytest.raises(PackingFileError, match=LATER):
         load(path)
-    with monkeypatch.context() as older:
-        older.setattr(f"{place}.FORMAT_KEY", "another_name")
-        if suffix == "h5":
-            path.unlink()
-            RunFile.create(path, sheared).close()
-            write()
-        else:
-            path.write_bytes(path.read_bytes().replace(b"faultgouge_format", b"another_name12345"))
+    write(FORMAT_KEY="another_name_123")
     assert len(load(path)) in (len(sheared), len(configuration))
 
 

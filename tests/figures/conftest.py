@@ -1,5 +1,8 @@
-"""A layer that is loaded, unloaded and loaded again, for what is drawn along a path of loads."""
+"""What pictures are drawn of: a layer along a path of loads, a column of two spheres, disks in another order."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from reference_layer import SMALL
 
@@ -14,3 +17,36 @@ def there_and_back():
 
     changed = {"packing": SMALL["packing"] | {"seed": 2}, "ramp": {"step": 0.02, "until": [0.16, 0.0, 0.16]}}
     return [each.packing for each in ramp(Scene.from_mapping(SMALL | changed))]
+
+
+@pytest.fixture(scope="session")
+def column():
+    """Two spheres, one on the other on a floor, at rest under their weight of one each."""
+    from faultgouge.analysis import Configuration, LinearisedContacts
+
+    zero, up, arm = np.zeros(2), np.tile([0.0, 0.0, 1.0], (2, 1)), np.full((2, 2), 0.5)
+    contacts = LinearisedContacts(
+        i=[0, 1], j=[-1, 0], normal=up, distance=[np.inf, 0.98], overlap=[0.01, 0.02], slip_arm=arm, lever_arm=arm,
+        lever_slope=zero, normal_force=[2, 1], tangential_force=np.zeros((2, 3)), normal_stiffness=[300, 300],
+        tangential_stiffness=[200, 200], closing=np.zeros((2, 3)), parting=np.zeros((2, 3)), friction=[1, 0.5],
+        sliding=[False, False], normal_dashpot=zero, tangential_dashpot=zero,
+    )  # fmt: skip
+    load = np.zeros((2, 2, 3))
+    load[:, 0, 2] = -1
+    return Configuration(
+        dimension=3, position=[[0.5, 0.5, 0.49], [0.5, 0.5, 1.47]], radius=[0.5, 0.5], mass=[1, 1], inertia=[0.1, 0.1],
+        contacts=contacts, box=np.diag([1.0, 1.0, 3.0]), origin=np.zeros(3), periodic=[True, True, False], load=load,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def renumbered(there_and_back):
+    """The layer where it turns, under another load, with its disks in another order: displacements of its modes are
+    those of other disks."""
+    from faultgouge.analysis.arrays import derive_frozen
+
+    last = there_and_back[TURN]
+    order = np.random.default_rng(1).permutation(len(last))
+    i, j = (np.where(each < 0, each, np.argsort(order)[each]) for each in (last.contacts.i, last.contacts.j))
+    moved = {name: getattr(last, name)[order] for name in ("position", "radius", "mass", "angle", "top")}
+    return derive_frozen(last, fx=0.17, contacts=replace(last.contacts, i=i, j=j), **moved)

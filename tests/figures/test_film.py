@@ -8,8 +8,16 @@ import pytest
 from PIL import Image
 
 from faultgouge.analysis import Packing
-from faultgouge.figures.film import LARGEST_SHOWN, RunMotion, faces_by_way, film_of_ramp, film_of_run
-from faultgouge.figures.writers import COLOUR_DIFFERENCE, usual_suffix, write_film
+from faultgouge.figures.film import (
+    COLOUR_DIFFERENCE,
+    LARGEST_SHOWN,
+    RunMotion,
+    faces_by_way,
+    film_of_ramp,
+    film_of_run,
+    usual_suffix,
+    write_film,
+)
 
 
 @pytest.fixture(scope="module")
@@ -39,8 +47,8 @@ def test_magnification_is_a_power_of_ten_that_only_falls(motion):
 
 def test_displacements_are_those_of_the_nearest_image(packing):
     position = np.stack([packing.position, packing.position + np.array([packing.box_length + 1e-3, 0.0])])
-    moved = RunMotion.of(packing, np.array([0.0, 1.0]), position).displacement
-    np.testing.assert_allclose(moved[1], np.tile([1e-3, 0.0], (100, 1)), atol=1e-13)
+    moved = RunMotion.of(packing, np.array([0.5, 1.0]), position).displacement
+    np.testing.assert_allclose(moved[2], np.tile([1e-3, 0.0], (100, 1)), atol=1e-13)
 
 
 def test_a_part_of_a_run(motion):

@@ -5,38 +5,18 @@ import pytest
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.quiver import Quiver
 
-from faultgouge.analysis import Configuration, LinearisedContacts, normal_modes
+from faultgouge.analysis import normal_modes
 from faultgouge.figures import draw_mode, draw_packing
-from faultgouge.figures.spheres import AZIMUTH, DOTS_ACROSS, ELEVATION, LIGHT, Eye, shade_spheres
+from faultgouge.figures.spheres import DOTS_ACROSS, INTO, LIGHT, flat, shade_spheres
 
 RED, BLUE = [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]
 FRAME = (-1.0, 1.0, -1.0, 1.0)
 
 
-@pytest.fixture
-def column():
-    """Two spheres, one above the other, on a plane: the lower contact carries both weights."""
-    zero, up = np.zeros(2), np.tile([0.0, 0.0, 1.0], (2, 1))
-    contacts = LinearisedContacts(
-        i=[0, 1], j=[-1, 0], normal=up, distance=[np.inf, 0.999], overlap=[0.001, 0.001],
-        slip_arm=np.full((2, 2), 0.5), lever_arm=np.full((2, 2), 0.5), lever_slope=zero, normal_force=[2.0, 1.0],
-        tangential_force=np.zeros((2, 3)), normal_stiffness=[3e3, 2e3], tangential_stiffness=[1e3, 1e3],
-        closing=np.zeros((2, 3)), parting=np.zeros((2, 3)), friction=[1.0, 0.5], sliding=[False, False],
-        normal_dashpot=zero, tangential_dashpot=zero,
-    )  # fmt: skip
-    load = np.zeros((2, 2, 3))
-    load[:, 0, 2] = -1.0
-    return Configuration(
-        dimension=3, position=[[0, 0, 0.499], [0, 0, 1.498]], radius=[0.5, 0.5], mass=[1.0, 1.0], inertia=[0.1, 0.1],
-        contacts=contacts, box=np.diag([2.0, 2.0, 4.0]), origin=[-1, -1, 0], periodic=[True, True, False], load=load,
-    )  # fmt: skip
-
-
 def test_the_nearer_sphere_hides_the_other_in_any_order():
-    eye = Eye.at(AZIMUTH, ELEVATION)
-    place = np.array([0.5 * eye.into, -0.5 * eye.into])  # the second is nearer
+    place = np.array([0.5 * INTO, -0.5 * INTO])  # the second is nearer
     for order in ([0, 1], [1, 0]):
-        dots = shade_spheres(eye, place[order], np.full(2, 0.4), np.array([RED, BLUE])[order], FRAME)
+        dots = shade_spheres(place[order], np.full(2, 0.4), np.array([RED, BLUE])[order], FRAME)
         red, _, blue, opaque = dots[len(dots) // 2, DOTS_ACROSS // 2]
         assert blue > red
         assert opaque == 1
@@ -44,12 +24,12 @@ def test_the_nearer_sphere_hides_the_other_in_any_order():
 
 
 def test_the_brightest_dot_faces_the_lamp():
-    eye, radius = Eye.at(AZIMUTH, ELEVATION), 0.8
-    dots = shade_spheres(eye, np.zeros((1, 3)), np.array([radius]), np.array([[0.5, 0.5, 0.5]]), FRAME)
+    radius = 0.8
+    dots = shade_spheres(np.zeros((1, 3)), np.array([radius]), np.array([[0.5, 0.5, 0.5]]), FRAME)
     row, column = np.unravel_index(np.argmax(dots[..., 0]), dots.shape[:2])
     size = 2 / DOTS_ACROSS
     seen = np.array([-1 + size * (column + 0.5), 1 - size * (row + 0.5)]) / radius
-    np.testing.assert_allclose(seen, eye.flat(LIGHT), atol=0.05)  # next to its top a cosine is flat
+    np.testing.assert_allclose(seen, flat(LIGHT), atol=0.05)  # next to its top a cosine is flat
 
 
 def test_bars_are_as_wide_as_their_forces_and_end_on_the_floor(column):
@@ -58,7 +38,7 @@ def test_bars_are_as_wide_as_their_forces_and_end_on_the_floor(column):
     [bars] = [each for each in axes.findobj(LineCollection) if len(each.get_segments()) == 2]
     widths = np.sort(bars.get_linewidths())
     assert widths[1] == pytest.approx(2 * widths[0], rel=1e-12)
-    at_floor = Eye.at(AZIMUTH, ELEVATION).flat(np.zeros(3))
+    at_floor = flat(np.array([0.5, 0.5, 0.0]))
     ends = np.concatenate([bar for bar in bars.get_segments()])
     assert np.hypot(*(ends - at_floor).T).min() < 1e-9
     assert floor.get_paths()[0].contains_point(at_floor)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, mean_square_displacement
-from faultgouge.assessment.extremes.cases.packings import at_rest
+from faultgouge.assessment.extremes.packings import at_rest
 from faultgouge.pywrap import Engine, equilibrate
 
 mpmath.mp.dps = 50

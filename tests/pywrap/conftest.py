@@ -32,7 +32,7 @@ def refused_scene() -> Callable[..., str]:
 @pytest.fixture(scope="session")
 def loaded(reference_packing) -> Callable[..., Packing]:
     """The reference packing in equilibrium under F_x, reached in increments of the size that is given, for mu = 1."""
-    from faultgouge.assessment.extremes.cases.packings import at_rest
+    from faultgouge.assessment.extremes.packings import at_rest
     from faultgouge.pywrap import Engine, equilibrate
 
     @cache

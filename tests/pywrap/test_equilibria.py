@@ -7,7 +7,7 @@ import pytest
 from reference_layer import REFERENCE
 
 from faultgouge.analysis import damping_matrix, largest_damping_rate, largest_frequency, stable_timestep
-from faultgouge.assessment.extremes.cases.packings import at_rest
+from faultgouge.assessment.extremes.packings import at_rest
 from faultgouge.pywrap import Engine, NoEquilibriumError, Scene, SceneError, equilibrate, ramp, reach
 from faultgouge.pywrap.runs.undamped import time_step
 

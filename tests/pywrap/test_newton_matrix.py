@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 
 from faultgouge.analysis import Contacts, MindlinLaw, stiffness_matrix
 from faultgouge.analysis.factors.linear_solver import RESIDUAL_SHARE, SparseSolver, elimination_order
-from faultgouge.assessment.extremes.cases.packings import crystal
+from faultgouge.assessment.extremes.packings import crystal
 from faultgouge.pywrap import Engine
 from faultgouge.pywrap.equilibria.newton_matrix import FLOATING_SHARE, factor_stiffness
 from faultgouge.pywrap.lammps.contact_graph import ContactGraph

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from faultgouge.analysis import Contacts, MindlinLaw, Packing, nearest_image, touching
-from faultgouge.assessment.extremes.cases.packings import at_rest
+from faultgouge.assessment.extremes.packings import at_rest
 from faultgouge.pywrap import Engine, equilibrate
 from faultgouge.pywrap.equilibria.rattlers import clear_rattlers, highest_corner, middle_of_cage
 

@@ -15,14 +15,14 @@ import pytest
 from reference_layer import REFERENCE
 
 from faultgouge.analysis import RunFile
-from faultgouge.analysis.files import checksummed_file
+from faultgouge.analysis.files import runfile
 from faultgouge.pywrap import Equilibrium, Record, Scene, SceneError, perturb, reach, settle
 from faultgouge.pywrap.runs import undamped
 from faultgouge.pywrap.runs.drive import DriveRecord
 from faultgouge.pywrap.runs.undamped import sample_steps, weakening_of
 
 SCENE = {"packing": {"file": str(REFERENCE)}, "law": {"kn": 2e5}, "load": {"fy": 3.0}}
-WRITERS = {"run_recorder.py", "runfile.py", "checksummed_file.py", "atomic_write.py"}
+WRITERS = {"run_recorder.py", "runfile.py", "atomic_write.py"}
 
 
 def interrupted_at(number, work):
@@ -72,7 +72,7 @@ def file_with_one_equilibrium(tmp_path_factory, equilibria):
 @pytest.mark.parametrize("share", [1e-9, math.inf], ids=["saved at the end", "saved at once"])
 @pytest.mark.long
 def test_what_is_said_is_what_is_stored(tmp_path, monkeypatch, file_with_one_equilibrium, equilibria, share):
-    monkeypatch.setattr(checksummed_file, "SHARE_OF_SAVING", share)
+    monkeypatch.setattr(runfile, "SHARE_OF_SAVING", share)
     path, counts, number, interrupted = tmp_path / "run.h5", set(), 0, True
     while interrupted:
         path.write_bytes(file_with_one_equilibrium)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import Contacts, find_onset, spectrum, stiffness_matrix
-from faultgouge.assessment.extremes.cases.packings import at_rest
+from faultgouge.assessment.extremes.packings import at_rest
 from faultgouge.pywrap import Engine, NoEquilibriumError, Scene, equilibrate
 from faultgouge.pywrap.equilibria.newton_matrix import factor_stiffness
 from faultgouge.pywrap.equilibria.quasistatic import rounding_floor

@@ -221,8 +221,8 @@ def test_a_list_is_no_scene(refused_scene):
     ("name", "content", "says"),
     [
         ("missing.json", None, "cannot be read at"),
-        ("broken.json", b"{", "is not a packing file"),
-        ("other.json", b'{"x": [1]}', "lacks the key .y."),
+        ("broken.json", b"{", "is not read as packing.json"),
+        ("other.json", b'{"x": [1]}', "lacks .y."),
         ("run.h5", b"no HDF5", "is of no format that is read: give"),
         ("deep.json", b"[" * 100_000, ""),
         ("long.json", b'{"x": [' + b"9" * 400 + b'], "y": [1.0], "radius": [0.5]}', ""),

@@ -67,7 +67,7 @@ def test_two_columns_and_records_are_read(tmp_path):
     with pytest.raises(SignalError, match=r"it has the traces BW\.RJOB\.\.EHZ"):
         read_signal(path)
     assert len(read_signal(path, "EHN")) == 3000
-    with pytest.raises(SignalError, match="fits no trace of"):
+    with pytest.raises(SignalError, match="fits none of"):
         read_signal(path, "XYZ")
 
 
@@ -75,8 +75,8 @@ def test_two_columns_and_records_are_read(tmp_path):
     ("text", "keys", "says"),
     [
         (None, {}, "cannot be read (No such file or directory)"),
-        ("0 1\n1 nan\n", {}, "row 2 of the signal has the value nan"),
-        ("0 1 2\n1 2 3\n", {}, "line 1 has something else than two numbers"),
+        ("0 1\n1 nan\n", {}, "line 2: 'nan' is no number"),
+        ("0 1 2\n1 2 3\n", {}, "line 1: it has 3 columns, and two are needed"),
         ("0 1\n1 1\n", {"amplitude": 1.0}, "perturb.amplitude cannot stand beside a signal from a file"),
         ("0 1\n1 1\n", {"quantity": "velocity"}, 'perturb.quantity belongs to on = "floor"'),
         ("0 1\n1 1\n", {"channel": "EHZ"}, "has no channels"),

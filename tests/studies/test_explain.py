@@ -1,7 +1,6 @@
 """explain: what it says is what LAMMPS holds, and what is left out leaves the motion to the bit."""
 
 import json
-from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 from mpi4py import MPI
 from reference_layer import SMALL
 
-from faultgouge.assessment.explain import UndampedRun, affordable, explain, features, run_of
+from faultgouge.assessment.explain import affordable, contents, everything, explain, features, in_words, run_of, set_up
 from faultgouge.pywrap import Scene, settle
 
 SCENES = files("faultgouge") / "scenes"
@@ -32,7 +31,13 @@ BROUGHT = {
     "signal": {"part signal.in", "fix force"},
     "spring": {"part spring.in", "fix drive"},
     "compensated coordinates": {"fix low", "array f_floor (8 columns)", "array f_low (5 columns)"},
-    "dumps": {"part write.in", "file run.1.contacts", "file run.1.disks", "file run.1.params"},
+    "dumps": {
+        "part write.in",
+        "part write_friction.in",
+        "file run.1.contacts",
+        "file run.1.disks",
+        "file run.1.params",
+    },
     "per-contact output": {"compute contact", "dump contact"},
     "trajectory": {"positions at each sample in run.h5"},
     "MPI": set(),
@@ -47,29 +52,25 @@ def test_what_is_in_and_what_each_part_brings():
         explain(scene)
         for scene in (Scene.from_toml(SCENES / "paper.toml"), Scene.from_mapping(smooth | {"perturb": pulse}))
     )
-    inside = [{part.name for part in each.parts if part.included} for each in (paper, frictionless)]
+    inside = [{part["name"] for part in each["parts"] if part["included"]} for each in (paper, frictionless)]
     always = {"floor", "periodicity"}
     assert inside[0] == always | {"tangential history", "dynamic friction", "perturbation"}
     assert inside[1] == always | {"signal", "dumps", "per-contact output", "trajectory"}
-    low = BROUGHT["compensated coordinates"]
-    for explanation, compensated in ((paper, low | {"array f_slips (25 columns)"}), (frictionless, low)):
-        found = {part.name: {each for each in part.adds if "rotations" not in each} for part in explanation.parts}
-        assert found == BROUGHT | {"compensated coordinates": compensated}
+    low, files = BROUGHT["compensated coordinates"], BROUGHT["dumps"]
+    plain = files - {"part write_friction.in"} | {"part write_plain.in"}
+    for found, fine, dumps in ((paper, low | {"array f_slips (25 columns)"}, files), (frictionless, low, plain)):
+        brings = {part["name"]: {each for each in part["adds"] if "rotations" not in each} for part in found["parts"]}
+        assert brings == BROUGHT | {"compensated coordinates": fine, "dumps": dumps}
     for name in ("tangential history", "dynamic friction", "dashpots", "drag", "perturbation"):
-        assert BROUGHT[name].isdisjoint(frictionless.loaded.everything), name
-    assert frictionless.loaded.parts == ("system.in", "undamped.in", "signal.in")
-    assert (paper.defaults["friction.B"], paper.defaults["packing.periodic"]) == (0.2, True)
-    assert not any(key == "packing.seed" or key.startswith("relax") for key in paper.defaults)
-    copy = json.loads(json.dumps(paper.as_dict()))
-    assert copy["loaded"]["fixes"] == list(paper.loaded.fixes)
-    said = "\n".join(paper.in_words())
+        assert BROUGHT[name].isdisjoint(everything(frictionless["loaded"])), name
+    assert frictionless["loaded"]["parts"] == ("system.in", "undamped.in", "signal.in")
+    assert (paper["defaults"]["friction.B"], paper["defaults"]["packing.periodic"]) == (0.2, True)
+    assert not any(key == "packing.seed" or key.startswith("relax") for key in paper["defaults"])
+    assert json.loads(json.dumps(paper))["loaded"]["fixes"] == list(paper["loaded"]["fixes"])
+    said = "\n".join(in_words(paper))
     assert said.startswith("In: floor, tangential history, periodicity, dynamic friction and perturbation. Out: dashp")
-    for words in (
-        "deck parts: system.in, friction.in, undamped.in, push.in, weaken.in\n",
-        "tau in [damping]",
-        "fix drive",
-    ):
-        assert words in said
+    parts = "deck parts: system.in, friction.in, undamped.in, push.in, weaken.in\n"
+    assert all(words in said for words in (parts, "tau in [damping]", "fix drive"))
 
 
 def test_of_a_large_packing_a_strip_is_explained():
@@ -86,37 +87,27 @@ def test_of_a_large_packing_a_strip_is_explained():
     assert affordable(small)[0] == small
 
 
-@pytest.fixture(scope="module")
-def run():
-    return UndampedRun(settle(Scene.from_toml(SCENES / "minimal.toml"), communicator=MPI.COMM_SELF).packing)
-
-
-def test_what_is_left_out_leaves_the_motion_and_the_forces_to_the_bit(run, tmp_path):
+def test_what_is_left_out_leaves_the_motion_and_the_forces_to_the_bit():
     """Friction that could weaken and the output of contacts do not touch the motion; other features act on some disks,
     and the forces on the others are the same. Only the low parts of coordinates give other last digits."""
-    for feature in features(run, tmp_path / "contacts"):
-        with (
-            feature.without.start(MPI.COMM_SELF) as (one, plain),
-            feature.with_it.start(MPI.COMM_SELF) as (two, switched),
-        ):
+    packing = settle(Scene.from_toml(SCENES / "minimal.toml"), communicator=MPI.COMM_SELF).packing
+    quiet = ("dynamic friction", "dumps", "per-contact output")
+    for name, _, without, with_it in features((packing, {})):
+        with set_up(without[0], **without[1]) as (one, plain), set_up(with_it[0], **with_it[1]) as (two, switched):
             same = one.net_force == two.net_force
-            if feature.name in ("dynamic friction", "per-contact output"):
+            if name in quiet:
                 motion, other = plain.advance(200), switched.advance(200)
                 assert all(np.array_equal(getattr(motion, name), getattr(other, name)) for name in motion._fields)
-        everyone = feature.name in ("tangential history", "dashpots", "drag", "dynamic friction", "per-contact output")
-        assert same.all() or not everyone, feature.name
-        assert same.mean() > 0.5 or feature.name == "compensated coordinates", feature.name
+        assert same.all() or name not in ("tangential history", "dashpots", "drag", *quiet), name
+        assert same.mean() > 0.5 or name == "compensated coordinates", name
 
 
 def test_a_driven_scene_has_its_spring(tmp_path):
     scene = Scene.from_toml(SCENES / "drive.toml")
-    own = run_of(scene, settle(scene, communicator=MPI.COMM_SELF).packing)
-    with own.start(MPI.COMM_SELF) as (_, dynamics):
+    packing, motion = run_of(scene, settle(scene, communicator=MPI.COMM_SELF).packing)
+    with set_up(packing, tmp_path / "log", **motion) as (engine, dynamics):
         still = dynamics.advance(1).position
-    np.testing.assert_allclose(still, own.packing.position, atol=1e-9)  # in small steps, from rest
-    spring = {each.name: each for each in features(own, tmp_path)}["spring"]
-    assert spring.reason == "stiffness 10.0"
-    assert BROUGHT["spring"] <= set(own.contents(tmp_path / "log").everything)
-    assert {each.name: each for each in features(replace(own, motion={}), tmp_path)}[
-        "spring"
-    ].reason == "no section [drive]"
+        assert BROUGHT["spring"] <= set(everything(contents(engine, tmp_path / "log")))
+    np.testing.assert_allclose(still, packing.position, atol=1e-9)  # in small steps, from rest
+    for own, why in ((motion, "stiffness 10.0"), ({}, "no section [drive]")):
+        assert {name: reason for name, reason, *_ in features((packing, own))}["spring"] == why

@@ -9,8 +9,7 @@ from scipy.linalg import LinAlgError
 
 from faultgouge.analysis import RunFile
 from faultgouge.pywrap import Scene
-from faultgouge.studies.reproduce.compute import growth_run, recorded_ramp, summary_of
-from faultgouge.studies.reproduce.page import report
+from faultgouge.studies.reproduce.protocol import growth_run, recorded_ramp, report, summary_of
 from faultgouge.studies.sweep.draw import draw_sweep
 
 

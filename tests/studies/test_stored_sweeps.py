@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from reference_layer import REFERENCE, SMALL, toml
 
-from faultgouge.pywrap import SceneError
+from faultgouge.pywrap import Scene, SceneError, settle
 from faultgouge.studies.sweep import sweep_plan
 from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep, other_packings
@@ -18,6 +18,8 @@ from faultgouge.studies.sweep.user_function import user_function
 TASK = """
 import sys
 from pathlib import Path
+
+import numpy as np
 
 from faultgouge.analysis import NoEquilibriumError
 
@@ -36,6 +38,12 @@ def ends(scene):
     if scene.packing.seed == 1:
         sys.exit()
     return {"seed": scene.packing.seed}
+
+def contacts(scene, settled):
+    return {"contacts": np.int64(len(settled.packing.contacts)), "of": {"x": settled.packing.position[:2, 0]}}
+
+def seed_of(scene):
+    return scene.packing.seed
 
 def imports(scene):
     from tools.numbers import number
@@ -69,11 +77,11 @@ def keys(sweep):
     return [point.key for point in sweep.points]
 
 
-def shards(folder, function, number=2, seeds="1:3"):
-    """The folders of the shards of a sweep."""
-    parts = [folder / f"part{k}" for k in range(1, number + 1)]
+def shards(place, folder, function):
+    """The folders of the two shards of a sweep."""
+    parts = [place / f"part{k}" for k in (1, 2)]
     for k, part in enumerate(parts, 1):
-        run_sweep(sweep_of(folder, function, seeds), part, (k, number), say=id)
+        run_sweep(sweep_of(folder, function), part, (k, 2), say=id)
     return parts
 
 
@@ -140,7 +148,7 @@ def test_failures_are_tried_again_but_for_scenes_without_equilibrium(folder):
     sweep = sweep_of(folder, "passing")
     rows = run_sweep(sweep, folder / "out", say=id)
     assert rows[0]["says"] == "it flows"
-    assert rows[1]["says"] == "scene 1: passing failed with OSError: the disk is full (ask.py, line 15)"
+    assert rows[1]["says"] == "scene 1: passing failed with OSError: the disk is full (ask.py, line 17)"
     again = run_sweep(sweep, folder / "out", say=id)
     assert (folder / "calls").read_text().split() == ["1", "2", "3", "2"]
     assert [row["result"].get("seed") for row in again] == [None, 2, 3]
@@ -149,21 +157,31 @@ def test_failures_are_tried_again_but_for_scenes_without_equilibrium(folder):
     assert len((folder / "calls").read_text().split()) == 4
 
 
-def test_the_end_of_python_in_a_task_is_a_row(folder):
-    rows = run_sweep(sweep_of(folder, "ends"), folder / "out", say=id)
-    assert rows[0]["says"].startswith("scene 0: ends failed with SystemExit:  (ask.py, line 20)")
-    assert [row["says"] for row in rows[1:]] == [None, None]
+def test_rows_of_a_function_hold_its_numbers_or_say_why_not(folder):
+    first, _ = run_sweep(sweep_of(folder, "contacts", "1:2"), folder / "contacts", say=id, workers=2)
+    rest = settle(Scene.from_mapping(SMALL | {"packing": SMALL["packing"] | {"seed": 1}})).packing
+    assert first["result"] == {"contacts": len(rest.contacts), "of": {"x": rest.position[:2, 0].tolist()}}
+    for function, says in (("ends", "scene 0: ends failed with SystemExit:  (ask.py, line 22)"), ("seed_of", "int: ")):
+        first, second = run_sweep(sweep_of(folder, function, "1:2"), folder / function, say=id)
+        assert says in first["says"]
+        assert (second["says"] is None) is (function == "ends")
 
 
-def test_merge_keeps_the_rows_of_its_target(folder):
-    """A target that has more than the parts, as a row that was computed since, loses none; another sweep is refused."""
-    one, two = shards(folder, "ends")
-    whole = folder / "whole"
-    merge([one, two], whole, id)
-    before = (whole / "results.jsonl").read_text()
-    merge([one], whole, id)
-    assert (whole / "results.jsonl").read_text() == before
-    assert len((whole / "results.csv").read_text().splitlines()) == 4
+def test_merge_keeps_the_rows_of_its_target_and_reads_parts_that_are_written(folder):
+    """A target that has more than the parts, as a row that was computed since, loses none; another sweep is refused.
+    What is no number is the same result again."""
+    for function in ("ends", "nothing"):
+        one, two = shards(folder / function, folder, function)
+        half = (one / "results.jsonl").read_text() + '{"key": "0123'
+        (one / "results.jsonl").write_text(half)
+        whole = folder / function / "whole"
+        assert len(merge([one, two], whole, id)[1]) == 3
+        before = (whole / "results.jsonl").read_text()
+        merge([one], whole, id)
+        merge([one, two, whole], whole, id)
+        assert (whole / "results.jsonl").read_text() == before
+        assert (one / "results.jsonl").read_text() == half
+        assert len((whole / "results.csv").read_text().splitlines()) == 4
     run_sweep(sweep_of(folder, "ends", "7:9"), folder / "precious", say=id)
     files = {path: path.read_bytes() for path in (folder / "precious").iterdir()}
     with pytest.raises(SceneError, match=r"precious is of another sweep than .*part1"):
@@ -171,45 +189,21 @@ def test_merge_keeps_the_rows_of_its_target(folder):
     assert {path: path.read_bytes() for path in (folder / "precious").iterdir()} == files
 
 
-def test_a_result_that_is_no_number_is_the_same_result_again(folder):
-    parts, whole = shards(folder, "nothing"), folder / "whole"
-    merge(parts, whole, id)
-    before = (whole / "results.jsonl").read_text()
-    merge([*parts, whole], whole, id)
-    assert (whole / "results.jsonl").read_text() == before
-
-
-def test_merge_reads_a_part_that_is_being_written(folder):
-    one, two = shards(folder, "ends")
-    half = (one / "results.jsonl").read_text() + '{"key": "0123'
-    (one / "results.jsonl").write_text(half)
-    assert len(merge([one, two], folder / "whole", id)[1]) == 3
-    assert (one / "results.jsonl").read_text() == half
-
-
-@pytest.mark.parametrize("first", ["good", "bad"])
-def test_a_good_row_goes_before_an_error(folder, first):
-    for name in ("good", "bad"):
+def test_a_good_row_goes_before_an_error_and_two_results_are_named(folder):
+    for name in ("good", "bad", "other"):
         run_sweep(sweep_of(folder, "ends", "2:3"), folder / name, say=id)
     change(folder / "bad", says="out of memory")
-    second = {"good": "bad", "bad": "good"}[first]
-    rows = merge([folder / first, folder / second], folder / "whole", id)[1]
-    assert [row["result"] for row in rows] == [{"seed": 2}, {"seed": 3}]
-
-
-def test_two_results_of_one_scene_are_named(folder):
-    one, two = folder / "one", folder / "two"
-    for part in (one, two):
-        run_sweep(sweep_of(folder, "ends", "2:3"), part, say=id)
-    merge([one, two], folder / "same", id)  # but for their times
-    key = change(two, result={"seed": 5})
-    with pytest.raises(SceneError, match=rf"one/results.jsonl and .*two/results.jsonl have .*seed = 2; key {key}"):
-        merge([one, two], folder / "whole", id)
+    key = change(folder / "other", result={"seed": 5})
+    for number, names in enumerate((("good", "bad"), ("bad", "good"))):
+        rows = merge([folder / name for name in names], folder / f"whole{number}", id)[1]
+        assert [row["result"] for row in rows] == [{"seed": 2}, {"seed": 3}]
+    with pytest.raises(SceneError, match=rf"good/results.jsonl and .*other/results.jsonl have .*seed = 2; key {key}"):
+        merge([folder / "good", folder / "other"], folder / "whole", id)
     assert not (folder / "whole" / "results.csv").exists()
 
 
 def test_merge_takes_the_keys_that_the_sweep_had_and_names_versions(folder, monkeypatch):
-    one, two = shards(folder, "ends")
+    one, two = shards(folder, folder, "ends")
     (folder / "ask.py").unlink()
     assert len(merge([one, two], folder / "whole", id)[1]) == 3
     (folder / "ask.py").write_text(TASK)

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import threading
 import time
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -20,14 +19,12 @@ from faultgouge.pywrap import Equilibrium, Scene, SceneError, settle
 from faultgouge.pywrap.onset import onset_run
 from faultgouge.pywrap.runs.drive import DriveRecord, settle_for_drive
 from faultgouge.studies.cycle import cycle
-from faultgouge.studies.executors import Processes, open_executor
 from faultgouge.studies.statistics import median_interval
 from faultgouge.studies.sweep import workers
 from faultgouge.studies.sweep.draw import draw_sweep, onsets_figure, reach_of
 from faultgouge.studies.sweep.run_sweep import merge, read_results, run_sweep
 from faultgouge.studies.sweep.sweep_plan import Sweep
-from faultgouge.studies.sweep.user_function import user_function
-from faultgouge.studies.sweep.workers import WorkerError, compute_points
+from faultgouge.studies.sweep.workers import Processes, WorkerError, compute_points, open_executor
 from faultgouge.studies.trigger import trigger
 
 AXES = {"packing.seed": "1:4", "law.mu": [1.0, 0.5, -1.0]}
@@ -75,23 +72,6 @@ def test_what_settles_alike(axes, changes, shared):
     assert (first.settling_key == second.settling_key) is shared
 
 
-FUNCTIONS = '''
-import numpy as np
-
-def contacts(scene, settled):
-    """A docstring."""
-    if scene.packing.seed == 2:
-        raise KeyError("no such grain")
-    return {"contacts": np.int64(len(settled.packing.contacts)), "of": {"x": settled.packing.position[:2, 0]}}
-
-def seed_of(scene):
-    return scene.packing.seed
-
-def three(scene, settled, more):
-    return {}
-'''
-
-
 BAD_SWEEPS = [
     ('task = "onest"', "give one of"),
     ('task = "onset"\nseeds = 3', "seeds is no key of a sweep"),
@@ -112,7 +92,11 @@ BAD_SWEEPS = [
 
 
 def refused_sweep(folder, text):
-    for name, code in {"ask.py": FUNCTIONS, "broken.py": "def", "ends.py": "raise SystemExit(0)"}.items():
+    for name, code in {
+        "ask.py": "def three(scene, settled, more): ...",
+        "broken.py": "def",
+        "ends.py": "raise SystemExit(0)",
+    }.items():
         (folder / name).write_text(code)
     (folder / "sweep.toml").write_text(text)
     Sweep.from_toml(folder / "sweep.toml")
@@ -145,38 +129,6 @@ def test_bad_input_is_refused_in_a_sentence_before_work(tmp_path, study, given, 
     with pytest.raises(SceneError, match=says):
         study(tmp_path, given)
     assert not (tmp_path / "out").exists()
-
-
-def function_sweep(folder, function, axes=None):
-    scene = {"task": f"ask.py:{function}", "sweep": axes or {"packing.seed": "1:2"}, "scene": SMALL}
-    return Sweep.from_mapping(scene, folder)
-
-
-def test_a_function_of_the_users_is_a_task_and_its_errors_are_rows(tmp_path):
-    (tmp_path / "ask.py").write_text(FUNCTIONS)
-    first, second = run_sweep(function_sweep(tmp_path, "contacts"), tmp_path / "out", say=id, workers=2)
-    rest = settle(Scene.from_mapping(SMALL | {"packing": SMALL["packing"] | {"seed": 1}})).packing
-    assert first["result"] == {"contacts": len(rest.contacts), "of": {"x": rest.position[:2, 0].tolist()}}
-    assert second["says"] == "scene 1: contacts failed with KeyError: 'no such grain' (ask.py, line 7)"
-    (wrong, _) = run_sweep(function_sweep(tmp_path, "seed_of"), tmp_path / "wrong", say=id)
-    assert "returned int: return a dict" in wrong["says"]
-
-
-def test_rows_of_a_function_are_known_by_its_code_and_shards_merge_without_it(tmp_path):
-    file = tmp_path / "ask.py"
-    file.write_text(FUNCTIONS)
-    before = [point.key for point in function_sweep(tmp_path, "contacts").points]
-    parts = [tmp_path / "a", tmp_path / "b"]
-    for k, part in enumerate(parts, 1):
-        run_sweep(function_sweep(tmp_path, "contacts"), part, (k, 2), say=id)
-    file.write_text(FUNCTIONS.replace("A docstring.", "Other words.") + "# a comment\n")
-    user_function.cache_clear()
-    assert [point.key for point in function_sweep(tmp_path, "contacts").points] == before
-    file.write_text(FUNCTIONS.replace("== 2", "== 3"))
-    user_function.cache_clear()
-    assert not set(before) & {point.key for point in function_sweep(tmp_path, "contacts").points}
-    file.unlink()
-    assert [row["key"] for row in merge(parts, tmp_path / "whole", id)[1]] == before
 
 
 @pytest.mark.slow
@@ -228,36 +180,23 @@ def test_failures_are_rows_and_merge_refuses_what_does_not_belong_together(tmp_p
     assert [row["says"] for row in table(tmp_path / "c")] == [failed["says"]]
 
 
-def drawn(keys, scenes=20, end=0.03):
-    """The picture of samples of random onsets, and the random onsets by sample."""
-    random, rows, known = np.random.default_rng(1), [], {}
-    for values in product(*keys.values()):
-        known[values] = onsets = 0.02 * random.weibull(1.2, scenes)
-        for seed, fx in enumerate(onsets.tolist()):
-            result = {"ends": "onset", "fx_c": fx} if fx < end else {"ends": "until", "reach": end}
-            rows.append({"values": dict(zip(keys, values, strict=True)) | {"packing.seed": seed}, "result": result})
-    return onsets_figure([(row, reach_of(row)) for row in rows]), known
-
-
 def test_the_picture_has_a_curve_and_a_median_with_its_interval_for_each_value():
-    figure, known = drawn({"law.mu": [0.5, 0.8, 1.0]})
-    share, over = figure.axes
-    assert [text.get_text() for text in share.get_legend().get_texts()] == [
-        "law.mu = 0.5",
-        "law.mu = 0.8",
-        "law.mu = 1.0",
-    ]
-    assert [line.get_color() for line in share.lines] == ["C0", "C1", "C2"]
-    for line, onsets in zip(share.lines, known.values(), strict=True):
-        fx, level = line.get_data()
-        np.testing.assert_allclose(np.sort(onsets[onsets < 0.03]), fx[1:-1])
-        assert level[-1] == pytest.approx(np.mean(onsets < 0.03))
+    random, rows, known = np.random.default_rng(1), [], {}
+    for mu in (0.5, 0.8, 1.0):
+        known[mu] = 0.02 * random.weibull(1.2, 20)
+        for seed, fx in enumerate(known[mu].tolist()):
+            result = {"ends": "onset", "fx_c": fx} if fx < 0.03 else {"ends": "until", "reach": 0.03}
+            rows.append({"values": {"law.mu": mu, "packing.seed": seed}, "result": result})
+    share, over = onsets_figure([(row, reach_of(row)) for row in rows]).axes
+    assert [text.get_text() for text in share.get_legend().get_texts()] == [f"law.mu = {mu}" for mu in known]
     diamonds = [line for line in over.lines if line.get_marker() == "D"]
     bars = [line for line in over.lines if line.get_linestyle() == "-" and len(line.get_xdata()) == 2]
-    assert [line.get_xdata()[0] for line in diamonds] == [0.5, 0.8, 1.0]
-    for diamond, bar, onsets in zip(diamonds, bars, known.values(), strict=True):
-        middle, low, high = median_interval(np.minimum(onsets, 0.03), onsets < 0.03)
-        assert diamond.get_ydata()[0] == middle
+    for mu, curve, diamond, bar in zip(known, share.lines, diamonds, bars, strict=True):
+        fx, level = curve.get_data()
+        np.testing.assert_allclose(np.sort(known[mu][known[mu] < 0.03]), fx[1:-1])
+        assert level[-1] == pytest.approx(np.mean(known[mu] < 0.03))
+        middle, low, high = median_interval(np.minimum(known[mu], 0.03), known[mu] < 0.03)
+        assert (diamond.get_xdata()[0], diamond.get_ydata()[0]) == (mu, middle)
         assert list(bar.get_ydata()) == [low, 0.03 if high is None else high]
 
 
@@ -368,6 +307,15 @@ def test_a_point_that_kills_every_worker_is_not_tried_for_ever(sweep):
     pool = Deadly(2)
     with pytest.raises(WorkerError, match="fewer --workers"):
         list(compute_points(pool, sweep.task, sweep.points))
+    pool.shutdown()
+
+
+@pytest.mark.slow
+def test_workers_that_end_as_they_start_are_told(monkeypatch):
+    monkeypatch.setattr(workers, "end_with", os._exit)
+    pool = Processes(2)
+    with pytest.raises(WorkerError, match="the workers end as they start; each reads a script anew"):
+        pool.submit(os.getpid).result()
     pool.shutdown()
 
 

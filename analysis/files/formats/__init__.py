@@ -1,7 +1,7 @@
 """Packings from and to other codes: LAMMPS, MercuryDPM, YADE, GSD, extended XYZ, CSV, VTK.
 
 `FORMATS` has a line for each format: the module that reads and writes it, imported when a file of the format is used. A
-reader returns `Disks`, plain columns; `packing_of` makes a packing of disks, and `upper_layer` finds the layer that
+reader returns columns, a `ParticleTable`; `packing_of` makes a packing of disks, and `upper_layer` finds the layer that
 carries the load. `settling.relax` brings a packing out of balance to rest. A writer takes `Exported`, the columns of a
 Packing or of a Configuration.
 """
@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,9 +21,8 @@ from ...configuration import Configuration
 from ...counted import counted
 from ...errors import BadInputError, PackingFileError
 from ...packing.packing import Packing
-from ..atomic_write import BEGINNINGS
-from ..plain_file import open_plain, open_text
-from .disks import Disks, Slips, UpperLayerError, packing_of, upper_layer
+from ..atomic_write import HDF5, SEAL, open_plain, open_text, telling
+from .disks import Disks, ParticleTable, Slips, UpperLayerError, disks_of, packing_of, upper_layer
 from .exported import (
     Frame,
     ModeVectors,
@@ -34,21 +34,9 @@ from .exported import (
 )
 
 __all__ = [
-    "Disks",
-    "Frame",
-    "ModeVectors",
-    "Slips",
-    "UpperLayerError",
-    "choose_frames",
-    "format_of",
-    "frames_of",
-    "is_hdf5",
-    "packing_of",
-    "read_disks",
-    "upper_layer",
-    "write_frames",
-    "write_packing",
-]
+    "Disks", "Frame", "ModeVectors", "Slips", "UpperLayerError", "choose_frames", "format_of",
+    "frames_of", "is_hdf5", "packing_of", "read_disks", "upper_layer", "write_frames", "write_packing",
+]  # fmt: skip
 
 RESTART_BEGINNING = b"LammpS RestartT"
 """How restarts of LAMMPS begin."""
@@ -57,49 +45,45 @@ WORD_OF_NUMBER = re.compile(r"[-+.\deE]+")
 
 
 class Format(NamedTuple):
-    """A format.
+    """A format that is read.
 
     Attributes
     ----------
     words : str
         What it is.
-    module : str
-        The module of this package.
+    module, reader : str
+        The module of this package, and its function. Restarts are read by LAMMPS itself, in pywrap.
     suffixes : tuple of str
-        Of files that are read; a file that is written has the first. Of a format that the first line tells, what that
-        line is.
-    reader : str
-        Function in the module; empty for what is not read. Restarts are read by LAMMPS itself, in pywrap.
+        Of files. Of a format that the first line tells, what that line is.
     frames : bool
-        Whether a file that is read may hold several frames.
+        Whether a file may hold several frames.
     text : bool
-        Whether a file that is read may be compressed by gzip, and its name end in .gz.
+        Whether a file may be compressed by gzip, and its name end in .gz.
     """
 
     words: str
     module: str
+    reader: str
     suffixes: tuple[str, ...]
-    reader: str = ""
     frames: bool = False
     text: bool = True
 
 
-DATA = Format("LAMMPS data (atom style sphere)", "lammps_data", (".data",), "read_data")
-DUMP = Format("LAMMPS dump", "lammps_dump", (".dump", ".lammpstrj"), "read_custom_dump", frames=True)
-RESTART = Format("LAMMPS restart", "", (".restart",), "LAMMPS itself", text=False)
-YADE = Format("YADE's text", "tables", ("line 1 is #format x_y_z_r",), "read_yade")
-MERCURY = Format("MercuryDPM's data", "tables", (".data, line 1 is N time bounds",), "read_mercury", frames=True)
-MDANALYSIS = Format("what MDAnalysis reads with radii", "libraries", (), "read_universe", frames=True)
-
+DATA = Format("LAMMPS data (atom style sphere)", "lammps_data", "read_data", (".data",))
+DUMP = Format("LAMMPS dump", "lammps_dump", "read_custom_dump", (".dump", ".lammpstrj"), frames=True)
+RESTART = Format("LAMMPS restart", "", "", (".restart",), text=False)
+YADE = Format("YADE's text", "tables", "read_yade", ("line 1 is #format x_y_z_r",))
+MERCURY = Format("MercuryDPM's data", "tables", "read_mercury", (".data, line 1 is N time bounds",), frames=True)
+MDANALYSIS = Format("what MDAnalysis reads with radii", "libraries", "read_universe", (), frames=True)
 FORMATS = (
-    Format("dumps of the decks", "lammps_dump", (".disks",), "read_deck_dump", frames=True, text=False),
-    Format("extended XYZ", "xyz", (".xyz", ".extxyz"), "read_xyz", frames=True),
+    Format("dumps of the decks", "lammps_dump", "read_deck_dump", (".disks",), frames=True, text=False),
+    Format("extended XYZ", "xyz", "read_xyz", (".xyz", ".extxyz"), frames=True),
     DATA,
     DUMP,
     RESTART,
-    Format("tables", "tables", (".csv", ".txt"), "read_table"),
-    Format("packing.json", "tables", (".json",), "read_json"),
-    Format("GSD", "libraries", (".gsd",), "read_gsd", frames=True, text=False),
+    Format("tables", "tables", "read_table", (".csv", ".txt")),
+    Format("packing.json", "tables", "read_json", (".json",)),
+    Format("GSD", "libraries", "read_gsd", (".gsd",), frames=True, text=False),
     YADE,
     MERCURY,
 )
@@ -107,20 +91,13 @@ FORMATS = (
 told by the first line, whatever the name is; MercuryDPM's files have the suffix of LAMMPS's."""
 
 READERS = {suffix: each for each in FORMATS for suffix in each.suffixes}
-WRITERS = {".vtp": ("vtp", "write_vtp"), ".xyz": ("xyz", "write_xyz"), ".gsd": ("libraries", "write_gsd")}
-FILMS = {name: WRITERS[name] for name in (".xyz", ".gsd")} | {".pvd": ("vtp", "write_pvd")}
-"""Module and function by suffix: of one packing, with modes; of several frames."""
-HEAD_OF_CONTACTS = "id1,id2,n_x,n_y,n_z,f_n,f_t,"
-"""How a table of contacts begins."""
+WRITERS = {
+    ".vtp": ("vtp", "write_vtp"), ".xyz": ("xyz", "write_xyz"), ".gsd": ("libraries", "write_gsd"),
+    ".data": ("lammps_data", "write_data"), ".csv": ("tables", "write_contacts"), ".pvd": ("vtp", "write_pvd"),
+}  # fmt: skip
+"""Module and function by suffix; of one packing all but the last, and `FILMS` of several frames."""
+FILMS = ".xyz", ".gsd", ".pvd"
 WITHOUT_MODES = {".data": "LAMMPS data", ".csv": "a table of contacts"}
-
-
-def list_formats() -> str:
-    """All formats that are read, in words."""
-    listed = [f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS]
-    return ", ".join(
-        [*listed, "each text also as .gz", "run.h5", "LAMMPS decks (.in, in.NAME)", f"and {MDANALYSIS.words}"]
-    )
 
 
 def begins_with(path: Path, *beginnings: bytes) -> bool:
@@ -131,11 +108,11 @@ def begins_with(path: Path, *beginnings: bytes) -> bool:
 
 def is_hdf5(path: Path) -> bool:
     """Whether a file begins like HDF5 or like a run.h5; OSError if it cannot be read."""
-    return begins_with(path, *BEGINNINGS)
+    return begins_with(path, HDF5, SEAL)
 
 
 def format_of(path: Path) -> Format:
-    """Find the format of a file by its suffix, or by its prefix for LAMMPS files.
+    """Find the format of a file by its first line, its suffix, or its prefix for LAMMPS files.
 
     Raises
     ------
@@ -144,9 +121,13 @@ def format_of(path: Path) -> Format:
     OSError
         If the file cannot be read.
     """
-    begun = _by_beginning(path)
-    if begun is not None:
-        return begun
+    words: list[str] = []
+    with suppress(OSError, UnicodeDecodeError, EOFError, zlib.error), open_text(path) as stream:
+        words = stream.readline(400).split()
+    if words[:1] == ["#format"]:
+        return YADE
+    if len(words) in (6, 8) and ".data" in path.name.lower() and all(map(WORD_OF_NUMBER.fullmatch, words)):
+        return MERCURY
     suffix = Path(path.stem).suffix if path.suffix.lower() == ".gz" else path.suffix
     found = READERS.get(suffix.lower())
     if found is not None and (suffix == path.suffix or found.text):
@@ -158,41 +139,29 @@ def format_of(path: Path) -> Format:
         return DATA if begin == "data" else DUMP
     if is_hdf5(path):
         raise PackingFileError(f"{path} is HDF5 and needs no import: packing.file, draw and spectrum take a run.h5.")
-    from .libraries import has_parser
+    from MDAnalysis import _PARSERS
 
-    own = path.suffix.lower() == ".h5"  # MDAnalysis has a parser of it once `mdanalysis` is imported
-    if path.suffix and not own and has_parser(path):
+    if path.suffix.lower() != ".h5" and path.suffix[1:].upper() in _PARSERS:  # .h5 is our own, in `mdanalysis`
         return MDANALYSIS
-    raise PackingFileError(f"{path} is of no format that is read: give {list_formats()}.")
+    names = ", ".join(f"{each.words} ({', '.join(each.suffixes)})" for each in FORMATS)
+    others = f"each text also as .gz, run.h5, LAMMPS decks (.in, in.NAME), and {MDANALYSIS.words}"
+    raise PackingFileError(f"{path} is of no format that is read: give {names}, {others}.")
 
 
-def _by_beginning(path: Path) -> Format | None:
-    """YADE and MercuryDPM, which the first line tells."""
-    try:
-        with open_text(path) as stream:
-            words = stream.readline(400).split()
-    except (OSError, UnicodeDecodeError, EOFError, zlib.error):
-        return None
-    if words[:1] == ["#format"]:
-        return YADE
-    numbers = len(words) in (6, 8) and all(WORD_OF_NUMBER.fullmatch(word) for word in words)
-    return MERCURY if numbers and ".data" in path.name.lower() else None
-
-
-def read_disks(path: Path, frame: int | None = None) -> Disks:
-    """Read the disks in a file of another code.
+def read_particles(path: Path, frame: int | None = None) -> ParticleTable:
+    """Read the particles in a file of another code.
 
     Parameters
     ----------
     path : Path
-        The file; see `list_formats`.
+        The file, of a format of `FORMATS`.
     frame : int, optional
         Number of the frame; negative numbers count from the last.
 
     Raises
     ------
     PackingFileError
-        If the file is missing, has no known format, is a restart, or does not contain disks in a plane.
+        If the file is missing, has no known format, is a restart, or has no particles.
     """
     if not path.is_file():
         raise PackingFileError(f"{path} {'is no file' if path.exists() else 'does not exist'}.")
@@ -201,8 +170,14 @@ def read_disks(path: Path, frame: int | None = None) -> Disks:
         raise PackingFileError(f"{path} has one frame; there is no --frame {frame}.")
     if found is RESTART:
         raise PackingFileError(f"{path} is a restart: LAMMPS itself reads it, in faultgouge import.")
-    disks: Disks = _function(found.module, found.reader)(path, *([frame] if found.frames else []))
-    return disks
+    with telling(path, f"is not read as {found.words}"):
+        read: ParticleTable = _function(found.module, found.reader)(path, *([frame] if found.frames else []))
+    return read
+
+
+def read_disks(path: Path, frame: int | None = None) -> Disks:
+    """Read the disks in a file of another code; as `read_particles`, and they must lie in a plane."""
+    return disks_of(read_particles(path, frame))
 
 
 def _function(module: str, name: str) -> Any:
@@ -211,18 +186,14 @@ def _function(module: str, name: str) -> Any:
 
 def check_writer(path: Path, modes: bool = False, frames: bool = False) -> None:
     """Refuse a name that no writer takes, of several frames or of one packing with or without modes."""
-    if frames:
-        if path.suffix not in FILMS:
-            raise BadInputError(f"-o {path}: several frames go into {', '.join(FILMS)}; give it one of these suffixes.")
-        return
-    if path.suffix == ".pvd":
+    taken = FILMS if frames else tuple(WRITERS)[:-1]
+    if path.suffix == ".pvd" and not frames:
         raise BadInputError(f"-o {path}: a .pvd is a list of frames; add --frames all, or export a .vtp.")
-    if path.suffix not in (*WRITERS, *WITHOUT_MODES):
-        names = ", ".join([*WRITERS, *WITHOUT_MODES])
-        raise BadInputError(f"-o {path}: exports are {names}; give it one of these suffixes.")
-    if modes and path.suffix in WITHOUT_MODES:
-        what = WITHOUT_MODES[path.suffix]
-        raise BadInputError(f"-o {path}: {what} has no room for modes; leave --mode out, or export .vtp or .xyz.")
+    if path.suffix not in taken:
+        what = "several frames go into" if frames else "exports are"
+        raise BadInputError(f"-o {path}: {what} {', '.join(taken)}; give it one of these suffixes.")
+    if modes and (flat := WITHOUT_MODES.get(path.suffix)):
+        raise BadInputError(f"-o {path}: {flat} has no room for modes; leave --mode out, or export .vtp or .xyz.")
 
 
 def write_packing(
@@ -257,20 +228,14 @@ def write_packing(
         If the file cannot be written.
     """
     check_writer(path, bool(modes))
-    alone = isinstance(packing, Packing)
-    if path.suffix == ".data":
-        return str(_function("lammps_data", "write_data" if alone else "write_spheres")(path, packing))
-    if path.suffix == ".csv":
-        return str(_function("tables", "write_contacts")(path, packing, HEAD_OF_CONTACTS))
-    if isinstance(packing, Packing):
+    if alone := isinstance(packing, Packing):
         exported = exported_packing(Frame(packing), modes)
     else:
         exported = exported_configuration(packing, modes)
     exported.particles.update(values or {})
-    write = _function(*WRITERS[path.suffix])
-    words = write(path, exported if path.suffix == ".vtp" else [(0.0, exported)])
-    if alone and path.suffix != ".vtp":
-        return str(words)
+    words: str = _function(*WRITERS[path.suffix])(path, [(0.0, exported)])
+    if path.suffix in WITHOUT_MODES or (alone and path.suffix != ".vtp"):
+        return words
     what = {"disk" if alone else "particle": len(packing), "contact": len(packing.contacts), "mode": len(modes)}
     return ", ".join(counted(number, noun) for noun, number in what.items())
 
@@ -286,7 +251,7 @@ def write_frames(path: Path, frames: Iterable[Frame]) -> None:
         If the file cannot be written.
     """
     check_writer(path, frames=True)
-    _function(*FILMS[path.suffix])(path, ((float(each.time), exported_packing(each)) for each in frames))
+    _function(*WRITERS[path.suffix])(path, ((float(each.time), exported_packing(each)) for each in frames))
 
 
 def write_mode_frames(
@@ -306,4 +271,4 @@ def write_mode_frames(
     """
     check_writer(path, frames=True)
     frames = motion_of_mode(configuration, mode, count, periods)
-    _function(*FILMS[path.suffix])(path, ((float(k), frame) for k, frame in enumerate(frames)))
+    _function(*WRITERS[path.suffix])(path, ((float(k), frame) for k, frame in enumerate(frames)))

@@ -7,8 +7,10 @@ the floor, and low parts of compensated packings are a fourth column.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -25,10 +27,10 @@ from ...packing.packing import Packing
 from ..runfile import RunFile, law_parameters
 from .disks import Slips
 
-PARAMETER_NAMES = (
+PARAMETER_NAMES = {
     "kn", "kt", "mu", "exponent", "rescaled", "coulomb", "cn", "ct", "tau", "fx", "fy", "inertia_factor",
     "slips_known",
-)  # fmt: skip
+}  # fmt: skip
 """Names of law, load and inertia in files; and slips_known, 0 where the slips are not known."""
 
 LARGEST_EXPORTED = 0.5
@@ -82,10 +84,10 @@ class Exported:
 
     Attributes
     ----------
+    source : Packing or Configuration
+        What they are of.
     position : ndarray, shape (N, 3)
         Centres, length.
-    top : ndarray of bool, shape (N,)
-        The upper layer.
     particles, contacts : dict of ndarray
         Columns by name, of numbers or of vectors with three components; whole numbers are integers.
     ends : ndarray, shape (C, 2, 3)
@@ -97,12 +99,14 @@ class Exported:
         Edges of the box in rows.
     periodic : tuple of bool
         Along each edge.
+    origin : ndarray, shape (3,), or None
+        Lower corner of the box; None of a Packing.
     rows : ndarray, shape (C, 3 or 4), or None
         Contacts of a Packing, as it is read back; None where slips are not known.
     """
 
+    source: Packing | Configuration
     position: Floats
-    top: NDArray[np.bool_]
     particles: dict[str, NDArray]
     contacts: dict[str, NDArray]
     ends: Floats
@@ -110,58 +114,43 @@ class Exported:
     box: Floats
     periodic: tuple[bool, ...]
     origin: Floats | None = None
-    rows: Floats | None = field(default=None)
+    rows: Floats | None = None
 
 
 def exported_packing(frame: Frame, modes: Sequence[ModeVectors] = ()) -> Exported:
     """The columns of a Packing; those of slips and of forces that follow from them where they are known."""
-    p, g, c = frame.packing, frame.packing.geometry, frame.packing.contacts
-    force, n = p.net_force.reshape(3, -1).T, len(p)
-    known: dict[str, NDArray] = {
-        "angle": p.angle,
-        "net_force": in_space(force[:, :2]),
-        "torque_over_radius": force[:, 2],
-        "mobilised": at_particles(np.maximum, n, c, p.mobilised),
-    }
-    low = {} if p.position_low is None else {"x_low": p.position_low[:, 0], "y_low": p.position_low[:, 1]}
-    moved = {} if frame.displacement is None else {"displacement": in_space(frame.displacement)}
-    particles: dict[str, NDArray] = {
-        "id": np.arange(1, n + 1),
-        "radius": p.radius,
-        "mass": p.mass,
-        "top": p.top.astype(np.int64),
-        "normal_force": at_particles(np.add, n, c, p.normal_force),
-        **(known if frame.whole else {}),
-        **moved,
-        **low,
-    }
+    p, c, n = frame.packing, frame.packing.contacts, len(frame.packing)
+    g, first = p.geometry, p.position[c.i]
+    particles: dict[str, NDArray] = {"id": np.arange(1, n + 1), "radius": p.radius, "mass": p.mass}
+    particles |= {"top": p.top.astype(np.int64), "normal_force": _at_particles(np.add, n, c, p.normal_force)}
     contacts: dict[str, NDArray] = {"contact_i": c.i, "contact_j": c.j}
     contacts |= {"contact_normal_force": p.normal_force, "contact_overlap": g.overlap}
     if frame.whole:
+        force = p.net_force.reshape(3, -1).T
+        particles |= {"angle": p.angle, "net_force": in_space(force[:, :2]), "torque_over_radius": force[:, 2]}
+        particles["mobilised"] = _at_particles(np.maximum, n, c, p.mobilised)
         both = p.normal_force[:, None] * g.normal + p.tangential_force[:, None] * g.tangent
         contacts |= {"contact_force": in_space(both), "contact_tangential_force": p.tangential_force}
         contacts |= {"contact_slip": c.slip, "contact_mobilised": p.mobilised}
-    first, height = p.position[c.i], float((p.position[:, 1] + p.radius).max())
-    sides = {} if p.box_length is None else {"box_length": p.box_length}
-    width = 2 * np.ptp(p.position[:, 0]) + 2 * p.radius.max() if p.box_length is None else p.box_length
+    if frame.displacement is not None:
+        particles["displacement"] = in_space(frame.displacement)
+    if p.position_low is not None:
+        particles |= {"x_low": p.position_low[:, 0], "y_low": p.position_low[:, 1]}
     for mode in modes:
-        for part, vectors in parts_of(mode):
+        for part, vectors in _parts_of(mode):
             particles |= {f"{mode.name}{part}": in_space(vectors[:2].T), f"{mode.name}{part}_rotation": vectors[2]}
-    return Exported(
-        in_space(p.position),
-        p.top,
-        particles,
-        contacts,
-        in_space(np.stack([first, first - g.distance[:, None] * g.normal], axis=1)),
-        scalars(p) | sides | ({} if frame.whole else {"time": frame.time}) | _eigenvalues(modes),
-        np.diag([width, height, 2 * p.radius.max()]),
-        (p.box_length is not None, False, False),
-        rows=contact_rows(p) if frame.whole else None,
-    )
+    numbers = scalars(p) | ({} if p.box_length is None else {"box_length": p.box_length})
+    numbers |= ({} if frame.whole else {"time": frame.time}) | _eigenvalues(modes)
+    largest, height = 2 * p.radius.max(), (p.position[:, 1] + p.radius).max()
+    width = 2 * np.ptp(p.position[:, 0]) + largest if p.box_length is None else p.box_length
+    ends = in_space(np.stack([first, first - g.distance[:, None] * g.normal], axis=1))
+    box, sides = np.diag([width, height, largest]), (p.box_length is not None, False, False)
+    rows = contact_rows(p) if frame.whole else None
+    return Exported(p, in_space(p.position), particles, contacts, ends, numbers, box, sides, rows=rows)
 
 
 def exported_configuration(
-    configuration: Configuration, modes: Sequence[ModeVectors] = (), displacement: Floats | None = None
+    configuration: Configuration, modes: Sequence[ModeVectors] = (), displacement: Floats | float = 0.0
 ) -> Exported:
     """The columns of a Configuration; particles may be displaced, with the contacts that they have at rest.
 
@@ -170,47 +159,27 @@ def exported_configuration(
     displacement : ndarray, shape (N, 3), optional
         In space, length.
     """
-    c, n = configuration.contacts, len(configuration)
-    rest = np.pad(configuration.position, ((0, 0), (0, 3 - configuration.dimension)))
-    moved = np.zeros_like(rest) if displacement is None else displacement
-    particles: dict[str, NDArray] = {
-        "radius": configuration.radius,
-        "mass": configuration.mass,
-        "id": configuration.ids,
-        "type": configuration.kind,
-        "free": configuration.free.astype(np.float64),
-        "load": configuration.load[:, 0],
-        "net_force": configuration.net_force[:, 0],
-        "net_torque": configuration.net_force[:, 1],
-        "normal_force": at_particles(np.add, n, c, c.normal_force),
-        "coordination": at_particles(np.add, n, c, np.ones(len(c))),
-    }
+    own, c, n = configuration, configuration.contacts, len(configuration)
+    rest = np.pad(own.position, ((0, 0), (0, 3 - own.dimension)))
+    moved = np.broadcast_to(displacement, rest.shape)
+    particles: dict[str, NDArray] = {"radius": own.radius, "mass": own.mass, "id": own.ids, "type": own.kind}
+    particles |= {"free": own.free.astype(np.float64), "load": own.load[:, 0]}
+    particles |= {"net_force": own.net_force[:, 0], "net_torque": own.net_force[:, 1]}
+    particles["normal_force"] = _at_particles(np.add, n, c, c.normal_force)
+    particles["coordination"] = _at_particles(np.add, n, c, np.ones(len(c)))
     for mode in modes:
-        for part, vectors in parts_of(mode):
+        for part, vectors in _parts_of(mode):
             names = f"{mode.name}{part}", f"{mode.name}{part}_rotation"
-            particles |= dict(zip(names, configuration.vectors(vectors), strict=True))
+            particles |= dict(zip(names, own.vectors(vectors), strict=True))
     second = np.maximum(c.j, 0)
-    contacts: dict[str, NDArray] = {
-        "contact_i": configuration.ids[c.i],
-        "contact_j": np.where(c.wall, 0, configuration.ids[second]),
-        "contact_force": c.normal_force[:, None] * c.normal + c.tangential_force,
-        "contact_normal_force": c.normal_force,
-        "contact_tangential_force": c.tangential_force,
-        "contact_overlap": c.overlap,
-        "contact_mobilised": configuration.mobilised,
-    }
-    other = rest[c.i] - configuration.branch + np.where(c.wall[:, None], 0.0, moved[second])
-    return Exported(
-        rest + moved,
-        configuration.top,
-        particles,
-        contacts,
-        np.stack([rest[c.i] + moved[c.i], other], axis=1),
-        _eigenvalues(modes),
-        configuration.box,
-        tuple(map(bool, configuration.periodic)),
-        configuration.origin,
-    )
+    contacts: dict[str, NDArray] = {"contact_i": own.ids[c.i], "contact_j": np.where(c.wall, 0, own.ids[second])}
+    contacts["contact_force"] = c.normal_force[:, None] * c.normal + c.tangential_force
+    contacts |= {f"contact_{name}": getattr(c, name) for name in ("normal_force", "tangential_force", "overlap")}
+    contacts["contact_mobilised"] = own.mobilised
+    other = rest[c.i] - own.branch + np.where(c.wall[:, None], 0.0, moved[second])
+    ends = np.stack([rest[c.i] + moved[c.i], other], axis=1)
+    box, sides = own.box, tuple(map(bool, own.periodic))
+    return Exported(own, rest + moved, particles, contacts, ends, _eigenvalues(modes), box, sides, own.origin)
 
 
 def motion_of_mode(configuration: Configuration, mode: ModeVectors, count: int, periods: int = 1) -> Iterator[Exported]:
@@ -222,7 +191,7 @@ def motion_of_mode(configuration: Configuration, mode: ModeVectors, count: int, 
         yield exported_configuration(configuration, [there], configuration.vectors(moved)[0])
 
 
-def parts_of(mode: ModeVectors) -> Iterator[tuple[str, Floats]]:
+def _parts_of(mode: ModeVectors) -> Iterator[tuple[str, Floats]]:
     """The real part of a mode, and, if it has one, the imaginary part, with what is added to their names."""
     yield "", mode.displacement.real
     if np.any(mode.displacement.imag):
@@ -236,22 +205,17 @@ def _eigenvalues(modes: Sequence[ModeVectors]) -> dict[str, float]:
 
 def scalars(packing: Packing) -> dict[str, float]:
     """Law, load and inertia by name, without absent values and defaults."""
-    values = law_parameters(packing.law)
-    if packing.drag_time is not None:
-        values["tau"] = packing.drag_time
-    if not packing.slips_known:
-        values["slips_known"] = 0.0
+    values = law_parameters(packing.law) | ({} if packing.drag_time is None else {"tau": packing.drag_time})
+    values |= {} if packing.slips_known else {"slips_known": 0.0}
     return {**values, "fx": packing.fx, "fy": packing.fy, "inertia_factor": packing.inertia_factor}
 
 
 def pick_numbers(values: Mapping[str, Any]) -> dict[str, float]:
     """The values of `PARAMETER_NAMES` in a mapping, as far as these are numbers."""
     found = {}
-    for key in PARAMETER_NAMES:
-        try:
+    for key in PARAMETER_NAMES & values.keys():
+        with suppress(TypeError, ValueError):
             found[key] = float(values[key])
-        except (KeyError, TypeError, ValueError):
-            continue
     return found
 
 
@@ -265,8 +229,8 @@ def contact_rows(packing: Packing) -> Floats:
 def slips_of(numbers: Sequence[float] | Floats, compensated: bool) -> Slips:
     """The reverse of `contact_rows`, of its numbers in a row."""
     rows = np.reshape(np.asarray(numbers, dtype=np.float64), (-1, 4 if compensated else 3))
-    low = rows[:, 3] if compensated else None
-    return Slips(rows[:, 0].astype(np.int64), rows[:, 1].astype(np.int64), rows[:, 2], low, complete=True)
+    first, second = rows[:, :2].T.astype(np.int64)
+    return Slips(first, second, rows[:, 2], rows[:, 3] if compensated else None, complete=True)
 
 
 def in_space(vectors: Floats) -> Floats:
@@ -274,7 +238,7 @@ def in_space(vectors: Floats) -> Floats:
     return np.pad(vectors, [(0, 0)] * (vectors.ndim - 1) + [(0, 1)])
 
 
-def at_particles(operation: np.ufunc, count: int, contacts: Contacts | LinearisedContacts, values: Floats) -> Floats:
+def _at_particles(operation: np.ufunc, count: int, contacts: Contacts | LinearisedContacts, values: Floats) -> Floats:
     """Numbers of contacts put together at their particles, shape (N,)."""
     found, pair = np.zeros(count), contacts.j >= 0
     operation.at(found, contacts.i, values)
@@ -290,14 +254,10 @@ def choose_frames(run: RunFile, says: str) -> range:
     total = len(run)
     if "trajectory" in run.names_of_series:
         total = 1 + len(run.series("trajectory")["time"])
-    parts = says.split(":")
-    try:
-        wanted = slice(None) if says == "all" else slice(*(int(part) if part else None for part in parts))
-        found = range(total)[wanted]
-    except (TypeError, ValueError):
-        found = None
-    if found is None or (says != "all" and len(parts) < 2):
+    if says != "all" and not re.fullmatch(r"(-?\d+)?:(-?\d+)?(:(-?[1-9]\d*)?)?", says):
         raise BadInputError(f"--frames {says}: give all, START:STOP or START:STOP:STEP, counted from 0.")
+    numbers = [int(part) if part else None for part in says.replace("all", ":").split(":")]
+    found = range(total)[slice(*numbers)]
     if not found:
         raise BadInputError(f"--frames {says}: {run.path} has {total} frames, and none of them is meant.")
     return found
@@ -320,15 +280,13 @@ def frames_of(run: RunFile, numbers: range) -> Iterator[Frame]:
         way = np.append(0.0, np.cumsum(np.abs(np.diff(way))))
     series = run.series("trajectory") if undamped else {}
     for number in numbers:
-        if not undamped:
-            packing, time = run.packing(number), float(way[number])
-        else:
-            time = float(series["time"][number - 1]) if number else 0.0
-            place = {"position": series["position"][number - 1]} if number else {"position": start.position}
-            if number and "position_low" in series:
-                place["position_low"] = series["position_low"][number - 1]
-            near = touching(place["position"], start.radius, start.box_length)
+        time, packing = (0.0, start) if undamped else (float(way[number]), run.packing(number))
+        if undamped:
+            names = ("position", "position_low") if number else ()
+            place = {name: series[name][number - 1] for name in names if name in series}
+            near = touching(place.get("position", start.position), start.radius, start.box_length)
             packing = replace(start, **place, contacts=near, angle=np.zeros(len(start)))
+            time = float(series["time"][number - 1]) if number else 0.0
         moved = nearest_image(packing.position - start.position, packing.box_length)
         if packing.position_low is not None and start.position_low is not None:
             moved = moved + (packing.position_low - start.position_low)

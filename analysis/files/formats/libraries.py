@@ -16,86 +16,76 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import BadInputError, PackingFileError
-from ..atomic_write import FORMAT, FORMAT_KEY, check_format, replace_whole
-from ..plain_file import check_plain
-from .disks import Disks, of_columns
+from ...errors import PackingFileError
+from ..atomic_write import FORMAT, FORMAT_KEY, check_format, open_plain, replace_whole
+from .disks import ParticleTable, choose_frame
 from .exported import Exported, pick_numbers, slips_of
-from .tables import choose_frame
 
 OWN_COLUMNS = "radius", "mass", "angle", "top", "x_low", "y_low"
 OWN_QUANTITIES = "particles/faultgouge/"
 CONTACTS = "faultgouge/contacts"
-GSD_PRECISION = "GSD keeps positions and radii in float32, about 1e-7 of a coordinate: overlaps are lost below that"
+SINGLE_PRECISION = "in float32, about 1e-7 of a coordinate: overlaps are lost below that"
+GSD_PRECISION = f"GSD keeps positions and radii {SINGLE_PRECISION}"
 
 
-def read_gsd(path: Path, frame: int | None = None) -> Disks:
-    """A frame of a GSD file; the last one by default, if all are of as many disks."""
-    hoomd = needed_library("gsd.hoomd", path)
+def _hoomd(path: Path) -> Any:
     try:
-        check_plain(path)
-        with hoomd.open(str(path), "r") as file:
-            counts = [file[k].particles.N for k in (range(len(file)) if frame is None else ())]
-            return _disks(path, file[choose_frame(path, counts or [0] * len(file), frame)])
-    except (OSError, RuntimeError) as error:
-        raise PackingFileError(f"{path} is no readable GSD file: {error}.") from error
+        return import_module("gsd.hoomd")
+    except ImportError:
+        needs = "needs the library gsd, which is not installed: pip install 'faultgouge[export]'"
+        raise PackingFileError(f"{path} {needs}.") from None
 
 
-def _disks(path: Path, frame: Any) -> Disks:
-    log, particles, box = frame.log, frame.particles, frame.configuration.box
-    own = {
-        key.removeprefix(OWN_QUANTITIES): np.asarray(value)
-        for key, value in log.items()
-        if key.startswith(OWN_QUANTITIES)
-    }
-    if "x" in own:
-        columns = {name: array.astype(np.float64) for name, array in own.items()}
-        values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
-        period, number = values.get("box_length"), values.get(FORMAT_KEY)
-        check_format(None if number is None else int(number), path)
-        rows = log.get(CONTACTS)
-        return of_columns(
-            str(path),
-            columns,
-            _type_names(particles),
-            box_length=None if period is None else float(period),
-            given=pick_numbers(values),
-            slips=None if rows is None else slips_of(rows[rows[:, 0] > 0], "x_low" in columns),
-        )
-    if particles.diameter is None or not particles.N:
-        raise PackingFileError(f"{path} has no disks with diameters.")
-    place = np.asarray(particles.position, dtype=np.float64)
-    turn = np.asarray(particles.orientation, dtype=np.float64)
-    columns = dict(zip("xyz", place.T, strict=True)) | {
-        "diameter": np.asarray(particles.diameter, dtype=np.float64),
-        "mass": np.asarray(particles.mass, dtype=np.float64),
-        "type": 1.0 + np.asarray(particles.typeid, dtype=np.float64),
-        "angle": 2 * np.arctan2(turn[:, 3], turn[:, 0]),
-    }
-    return of_columns(str(path), columns, _type_names(particles), box_length=float(box[0]), remark=GSD_PRECISION)
-
-
-def _type_names(particles: Any) -> list[str]:
-    """The name of each particle's type; none where types have no names."""
+def read_gsd(path: Path, frame: int | None = None) -> ParticleTable:
+    """A frame of a GSD file; the last one by default, if all are of as many disks."""
+    hoomd = _hoomd(path)
+    open_plain(path).close()
+    with hoomd.open(str(path), "r") as file:
+        counts = [file[k].particles.N for k in range(len(file))] if frame is None else [0] * len(file)
+        shown = file[choose_frame(path, counts, frame)]
+    log, particles, box = shown.log, shown.particles, shown.configuration.box
+    columns = {key: np.asarray(log[key], np.float64) for key in log if key.startswith(OWN_QUANTITIES)}
+    columns = {key.removeprefix(OWN_QUANTITIES): column for key, column in columns.items()}
     names = list(particles.types or [])
     known = len(names) > int(np.max(particles.typeid, initial=0))
-    return [names[number] for number in particles.typeid] if known else []
+    type_names = [names[number] for number in particles.typeid] if known else []
+    if "x" in columns:
+        values = {key.removeprefix("faultgouge/"): np.ravel(value)[0] for key, value in log.items() if "/" in key}
+        period, number, rows = values.get("box_length"), values.get(FORMAT_KEY), log.get(CONTACTS)
+        check_format(None if number is None else int(number), path)
+        edges = None if period is None else np.diag([float(period), 1.0, 1.0])
+        slips = None if rows is None else slips_of(rows[rows[:, 0] > 0], "x_low" in columns)
+        given = pick_numbers(values)
+        return ParticleTable(str(path), columns, edges, type_names=type_names, given=given, slips=slips)
+    if particles.diameter is None or not particles.N:
+        raise PackingFileError(f"{path} has no disks with diameters.")
+    given = {"diameter": particles.diameter, "mass": particles.mass, "type": 1.0 + particles.typeid}
+    given |= dict(zip("xyz", particles.position.T, strict=True))
+    columns = {name: np.asarray(column, dtype=np.float64) for name, column in given.items()}
+    turn = np.asarray(particles.orientation, dtype=np.float64)
+    columns["angle"] = 2 * np.arctan2(turn[:, 3], turn[:, 0])
+    x, y, z, xy, xz, yz = (float(each) for each in box)
+    edges = np.array([[x, 0, 0], [xy * y, y, 0], [xz * z, yz * z, z]])
+    return ParticleTable(
+        str(path), columns, edges, -0.5 * edges.sum(axis=0), type_names=type_names, remark=GSD_PRECISION
+    )
 
 
 def write_gsd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
     """Write one frame or several, and return the contents in words."""
-    hoomd = needed_library("gsd.hoomd", path)
+    hoomd = _hoomd(path)
     with replace_whole(path) as new, hoomd.open(str(new), "w") as file:
         for number, (_, exported) in enumerate(frames):
-            frame = _frame(hoomd, exported)
+            frame = hoomd.Frame()
+            _fill(frame, exported)
             frame.configuration.step = number
             file.append(frame)
     return f"{GSD_PRECISION}; the logged quantities have all of the packing in float64, and import takes these"
 
 
-def _frame(hoomd: Any, e: Exported) -> Any:
-    frame, radius, mass = hoomd.Frame(), e.particles["radius"], e.particles["mass"]
-    n, zeros = len(radius), np.zeros((len(radius), 2))
+def _fill(frame: Any, e: Exported) -> None:
+    radius, mass = e.particles["radius"], e.particles["mass"]
+    zeros = np.zeros((len(radius), 2))
     angle = e.particles.get("angle", zeros[:, 0])
     flat = "fy" in e.numbers  # a Packing: y = 0 is in the middle, so that the floor stays there
     box, middle = e.box.copy(), np.zeros(3)
@@ -107,14 +97,13 @@ def _frame(hoomd: Any, e: Exported) -> Any:
     flats = np.flatnonzero(np.diag(box) == 0)
     box[flats, flats] = np.ptp(e.position, axis=0)[flats] + 2 * radius.max()
     shares = (e.position - middle) @ np.linalg.inv(box)
-    place = e.position - middle - (np.floor(shares + 0.5) * e.periodic) @ box
-    lengths = np.diag(box)
+    lengths, particles = np.diag(box), frame.particles
     tilts = [box[1, 0] / lengths[1], box[2, 0] / lengths[2], box[2, 1] / lengths[2]]
     frame.configuration.box = [*(lengths * (1, 1, 0 if flat else 1)), *tilts]
     frame.configuration.dimensions = 2 if flat else 3
-    particles = frame.particles
-    particles.N, particles.types, particles.typeid = n, ["bed", "top"], e.top.astype(np.uint32)
-    particles.position, particles.diameter, particles.mass = place, 2 * radius, mass
+    particles.N, particles.types, particles.typeid = len(radius), ["bed", "top"], e.source.top.astype(np.uint32)
+    particles.position = e.position - middle - (np.floor(shares + 0.5) * e.periodic) @ box
+    particles.diameter, particles.mass = 2 * radius, mass
     particles.orientation = np.column_stack([np.cos(0.5 * angle), zeros, np.sin(0.5 * angle)])
     inertia = e.particles.get("inertia", e.numbers.get("inertia_factor", 0.4) * mass * radius**2)
     particles.moment_inertia = np.column_stack([zeros if flat else np.tile(inertia, (2, 1)).T, inertia])
@@ -126,49 +115,22 @@ def _frame(hoomd: Any, e: Exported) -> Any:
     if e.rows is not None:  # gsd has no empty arrays: a row of zeros stands for no contact
         logged[CONTACTS] = e.rows if len(e.rows) else np.zeros((1, e.rows.shape[1]))
     frame.log = {name: np.ascontiguousarray(values, dtype=np.float64) for name, values in logged.items()}
-    return frame
 
 
-def needed_library(module: str, path: Path) -> Any:
-    """A module of a dependency, or of the extra `export`. Raises BadInputError if it is not installed."""
-    try:
-        return import_module(module)
-    except ImportError:
-        library = module.split(".")[0]
-        raise BadInputError(
-            f"{path} needs the library {library}, which is not installed: pip install 'faultgouge[export]'."
-        ) from None
+def read_universe(path: Path, frame: int | None = None) -> ParticleTable:
+    """Particles of a file of MDAnalysis."""
+    from MDAnalysis import Universe
 
-
-MDANALYSIS_PRECISION = (
-    "MDAnalysis hands out positions in float32, about 1e-7 of a coordinate: overlaps are lost below that"
-)
-
-
-def has_parser(path: Path) -> bool:
-    """Whether MDAnalysis has a parser for files of this name."""
-    try:
-        library = needed_library("MDAnalysis", path)
-    except BadInputError:  # not installed: then the formats that are read are named
-        return False
-    return path.suffix[1:].upper() in library._PARSERS
-
-
-def read_universe(path: Path, frame: int | None = None) -> Disks:
-    """Disks of a file of MDAnalysis."""
-    library = needed_library("MDAnalysis", path)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            universe = library.Universe(str(path))
+            universe = Universe(str(path))
             universe.trajectory[-1 if frame is None else frame]
     except Exception as error:  # its parsers raise nearly every exception there is
         raise PackingFileError(f"{path} is not read by MDAnalysis: {str(error).splitlines()[0]}") from error
-    atoms = universe.atoms
-    if not hasattr(atoms, "radii"):
-        raise PackingFileError(f"{path} has no radii for MDAnalysis: write it with radii, as CSV or extended XYZ.")
-    columns = dict(zip("xyz", np.asarray(atoms.positions, dtype=np.float64).T, strict=True))
-    columns["radius"] = np.asarray(atoms.radii, dtype=np.float64)
-    size = universe.dimensions
-    period = float(size[0]) if size is not None and size[0] > 0 else None
-    return of_columns(str(path), columns, box_length=period, remark=MDANALYSIS_PRECISION)
+    atoms, size = universe.atoms, universe.dimensions
+    columns = dict(zip("xyz", atoms.positions.astype(np.float64).T, strict=True))
+    if hasattr(atoms, "radii"):
+        columns["radius"] = np.asarray(atoms.radii, dtype=np.float64)
+    box = None if size is None else np.diag(size[:3].astype(np.float64))
+    return ParticleTable(str(path), columns, box, remark=f"MDAnalysis has positions {SINGLE_PRECISION}")

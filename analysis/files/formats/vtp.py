@@ -23,8 +23,9 @@ from .exported import Exported
 Element = ElementTree.Element
 
 
-def write_vtp(path: Path, exported: Exported) -> str:
-    """Write a .vtp file, and return the contents in words."""
+def write_vtp(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
+    """Write a .vtp file of one frame, and return the contents in words."""
+    [(_, exported)] = frames
     write_whole(path, ElementTree.tostring(_page(exported), encoding="utf-8", xml_declaration=True))
     return "particles and contacts in float64"
 
@@ -37,7 +38,7 @@ def write_pvd(path: Path, frames: Iterable[tuple[float, Exported]]) -> str:
     collection = ElementTree.SubElement(root, "Collection")
     for number, (time, exported) in enumerate(frames):
         name = f"{folder.name}/{number:05d}.vtp"
-        write_vtp(path.parent / name, exported)
+        write_vtp(path.parent / name, [(time, exported)])
         ElementTree.SubElement(collection, "DataSet", timestep=repr(time), part="0", file=name)
     write_whole(path, ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))
     return "displacements and what is known of forces"
@@ -49,34 +50,30 @@ def _page(exported: Exported) -> Element:
     data = ElementTree.SubElement(root, "PolyData")
     fields = ElementTree.SubElement(data, "FieldData")
     for name, value in exported.numbers.items():
-        _array(fields, name, np.array([value]))
+        _array(fields, name, np.array([value]), NumberOfTuples="1")
     sizes = {"NumberOfPoints": n + 2 * count, "NumberOfVerts": n, "NumberOfLines": count}
-    none = {"NumberOfStrips": 0, "NumberOfPolys": 0}
-    piece = ElementTree.SubElement(data, "Piece", {key: str(value) for key, value in (sizes | none).items()})
-    on_points = ElementTree.SubElement(piece, "PointData")
+    sizes |= {"NumberOfStrips": 0, "NumberOfPolys": 0}
+    piece = ElementTree.SubElement(data, "Piece", {key: str(value) for key, value in sizes.items()})
+    parts = {
+        name: ElementTree.SubElement(piece, name) for name in ("PointData", "CellData", "Points", "Verts", "Lines")
+    }
     for name, values in exported.particles.items():
         ends = np.full((2 * count, *values.shape[1:]), 0.0 if name == "radius" else np.nan)
-        _array(on_points, name, np.concatenate([values, ends]))
-    on_cells = ElementTree.SubElement(piece, "CellData")
+        _array(parts["PointData"], name, np.concatenate([values, ends]))
     for name, values in exported.contacts.items():
-        _array(on_cells, name, np.concatenate([np.full((n, *values.shape[1:]), np.nan), values]))
-    points = np.concatenate([exported.position, exported.ends.reshape(-1, 3)])
-    _array(ElementTree.SubElement(piece, "Points"), "Points", points)
+        _array(parts["CellData"], name, np.concatenate([np.full((n, *values.shape[1:]), np.nan), values]))
+    _array(parts["Points"], "Points", np.concatenate([exported.position, exported.ends.reshape(-1, 3)]))
     for name, these, size in (("Verts", np.arange(n), 1), ("Lines", n + np.arange(2 * count), 2)):
-        cells = ElementTree.SubElement(piece, name)
-        _array(cells, "connectivity", these.astype(np.int64))
-        _array(cells, "offsets", size * np.arange(1, len(these) // size + 1, dtype=np.int64))
+        _array(parts[name], "connectivity", these.astype(np.int64))
+        _array(parts[name], "offsets", size * np.arange(1, len(these) // size + 1, dtype=np.int64))
     return root
 
 
-def _array(parent: Element, name: str, values: NDArray) -> None:
+def _array(parent: Element, name: str, values: NDArray, **more: str) -> None:
+    """An array in one base64 text of its size and its content."""
     whole = values.dtype.kind == "i"
-    about = {"type": "Int64" if whole else "Float64", "Name": name, "format": "binary"}
-    if values.ndim > 1:
-        about["NumberOfComponents"] = str(values.shape[1])
-    if parent.tag == "FieldData":
-        about["NumberOfTuples"] = str(len(values))
+    about = {"type": "Int64" if whole else "Float64", "Name": name, "format": "binary"} | more
+    about |= {"NumberOfComponents": str(values.shape[1])} if values.ndim > 1 else {}
     content = np.ascontiguousarray(values, dtype="<i8" if whole else "<f8").tobytes()
-    size = np.array([len(content)], dtype="<u8").tobytes()
-    # one base64 text of size and content
-    ElementTree.SubElement(parent, "DataArray", about).text = base64.b64encode(size + content).decode()
+    text = base64.b64encode(np.array([len(content)], dtype="<u8").tobytes() + content).decode()
+    ElementTree.SubElement(parent, "DataArray", about).text = text

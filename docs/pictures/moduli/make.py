@@ -8,8 +8,8 @@ from matplotlib.patches import Circle
 
 from faultgouge.analysis import Material, dispersion, elastic_moduli, spheres_of_material, vibrations
 from faultgouge.figures import save_as, styled
+from faultgouge.figures.series import draw_vibrations, draw_waves
 from faultgouge.figures.style import BULK, EDGE, FLOOR, INK
-from faultgouge.figures.vibrations import draw_vibrations, draw_waves
 
 HERE = Path(__file__).parent
 

@@ -53,7 +53,8 @@ def export(
     displacements; a .pvd for ParaView comes with a folder of .vtp.
     """
     from faultgouge.analysis import Configuration
-    from faultgouge.analysis.files.formats import HEAD_OF_CONTACTS, ModeVectors, check_writer, write_packing
+    from faultgouge.analysis.files.formats import ModeVectors, check_writer, write_packing
+    from faultgouge.analysis.files.formats.tables import HEAD_OF_CONTACTS
 
     lock_output(context, output, file, head=HEAD_OF_CONTACTS if output.suffix == ".csv" else "")
     if frames is not None:

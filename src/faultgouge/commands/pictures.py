@@ -103,10 +103,9 @@ def draw(
     if not is_root():
         return
     from faultgouge.figures import draw_cycle, draw_packing
-    from faultgouge.figures.drive import draw_drive
     from faultgouge.figures.mode import draw_modes
     from faultgouge.figures.packing import in_words
-    from faultgouge.figures.series import draw_growth
+    from faultgouge.figures.series import draw_drive, draw_growth
     from faultgouge.figures.style import save_as
 
     if driven is not None:
@@ -168,8 +167,7 @@ def movie(
     (.xyz) or ParaView (.pvd).
     """
     from faultgouge.analysis import Configuration
-    from faultgouge.figures.film import DOTS
-    from faultgouge.figures.writers import check_name, usual_suffix, write_film
+    from faultgouge.figures.film import DOTS, check_name, usual_suffix, write_film
 
     output = output or Path("film").with_suffix(usual_suffix())
     if dots is None and output.suffix.lower() == ".gif":
@@ -281,8 +279,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
     """The run if the file has its trajectory, else its drive or its ramp."""
     from faultgouge.analysis import PackingFileError, RunFile
     from faultgouge.analysis.files.configuration_file import holds_configuration
-    from faultgouge.figures.drive import course_of
-    from faultgouge.figures.film import RunMotion, film_of_ramp, film_of_run
+    from faultgouge.figures.film import Course, RunMotion, film_of_ramp, film_of_run
 
     if file.suffix == ".disks" or holds_configuration(file):
         raise PackingFileError(f"{file} is one packing, and nothing moves in it: ask for a mode with --mode")
@@ -300,7 +297,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
                 f"{file} has {len(shown)} of its {len(times)} states between t = {first:g} and {last:g}, and a film "
                 "shows two or more: give a longer --span"
             )
-        course = course_of(*driven, [times[k] for k in shown], first, last)
+        course = Course.of_drive(*driven, [times[k] for k in shown], first, last)
     if motion is not None:
         return film_of_run(motion if span is None else motion.between(*span), count, dots=dots)
     if len(packings) < 2:

@@ -91,10 +91,11 @@ def explain(scene: SceneFile) -> Answer:
     what LAMMPS has loaded with and without each part.
     """
     from faultgouge.assessment.explain import explain as explain_scene
+    from faultgouge.assessment.explain import in_words
 
     with status("setting up the run with and without each part"):
-        explanation = explain_scene(scene)
-    return Answer(explanation.in_words(), explanation.as_dict())
+        found = explain_scene(scene)
+    return Answer(in_words(found), found)
 
 
 @app.command(epilog="Example: faultgouge reproduce -o results")
@@ -130,10 +131,10 @@ def reproduce(
 )
 def report(
     output: NewFolder = Path("report"),
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer points: a minute instead of ten.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer points: half a minute instead of two.")] = False,
 ) -> Answer:
-    """Measure error against run time: which method to use when, for six tasks, with figures and numbers."""
-    from faultgouge.assessment.work_precision import report as run_studies
+    """Measure error against run time: which method to use when, for seven tasks, with figures and numbers."""
+    from faultgouge.assessment.work_precision.run import report as run_studies
 
     run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
     return Answer(written=f"written: {output}/report.md")
@@ -151,7 +152,7 @@ def extremes(output: NewFolder = Path("extremes"), quick: Quick = False) -> Answ
 
 def try_cases(output: Path, quick: bool) -> Answer:
     """What `extremes` does in a folder."""
-    from faultgouge.assessment.extremes import check, extremes
+    from faultgouge.assessment.extremes.run import check, extremes
 
     result = extremes(output, quick, say, lambda cases: progress(cases, "cases", len(cases)))
     counts = Counter(case["status"] for case in result["cases"])

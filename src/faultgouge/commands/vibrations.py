@@ -164,8 +164,8 @@ def _write(
 
 def _draw(folder: Path, found: Vibrations, plane: list[PlaneWave], moduli: ElasticModuli | None) -> None:
     from faultgouge.figures import save
+    from faultgouge.figures.series import draw_vibrations, draw_waves
     from faultgouge.figures.style import report_failure
-    from faultgouge.figures.vibrations import draw_vibrations, draw_waves
 
     with report_failure("density", say):
         save(draw_vibrations(found), folder / "density")

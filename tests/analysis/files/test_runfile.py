@@ -12,6 +12,7 @@ import pytest
 
 from faultgouge.analysis import Contacts, MindlinLaw, OutputError, PackingFileError, RunFile
 from faultgouge.analysis.files.atomic_write import write_text
+from faultgouge.analysis.files.configuration_file import read_configuration
 
 
 @pytest.fixture
@@ -59,16 +60,15 @@ def test_what_was_written_is_what_is_read(tmp_path, states):
 @pytest.mark.parametrize(
     ("law", "changes", "stored"),
     [
-        ({"exponent": 1.5}, {}, {"box_length"}),
-        ({"exponent": 1.5, "cn": 0.1, "ct": 0.2}, {"drag_time": 0.3}, {"box_length", "cn", "ct", "drag_time"}),
-        ({"exponent": 1.5, "rescaled": True}, {}, {"box_length", "rescaled"}),
-        ({"exponent": 1.5, "coulomb": True}, {}, {"box_length", "coulomb"}),
+        ({}, {}, {"box_length"}),
+        ({"cn": 0.1, "ct": 0.2}, {"drag_time": 0.3}, {"box_length", "cn", "ct", "drag_time"}),
+        ({"rescaled": True}, {}, {"box_length", "rescaled"}),
+        ({"coulomb": True}, {}, {"box_length", "coulomb"}),
         ({"exponent": 1.0, "kt": 0.0}, {"box_length": None}, {"exponent"}),
     ],
-    ids=["undamped", "damped", "rescaled", "slider", "open sides, harmonic, without friction"],
 )
 def test_what_is_not_there_is_not_in_the_file(tmp_path, cluster, law, changes, stored):
-    state = replace(cluster, law=replace(cluster.law, **law), **changes)
+    state = replace(cluster, law=replace(cluster.law, **({"exponent": 1.5} | law)), **changes)
     with RunFile.create(tmp_path / "run.h5", state) as run:
         run.append(state)
     with RunFile(tmp_path / "run.h5", "a") as run:
@@ -195,57 +195,49 @@ def test_a_file_holds_one_set_of_disks_and_of_names(sound, states):
         assert len(run) == 4
 
 
+BROKEN = {
+    "missing": (lambda sound: None, "does not exist"),
+    "empty": (lambda sound: b"", "begins like none"),
+    "text": (lambda sound: b"not HDF5", "begins like none"),
+    "cut off": (lambda sound: sound[:3000], "is damaged"),
+    "without its checksum": (lambda sound: sound[512:], "is an HDF5 file, and no run of faultgouge"),
+}
+
+
 @HERTZ
-@pytest.mark.parametrize("content", [None, b"", b"not HDF5", "truncated", "foreign", "other h5md"])
-def test_broken_missing_and_foreign_files(sound, content):
-    if content == "truncated":
-        content = sound.read_bytes()[:3000]
+@pytest.mark.parametrize("kind", BROKEN)
+@pytest.mark.parametrize("reads", [RunFile, lambda path: RunFile(path, "a"), read_configuration])
+def test_broken_missing_and_foreign_files(sound, kind, reads):
+    make, says = BROKEN[kind]
+    content = make(sound.read_bytes())
     sound.unlink()
-    if content in ("foreign", "other h5md"):
-        with h5py.File(sound, "w") as file:
-            file["x"] = 1
-            if content == "other h5md":
-                file.create_group("h5md/creator").attrs["name"] = "somebody"
-    elif content is not None:
+    if content is not None:
         sound.write_bytes(content)
-    for mode in ("r", "a"):
-        with pytest.raises(PackingFileError, match=r"run\.h5"):
-            RunFile(sound, mode)
+    with pytest.raises(PackingFileError, match=rf"run\.h5 .*{says}"):
+        reads(sound)
 
 
-def add_link(file):
-    file["other"] = h5py.ExternalLink("other.h5", "/data")
-
-
-def stored_elsewhere(file):
-    file.create_dataset("faultgouge/more/msd", (4,), "f8", external=[("raw", 0, 32)])
-
-
-def virtual(file):
-    layout = h5py.VirtualLayout((4,), "f8")
-    layout[:] = h5py.VirtualSource("other.h5", "data", (4,))
-    file.create_virtual_dataset("faultgouge/more/msd", layout)
+NAME = "faultgouge/more/msd"
+VIRTUAL = h5py.VirtualLayout((4,), "f8")
+VIRTUAL[:] = h5py.VirtualSource("other.h5", "data", (4,))
 
 
 def add_compressed(file):
     chunk = 1 << 24
-    item = file.create_dataset("faultgouge/more/msd", (1 << 40,), "f8", chunks=(chunk,), compression="gzip")
+    item = file.create_dataset(NAME, (1 << 40,), "f8", chunks=(chunk,), compression="gzip")
     for k in range(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // (8 * chunk) + 1):
         item.id.write_direct_chunk((k * chunk,), b"\0")
 
 
-def add_huge(file):
-    file.create_dataset("faultgouge/more/msd", (10**13,), "f8", chunks=(1000,))
-
-
+@HERTZ
 @pytest.mark.parametrize(
     ("add", "says"),
     [
-        (add_link, "is a link to another file"),
-        (stored_elsewhere, "has its numbers in another file"),
-        (virtual, "has its numbers in another file"),
+        (lambda file: file.update({"other": h5py.ExternalLink("other.h5", "/data")}), "is a link to another file"),
+        (lambda file: file.create_dataset(NAME, (4,), "f8", external=[("raw", 0, 32)]), "numbers in another file"),
+        (lambda file: file.create_virtual_dataset(NAME, VIRTUAL), "has its numbers in another file"),
         (add_compressed, "more than this machine has memory"),
-        (add_huge, "has the shape"),
+        (lambda file: file.create_dataset(NAME, (10**13,), "f8", chunks=(1000,)), "has the shape"),
     ],
 )
 def test_what_is_not_in_the_file_or_not_for_this_machine_is_refused(sound, add, says):
@@ -253,11 +245,3 @@ def test_what_is_not_in_the_file_or_not_for_this_machine_is_refused(sound, add, 
         add(run._file)
     with pytest.raises(PackingFileError, match=says):
         RunFile(sound)
-
-
-@HERTZ
-def test_a_file_without_a_checksum_is_refused(sound):
-    sound.write_bytes(sound.read_bytes()[512:])
-    for mode in ("r", "a"):
-        with pytest.raises(PackingFileError, match=r"run\.h5 is an HDF5 file, and no run of faultgouge"):
-            RunFile(sound, mode)

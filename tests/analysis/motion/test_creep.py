@@ -7,7 +7,7 @@ from linearised import dissipative
 from faultgouge.analysis import stability
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.motion import pushes
-from faultgouge.analysis.motion.one_sided import VERDICT_STEP, OneSidedSystem
+from faultgouge.analysis.motion.one_sided import OneSidedSystem
 from faultgouge.analysis.motion.pushes import CREEP_LEFT, follow_creep
 
 
@@ -51,7 +51,7 @@ def test_weak_dashpots_leave_a_limit_that_holds(wearing, monkeypatch):
 
 
 def test_what_is_not_known_to_decay_has_no_limit(wearing):
-    found = follow_creep(OneSidedSystem.of(wearing(0.5, 600.0), VERDICT_STEP), 1)
+    found = follow_creep(OneSidedSystem.of(wearing(0.5, 600.0)), 1)
     assert found.limit is None
     assert not found.settled
 

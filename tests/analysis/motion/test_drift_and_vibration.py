@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import replace
-from itertools import count, islice
+from itertools import count
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from faultgouge.analysis import (
 )
 from faultgouge.analysis.motion import rising_load
 from faultgouge.analysis.motion.one_sided import OneSidedSystem, forces_on_coordinates
-from faultgouge.analysis.motion.rising_load import DriftAndVibration, RisingMotion, Span, follow_load
+from faultgouge.analysis.motion.rising_load import Span, motion_under_load
 
 RISE = np.tile([1.0, 0.0], (3, 1))
 
@@ -33,7 +33,7 @@ def test_what_follows_a_load_that_rises_does_not_vibrate(exponent):
     assert rising.vibration == 0
     assert rising.time is None
     system = OneSidedSystem.of(at_rest)
-    followed = follow_load(system, forces_on_coordinates(at_rest, RISE), 30.0)
+    followed = motion_under_load(system, forces_on_coordinates(at_rest, RISE), 30.0, decays=False)
     assert rising.drift == pytest.approx(followed.drift, rel=1e-3)
     assert rising.next_change == pytest.approx(followed.next_change, rel=1e-2)
     assert followed.vibration < 1e-2 * rising.drift
@@ -76,12 +76,12 @@ def test_the_drift_of_a_slow_cycle_is_its_mean_velocity(monkeypatch):
     def windows(system, direction, length):
         for number in count():
             speed = 10.0 if number % 5 == 0 else 0.0
-            worn, slid = (np.zeros((each.shape[0], 1)) for each in (system.rescaled[0], system.sliders[1]))
+            worn, slid = (np.zeros((each.shape[0], 1)) for each in (system.rates, system.excess))
             moved, squares = speed * length * shape, speed**2 * length * shape**2
             yield Span(length, speed * length * z, worn, moved, squares, slid)
 
     monkeypatch.setattr(rising_load, "windows_under_load", windows)
-    found = follow_load(system, forces_on_coordinates(at_rest, RISE))
+    found = motion_under_load(system, forces_on_coordinates(at_rest, RISE), decays=False)
     size = np.sqrt(1 / 6)
     assert found.drift == pytest.approx(2 * size, abs=2 * found.drift_error)
     assert found.vibration == pytest.approx(4 * size, abs=2 * found.vibration_error)
@@ -108,27 +108,6 @@ def test_a_rise_that_comes_after_the_next_change_is_refused(monkeypatch):
     )
 
 
-def test_spans_of_windows_are_joined_exactly(bound):
-    system = OneSidedSystem.of(bound)
-    direction = forces_on_coordinates(bound.configuration, np.random.default_rng(4).standard_normal((len(bound), 2)))
-    short = list(islice(rising_load.windows_under_load(system, direction, 0.2), 6))
-    whole = Span.joined(short)
-    assert whole.time == pytest.approx(1.2)
-    np.testing.assert_allclose(
-        Span.joined([Span.joined(short[:4]), Span.joined(short[4:])]).drift_and_vibration(system),
-        whole.drift_and_vibration(system),
-        rtol=1e-12,
-    )
-    # what the means of the windows differ by is no drift of the whole, but vibration
-    means = [(system.displacement(each.displacement) / each.time, each.velocities / each.time) for each in short]
-    apart = np.var(means, axis=0).mean(axis=(1, 2))
-    of_windows = np.mean([each.drift_and_vibration(system) ** 2 for each in short], axis=0)
-    assert np.all(apart > 1e-3 * of_windows[0])
-    drift, vibration = whole.drift_and_vibration(system) ** 2
-    np.testing.assert_allclose(drift, of_windows[0] - apart[0], rtol=1e-9)
-    np.testing.assert_allclose(vibration, of_windows[1] + apart[1], rtol=1e-9)
-
-
 def test_a_load_that_accelerates_a_free_motion_is_not_followed():
     """Three disks without friction on a floor, on which they slide together."""
     packing = replace(
@@ -153,21 +132,3 @@ def test_under_a_rising_load_a_packing_that_is_unstable_is_not_followed():
     assert found.rising is None
     assert found.sentences[-1] == "under a load that rises: not followed, since small motion grows"
     json.dumps(found.as_dict(), allow_nan=False)
-
-
-def test_two_vibrations_of_one_packing_are_told_apart():
-    """What is said of two starts, whose motions are those of a layer that vibrates in two ways."""
-    at_rest = balanced(replace(three_disks(), law=replace(three_disks().law, cn=0.02, ct=0.01)))
-    found = stability(at_rest, rise=np.tile([1.0, 0.0], (3, 1)), time=4.0)
-    one = DriftAndVibration(3.75e-3, 1e-5, 6.85e-4, 2e-5, steady=True)
-    for other, says in (
-        (
-            {"vibration": 1.05e-3},
-            "\u00b1 2e-05, and from another start drift 0.00375 \u00b1 1e-05, vibration 0.00105 \u00b1 2e-05",
-        ),
-        ({"steady": False}, "vibration 0.000685 \u00b1 2e-05, not steady yet"),
-        ({"vibration": 6.8e-4}, "1e-05, vibration 0.000685 \u00b1 2e-05"),
-    ):
-        rising = RisingMotion(**one, time=4.0, span=3.0, other_start=replace(one, **other))
-        assert replace(found, rising=rising).sentences[-1].endswith(says)
-    assert set(found.rising.other_start) == set(one)

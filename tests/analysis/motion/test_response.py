@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from linearised import dissipative, motion_matrix
 from scipy.linalg import block_diag, expm
-from scipy.sparse import csr_array
 
 from faultgouge.analysis import mean_square_displacement
-from faultgouge.analysis.motion.energy_norm import EnergyNorm
+from faultgouge.analysis.motion.motion import EnergyNorm
 from faultgouge.analysis.responses.matrix_functions import BlockDiagonal, first_order
 from faultgouge.analysis.responses.oscillator import Oscillator, driven_motion, released_motion
 from faultgouge.analysis.responses.response import layer_force, linear_response
@@ -64,10 +63,11 @@ def motion_of(matrix, force, start, time, tau=None, dt=None):
         modes, oscillator = BlockDiagonal.of(matrix), Oscillator(OMEGA, dt)
         pairs = ((oscillator.forced_motion, force), (oscillator.free_motion, start))
         return np.sum([modes.apply(function, time, vector) for function, vector in pairs], axis=0)
-    norm = EnergyNorm.of(csr_array(matrix))
+    norm = EnergyNorm.of(matrix)
     rows, rest = block_diag(norm.unweight, np.eye(size)), np.zeros(size)
-    pairs = ((partial(driven_motion, OMEGA), norm.state(rest, force)), (released_motion, norm.state(start, rest)))
-    modes = BlockDiagonal.of(norm.first_order(csr_array(matrix), csr_array(np.eye(size) / tau)), first_order)
+    states = np.concatenate([rest, force]), np.concatenate([norm.weight @ start, rest])
+    pairs = zip((partial(driven_motion, OMEGA), released_motion), states, strict=True)
+    modes = BlockDiagonal.of(norm.first_order(matrix, np.eye(size) / tau), first_order)
     found = sum(modes.apply(function, time, vector, rows)[0] for function, vector in pairs)
     return found[:, :size], found[:, size:]
 

@@ -1,5 +1,7 @@
 """Pushes of particles at rest, whose motion in LAMMPS is compared with one-sided motion."""
 
+from itertools import islice
+
 import numpy as np
 
 from faultgouge.analysis.motion.one_sided import OneSidedSystem
@@ -44,7 +46,7 @@ def in_steps(here, push, times, dt):
     system = OneSidedSystem.of(here)
     state, steps, found = system.start(push), 0, []
     for time in times:
-        system.take_steps(state, dt, round(time / dt) - steps)
-        steps = round(time / dt)
+        for _ in islice(system.steps(state, dt), round(time / dt) - steps):
+            steps += 1
         found.append(np.sum(system.displacement(state.z)[..., 0] ** 2, axis=1).mean())
     return np.array(found)

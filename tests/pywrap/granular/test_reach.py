@@ -7,9 +7,10 @@ import pytest
 from pushes import in_steps, pushed
 from scipy.sparse import csr_array
 
-from faultgouge.analysis import Motion, stability
+from faultgouge.analysis import stability
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.contacts import PER_CONTACT, LinearisedContacts
+from faultgouge.analysis.motion.one_sided import OneSidedSystem
 from faultgouge.analysis.motion.reach import OVERLAP_CHANGE, reach_of
 
 BEDS = [("mindlin/force", 2), ("gran/hertz/history", 3)]
@@ -62,7 +63,7 @@ def turned(here, matrix):
 @pytest.mark.parametrize(("law", "d"), BEDS)
 def test_the_range_does_not_depend_on_how_the_packing_is_written(bed, law, d):
     _, here = bed(law, d)
-    expected, random = reach_of(Motion.of(here)), np.random.default_rng(2)
+    expected, random = reach_of(OneSidedSystem.of(here)), np.random.default_rng(2)
     told = stability(here)
     assert told.largest_energy == pytest.approx(expected.energy, rel=1e-9)
     others = [renumbered(here, random) for _ in range(20)]
@@ -71,7 +72,7 @@ def test_the_range_does_not_depend_on_how_the_packing_is_written(bed, law, d):
     rotation[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     others += [turned(here, rotation), turned(here, np.diag([-1.0, 1.0, 1.0]))]
     for other in others:
-        found = reach_of(Motion.of(other))
+        found = reach_of(OneSidedSystem.of(other))
         for name in ("energy", "gain", "residual_energy"):
             assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-6)
 
@@ -101,13 +102,11 @@ def test_every_push_within_the_range_moves_lammps_as_the_linear_packing(bed, law
 @pytest.mark.parametrize(("law", "d"), BEDS)
 def test_the_push_that_the_bound_is_made_for_takes_a_contact_there(bed, law, d):
     """The bound is no looser than its gain: the state that Cauchy and Schwarz name changes the contact at once."""
-    from faultgouge.analysis.motion.one_sided import OneSidedSystem
-
     _, here = bed(law, d)
-    motion = Motion.of(here)
-    reach, system = reach_of(motion), OneSidedSystem(motion)
-    symmetric = 0.5 * (motion.stiffness + motion.stiffness.T).toarray()
-    changes, best = system.contact_changes, np.inf
+    system = OneSidedSystem.of(here)
+    reach, stiffness = reach_of(system), system.motion.stiffness
+    symmetric = 0.5 * (stiffness + stiffness.T).toarray()
+    changes, best = system.changes, np.inf
     count = len(changes.bound)
     rows, viscous = (csr_array(each).toarray() for each in (changes.rows, changes.viscous))
     none = np.zeros((0, 1))
@@ -136,7 +135,7 @@ def test_free_motions_limit_the_time(bed):
             tangential_force=0 * c.tangential_force,
         ),
     )
-    found = reach_of(Motion.of(smooth), free=1)
+    found = reach_of(OneSidedSystem.of(smooth), free=1)
     assert found is not None
     assert 0 < found.time < np.inf
 

@@ -12,16 +12,16 @@ is braced from side to side and stands without friction, too. The overlap of two
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ....analysis import MindlinLaw, Packing, touching
-from ....analysis.arrays import Floats
-from ....pywrap import Engine, Equilibrium, Scene, equilibrate, settle
+from ...analysis import MindlinLaw, Packing, touching
+from ...analysis.arrays import Floats
+from ...pywrap import Engine, Equilibrium, Scene, equilibrate, settle
 
 KN = 2e5
 """Normal stiffness of the paper."""
@@ -49,7 +49,7 @@ def crystal(
         overlap = law.overlap_of_force(0.5 * load * law.kn * (1.0 - overlap) / rise)
     row, column = np.divmod(np.arange(rows * columns), columns)
     position = np.column_stack([spacing * (column + 0.5 * (row % 2) + 0.25), 0.5 - reach + rise * row])
-    packing = _load_packing(position, np.full(rows * columns, 0.5), columns * spacing, row == rows - 1, law, load)
+    packing = _loaded(position, np.full(rows * columns, 0.5), columns * spacing, row == rows - 1, law, load)
     return replace(packing, position_low=np.zeros_like(position)) if compensated else packing
 
 
@@ -60,17 +60,13 @@ def arches(ratio: float) -> Packing:
     half = small - 0.5 * reach
     centre = np.array([1.0, 3.05, 5.1])
     height = small - reach + np.sqrt((1.0 + small - reach) ** 2 - half**2)
-    position = np.concatenate(
-        [
-            np.column_stack([centre, np.full(3, height)]),
-            np.column_stack([np.repeat(centre, 2) + np.tile([-half, half], 3), np.full(6, small - reach)]),
-        ]
-    )
+    x = np.append(centre, np.repeat(centre, 2) + np.tile([-half, half], 3))
     radius = np.repeat([1.0, small], [3, 6])
-    return _load_packing(position, radius, 6.15, radius == 1.0, PAPERS, load)
+    position = np.column_stack([x, np.repeat([height, small - reach], [3, 6])])
+    return _loaded(position, radius, 6.15, radius == 1.0, PAPERS, load)
 
 
-def _load_packing(
+def _loaded(
     position: Floats, radius: Floats, box: float, top: NDArray[np.bool_], law: MindlinLaw, load: float
 ) -> Packing:
     """A periodic packing without slips; load is F_y / k_n."""
@@ -81,20 +77,12 @@ def _load_packing(
 @cache
 def bed(law: MindlinLaw = PAPERS, load: float = LOAD, seed: int = 1) -> Packing:
     """24 disks that have settled without friction in a box 5.95 wide, with the friction of the law from then on."""
-    scene = Scene.from_mapping(
-        {
-            "packing": {"disks": 24, "top": 5, "width": 8.5 * 0.7, "radii": [0.5, 0.7], "seed": seed},
-            "law": {"kn": law.kn, "kt": law.kt, "mu": law.mu},
-            "load": {"fy": load * law.kn},
-        }
-    )
-    return settle(scene).packing
-
-
-def with_slips(packing: Packing, shares: Sequence[float]) -> Packing:
-    """The packing with slips in several states, by their shares of the limit, over and over."""
-    slip = np.resize(shares, len(packing.contacts)) * packing.law.slip_limit(packing.geometry.overlap)
-    return replace(packing, contacts=packing.contacts.slipped(slip))
+    scene = {
+        "packing": {"disks": 24, "top": 5, "width": 8.5 * 0.7, "radii": [0.5, 0.7], "seed": seed},
+        "law": {"kn": law.kn, "kt": law.kt, "mu": law.mu},
+        "load": {"fy": load * law.kn},
+    }
+    return settle(Scene.from_mapping(scene)).packing
 
 
 def with_low_parts(packing: Packing) -> Packing:
@@ -106,16 +94,12 @@ def with_low_parts(packing: Packing) -> Packing:
 
 
 def with_rattlers(packing: Packing, position: Floats, top: bool) -> Packing:
-    """The packing with small disks that touch nothing at further positions, shape (n, 2), in the upper layer or not."""
-    extra = len(position)
-    return replace(
-        packing,
-        position=np.vstack([packing.position, position]),
-        radius=np.append(packing.radius, np.full(extra, 0.5)),
-        angle=np.append(packing.angle, np.zeros(extra)),
-        mass=np.append(packing.mass, np.ones(extra)),
-        top=np.append(packing.top, np.full(extra, top)),
-    )
+    """The packing, whose masses are one and angles zero, with small disks more that touch nothing, at positions of
+    shape (n, 2), in the upper layer or not."""
+    radius, tops = np.full(len(position), 0.5), np.full(len(position), top)
+    larger: dict[str, Any] = {"position": np.vstack([packing.position, position]), "angle": None, "mass": None}
+    larger |= {"radius": np.append(packing.radius, radius), "top": np.append(packing.top, tops)}
+    return replace(packing, **larger)
 
 
 def at_rest(packing: Packing) -> Equilibrium:
