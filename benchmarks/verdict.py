@@ -141,8 +141,7 @@ def show(name: str, configuration: Configuration) -> None:
     """Print a row."""
     found, seconds, memory = measured(configuration)
     verdict = {True: "rests", False: "grows", None: "not known"}[found.stable]
-    followed = found.decay.time if found.decay else 0.0
-    told = found.one_sided or {"growth_rate": found.growth_rate, "amplification": np.nan, "time": followed}
+    told = found.one_sided or {"growth_rate": found.growth_rate, "amplification": np.nan, "time": 0.0}
     size = f"exp({told['growth_rate']:.3g} t)" if found.stable is False else f"{told['amplification']:.3g}"
     print(
         f"{name:24s}{len(configuration):8d}{found.at_bound:9d}{verdict:>11s}{size:>14s}{told['time']:8.3g}"

@@ -299,8 +299,8 @@ def elastic_moduli(packing: HasConfiguration, frequency: float | None = None) ->
         parts.append((1j * frequency, as_springs(c)))
     by_motion = [(w, each, contact_derivatives(each)) for w, each in parts]
     force = sum(w * each.force_by_u[:, :, None] * branch.T for w, _, each in by_motion)
-    loads = sum(w * _unbalanced(configuration, each, of_each, branch) for w, each, of_each in by_motion)
-    response, loads = QuietResponse(configuration, frequency), np.asarray(loads).reshape(size, 9)
+    unbalanced = [w * _unbalanced(configuration, each, of_each, branch) for w, each, of_each in by_motion]
+    response, loads = QuietResponse(configuration, frequency), np.sum(unbalanced, axis=0).reshape(size, 9)
     moved = response.solve(loads)
     lacks = float(np.linalg.norm(loads - response.matrix @ moved) / (np.linalg.norm(loads) or 1.0))
     if lacks > UNSOLVED:

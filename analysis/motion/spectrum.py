@@ -260,9 +260,10 @@ def spectrum(packing: HasConfiguration, form: Form = "consistent") -> Spectrum:
     --------
 
     >>> start = faultgouge.settle("three_disks.toml").packing
-    >>> len(faultgouge.spectrum(start).pairs)
-    0
-    >>> faultgouge.spectrum(start).eigenvalues[:3].real.round(3)
+    >>> found = faultgouge.spectrum(start)
+    >>> len(found.pairs), len(found.negative), len(found.rattlers)
+    (0, 0, 0)
+    >>> found.eigenvalues[:3].real.round(3)
     array([ 383.589, 1188.882, 1484.786])
     """
     with np.errstate(over="ignore", invalid="ignore"):
