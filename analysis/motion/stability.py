@@ -18,12 +18,13 @@ enough. If these contacts bear next to nothing, and linear motion without them d
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, derive_frozen, number
+from ..arrays import Floats, derive_frozen
 from ..counted import counted
 from ..has_configuration import HasConfiguration
 from ..operators.asymmetry import asymmetry
@@ -86,11 +87,8 @@ def stability(
         If the direction has another shape, or is "fx" of a packing without an upper layer; or if the time is not
         positive.
     """
-    if time is not None:
-        try:
-            time = number("time", time, positive=True)
-        except (TypeError, ValueError):
-            raise ValueError(f"The time that motion is followed is a positive number, not {time!r}.") from None
+    if time is not None and not (isinstance(time, Real) and 0 < time < np.inf):
+        raise ValueError(f"The time that motion is followed is a positive number, not {time!r}.")
     c = with_sticking_contacts(packing.configuration)
     known = spectrum_of_stiffness if c is packing.configuration else None  # the other is of contacts that slide
     direction = None if rise is None else forces_on_coordinates(c, rise)

@@ -145,7 +145,9 @@ class Stability:
     def _verdict(self) -> str:
         outcome = self.one_sided
         free = f", except for {counted(self.free, 'motion')} that no force opposes" if self.free else ""
-        rate = exponential(self.growth_rate, _digits(self.growth_rate, self.error), self.at_least)
+        share = abs(self.error / self.growth_rate) if self.growth_rate else 0.0
+        digits = 6 if share < 1e-6 else int(np.clip(np.ceil(-np.log10(share)), 1, 6))  # those larger than the error
+        rate = exponential(self.growth_rate, digits, self.at_least)
         if not self.contacts:
             return "no particle touches another or a wall: stability is not defined"
         if self.stable is None:
@@ -272,12 +274,6 @@ class Stability:
             found[name] = {key: value for key, value in asdict(found[name]).items() if key != "s"}
         found |= {name: list(found[name]) for name in ("reasons", "remarks")}
         return found | {"undamped": vars(self.undamped), "searched": self.sticking.searched}
-
-
-def _digits(number: float, error: float) -> int:
-    """How many digits of a number are larger than its error, one to six."""
-    share = abs(error / number) if number else 0.0
-    return 6 if share < 1e-6 else int(np.clip(np.ceil(-np.log10(share)), 1, 6))
 
 
 def _neighbour(linear: Linear) -> str:
