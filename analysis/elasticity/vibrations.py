@@ -295,8 +295,8 @@ def dispersion(packing: HasConfiguration, axis: int = 0, waves: int = 4) -> list
         raise BadInputError(f"Plane waves need a box that is periodic along {'xyz'[axis]}, and this one is not.")
     d, n = c.dimension, len(c)
     stiffness, damping, mass = stiffness_matrix(c), damping_matrix(c), c.coordinate_mass
-    edges = c.box.copy()
-    edges[d:] = np.eye(3)[d:]
+    edges = np.eye(3)  # an open axis has no edge
+    edges[:d][c.periodic[:d]] = c.box[:d][c.periodic[:d]]
     reciprocal = 2 * np.pi * np.linalg.inv(edges)[:d, axis]
     ahead = reciprocal / np.linalg.norm(reciprocal)
     directions = np.linalg.qr(np.column_stack([ahead, np.delete(np.eye(d), np.argmax(abs(ahead)), axis=1)]))[0]

@@ -263,6 +263,7 @@ def test_where_there_is_no_volume_none_is_guessed(reference_packing):
         elastic_moduli(layer)
     with pytest.raises(BadInputError, match="Plane waves need a box that is periodic along y"):
         dispersion(layer, 1)
+    assert [wave.wave_number for wave in dispersion(layer, 0, 1)] == pytest.approx([2 * np.pi / layer.box_length] * 2)
 
 
 def test_a_bent_chain_straightens_without_resistance():
