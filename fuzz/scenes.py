@@ -142,7 +142,9 @@ def _command(task: str, folder: Path, longest: int) -> None:
         os.dup2(os.open(file, os.O_WRONLY), number)
     sys.argv = ["faultgouge", task, "scene.toml", "-o", "run.json" if task == "onset" else "run.h5"]
     from faultgouge.cli import main
+    from faultgouge.commands import terminal
 
+    terminal.SECONDS_BETWEEN_LINES = longest / 4  # a run that says what it is at once a minute has no minute here
     main()
 
 
