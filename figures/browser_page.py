@@ -23,7 +23,7 @@ from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.counted import counted
 from faultgouge.analysis.files.atomic_write import write_text
 from faultgouge.analysis.has_configuration import HasConfiguration
-from faultgouge.analysis.motion.hysteresis import layer_displacement, turning_points
+from faultgouge.analysis.responses.hysteresis import layer_displacement, turning_points
 
 from .disk_view import View, cell_of, walls_of, within_cell
 from .followed_pairs import SECONDS_OF_1000, FollowedPair, Progress, RampEigenvalues, follow_eigenvalues

@@ -29,7 +29,7 @@ from faultgouge.analysis import BadInputError, Packing, PackingFileError, RunFil
 from faultgouge.analysis.arrays import Floats
 from faultgouge.analysis.files.atomic_write import replace_whole
 from faultgouge.analysis.has_configuration import HasConfiguration
-from faultgouge.analysis.motion.hysteresis import layer_displacement
+from faultgouge.analysis.responses.hysteresis import layer_displacement
 from faultgouge.analysis.responses.slips import Slip
 
 from .disk_view import View

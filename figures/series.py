@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from faultgouge.analysis import ElasticModuli, Growth, Packing, PlaneWave, Vibrations
 from faultgouge.analysis.arrays import Floats
-from faultgouge.analysis.motion.hysteresis import hysteresis, layer_displacement, turning_points
+from faultgouge.analysis.responses.hysteresis import hysteresis, layer_displacement, turning_points
 from faultgouge.analysis.responses.slips import Slip
 
 from .style import EDGE, FLOOR, INK, MOBILIZATION, figure_of, styled

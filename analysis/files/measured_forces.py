@@ -12,10 +12,10 @@ contacts   ``step, id1, id2, f_t, f_n``; f_t along n turned by 90 degrees; walls
 J. E. Kollmer, K. E. Daniels, J. M. Schwarz and S. Henkes, Phys. Rev. Lett. 126, 088002, 2021.) The sign of all f_t that
 balances the forces better is taken.
 
-**What they tell.** Measured forces are out of balance by half of a disk's mean contact force, and those of the two
-sides of a contact differ by a sixth. Errors of 2 % move growth rates by more than 5 % in six of ten tables, as rates
-come from the small asymmetric part of K. Numbers survive: contacts, those at Coulomb's bound, motions without
-stiffness, and how often a packing with forces drawn from the errors is unstable. A load balances each such packing.
+**What they tell.** Measured forces do not balance, and those of the two sides of a contact differ. Growth rates come
+from the small asymmetric part of K, so that no rate is told. Counts are: contacts, those at Coulomb's bound, motions
+without stiffness, and in how many draws of the forces from their errors the linearised packing is unstable. A load on
+each disk balances each such packing, and no motion of a real packing or of LAMMPS's is beside these verdicts.
 """
 
 from __future__ import annotations
@@ -44,8 +44,7 @@ FREE_OF_SPRINGS = 1e-9
 """Eigenvalue of the springs, over the largest, of a motion without stiffness."""
 
 NO_RATE = (
-    "no growth rate is given: errors of 2 % of the forces move it by more than 5 % in six of ten tables, and measured "
-    "forces have larger ones"
+    "no growth rate is given: it comes from the small asymmetric part of K, which measured errors exceed"
 )
 
 
@@ -151,7 +150,8 @@ def measured_forces(
         f"forces on a disk are out of balance by {np.median(lacks) if len(lacks) else 0:.2g} of its mean contact force "
         f"(median), and f_n is taken with an error of {error:.2g}{left_out}",
         f"{_floppy(found)} motions without stiffness beside those of a free body, if contacts at the bound slide",
-        f"unstable in {seen.count(False)} of {draws} draws of the forces within this error{unknown}",
+        f"unstable in {seen.count(False)} of {draws} draws of the forces within this error{unknown}, if a load on "
+        "each disk balanced the forces drawn",
         NO_RATE,
     ]
     return derive_frozen(found, slips_known=False, remarks=tuple(says)), says

@@ -239,7 +239,7 @@ def _of_slice(
 
         def doubtful(among: Indices, of: Floats) -> NDArray[np.bool_]:
             """Which of some motions may be slower than the slowest that is known, with an error that matters."""
-            return (s.real[among] + of > best) & (of > 1e-3 * np.abs(s.real[among]))  # noqa: B023
+            return (s.real[among] + of > best) & (of > 1e-3 * np.abs(s.real[among]))  # noqa: B023  called within its turn of the loop
 
         # what each vector of the basis leaves outside bounds what a motion leaves
         leaves = [

@@ -104,9 +104,9 @@ class OneSidedOutcome(FieldsByName):
     needed : float or None
         After which time `grows` may be known: as D gains at its rate, or as the slowest vibration decays. None where
         `grows` is known, or this time is over.
-    amplification : float
-        Largest D over the mean square velocity of the push along an axis, time^2. Motion that goes on may take D
-        further.
+    amplification, least_amplification : float
+        Largest D over the mean square velocity of the push along an axis, time^2: the largest and the smallest of
+        the pushes. Motion that goes on may take D further.
     slip_left : float or None
         How much of their slip contacts may have still to come, as a share; None if that is not known.
     slides_on : int
@@ -132,6 +132,7 @@ class OneSidedOutcome(FieldsByName):
     searched: float
     needed: float | None
     amplification: float
+    least_amplification: float
     slip_left: float | None
     slides_on: int
     wears: bool
@@ -185,6 +186,7 @@ def follow_pushes(
         grows=grows, growth_rate=rate if grows else (sticking if grows is False else None),
         error=error if grows else None, searched=float(np.log(GROWN_ENERGY) / end) if grows is None else 0.0,
         needed=needed if end < needed < np.inf else None, amplification=float(size.max()),
+        least_amplification=float(size.max(axis=0).min()),
         slip_left=left if grows is False and np.isfinite(left) else None, slides_on=slides_on,
         wears=bool(len(seen[0].paths)), time=end, pushes=size.shape[1],
         scales=(least_scale(seen[:LOOKS_PER_CHUNK]), float(first.min())),
@@ -229,7 +231,7 @@ class Creep(FieldsByName):
         Largest D of this displacement over the mean square velocity of the push along an axis, time^2.
     time : float
         How long motion was followed.
-    velocity : float
+    velocity, least_velocity : float
         Root mean square over the particles of its mean velocity in the last quarter of this time, over the root mean
         square velocity of the push along an axis.
     limit : float or None
@@ -244,6 +246,7 @@ class Creep(FieldsByName):
     amplification: float
     time: float
     velocity: float
+    least_velocity: float
     limit: float | None
     grows: bool | None
     growth_rate: float
@@ -286,7 +289,7 @@ def follow_creep(
         # the energy of a push is all kinetic at first, and half of it later
         grows = True if not gained <= GROWN_ENERGY else None if gained > 2 else False
         rate = _rate(times, energy)[0] if grows else 0.0
-        found = Creep(float(sizes.max()), after.time, float(velocity.max()), limit, grows, rate)
+        found = Creep(float(sizes.max()), after.time, float(velocity.max()), float(velocity.min()), limit, grows, rate)
         if grows or (found.settled and time is None):
             break
     return found

@@ -145,9 +145,7 @@ class Stability:
     def _verdict(self) -> str:
         outcome = self.one_sided
         free = f", except for {counted(self.free, 'motion')} that no force opposes" if self.free else ""
-        share = abs(self.error / self.growth_rate) if self.growth_rate else 0.0
-        digits = 6 if share < 1e-6 else int(np.clip(np.ceil(-np.log10(share)), 1, 6))  # those larger than the error
-        rate = exponential(self.growth_rate, digits, self.at_least)
+        rate = exponential(self.growth_rate, _digits(self.growth_rate, self.error), self.at_least)
         if not self.contacts:
             return "no particle touches another or a wall: stability is not defined"
         if self.stable is None:
@@ -158,9 +156,10 @@ class Stability:
             left = f", where {outcome.slip_left:.1%} of their slip is left" if outcome.slip_left else ""
             ends = "comes to rest" if self.growth_rate < 0 else "ends in vibration that goes on, but does not grow"
             known = f"; with sticking contacts, {self.sticking.said}" if self.sticking.said else ""
-            size = f"D reaches {outcome.amplification:.3g} times the mean square velocity of the push"
+            size = as_known(outcome.least_amplification, outcome.amplification)
             while_sliding = f"while contacts slide (followed for t = {outcome.time:.4g}{left})"
-            return f"stable: each of {outcome.pushes} pushes {ends}{free}; {size} {while_sliding}{known}"
+            reaches = f"D reaches {size} times the mean square velocity of the push {while_sliding}"
+            return f"stable: each of {outcome.pushes} pushes {ends}{free}; {reaches}{known}"
         if self.sticking.said:
             return f"stable: {self.sticking.said}{free}"
         if self.dissipative and self.growth_rate < 0:
@@ -203,7 +202,8 @@ class Stability:
                 f"of the push within t = {creep.time:.4g}{later}"
             )
         elif creep is not None:
-            yield f"{WORN}: D as ({creep.velocity:.2g} t)^2 times the mean square velocity of the push"
+            known = as_known(creep.least_velocity, creep.velocity)
+            yield f"{WORN}: D as ({known} t)^2 times the mean square velocity of the push"
 
     def _range(self) -> Iterator[str]:
         """Between which pushes this holds."""
@@ -283,3 +283,14 @@ def _neighbour(linear: Linear) -> str:
     if linear.growth_rate == 0:
         return "D neither grows nor decays"
     return exponential(linear.growth_rate, 4, linear.at_least)
+
+
+def as_known(least: float, most: float) -> str:
+    """The larger of two numbers, with as many digits as these agree in."""
+    return f"{most:.{_digits(most, most - least)}g}"
+
+
+def _digits(number: float, error: float) -> int:
+    """How many digits of a number are larger than its error, one to six."""
+    share = abs(error / number) if number else 0.0
+    return 6 if share < 1e-6 else int(np.clip(np.ceil(-np.log10(share)), 1, 6))

@@ -187,7 +187,10 @@ class SlicedSearch:
             )
 
         narrowest = 1e-7 * max(abs(here.fx), abs(there.fx))
-        few = lambda below, above: (motions(below), motions(above))  # noqa: E731
+
+        def few(below: System, above: System) -> tuple[Motions, Motions]:
+            return motions(below), motions(above)
+
         search = Search(lambda fx: known.get(fx) or self.at(fx), narrowest, few, decompose=lost)
         inside = [candidate.inside] if here.fx < candidate.inside < there.fx else []
         *_, (_, found) = search.along(np.array([here.fx, *inside, there.fx]))

@@ -366,7 +366,10 @@ def time_stepping() -> Iterator[Row]:
 
     yield "step of 0.5 of the limit", partial(below_the_limit, 0.5), True
     yield "step of 0.99 of the limit", partial(below_the_limit, 0.99), True
-    too_long = lambda: time_step(smooth_mode()[0], 1.01 * smooth_mode()[2])  # noqa: E731
+
+    def too_long() -> float:
+        return time_step(smooth_mode()[0], 1.01 * smooth_mode()[2])
+
     yield "step of 1.01 of the limit", too_long, True, "over the limit 2/omega_max"
     yield "step of 1.01 of the limit, LAMMPS alone", limit_is_sharp, True
     yield "energy, 1e5 steps", partial(drift, 100_000), True

@@ -409,7 +409,7 @@ def view(
 
 def _of_run(run: RunFile, most: int) -> tuple[list[Any], Axis | None, str]:
     """The packings of a page, what changes from one to the next, and the title of the page."""
-    from .analysis.motion.hysteresis import turning_points
+    from .analysis.responses.hysteresis import turning_points
     from .figures.browser_page import Axis, equally_spaced
 
     driven = "time" in run.observables

@@ -91,3 +91,11 @@ def test_another_exponent(tmp_path, monkeypatch):
             # the trapezoidal rule of each of 20,000 steps: (d overlap/overlap)^2/12 of each, 2e-10 in all
             assert there == pytest.approx(slip, rel=1e-8, abs=1e-15)
             assert force == pytest.approx(float(law.tangential_force(overlap, slip)), rel=1e-8, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_a_member_that_is_missing_does_not_compile(tmp_path):
+    member = "lost"
+    said = compiled(tmp_path, "".join(line for line in SQUARE.splitlines(keepends=True) if f" {member}" not in line))
+    assert said.returncode != 0
+    assert member in said.stderr

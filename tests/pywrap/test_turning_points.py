@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import RunFile
-from faultgouge.analysis.motion.hysteresis import hysteresis, layer_displacement, turning_points
+from faultgouge.analysis.responses.hysteresis import hysteresis, layer_displacement, turning_points
 from faultgouge.pywrap import Scene, SceneError
 from faultgouge.pywrap.runs.ramp_loads import all_loads, count_behind, ramp_loads
 from faultgouge.pywrap.scenes.sections import Ramp

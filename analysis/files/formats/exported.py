@@ -20,10 +20,10 @@ from ...arrays import Floats
 from ...configuration import Configuration
 from ...contacts import LinearisedContacts
 from ...errors import BadInputError
-from ...motion.hysteresis import turning_points
 from ...packing.contacts import Contacts
 from ...packing.geometry import nearest_image, touching
 from ...packing.packing import Packing
+from ...responses.hysteresis import turning_points
 from ..runfile import RunFile, law_parameters
 from .disks import Slips
 

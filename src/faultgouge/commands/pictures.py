@@ -116,7 +116,7 @@ def draw(
 def _picture_of_run(file: Path) -> Figure | None:
     """The force of a drive, the cycle of a ramp with turning points, or D(t); None of another file."""
     from faultgouge.analysis import RunFile
-    from faultgouge.analysis.motion.hysteresis import turning_points
+    from faultgouge.analysis.responses.hysteresis import turning_points
     from faultgouge.figures import draw_cycle
     from faultgouge.figures.series import draw_drive, draw_growth
     from faultgouge.pywrap.runs.drive import series_and_slips

@@ -94,7 +94,7 @@ def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     the layer and the work of the loads.
     """
     from faultgouge.analysis import RunFile
-    from faultgouge.analysis.motion.hysteresis import hysteresis
+    from faultgouge.analysis.responses.hysteresis import hysteresis
     from faultgouge.pywrap import Record
     from faultgouge.pywrap import ramp as ramp_up
     from faultgouge.pywrap.runs.ramp_loads import all_loads, count_behind

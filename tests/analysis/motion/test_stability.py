@@ -11,6 +11,7 @@ from faultgouge.analysis import Contacts, MindlinLaw, Packing, one_sided_motion,
 from faultgouge.analysis.arrays import derive_frozen
 from faultgouge.analysis.motion import pushes as pushes_module
 from faultgouge.analysis.motion import stability as stability_module
+from faultgouge.analysis.motion.verdict import as_known
 
 
 def test_stability_of_three_disks():
@@ -137,3 +138,10 @@ def test_the_gain_of_energy_bounds_what_motion_gains_without_loss(path):
     for _ in range(50):
         state = step @ state
         assert np.all(np.sum(state**2, axis=0) < reach.gain * first)
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "says"), [(0.58, 0.99, "1"), (0.95, 0.99, "0.99"), (1.234, 1.2341, "1.2341"), (2.0, 2.0, "2")]
+)
+def test_numbers_have_as_many_digits_as_pushes_agree_in(least, most, says):
+    assert as_known(least, most) == says
