@@ -43,9 +43,7 @@ DRAWN_FORCES = 10
 FREE_OF_SPRINGS = 1e-9
 """Eigenvalue of the springs, over the largest, of a motion without stiffness."""
 
-NO_RATE = (
-    "no growth rate is given: it comes from the small asymmetric part of K, which measured errors exceed"
-)
+NO_RATE = "no growth rate is given: it comes from the small asymmetric part of K, which measured errors exceed"
 
 
 def is_measured(contacts: Path) -> bool:
