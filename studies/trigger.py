@@ -29,8 +29,7 @@ from threadpoolctl import threadpool_limits
 
 from ..analysis import Packing, spectrum
 from ..analysis.arrays import Floats
-from ..analysis.responses.forcing import floor_force, impulse_response
-from ..analysis.responses.response import layer_force
+from ..analysis.responses.response import floor_force, impulse_response, layer_force
 from ..pywrap import Engine, Scene, SceneError
 from ..pywrap.onset import onset_run
 from ..pywrap.runs.ramp_loads import ramp_loads

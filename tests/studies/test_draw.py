@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from faultgouge.analysis import Growth
+from faultgouge.analysis.responses.growth import PowerLaw
 from faultgouge.analysis.responses.normal_form import NormalForm
-from faultgouge.analysis.responses.power_law import PowerLaw
 from faultgouge.figures.series import draw_growth
 from faultgouge.studies.reproduce.triggering_figures import (
     amplitude_figure,

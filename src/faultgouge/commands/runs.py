@@ -17,7 +17,7 @@ from .terminal import LAYER, Out, Results, SceneFile, command, progress, report_
 
 if TYPE_CHECKING:
     from faultgouge.analysis import Packing, RunFile
-    from faultgouge.analysis.responses.growth_of_run import GrowthOfRun
+    from faultgouge.analysis.responses.growth import GrowthOfRun
     from faultgouge.pywrap import Equilibrium, Record, Scene
 
 MOST_LOOSE = 0.1
@@ -227,7 +227,7 @@ def growth_in(file: RunFile) -> GrowthOfRun | None:
     None of another file, or where the run has not begun."""
     import json
 
-    from faultgouge.analysis.responses.growth_of_run import growth_of_run
+    from faultgouge.analysis.responses.growth import growth_of_run
     from faultgouge.pywrap.runs.undamped import time_step
 
     if file.attributes.get("task") != "perturb" or "undamped" not in file.names_of_series:
