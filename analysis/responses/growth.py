@@ -27,6 +27,7 @@ those of the weakened packing, and the fit begins at ten times the jump.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -271,7 +272,7 @@ class GrowthOfRun:
     weakened: float | None
     says: str
 
-    def as_dict(self) -> dict[str, object]:
+    def as_dict(self) -> dict[str, Any]:
         """Entries of JSON: growth, or null with the reason in `says`."""
         growth, fit = None, self.measured
         if fit is not None:
