@@ -73,15 +73,14 @@ def set_up(
     files : {"", "dumps", "contacts"}
         What is written beside the log: the decks' dumps of the start, or the forces of each contact every 100 steps.
     **motion
-        What `Engine.undamped` is given beside the time step: perturbation, signal, weakening; or `Engine.driven`:
-        spring, stages, signal.
+        What `Engine.undamped` is given beside the time step: perturbation, signal, weakening, spring and stages.
     """
     # the decks' step: a tenth of the limit of a disk whose contacts carry ten times F_y, see undamped.in
     motion["time_step"] = float(QUIET_SHARE * 0.2 / np.sqrt(12 * packing.law.stiffness_scale(10 * packing.fy)))
     with temporary_folder() as folder, Engine(packing, MPI.COMM_SELF, log) as engine:
         if files == "dumps":
             engine.dump((log or Path(folder) / "log").with_name("run.1"))
-        with (engine.driven if "spring" in motion else engine.undamped)(**motion) as dynamics:
+        with engine.undamped(**motion) as dynamics:
             if not floor:
                 engine.lammps.command("unfix floor")
             if files == "contacts":

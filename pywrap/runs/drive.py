@@ -295,7 +295,7 @@ def driven(settings: Drive, start: Packing, communicator: MPI.Comm | None = None
     signal = settings.forcing()
     with (
         Engine(start, communicator) as engine,
-        engine.driven(settings.spring, settings.stages, signal, settings.on) as dynamics,
+        engine.undamped(spring=settings.spring, stages=settings.stages, signal=signal, on=settings.on) as dynamics,
     ):
         dt = dynamics.time_step
         says = f"and the time step is {dt:.3g}: the run would not follow it, so give a slower signal"
@@ -451,7 +451,7 @@ def drive(
             if is_over:
                 return
             if step % plan.part == 0:
-                dynamics.stop_strays()
+                engine.include("stray.in")
                 reached = dynamics.state()
                 dynamics.resume(step, reached)  # as a run does that is continued from here
                 if keep is not None:
