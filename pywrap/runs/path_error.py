@@ -36,7 +36,6 @@ The stated error is the largest of :math:`|F_{2h} - F_h|`, twice the span, and :
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -53,6 +52,7 @@ from ..equilibria.quasistatic import Equilibrium
 from ..load_path import LoadPath
 
 Vanishes = Callable[[Packing], float]
+Known = dict[str | float, list[Equilibrium]]
 
 FEWEST_INCREMENTS = 4
 """Increments up to the onset from which on every second load may be left out."""
@@ -160,7 +160,7 @@ def with_path_error(
         keeps its own, and a `path_error` of None, where the ramp has no equilibrium at the onset that the search has
         found there.
     """
-    errors = PathErrors(path)
+    known: Known = {}
 
     def whole(window: Window) -> Window:
         if not window.fx_onset > path.equilibria[0].fx:
@@ -169,7 +169,7 @@ def with_path_error(
             growth_near(window.frequency, with_dashpots) if window.dissipative else squared_gap(window.eigenvalue)
         )
         try:
-            part = errors.error(window.fx_onset, vanishes, window.rounding_error)
+            part = path_error(path, window.fx_onset, vanishes, window.rounding_error, known)
         except PATH_FAILURES:
             return window
         edge = replace(window.onset, fx=window.fx_onset + part.correction)
@@ -181,80 +181,68 @@ def with_path_error(
     return replace(onset, windows=tuple(map(whole, onset.windows)), undamped=undamped)
 
 
-class PathErrors:
-    """The errors of the onsets of one ramp, which have the paths through other loads in common for the most part.
+def path_error(
+    path: LoadPath[Equilibrium], fx: float, vanishes: Vanishes, rounding: float, known: Known | None = None
+) -> PathError:
+    """The effect of the increments on one onset of a ramp.
 
     Parameters
     ----------
     path : LoadPath
-        The ramp, at least up to the last onset.
+        The ramp, at least up to the onset.
+    fx : float
+        The onset as found on the path, force.
+    vanishes : callable
+        Packing -> what goes through zero at the onset: `squared_gap` or `growth_near`.
+    rounding : float
+        Uncertainty of fx from rounding, force.
+    known : dict, optional
+        Equilibria of the other paths of this ramp by their names: onsets have these in common for the most part.
+
+    Raises
+    ------
+    NoEquilibriumError
+        If the ramp has no equilibrium at fx.
     """
+    changed, known = contact_changes(path, fx), {} if known is None else known
+    ramp = np.array([*(each.fx for each in path.equilibria if each.fx < fx), fx])
+    steps = np.diff(ramp)
+    halved = np.sort(np.concatenate([ramp, 0.5 * (ramp[1:] + ramp[:-1])]))
+    few = len(changed) < FEWEST_INCREMENTS
+    other = halved if few else _thin_loads(ramp, changed)
+    increment, slope = float(steps.max()), None
 
-    def __init__(self, path: LoadPath[Equilibrium]) -> None:
-        self.path = path
-        self._states = [bearing_contacts(each.packing) for each in path.equilibria]
-        self._known: dict[str | float, list[Equilibrium]] = defaultdict(lambda: [path.equilibria[0]])
+    def shift(name: str | float, through: Floats) -> float:
+        """The onset on the path through some loads, less fx; the path goes on from its known equilibria."""
+        nonlocal slope
+        inner, before, common = through[1:-1], known.get(name, path.equilibria[:1]), 0
+        while common < min(len(inner), len(before) - 1) and before[common + 1].fx == inner[common]:
+            common += 1
+        there = LoadPath(path.solver, before[: common + 1], onward=False)
+        try:
+            for load in inner[common:].tolist():
+                there(load)
+                known[name] = [*there.equilibria]
+            root, slope = nearby_root(lambda load: vanishes(there(load)), fx, rounding, 0.5 * increment, slope)
+        except PATH_FAILURES:
+            return np.nan
+        return root - fx
 
-    def error(self, fx: float, vanishes: Vanishes, rounding: float) -> PathError:
-        """The effect of the increments on the onset at fx, whose rounding error is known.
+    coarse, weight = shift("coarser", other), float(np.sum(np.diff(other) ** 3) / np.sum(steps**3)) - 1
+    if not changed.any():
+        return PathError(coarse, 0.0, (), weight, False, rounding, increment)
+    finer = 0.0 if few else shift("finer", halved)
+    moved = [shift(share, np.concatenate([ramp[:1], ramp[:-1] + share * steps, ramp[-1:]])) for share in LOAD_SHIFTS]
+    return PathError(coarse, finer, tuple(moved), weight, True, rounding, increment)
 
-        Parameters
-        ----------
-        fx : float
-            The onset as found on the path, force.
-        vanishes : callable
-            Packing -> what goes through zero at the onset: `squared_gap` or `growth_near`.
-        rounding : float
-            Uncertainty of fx from rounding, force.
 
-        Raises
-        ------
-        NoEquilibriumError
-            If the ramp has no equilibrium at fx.
-        """
-        changed = self.changes(fx)
-        ramp = np.array([*(each.fx for each in self.path.equilibria if each.fx < fx), fx])
-        steps = np.diff(ramp)
-        halved = np.sort(np.concatenate([ramp, 0.5 * (ramp[1:] + ramp[:-1])]))
-        few = len(changed) < FEWEST_INCREMENTS
-        other = halved if few else _thin_loads(ramp, changed)
-        increment, slope = float(steps.max()), None
+def contact_changes(path: LoadPath[Equilibrium], fx: float) -> NDArray[np.bool_]:
+    """In which increments of a ramp up to fx contacts close, open, or reach or leave the Coulomb bound.
 
-        def shift(name: str | float, through: Floats) -> float:
-            """The onset on the path through some loads, less fx; the path goes on from its known equilibria."""
-            nonlocal slope
-            inner, known = through[1:-1], self._known[name]
-            common = 0
-            while common < min(len(inner), len(known) - 1) and known[common + 1].fx == inner[common]:
-                common += 1
-            there = LoadPath(self.path.solver, known[: common + 1], onward=False)
-            try:
-                for load in inner[common:].tolist():
-                    there(load)
-                    self._known[name] = [*there.equilibria]
-                root, slope = nearby_root(lambda load: vanishes(there(load)), fx, rounding, 0.5 * increment, slope)
-            except PATH_FAILURES:
-                return np.nan
-            return root - fx
-
-        coarse = shift("coarser", other)
-        weight = float(np.sum(np.diff(other) ** 3) / np.sum(steps**3)) - 1
-        if not changed.any():
-            return PathError(coarse, 0.0, (), weight, False, rounding, increment)
-        finer = 0.0 if few else shift("finer", halved)
-        moved = (
-            shift(share, np.concatenate([ramp[:1], ramp[:-1] + share * steps, ramp[-1:]])) for share in LOAD_SHIFTS
-        )
-        return PathError(coarse, finer, tuple(moved), weight, True, rounding, increment)
-
-    def changes(self, fx: float) -> NDArray[np.bool_]:
-        """In which increments of the ramp up to fx contacts close, open, or reach or leave the Coulomb bound.
-
-        Raises NoEquilibriumError if the ramp has no equilibrium at fx.
-        """
-        before = self._states[: sum(each.fx < fx for each in self.path.equilibria)]
-        states = [*before, bearing_contacts(self.path(fx))]
-        return np.array([a != b for a, b in pairwise(states)])
+    Raises NoEquilibriumError if the ramp has no equilibrium at fx.
+    """
+    states = [bearing_contacts(each.packing) for each in path.equilibria if each.fx < fx]
+    return np.array([a != b for a, b in pairwise([*states, bearing_contacts(path(fx))])])
 
 
 def bearing_contacts(packing: Packing) -> frozenset[tuple[int, int, bool]]:
@@ -268,8 +256,7 @@ def _thin_loads(loads: Floats, changed: NDArray[np.bool_]) -> Floats:
     """Every second load; after an increment with a change the load is left out, before one it is kept."""
     kept, run = [True], 0
     for k in range(1, len(loads) - 1):
-        leave = bool(changed[k - 1]) or (run == 0 and not changed[k])
-        leave = leave and run < LONGEST_RUN
+        leave = (changed[k - 1] or (run == 0 and not changed[k])) and run < LONGEST_RUN
         run = run + 1 if leave else 0
         kept.append(not leave)
     return loads[[*kept, True]]

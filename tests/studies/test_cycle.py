@@ -10,8 +10,8 @@ from scipy.linalg import expm
 from faultgouge.analysis import FLOOR, Contacts, MindlinLaw, Packing, RunFile, stability
 from faultgouge.analysis.files.configuration_file import read_configuration, write_configuration
 from faultgouge.analysis.motion.motion import Motion
-from faultgouge.pywrap import Equilibrium, Scene
-from faultgouge.pywrap.runs.drive import SERIES, DriveRecord, settle_for_drive
+from faultgouge.pywrap import Equilibrium, Record, Scene
+from faultgouge.pywrap.runs.drive import SERIES, settle_for_drive
 from faultgouge.studies.cycle import CYCLE_COLUMNS, cycle, cycle_state, with_spring
 
 SPRING = 10.0
@@ -28,7 +28,7 @@ def make_run(path, **drive):
             "drive": {"spring": SPRING} | drive,
         }
     )
-    with DriveRecord(path, scene) as record:
+    with Record(path, scene, task="drive") as record:
         record.append(Equilibrium.of(settle_for_drive(scene)))
         for _ in record.drive():
             pass

@@ -12,7 +12,7 @@ from scipy.linalg import LinAlgError
 from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
 from faultgouge.pywrap import Engine, LoadPath, Scene, scene_path, settle
 from faultgouge.pywrap.onset import onset_run
-from faultgouge.pywrap.runs.path_error import PathError, PathErrors, squared_gap, with_path_error
+from faultgouge.pywrap.runs.path_error import PathError, path_error, squared_gap, with_path_error
 from faultgouge.studies.onset import onset
 
 PAPER = Scene.from_toml(files("faultgouge") / "scenes/paper.toml").resolved()
@@ -77,7 +77,7 @@ def test_a_contact_that_slides_before_the_onset_is_covered():
         scene = scene_of(sections, precision, increment, 3e-3)
         with path_of(scene) as path:
             window, *_ = find_onset(path, increment * np.arange(round(3e-3 / increment) + 1)).windows
-            part = PathErrors(path).error(window.fx_onset, squared_gap(window.eigenvalue), window.error)
+            part = path_error(path, window.fx_onset, squared_gap(window.eigenvalue), window.error)
         assert part.changes
         assert part.correction == 0
         found[precision, increment] = window.fx_onset, window.error + part.error
@@ -126,7 +126,7 @@ def test_an_onset_that_is_not_found_again_is_uncertain_by_the_increment():
     scene = scene_of(HUNDRED, "double", 1e-3, 0.02)
     with path_of(scene) as path:
         path(1e-3)
-        part = PathErrors(path).error(0.0005, squared_gap(30.0), 1e-11)  # no pair coalesces there
+        part = path_error(path, 0.0005, squared_gap(30.0), 1e-11)  # no pair coalesces there
     assert np.isnan(part.shift)
     assert part.correction == 0
     assert part.error == pytest.approx(5e-4)

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from reference_layer import BIN, SMALL, on_ranks, toml
 
-from faultgouge.pywrap import Equilibrium, Scene, SceneError, settle
+from faultgouge.pywrap import Equilibrium, Record, Scene, SceneError, settle
 from faultgouge.pywrap.onset import onset_run
-from faultgouge.pywrap.runs.drive import DriveRecord, settle_for_drive
+from faultgouge.pywrap.runs.drive import settle_for_drive
 from faultgouge.studies.cycle import cycle
 from faultgouge.studies.statistics import median_interval
 from faultgouge.studies.sweep import workers
@@ -109,7 +109,7 @@ def refused_trigger(folder, friction):
 def refused_cycle(folder, _):
     drive = {"spring": "rigid", "velocity": 1e-3, "until": 0.2, "states": 0.1}
     scene = Scene.from_mapping(SMALL | {"damping": {"cn": 60.0, "ct": 17.0}, "drive": drive})
-    with DriveRecord(folder / "rigid.h5", scene) as record:
+    with Record(folder / "rigid.h5", scene, task="drive") as record:
         record.append(Equilibrium.of(settle_for_drive(scene)))
         list(record.drive())
         record.finish()
