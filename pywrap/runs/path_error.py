@@ -37,7 +37,7 @@ The stated error is the largest of :math:`|F_{2h} - F_h|`, twice the span, and :
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 
@@ -90,55 +90,6 @@ SECANT_TOLERANCE = 0.02
 """Last secant step, in units of the shift, at which the shift is known: it only has to tell the size of an error."""
 
 
-@dataclass(frozen=True)
-class PathError:
-    """The effect of the increments on one onset.
-
-    Attributes
-    ----------
-    shift : float
-        F_2h - F_h, force; nan where the pair is not found on the other path.
-    finer : float
-        F_h/2 - F_h, force, where contacts change and the other path is the coarser one; else 0, or nan as of `shift`.
-    moved : tuple of float
-        Onsets on the paths with moved loads less F_h, force, where contacts change; nan as of `shift`.
-    weight : float
-        S_2h / S_h - 1.
-    changes : bool
-        Whether contacts close, open, or reach or leave the Coulomb bound before the onset.
-    rounding : float
-        Uncertainty of either onset from rounding, force.
-    increment : float
-        Of the ramp at the onset, force.
-    """
-
-    shift: float
-    finer: float
-    moved: tuple[float, ...]
-    weight: float
-    changes: bool
-    rounding: float
-    increment: float
-
-    @property
-    def correction(self) -> float:
-        """Correction of F_h, force: 0 where the correction is no more than rounding, or contacts change."""
-        if self.changes or not abs(self.shift) > 2 * self.rounding:
-            return 0.0
-        return -self.shift / self.weight
-
-    @property
-    def error(self) -> float:
-        """Uncertainty of the onset from its path, force."""
-        hidden = 2 * self.rounding
-        if np.isnan([self.shift, self.finer, *self.moved]).any():
-            return self.increment
-        if not self.changes:
-            return UNCERTAINTY_OF_CORRECTION * (abs(self.shift) + hidden) / abs(self.weight)
-        part = 1.0 if self.weight > 0 else 2.0  # the ramp is the coarser path of the two
-        return max(part * abs(self.shift), 2 * abs(self.finer), 2 * float(np.ptp([0.0, *self.moved]))) + hidden
-
-
 def with_path_error(
     onset: Onset, path: LoadPath[Equilibrium], with_dashpots: Callable[[Packing], Packing] = lambda packing: packing
 ) -> Onset:
@@ -165,15 +116,13 @@ def with_path_error(
     def whole(window: Window) -> Window:
         if not window.fx_onset > path.equilibria[0].fx:
             return window
-        vanishes = (
-            growth_near(window.frequency, with_dashpots) if window.dissipative else squared_gap(window.eigenvalue)
-        )
+        growth = growth_near(window.frequency, with_dashpots)
+        vanishes = growth if window.dissipative else squared_gap(window.eigenvalue)
         try:
-            part = path_error(path, window.fx_onset, vanishes, window.rounding_error, known)
+            correction, error = path_error(path, window.fx_onset, vanishes, window.rounding_error, known)
         except PATH_FAILURES:
             return window
-        edge = replace(window.onset, fx=window.fx_onset + part.correction)
-        return replace(window, onset=edge, path_error=part.error)
+        return replace(window, onset=replace(window.onset, fx=window.fx_onset + correction), path_error=error)
 
     undamped = onset.undamped
     if undamped is not None:
@@ -183,8 +132,11 @@ def with_path_error(
 
 def path_error(
     path: LoadPath[Equilibrium], fx: float, vanishes: Vanishes, rounding: float, known: Known | None = None
-) -> PathError:
-    """The effect of the increments on one onset of a ramp.
+) -> tuple[float, float]:
+    """The effect of the increments on one onset of a ramp: its correction and its uncertainty, force.
+
+    The correction is 0 where it is no more than rounding, or contacts change. The uncertainty is an increment where the
+    onset is not found on another path.
 
     Parameters
     ----------
@@ -229,11 +181,17 @@ def path_error(
         return root - fx
 
     coarse, weight = shift("coarser", other), float(np.sum(np.diff(other) ** 3) / np.sum(steps**3)) - 1
+    hidden = 2 * rounding
     if not changed.any():
-        return PathError(coarse, 0.0, (), weight, False, rounding, increment)
+        correction = -coarse / weight if abs(coarse) > hidden else 0.0
+        error = UNCERTAINTY_OF_CORRECTION * (abs(coarse) + hidden) / abs(weight)
+        return correction, increment if np.isnan(coarse) else error
     finer = 0.0 if few else shift("finer", halved)
     moved = [shift(share, np.concatenate([ramp[:1], ramp[:-1] + share * steps, ramp[-1:]])) for share in LOAD_SHIFTS]
-    return PathError(coarse, finer, tuple(moved), weight, True, rounding, increment)
+    if np.isnan([coarse, finer, *moved]).any():
+        return 0.0, increment
+    part = 1.0 if weight > 0 else 2.0  # the ramp is the coarser path of the two
+    return 0.0, max(part * abs(coarse), 2 * abs(finer), 2 * float(np.ptp([0.0, *moved]))) + hidden
 
 
 def contact_changes(path: LoadPath[Equilibrium], fx: float) -> NDArray[np.bool_]:

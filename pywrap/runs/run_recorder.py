@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
@@ -213,10 +213,12 @@ class Record:
         samples, motions = list[Sample](), list[tuple[float, MotionState]]()
 
         def watch(time: float, motion: MotionState) -> None:
-            motions.extend([(time, motion)] if time in shown else [])
+            motions.extend([(time, motion)] * (time in shown))
 
         def keep(reached: Checkpoint | None) -> None:
             self._keep(name, samples, reached, motions)
+            samples.clear()
+            motions.clear()
 
         options: dict[str, Any] = {"weakening": weakening, "watch": watch, "keep": keep, "resume": checkpoint}
         for sample in perturb(scene, start, communicator=self.communicator, **options):
@@ -248,20 +250,20 @@ class Record:
 
         def keep(reached: DriveCheckpoint | None) -> None:
             nonlocal time
-            before, time, file = time, steps[-1].sample.time if steps else time, self._file
-            if file is not None:
-                if others and before <= begins < time:
-                    self._divide(file, others)
-                with file.change():
-                    decided = [state for step in steps for state in step.states]
-                    pending = reached.pending if reached else ()
-                    file.cut(self._decided)
-                    for state in (*decided, *pending):
-                        file.append(state.packing, time=state.time, displacement=state.displacement)
-                    self._decided += len(decided)
-                    state = reached and Checkpoint(reached.step, reached.state | {PENDING: np.array(len(pending))})
-                    self._keep(SERIES, [step.sample for step in steps], state)
-                    file.complete = reached is None
+            before, time = time, steps[-1].sample.time if steps else time
+            if others and self._file is not None and before <= begins < time:  # in the part that is written now
+                self._file.save()
+                for path, scene in others.items():
+                    with lock_output(path):
+                        if not path.exists():
+                            with replace_whole(path) as new:
+                                shutil.copyfile(self.path, new)
+                                with RunFile(new, "a") as other:
+                                    other.put_attribute("scene", json.dumps(scene.resolved()))
+            states, pending = [state for step in steps for state in step.states], reached.pending if reached else ()
+            state = reached and Checkpoint(reached.step, reached.state | {PENDING: np.array(len(pending))})
+            self._keep(SERIES, [step.sample for step in steps], state, states=[*states, *pending])
+            self._decided += len(states)
             steps.clear()
 
         for step in drive(self.scene, self.last.packing, known, resume, keep, self.communicator):
@@ -280,18 +282,6 @@ class Record:
         states = tuple(DriveState(times[k], moved[k], self._file.packing(k)) for k in frames)
         return known, DriveCheckpoint(reached.step, reached.state, states)
 
-    @staticmethod
-    def _divide(file: RunFile, others: Mapping[Path, Scene]) -> None:
-        """Make the files of the other scenes from this one, whose last part ends before the signal begins."""
-        file.save()
-        for path, scene in others.items():
-            with lock_output(path):
-                if not path.exists():
-                    with replace_whole(path) as new:
-                        shutil.copyfile(file.path, new)
-                        with RunFile(new, "a") as other:
-                            other.put_attribute("scene", json.dumps(scene.resolved()))
-
     def _known(self, name: str, kind: Callable[..., S]) -> tuple[list[S], Checkpoint | None]:
         """Lines of a series so far, and the state after them."""
         if self._file is None or name not in self._file.names_of_series:
@@ -305,27 +295,32 @@ class Record:
     def _keep(
         self,
         name: str,
-        samples: list[Any],
+        samples: Sequence[Any],
         reached: Checkpoint | None,
-        motions: list[tuple[float, MotionState]] | None = None,
+        motions: Sequence[tuple[float, MotionState]] = (),
+        states: Sequence[DriveState] | None = None,
     ) -> None:
-        """Write the samples and motions since the last checkpoint, together with this checkpoint."""
-        if self._file is not None and (samples or reached):
-            with self._file.change():
-                self._file.complete = False
-                if samples:
-                    columns = {key: [getattr(sample, key) for sample in samples] for key in vars(samples[0])}
-                    self._file.append_series(name, **columns)
-                if motions:
-                    low = [motion.position_low for _, motion in motions if motion.position_low is not None]
-                    times, positions = [time for time, _ in motions], [motion.position for _, motion in motions]
-                    self._file.append_trajectory(times, positions, low or None)
-                state: dict[str, Any] = {} if reached is None else {"step": reached.step, **reached.state}
-                self._file.put_checkpoint(**state)
-            self._say_saved(f", and the series {name}" + (f" up to t = {samples[-1].time:g}" if samples else ""))
-        samples.clear()
-        if motions:
-            motions.clear()
+        """Write what came since the last checkpoint together with this checkpoint: lines of a series, frames of a
+        film, and states of a driven run in place of the pending ones."""
+        file = self._file
+        if file is None or not (samples or reached):
+            return
+        with file.change():
+            file.complete = states is not None and reached is None
+            if states is not None:
+                file.cut(self._decided)
+                for state in states:
+                    file.append(state.packing, time=state.time, displacement=state.displacement)
+            if samples:
+                columns = {key: [getattr(sample, key) for sample in samples] for key in vars(samples[0])}
+                file.append_series(name, **columns)
+            if motions:
+                low = [motion.position_low for _, motion in motions if motion.position_low is not None]
+                times, positions = [time for time, _ in motions], [motion.position for _, motion in motions]
+                file.append_trajectory(times, positions, low or None)
+            state_now: dict[str, Any] = {} if reached is None else {"step": reached.step, **reached.state}
+            file.put_checkpoint(**state_now)
+        self._say_saved(f", and the series {name}" + (f" up to t = {samples[-1].time:g}" if samples else ""))
 
     def _say_saved(self, more: str = "") -> None:
         """Say what the stored file contains, if nothing is still to be written."""
@@ -356,13 +351,13 @@ def fallbacks(file: RunFile) -> dict[int, str]:
 
 def raise_on_all_ranks(communicator: MPI.Comm, work: Callable[[], T]) -> T:
     """The result of rank 0, on all ranks; an error on rank 0 is raised on all ranks."""
-    result: tuple[T | None, Exception | None] = (None, None)
+    value, failure = None, None
     if communicator.rank == 0:
         try:
-            result = work(), None
+            value = work()
         except Exception as error:  # of whatever kind: the other ranks wait for it
-            result = None, error
-    value, failure = communicator.bcast(result)
+            failure = error
+    value, failure = communicator.bcast((value, failure))
     if failure is not None:
         raise failure
     return value

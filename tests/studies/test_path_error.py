@@ -4,6 +4,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from importlib.resources import files
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from scipy.linalg import LinAlgError
 from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
 from faultgouge.pywrap import Engine, LoadPath, Scene, scene_path, settle
 from faultgouge.pywrap.onset import onset_run
-from faultgouge.pywrap.runs.path_error import PathError, path_error, squared_gap, with_path_error
+from faultgouge.pywrap.runs.path_error import contact_changes, path_error, squared_gap, with_path_error
 from faultgouge.studies.onset import onset
 
 PAPER = Scene.from_toml(files("faultgouge") / "scenes/paper.toml").resolved()
@@ -37,12 +38,24 @@ def path_of(scene, mu=None):
         yield scene_path(engine, start, scene)
 
 
-@pytest.mark.parametrize(("coarser", "weight"), [(1.04, 3.0), (1.0025, -0.75)], ids=["doubled", "halved"])
-def test_the_correction_leads_to_the_limit_of_small_increments(coarser, weight):
-    """Onsets 1 + 0.01 (h'/h)^2 of increments h' on the ramp, with increments twice and half as large."""
-    error = PathError(coarser - 1.01, 0.0, (), weight, False, 1e-9, 1e-2)
-    assert 1.01 + error.correction == pytest.approx(1.0, abs=1e-12)
-    assert error.error >= 0.01
+class CubicSolver:
+    """Increments h that each add h^3 to an error of the path, which the packing stands for here."""
+
+    def solve(self, load, below, beside, ahead):
+        packing = (load, below.packing[1] + (load - below.fx) ** 3)
+        return SimpleNamespace(fx=load, packing=packing)
+
+
+@pytest.mark.parametrize("count", [10, 3], ids=["doubled", "halved"])
+def test_the_correction_leads_to_the_limit_of_small_increments(monkeypatch, count):
+    """An onset at 1 without the error of the path."""
+    monkeypatch.setattr("faultgouge.pywrap.runs.path_error.contact_changes", lambda path, fx: np.zeros(count, bool))
+    path = LoadPath(CubicSolver(), [SimpleNamespace(fx=0.0, packing=(0.0, 0.0))])
+    list(path.climb((np.arange(1, count + 1) / count).tolist()))
+    shift = 0.1 / count**2
+    correction, error = path_error(path, 1 + shift, lambda packing: packing[0] - 1 - 0.1 * packing[1], 1e-12)
+    assert correction == pytest.approx(-shift, rel=0.1)
+    assert error >= shift
 
 
 @pytest.mark.long
@@ -77,10 +90,10 @@ def test_a_contact_that_slides_before_the_onset_is_covered():
         scene = scene_of(sections, precision, increment, 3e-3)
         with path_of(scene) as path:
             window, *_ = find_onset(path, increment * np.arange(round(3e-3 / increment) + 1)).windows
-            part = path_error(path, window.fx_onset, squared_gap(window.eigenvalue), window.error)
-        assert part.changes
-        assert part.correction == 0
-        found[precision, increment] = window.fx_onset, window.error + part.error
+            correction, part = path_error(path, window.fx_onset, squared_gap(window.eigenvalue), window.error)
+            assert contact_changes(path, window.fx_onset).any()
+        assert correction == 0
+        found[precision, increment] = window.fx_onset, window.error + part
     truth = found.pop(("compensated", 2.5e-4))
     assert all(covers(onset, truth) for onset in found.values())
 
@@ -126,10 +139,8 @@ def test_an_onset_that_is_not_found_again_is_uncertain_by_the_increment():
     scene = scene_of(HUNDRED, "double", 1e-3, 0.02)
     with path_of(scene) as path:
         path(1e-3)
-        part = path_error(path, 0.0005, squared_gap(30.0), 1e-11)  # no pair coalesces there
-    assert np.isnan(part.shift)
-    assert part.correction == 0
-    assert part.error == pytest.approx(5e-4)
+        found = path_error(path, 0.0005, squared_gap(30.0), 1e-11)  # no pair coalesces there
+    assert found == (0.0, pytest.approx(5e-4))
 
 
 @pytest.fixture(scope="module")
