@@ -64,8 +64,6 @@ def test_a_packing_may_be_the_path_of_its_file(cluster_file):
 def test_a_path_in_a_wrong_place_is_refused_with_the_right_call(cluster_file, tmp_path):
     with pytest.raises(BadInputError, match=r"and no str: draw\(packing\)\.savefig\(path\) writes a file\.$"):
         faultgouge.draw(cluster_file, "p q.png")
-    with pytest.raises(BadInputError, match=r"Scene\.from_toml\(path\) reads a file\.$"):
-        faultgouge.Scene("scene.toml")
     with pytest.raises(BadInputError, match=r"^sweep takes the path of a SWEEP.toml, or a mapping .* no NoneType\.$"):
         faultgouge.sweep(None, tmp_path)
 

@@ -4,10 +4,10 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
 from ...analysis import BadInputError, MindlinLaw, Packing, PackingFileError, RunFile
 from ...analysis.arrays import Floats
@@ -203,7 +203,13 @@ class StoredPacking(Section):
             return len(run.packing(0)) if len(run) else 0
 
 
-def kind_of_packing(section: Any) -> str:
-    """Which of the two a section [packing] is, by name of its tag."""
+def _kind(section: Any) -> str:
+    """The tag of a section [packing]."""
     stored = "file" in section if isinstance(section, Mapping) else isinstance(section, StoredPacking)
     return "stored" if stored else "generated"
+
+
+PackingSection: TypeAlias = Annotated[
+    Annotated[GeneratedPacking, Tag("generated")] | Annotated[StoredPacking, Tag("stored")], Discriminator(_kind)
+]
+"""[packing], from a seed or from a file."""

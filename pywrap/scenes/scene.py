@@ -21,59 +21,40 @@ length^law.exponent, 3/2 by default. The units of the paper are the mass of a di
 Defaults are the values of the paper if it gives them; the docstrings say where it does not.
 
 `refuse_impossible` finds numbers that no packing can bear: overlaps beyond the contact law, forces near the rounding of
-the coordinates. `refuse_endless` finds a command that would take years, more memory than there is, or a file that no
-disk holds.
+the coordinates.
 """
 
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Any, Literal
 
 from pydantic import (
     ConfigDict,
-    Discriminator,
     PrivateAttr,
-    Tag,
     ValidationError,
     ValidationInfo,
+    create_model,
     field_validator,
     model_validator,
 )
-from pydantic_core import InitErrorDetails
+from pydantic_core import PydanticCustomError
 
 from ...analysis import MindlinLaw
-from .command_sections import check_study_section, command_of, errors_in, require_sections, study_model, study_models
-from .packing_section import GeneratedPacking, StoredPacking, kind_of_packing
+from .command_sections import command_of, require_sections, study_model, study_models
+from .packing_section import GeneratedPacking, PackingSection
 from .sections import Damping, Drive, Friction, Inertia, Law, Load, Output, Perturb, Ramp, Relax, refuse_first
-from .units import Units, as_numbers, real_units
-from .validation import (
-    KEYS_TO_ADD,
-    SceneError,
-    Section,
-    digest_of,
-    files_named,
-    read_toml,
-    sections_in,
-    sentence,
-)
-
-Task: TypeAlias = Literal["settle", "ramp", "perturb", "onset", "reproduce"]
+from .units import Units, in_units, real_units
+from .validation import SceneError, Section, digest_of, files_named, read_toml, sections_in, sentence, unknown_key
 
 DOUBLE_ROUNDING = 2.3e-16
 """Relative rounding of a double, rounded up."""
 
 STEPS_OF_A_YEAR = 1e13
 """A year of LAMMPS's steps: 2e-6 s each and more, on a core of 2020."""
-LARGEST_FILE = 1e13
-"""10 TB."""
-BYTES_IN_MEMORY = 4000
-"""Bytes for each disk, at the least: LAMMPS, the matrices and their factors."""
-BYTES_WRITTEN = 150
-"""Bytes of one equilibrium in run.h5, for each disk."""
+
 ROUNDING_LIMIT = 1e-6
 """Rounding of a force, in units of F_y, beyond which no bed comes to rest: 30 disks do at 1e-7, and fly apart at
 5e-7."""
@@ -112,10 +93,7 @@ class Scene(Section):
     model_config = ConfigDict(extra="allow")
 
     precision: Literal["double", "compensated"] = "double"
-    packing: Annotated[
-        Annotated[GeneratedPacking, Tag("generated")] | Annotated[StoredPacking, Tag("stored")],
-        Discriminator(kind_of_packing),
-    ]
+    packing: PackingSection
     law: Law
     load: Load
     relax: Relax = Relax()
@@ -126,17 +104,6 @@ class Scene(Section):
     units: Units | None = None
     damping: Damping | None = None
     output: Output | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _sections_of_studies(cls, sections: Any, info: ValidationInfo) -> Any:
-        if not isinstance(sections, Mapping):
-            return sections
-        others = sections.keys() - cls.model_fields.keys()
-        checked = {
-            name: check_study_section(str(name), sections[name], info.context) for name in sorted(others, key=str)
-        }
-        return {**sections, **checked}
 
     @field_validator("ramp", mode="before")
     @classmethod
@@ -156,12 +123,6 @@ class Scene(Section):
         """I_0 in I = I_0 m R^2, for dynamics, spectrum and onset alike: the key of [perturb], or the paper's 1."""
         return (self.perturb or self._inertia).inertia_factor
 
-    def __new__(cls, *path: object, **sections: object) -> Scene:
-        """Refuse a path, which pydantic would refuse without advice."""
-        if path:
-            raise SceneError("Scene takes sections by name: Scene.from_toml(path) reads a file.")
-        return super().__new__(cls)
-
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
         refuse_first(self._cases())
@@ -174,6 +135,11 @@ class Scene(Section):
         if perturb is not None:
             missing = "is missing: give it, or a section [ramp] in which the onset is sought"
             yield "perturb.fx", perturb.fx is None and ramp is None, missing
+            lightest = min(1.0, self.inertia_factor) * (getattr(self.packing, "mass", None) or 1.0)
+            usual = 0.1 * math.sqrt(lightest / (6 * _overlap_and_stiffness(self)[1]))
+            steps = perturb.time / (perturb.time_step or usual)
+            says = f"= {perturb.time:g} takes {steps:.2g} time steps, a year and more: lower it, or raise the time_step"
+            yield "perturb.time", steps > STEPS_OF_A_YEAR, says
             if ramp and perturb.fx is not None:
                 says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.first}: ramp further"
                 yield "perturb.fx", perturb.fx > max(0.0, ramp.first), says
@@ -247,24 +213,33 @@ class Scene(Section):
 
     @classmethod
     def _check(cls, mapping: Mapping[str, Any], folder: Path, name: str, command: str | None) -> Scene:
-        wanted = command_of(command)
-        context: dict[str, Any] = {"folder": folder}
+        if not isinstance(mapping, Mapping):
+            raise SceneError(f"{name}: a scene maps the names of sections to their keys: give a dict.")
+        wanted, context = command_of(command), dict[str, Any](folder=folder)
+        others = {key: model for key in mapping.keys() - cls.model_fields if (model := study_model(str(key)))}
+        sections = SECTIONS | {key: (model,) for key, model in others.items()}
+        # keys of all sections are checked, and first: a misspelled name makes the right one missing, too
+        if unknown := next(_unknown(mapping, sections), None):
+            raise SceneError(f"{name}: {unknown_key(unknown, SECTIONS | study_models())}.")
         try:
-            if isinstance(mapping, Mapping) and "units" in mapping:
-                mapping = as_numbers(mapping, folder, name, SECTIONS | _of_studies(mapping))
-            if wanted is not None and isinstance(mapping, Mapping):
-                _check_keys(mapping)
-                mapping = wanted.part(mapping)
-                if "perturb" not in wanted.reads:
-                    context["inertia"] = _Part.model_validate({"perturb": mapping.pop("perturb", {})}).perturb
-            scene = cls.model_validate(mapping, context=context)
-            require_sections(scene, wanted.needs if wanted else (), KEYS_TO_ADD)
-            return scene
+            mapping = mapping if wanted is None else wanted.part(mapping)
+            if "units" in mapping:
+                mapping = in_units(mapping, context)
+            alone = {key: model for key, model in others.items() if key in mapping}
+            if wanted is not None and "perturb" not in wanted.reads and "perturb" in mapping:
+                alone["perturb"] = Inertia
+            part = create_model("Part", **{key: (model, ...) for key, model in alone.items()})  # type: ignore[call-overload]
+            found = dict(part.model_validate(mapping, context=context))
+            context["inertia"] = found.pop("perturb", Inertia())
+            own = {key: section for key, section in mapping.items() if key not in alone}
+            scene = cls.model_validate(own | found, context=context)
+        except PydanticCustomError as error:
+            raise SceneError(f"{name}: {error}.") from None
         except ValidationError as error:
-            # A misspelled name makes the right one missing, too: the misspelling is the cause.
-            first = min(errors_in(error), key=lambda each: each["type"] != "extra_forbidden")
-            studies = study_models() if first["type"] == "extra_forbidden" else {}
-            raise SceneError(f"{name}: {sentence(first, SECTIONS | studies)}.") from None
+            first = min(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
+            raise SceneError(f"{name}: {sentence(first, sections)}.") from None
+        require_sections(scene, wanted.needs if wanted else ())
+        return scene
 
     @property
     def files(self) -> dict[str, tuple[Path, ...]]:
@@ -292,33 +267,14 @@ class Scene(Section):
         return {**({"perturb": inertia} if inertia else {}), **sections}
 
 
-class _Part(Section):
-    """The keys of [perturb] that a command reads if it does not read the whole section."""
-
-    perturb: Inertia
-
-
-def _of_studies(mapping: Mapping[str, Any]) -> dict[str, tuple[type[Section], ...]]:
-    """The models of the sections of a scene that belong to studies."""
-    others = {name: study_model(str(name)) for name in mapping.keys() - Scene.model_fields.keys()}
-    return {name: (model,) for name, model in others.items() if model is not None}
-
-
-def _check_keys(mapping: Mapping[str, Any]) -> None:
-    """Refuse unknown sections and keys, also in sections that are not read."""
-    errors: list[InitErrorDetails] = []
-    sections = SECTIONS | _of_studies(mapping)
+def _unknown(mapping: Mapping[str, Any], sections: Mapping[str, tuple[type[Section], ...]]) -> Iterator[list[str]]:
+    """The names of unknown sections, and of unknown keys behind those of their sections."""
     for name, section in mapping.items():
-        if not (models := sections.get(name, ())):
-            if name not in Scene.model_fields:
-                errors.append({"type": "extra_forbidden", "loc": (name,), "input": section})
-        elif not isinstance(section, Mapping):
-            errors.append({"type": "dict_type", "loc": (name,), "input": section})
-        else:
-            unknown = [key for key in section if not any(key in model.model_fields for model in models)]
-            errors += [{"type": "extra_forbidden", "loc": (name, key), "input": section} for key in unknown]
-    if errors:
-        raise ValidationError.from_exception_data("Scene", errors)
+        if name not in sections and name not in Scene.model_fields:
+            yield [str(name)]
+        elif name in sections and isinstance(section, Mapping):
+            known = {key for model in sections[name] for key in model.model_fields}
+            yield from ([name, str(key)] for key in section if key not in known)
 
 
 SECTIONS = {name: models for name, field in Scene.model_fields.items() if (models := sections_in(field.annotation))}
@@ -342,31 +298,6 @@ def scene_of(scene: object, command: str) -> Scene:
     if isinstance(scene, (str, Path)):
         return Scene.from_toml(scene, command=command)
     raise SceneError(f"{command} takes a Scene, or the path of its .toml file, and no {type(scene).__name__}.")
-
-
-def refuse_endless(scene: Scene, task: Task) -> None:
-    """Refuse a scene with which a command would not come to an end.
-
-    Raises SceneError if it takes a year, more memory than there is, or a file of more than `LARGEST_FILE`.
-    """
-    disks, ramp, perturb = scene.packing.disks, scene.ramp, scene.perturb
-    equilibria = 1.0 + (ramp.length / ramp.step if ramp is not None and task not in ("settle", "perturb") else 0.0)
-    steps = 0.0
-    if perturb is not None and task in ("perturb", "reproduce"):
-        lightest = min(1.0, scene.inertia_factor) * (getattr(scene.packing, "mass", None) or 1.0)
-        usual = 0.1 * math.sqrt(lightest / (6 * _overlap_and_stiffness(scene)[1]))
-        steps = perturb.time / (perturb.time_step or usual)
-    memory, written = disks * BYTES_IN_MEMORY, disks * BYTES_WRITTEN * equilibria
-    installed = float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
-    if steps > STEPS_OF_A_YEAR:
-        found = f"{steps:.2g} time steps, a year and more: lower perturb.time, or raise perturb.time_step"
-    elif memory > installed:
-        found = f"{memory / 1e9:.2g} GB of memory, and this machine has {installed / 1e9:.2g}: take fewer disks"
-    elif task == "ramp" and written > LARGEST_FILE:
-        found = f"a file of {written / 1e12:.2g} TB: take a larger ramp.step, or fewer disks"
-    else:
-        return
-    raise SceneError(f"the scene asks {task} for {found}")
 
 
 def refuse_impossible(scene: Scene) -> tuple[str, str] | None:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
@@ -23,6 +23,7 @@ from .validation import (
     TIME,
     VELOCITY,
     VISCOSITY,
+    WAVE,
     NamesFile,
     NotNegative,
     Number,
@@ -81,7 +82,7 @@ class Law(Section):
     @field_validator("kt", mode="before")
     @classmethod
     def _share_of_kn(cls, kt: object, info: ValidationInfo) -> object:
-        if not isinstance(kt, str):
+        if not isinstance(kt, str) or "kn" not in kt:
             return kt
         if "kn" not in info.data:
             return 0.0  # kn is missing or refused, and that is what gets reported
@@ -198,8 +199,8 @@ class Ramp(Section):
     step: Annotated[Positive, FORCE]
     until: Annotated[
         Number | Annotated[tuple[Number, ...], Field(min_length=1, strict=False)],
-        FORCE,
         rule("give a force, or a list of forces between which F_x goes"),
+        FORCE,
     ]
     method: Literal["newton", "overdamped"] = "newton"
     force_tolerance: Annotated[Positive | None, FORCE] = None
@@ -336,14 +337,14 @@ class Perturb(WithSignal, Inertia):
         Literal["top", "all"] | Annotated[tuple[Annotated[int, Field(ge=0)], ...], Field(min_length=1, strict=False)],
         rule('give "top", "all" or a list of disks, counted from 0'),
     ] = "top"
-    amplitude: Annotated[NotNegative, FORCE] = 0.0
+    on: Literal["layer", "floor"] | None = None
+    amplitude: Annotated[NotNegative, WAVE] = 0.0
     omega: Annotated[NotNegative | None, FREQUENCY] = None
     omega_end: Annotated[Positive | None, FREQUENCY] = None
     signal: Annotated[str | None, NamesFile()] = None
     channel: str | None = None
     scale: Number | None = None
     stretch: Positive | None = None
-    on: Literal["layer", "floor"] | None = None
     quantity: Literal["velocity", "acceleration", "displacement"] | None = None
 
     @property
@@ -423,9 +424,9 @@ class Friction(Section):
     w: Positive = 0.4
     mu_ss: NotNegative = 0.8
     v0: Annotated[
-        NotNegative | Literal["calibrated"], VELOCITY, rule('give a velocity of at least 0, or "calibrated"')
+        NotNegative | Literal["calibrated"], rule('give a velocity of at least 0, or "calibrated"'), VELOCITY
     ] = "calibrated"
-    v_ss: Annotated[Positive | str, VELOCITY, rule('give a velocity above 0, or a multiple of v0 such as "10 v0"')]
+    v_ss: Annotated[Positive | str, rule('give a velocity above 0, or a multiple of v0 such as "10 v0"'), VELOCITY]
 
     @field_validator("v_ss")
     @classmethod
@@ -473,6 +474,9 @@ PROBE_SCALE = 1e-12
 and far below every force."""
 
 
+Stage: TypeAlias = tuple[Annotated[Number, VELOCITY], Annotated[Positive, TIME]]
+
+
 class Drive(WithSignal):
     """[drive] a spring whose far end moves along x draws the upper layer.
 
@@ -507,14 +511,10 @@ class Drive(WithSignal):
         What the signal is: the force on each disk of the upper layer along x, or the velocity of the floor.
     """
 
-    spring: Annotated[Positive | Literal["rigid"], SPRING, rule('give a stiffness above 0, or "rigid"')]
+    spring: Annotated[Positive | Literal["rigid"], rule('give a stiffness above 0, or "rigid"'), SPRING]
     velocity: Annotated[Number | None, VELOCITY] = None
     protocol: Annotated[
-        Annotated[
-            tuple[Annotated[tuple[Number, Positive], Field(strict=False)], ...], Field(min_length=1, strict=False)
-        ]
-        | None,
-        (VELOCITY, TIME),
+        Annotated[tuple[Annotated[Stage, Field(strict=False)], ...], Field(min_length=1, strict=False)] | None,
         rule("give pairs of a velocity and a time above 0, as in [[1e-3, 100], [0, 50]]"),
     ] = None
     until: Annotated[Positive | None, TIME] = None
@@ -523,8 +523,8 @@ class Drive(WithSignal):
     signal: Annotated[str | None, NamesFile()] = None
     at: Annotated[NotNegative | None, TIME] = None
     omega: Annotated[Positive | None, FREQUENCY] = None
-    scale: Annotated[Number, FORCE] = 1.0
     on: Literal["layer", "floor"] = "layer"
+    scale: Annotated[Number, WAVE] = 1.0
 
     def _cases(self) -> Iterator[tuple[str, object, str]]:
         rigid, endless = self.spring == "rigid", self.until is None and self.protocol is None

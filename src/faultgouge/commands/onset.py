@@ -30,7 +30,6 @@ OF_MODES = (
 @command(
     "faultgouge examples scene && faultgouge onset scene.toml --json",
     reads="onset",
-    task="onset",
     writes="file",
     as_json=True,
     aloud=True,

@@ -73,7 +73,7 @@ def examples(
     yield "{}: {}\nnext: {}".format(chosen.name, *head(text))
 
 
-@command(f"{LAYER} && faultgouge settle scene.toml", reads="settle", task="settle", writes="run")
+@command(f"{LAYER} && faultgouge settle scene.toml", reads="settle", writes="run")
 def settle(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     """Settle the packing of a scene under its load, at F_x = 0."""
     from faultgouge.pywrap import Record
@@ -85,7 +85,7 @@ def settle(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     yield f"{last}; written to {output}"
 
 
-@command(f"{LAYER} && mpiexec -n 2 faultgouge ramp scene.toml", reads="ramp", task="ramp", writes="run", as_json=True)
+@command(f"{LAYER} && mpiexec -n 2 faultgouge ramp scene.toml", reads="ramp", writes="run", as_json=True)
 def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     """Raise F_x from equilibrium to equilibrium, and store each equilibrium.
 
@@ -163,7 +163,6 @@ def _settle_or_read(scene: Scene, record: Record) -> Equilibrium:
 @command(
     "faultgouge examples eruption && faultgouge perturb eruption.toml",
     reads="perturb",
-    task="perturb",
     writes="run",
     as_json=True,
 )
@@ -242,7 +241,7 @@ def growth_in(file: RunFile) -> GrowthOfRun | None:
 
 @command(
     "faultgouge examples drive && faultgouge drive drive.toml -o drive.h5",
-    reads="drive", task="settle", writes="run", as_json=True,
+    reads="drive", writes="run", as_json=True,
 )  # fmt: skip
 def drive(scene: SceneFile, output: Out = Path("drive.h5")) -> Results:
     """Draw the upper layer with a spring whose far end moves: the layer sticks and slips.

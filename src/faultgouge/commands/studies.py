@@ -88,7 +88,7 @@ def study_command(name: str) -> CommandInfo | None:
     return COMMANDS.pop(name)
 
 
-@command("faultgouge examples scene && faultgouge explain scene.toml", reads="explain", task="settle", as_json=True)
+@command("faultgouge examples scene && faultgouge explain scene.toml", reads="explain", as_json=True)
 def explain(scene: SceneFile) -> Results:
     """Explain what a scene includes, what it leaves out, and why.
 
@@ -123,7 +123,7 @@ def reproduce(
     from importlib.resources import files
 
     shipped = Path(str(files("faultgouge") / "scenes"))
-    wanted = read_scene(scene or shipped / "paper.toml", "reproduce", "reproduce")
+    wanted = read_scene(scene or shipped / "paper.toml", "reproduce")
     from faultgouge.studies.reproduce import reproduce as run_protocol
 
     triggered = read_scene(shipped / "triggered.toml", "reproduce") if scene is None else None

@@ -79,7 +79,6 @@ def command(
     *,
     name: str | None = None,
     reads: str | None = None,
-    task: Any = None,
     writes: str = "",
     kept: str = "",
     alone: bool = False,
@@ -97,9 +96,8 @@ def command(
         Of the help.
     name : str, optional
         Of the command; by default that of the function.
-    reads, task : str, optional
-        The argument `scene`, of type `SceneFile`, is read as this command reads it, before anything is written; a task
-        that would never end is refused.
+    reads : str, optional
+        The argument `scene`, of type `SceneFile`, is read as this command reads it, before anything is written.
     writes : {"", "file", "new", "run", "folder"}
         What the option `output` is, see `locked`.
     kept : str
@@ -122,7 +120,7 @@ def command(
                 return
             inputs = [given[key] for key in ("file", "scene") if isinstance(given.get(key), Path)]
             if reads is not None:
-                given["scene"] = scene = read_scene(given["scene"], reads, task)
+                given["scene"] = scene = read_scene(given["scene"], reads)
                 inputs += [path for paths in scene.files.values() for path in paths]
             with ExitStack() as held:
                 if writes and (output := given["output"]) is not None:
@@ -151,10 +149,10 @@ def command(
     return register
 
 
-def read_scene(path: Path, command: str, task: Any = None) -> Scene:
-    """The part of a scene file that a command reads; a task that would never end is refused."""
+def read_scene(path: Path, command: str) -> Scene:
+    """The part of a scene file that a command reads."""
     from faultgouge.analysis.files.formats import READERS
-    from faultgouge.pywrap.scenes.scene import Scene, refuse_endless
+    from faultgouge.pywrap.scenes.scene import Scene
 
     if path.suffix == ".h5":
         raise typer.BadParameter(f"{path} is a stored run, and {command} reads a scene: give its .toml file")
@@ -162,10 +160,7 @@ def read_scene(path: Path, command: str, task: Any = None) -> Scene:
         name_it = 'write file = "packing.h5" under [packing] of the scene'
         convert = f"convert it by `faultgouge import {path} -o packing.h5`, and {name_it}"
         raise typer.BadParameter(f"{path} is a packing, and {command} reads a scene: {convert}")
-    scene = Scene.from_toml(path, command=command)
-    if task is not None:
-        refuse_endless(scene, task)
-    return scene
+    return Scene.from_toml(path, command=command)
 
 
 @contextmanager
