@@ -121,7 +121,7 @@ def import_(
         allowed = BALANCE if balance is None else balance
         with status(f"{file}: LAMMPS runs") as show:
             found = run_deck(file, slides=slides, balance=allowed, relaxes=relax, keep=output, notice=say, show=show)
-        keeps(f"{output} has been written; whether the packing is stable says `faultgouge stability {output}`", output)
+        keeps(f"{output} has been written; whether the packing is stable says `faultgouge stability {output}`")
         if is_root():
             write_configuration(output, found, {"deck": text})
             yield from _deck_in_words(found, output)
@@ -184,7 +184,7 @@ def _spheres(
     if not is_root():
         return
     write_configuration(output, found, {"deck": ""})
-    keeps(f"{output} has been written", output)
+    keeps(f"{output} has been written")
     yield _in_words(found, output)
     if contacts is None:
         yield "\n".join(found.remarks)

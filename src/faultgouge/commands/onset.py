@@ -91,7 +91,7 @@ def _search(scene: Scene, mu: float, first: bool, bed: Any, folder: Path | None)
         def watch(now: str) -> None:
             show(f"mu = {mu:g}: {now}")
             if folder is not None and folder.is_dir():
-                keeps(f"{folder} has what was found so far; the same command continues from there", folder)
+                keeps(f"{folder} has what was found so far; the same command continues from there")
 
         found = onset_run(scene, mu, dissipation=dissipation, first=first, bed=bed, watch=watch, folder=folder)
     for equilibrium in found.equilibria:

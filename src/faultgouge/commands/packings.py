@@ -120,7 +120,7 @@ def _extremes(output: Path, quick: bool) -> Results:
 
     say("faultgouge stability without a file is called faultgouge extremes now")
     with locked(output, kind="folder"):
-        keeps(TRIED.format(output=output), output)
+        keeps(TRIED.format(output=output))
         try:
             yield from try_cases(output, quick)
         finally:

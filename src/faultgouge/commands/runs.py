@@ -78,7 +78,7 @@ def settle(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
     """Settle the packing of a scene under its load, at F_x = 0."""
     from faultgouge.pywrap import Record
 
-    with Record(output, scene, saved=keeps) as record:
+    with Record(output, scene, saved=lambda words, _: keeps(words)) as record:
         last = _settle_or_read(scene, record)
         if last.fx == 0 and not record.complete:  # a ramp has not gone beyond
             record.finish()
@@ -102,7 +102,7 @@ def ramp(scene: SceneFile, output: Out = Path("run.h5")) -> Results:
 
     assert scene.ramp is not None
     loads = all_loads(scene.ramp)
-    with Record(output, scene, saved=keeps) as record:
+    with Record(output, scene, saved=lambda words, _: keeps(words)) as record:
         start = _settle_or_read(scene, record)
         done = count_behind(scene.ramp, record.forces)
         dumps = output.with_suffix("") if scene.output is not None and scene.output.dumps else None
@@ -185,7 +185,7 @@ def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Results:
     assert settings is not None
     if len(mus) > 1:
         say(f"the run uses mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene")
-    with Record(output, scene, task="perturb", saved=keeps) as record:
+    with Record(output, scene, task="perturb", saved=lambda words, _: keeps(words)) as record:
         if record.remark:
             say(record.remark)
         if (start := record.last) is None:
@@ -339,7 +339,7 @@ def _drive(output: Path, scene: Scene, what: str, start: Packing | None = None, 
     from faultgouge.pywrap import Equilibrium
     from faultgouge.pywrap.runs.drive import DriveRecord, check_drive, settle_for_drive
 
-    with DriveRecord(output, scene, saved=keeps) as record:
+    with DriveRecord(output, scene, saved=lambda words, _: keeps(words)) as record:
         if record.remark:
             say(record.remark)
         if record.last is None:

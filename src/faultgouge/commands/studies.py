@@ -68,7 +68,7 @@ def study_command(name: str) -> CommandInfo | None:
             if not (of_run and file.suffix == ".h5"):
                 yield from _run_task(name, file, output, shard, workers)
             elif is_root():
-                keeps(f"{output} has the states so far; the same command continues from there", output)
+                keeps(f"{output} has the states so far; the same command continues from there")
                 with locked(output, kind="folder"):
                     study = registered.study_of(name)
                     yield from study.of_run(file, output, say, lambda rows, count: progress(rows, "states", count))
@@ -201,7 +201,7 @@ def _run_task(task: str | None, file: Path, output: Path, shard: str, workers: i
         say(sentence)
     for name, head in getattr(registered.study_of(wanted.task), "writes", {}).items():
         check_own(output / name, head)
-    keeps(f"{output}/results.jsonl has the scenes that have ended; the same command continues from there", output)
+    keeps(f"{output}/results.jsonl has the scenes that have ended; the same command continues from there")
     rows = run_sweep(wanted, output, (part, of), say, lambda rows, count: progress(rows, "scenes", count), workers)
     if not is_root():
         return

@@ -126,7 +126,7 @@ def command(
                 if writes and (output := given["output"]) is not None:
                     held.enter_context(locked(output, *inputs, kind=writes))
                     if kept:
-                        keeps(kept.format(output=output), output)
+                        keeps(kept.format(output=output))
                 speak = (say if aloud else lambda line: None) if as_json else print_line
                 for result in work(**given):  # type: ignore[call-arg]
                     if isinstance(result, str):
