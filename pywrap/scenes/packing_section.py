@@ -113,10 +113,6 @@ class GeneratedPacking(Section):
                 "= false leaves the sides open, where the upper layer spreads the disks below until they are lost: "
                 "leave it out, or give a pile that stands by itself as packing.file",
             )
-        try:
-            self.start()
-        except ValueError as error:
-            raise refusal_sentence("", f"is refused because {error}: widen the box, or take fewer disks") from None
         return self
 
     def start(self, draw: int = 0) -> Disks:

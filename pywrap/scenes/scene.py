@@ -305,14 +305,6 @@ def refuse_impossible(scene: Scene) -> tuple[str, str] | None:
     packing, law, fy = scene.packing, scene.law, scene.load.fy
     if not isinstance(packing, GeneratedPacking):
         return None
-    if (at := packing.settle_at) is not None:
-        settling = {
-            "law": law.model_copy(update={"kn": at.kn or law.kn}),
-            "load": scene.load.model_copy(update={"fy": at.fy or fy}),
-            "packing": packing.model_copy(update={"settle_at": None}),
-        }
-        if (cannot := refuse_impossible(scene.model_copy(update=settling))) is not None:
-            return "packing.settle_at", f"does not settle, since {' '.join(cannot)}"
     (overlap, stiffness), smallest = _overlap_and_stiffness(scene), min(packing.radii)
     if not overlap < smallest:
         return "load.fy", (

@@ -7,13 +7,13 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from ...analysis.files.signal_files import read_signal
 from ...analysis.packing.law import EXPONENTS, LEAST_RESCALED, known_exponents
-from ...analysis.responses.signals import Signal, SignalError, pulse, sweep
+from ...analysis.responses.signals import Signal, SignalError, pulse
 from .validation import (
     DASHPOT,
     FORCE,
@@ -71,13 +71,6 @@ class Law(Section):
     ] = 1.0
     exponent: float = 1.5
     history: Literal["total", "rescaled", "coulomb"] = "total"
-
-    @model_validator(mode="before")
-    @classmethod
-    def _kt_has_kn(cls, section: Any) -> Any:
-        if isinstance(section, Mapping) and "kt" in section and "kn" not in section:
-            raise refusal_sentence("kt", "stands without kn: give kn, in force / length^exponent, as well")
-        return section
 
     @field_validator("kt", mode="before")
     @classmethod
@@ -260,20 +253,33 @@ def refuse_first(cases: Iterable[tuple[str, object, str]]) -> None:
             raise refusal_sentence(key, advice)
 
 
-class WithSignal(Section):
-    """A section with a signal, which is one of its `KINDS` or a file."""
+SignalKeys: TypeAlias = Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]]
 
-    KINDS: ClassVar[tuple[str, ...]] = ("pulse",)
+
+class WithSignal(Section):
+    """A section with a signal, "pulse" or a file: of each kind the keys that it needs, and those that it takes."""
+
+    TAKES: ClassVar[SignalKeys] = {}
 
     @field_validator("signal", check_fields=False)
     @classmethod
     def _absolute(cls, signal: str | None, info: ValidationInfo) -> str | None:
-        if signal is None or signal in cls.KINDS:
+        if signal in (None, "pulse"):
             return signal
-        return str(((info.context or {}).get("folder", Path()) / signal).resolve())
+        return str(((info.context or {}).get("folder", Path()) / str(signal)).resolve())
 
     @model_validator(mode="after")
     def _complete(self) -> "WithSignal":
+        signal = getattr(self, "signal", None)
+        kind = signal if signal in (None, "pulse") else "file"
+        of = {None: "a section without signal", "pulse": 'signal = "pulse"', "file": "a signal from a file"}[kind]
+        needs, takes = self.TAKES[kind or ""]
+        for key in dict.fromkeys(key for keys in self.TAKES.values() for each in keys for key in each):
+            value = getattr(self, key)
+            if key in needs and (value is None or not (value or key == "at")):
+                raise refusal_sentence(key, f"is missing: {of} needs it, above 0")
+            if key not in (*needs, *takes) and value != type(self).model_fields[key].default:
+                raise refusal_sentence(key, f"does not belong to {of}: leave it out")
         refuse_first(self._cases())
         try:
             self.forcing()
@@ -282,7 +288,7 @@ class WithSignal(Section):
         return self
 
     def _cases(self) -> Iterator[tuple[str, object, str]]:
-        """Keys that are missing or do not belong here, for `refuse_first`."""
+        """Keys that are missing or do not fit, for `refuse_first`."""
         raise NotImplementedError
 
     def forcing(self) -> Signal | None:
@@ -291,8 +297,7 @@ class WithSignal(Section):
 
 
 class Perturb(WithSignal, Inertia):
-    """[perturb] an undamped run from an equilibrium, and the forcing in it: a force a cos(omega t), a pulse, a sweep of
-    frequency, or a signal from a file.
+    """[perturb] an undamped run from an equilibrium, and its forcing: a cos(omega t), a pulse, or a signal of a file.
 
     Its keys are that of `Inertia`, and these.
 
@@ -311,13 +316,10 @@ class Perturb(WithSignal, Inertia):
         a, force on each forced disk along x, or, on the floor, largest velocity of the floor; 0 means no forcing. The
         paper's is 1e-12.
     omega : float or None
-        Angular frequency of the forcing, 1 / time; of a pulse that at which its spectrum peaks, of a sweep the first
-        one. The paper's is 0.01.
-    omega_end : float or None
-        The last frequency of a sweep, at the end of the run, 1 / time.
+        Angular frequency of the forcing, 1 / time; of a pulse that at which its spectrum peaks. The paper's is 0.01.
     signal : str or None
-        "pulse", "sweep", or a file: two columns (time, value), or a record that ObsPy reads. In a scene, a relative
-        path counts from the folder of the scene's file. None: a cos(omega t).
+        "pulse", or a file: two columns (time, value), or a record that ObsPy reads. In a scene, a relative path counts
+        from the folder of the scene's file. None: a cos(omega t).
     channel : str or None
         Which trace of a record with several: the end of its id, such as "EHZ".
     scale, stretch : float or None
@@ -328,7 +330,11 @@ class Perturb(WithSignal, Inertia):
         What of the floor's motion the signal gives; None is its velocity.
     """
 
-    KINDS = ("pulse", "sweep")
+    TAKES: ClassVar[SignalKeys] = {
+        "": ((), ("amplitude", "omega")),
+        "pulse": (("amplitude", "omega"), ("on", "quantity")),
+        "file": ((), ("on", "quantity", "channel", "scale", "stretch")),
+    }
 
     fx: Annotated[NotNegative | None, FORCE] = None
     time: Annotated[Positive, TIME]
@@ -340,33 +346,17 @@ class Perturb(WithSignal, Inertia):
     on: Literal["layer", "floor"] | None = None
     amplitude: Annotated[NotNegative, WAVE] = 0.0
     omega: Annotated[NotNegative | None, FREQUENCY] = None
-    omega_end: Annotated[Positive | None, FREQUENCY] = None
     signal: Annotated[str | None, NamesFile()] = None
     channel: str | None = None
     scale: Number | None = None
     stretch: Positive | None = None
     quantity: Literal["velocity", "acceleration", "displacement"] | None = None
 
-    @property
-    def _from_file(self) -> bool:
-        return self.signal is not None and self.signal not in self.KINDS
-
     def _cases(self) -> Iterator[tuple[str, object, str]]:
-        for key in ("amplitude", "omega", "omega_end"):
-            wrong = self._from_file and getattr(self, key)
-            yield key, wrong, "cannot stand beside a signal from a file: scale and stretch take its place"
-        for key in ("channel", "scale", "stretch"):
-            wrong = not self._from_file and getattr(self, key)
-            yield key, wrong, "belongs to a signal from a file: a forcing without one has amplitude and omega"
-        yield "omega_end", self.omega_end and self.signal != "sweep", 'belongs to signal = "sweep": leave it out'
         of_floor = 'belongs to on = "floor": the signal is the force on the layer otherwise'
         yield "quantity", self.quantity and self.on != "floor", of_floor
-        yield "on", self.on and self.signal is None, 'stands without signal: give signal = "pulse", "sweep" or a file'
         forced = self.amplitude > 0 and self.omega is None
         yield "omega", forced, "is missing: an amplitude needs the frequency of its forcing"
-        for key in ("amplitude", "omega", *(["omega_end"] if self.signal == "sweep" else [])):
-            wrong = self.signal in self.KINDS and not getattr(self, key)
-            yield key, wrong, f"is missing: a {self.signal} needs one above 0"
         short = self.time_step is not None and self.time < self.time_step
         yield "time", short, f"= {self.time} is shorter than one step, {self.time_step}: run longer"
 
@@ -379,13 +369,11 @@ class Perturb(WithSignal, Inertia):
         """The signal as LAMMPS takes it, the force on a disk or the acceleration of the floor; None for a cosine."""
         if self.signal is None:
             return None
-        if self._from_file:
+        if self.signal == "pulse":
+            signal = pulse(self.omega or 0.0).scale_by(self.amplitude)
+        else:
             scale = 1.0 if self.scale is None else self.scale
             signal = read_signal(self.signal, self.channel).scale_by(scale, self.stretch or 1.0)
-        else:
-            omega, end = self.omega or 0.0, self.omega_end or 0.0
-            wave = pulse(omega) if self.signal == "pulse" else sweep(omega, end, self.time)
-            signal = wave.scale_by(self.amplitude)
         derivatives = {"displacement": 2, "velocity": 1, "acceleration": 0}[self.quantity or "velocity"]
         for _ in range(derivatives if self.on == "floor" else 0):
             signal = signal.derivative()
@@ -396,7 +384,7 @@ class Perturb(WithSignal, Inertia):
 
         Raises SignalError if rows of the file are closer than the time step, or the whole signal is.
         """
-        signal = self.forcing() if self._from_file else None
+        signal = None if self.signal == "pulse" else self.forcing()
         if signal is not None and signal.shortest < dt:
             raise SignalError(
                 f"perturb.signal has rows that are {signal.shortest:.3g} apart, and the time step is {dt:.3g}: a run "
@@ -511,6 +499,12 @@ class Drive(WithSignal):
         What the signal is: the force on each disk of the upper layer along x, or the velocity of the floor.
     """
 
+    TAKES: ClassVar[SignalKeys] = {
+        "": ((), ()),
+        "pulse": (("at", "omega"), ("scale", "on")),
+        "file": (("at",), ("scale", "on")),
+    }
+
     spring: Annotated[Positive | Literal["rigid"], rule('give a stiffness above 0, or "rigid"'), SPRING]
     velocity: Annotated[Number | None, VELOCITY] = None
     protocol: Annotated[
@@ -538,13 +532,6 @@ class Drive(WithSignal):
         yield "until", endless and rigid, no_slips
         no_spring = "needs a spring: a rigid drive moves the layer at its velocity, and counts no slips"
         yield "slips", rigid and self.slips is not None, no_spring
-        for key in ("at", "omega"):
-            alone = self.signal is None and getattr(self, key) is not None
-            yield key, alone, 'stands without signal: give signal = "pulse" or a file'
-        begins = self.signal is not None and self.at is None
-        yield "at", begins, "is missing: give the time at which the signal begins"
-        one = (self.signal == "pulse") != (self.omega is not None)
-        yield "omega", one, 'is the frequency of signal = "pulse": give both or neither'
 
     @property
     def stages(self) -> tuple[tuple[float, float], ...]:

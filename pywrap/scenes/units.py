@@ -182,10 +182,6 @@ class RealUnits:
         """m/s of a velocity."""
         return velocity * self.length / self.time
 
-    def displacement(self, msd: float) -> float:
-        """Root of a mean square displacement, m."""
-        return float(np.sqrt(msd)) * self.length
-
     def ground_velocity(self, amplitude: float, omega: float, on: str) -> float:
         """m/s of the ground in a wave: a force on each disk of the upper layer, or an acceleration of the floor."""
         if on == "floor":

@@ -191,23 +191,6 @@ def _digest(files: tuple[tuple[str, int, int, int], ...]) -> str:
     return hashlib.sha256(b"".join(read_plain(name) for name, *_ in files)).hexdigest()
 
 
-RULES = {
-    "greater_than": "give a number above {gt}",
-    "greater_than_equal": "give a number of at least {ge}",
-    "less_than": "give a number below {lt}",
-    "less_than_equal": "give a number of at most {le}",
-    "finite_number": "give a finite number",
-    "float_type": "give a number",
-    "int_type": "give a whole number",
-    "int_from_float": "give a whole number",
-    "bool_type": "give true or false",
-    "literal_error": "give {expected}",
-    "path_type": "give the name of a file, in quotes",
-    "tuple_type": "give a list of numbers",
-    "too_short": "give at least one number",
-}
-
-
 def refusal_sentence(key: str, says: str) -> PydanticCustomError:
     """An error of `key` of the section (or of the field, if empty) that is being checked."""
     return PydanticCustomError("refused", "{key} {says}", {"key": key, "says": says})
@@ -239,22 +222,10 @@ def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[Section], ..
         return f"{place} is missing{MISSING_KEY_ADVICE.get(place, f': add {what}')}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return f"{place} is not a section: write [{place}] and its keys below"
-    advice = RULES[kind].format(**context) if kind in RULES else error["msg"]
+    advice = error["msg"].replace("Input", "it").replace("Tuple", "the list").replace("tuple", "list")
     if kind == "float_type" and isinstance(error["input"], str):
         advice += "; a number with a unit needs the section [units]"
     return f"{place} = {reprlib.repr(error['input'])} is refused: {advice}"
-
-
-SAME_MEANING = {
-    "friction": "mu",
-    "friction_coefficient": "mu",
-    "stiffness": "kn",
-    "particles": "disks",
-    "grains": "disks",
-    "force": "fy",
-    "pressure": "fy",
-}
-"""Words for a key that are not written like the key."""
 
 
 def unknown_key(path: list[str], sections: Mapping[str, tuple[type[Section], ...]], stored: bool = False) -> str:
@@ -273,9 +244,7 @@ def unknown_key(path: list[str], sections: Mapping[str, tuple[type[Section], ...
         return f"{section}.{key} is no key of [{section}]: the nearest is {homes[0]}.{key}"
     keys = [name for model in sections[section] for name in model.model_fields]
     (nearest,) = get_close_matches(key, keys, 1, cutoff=0)
-    if SAME_MEANING.get(key) in keys:
-        nearest = SAME_MEANING[key]
-    return f"{section}.{key} is no key of [{section}]: the nearest is {section}.{nearest}"
+    return f"{section}.{key} is no key of [{section}]: the nearest is {section}.{nearest} of {', '.join(keys)}"
 
 
 def is_number(value: object) -> TypeGuard[float]:

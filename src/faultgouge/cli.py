@@ -104,11 +104,7 @@ def _sentence(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror:
         if error.filename or error.errno == errno.ENOSPC:
             return f"{error.filename or 'standard output'}: {error.strerror}"
-        try:
-            os.getcwd()
-        except FileNotFoundError:
-            return "the folder in which this command was called has been deleted: go to another one"
-        return error.strerror
+        return f"{error.strerror} (is the folder in which this command was called still there?)"
     if isinstance(error, MemoryError):
         what = str(error) or "a request was refused"
         return f"there is not enough memory ({what}): take a smaller packing, or a machine with more memory"

@@ -112,16 +112,6 @@ def test_settle_finishes_a_settling_and_no_ramp(faultgouge_here, tmp_path, loads
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "says"), [(1, "11 of 40 disks lie above the upper layer"), (2, "")])
-def test_settle_says_that_many_disks_lie_above_the_layer(faultgouge_here, tmp_path, seed, says):
-    packing = {"disks": 40, "width": 7.5, "seed": seed}
-    (tmp_path / "scene.toml").write_text(toml({"packing": packing, "law": {"kn": 2e5}, "load": {"fy": 3.0}}))
-    said = faultgouge_here("settle", "scene.toml").stderr
-    assert says in said
-    assert ("above the upper layer" in said) is bool(says)
-
-
-@pytest.mark.slow
 def test_perturb_writes_the_series_and_the_trajectory_that_is_asked_for(faultgouge_here, tmp_path):
     done = faultgouge_here("perturb", "scene.toml", "--json")
     series = json.loads(done.stdout)
@@ -216,7 +206,7 @@ def test_off_a_terminal_progress_is_a_line_a_minute_until_it_is_left(monkeypatch
 @pytest.mark.parametrize(
     ("command", "change", "code", "says"),
     [
-        ("perturb", ("kn = 2e5", "kn = -1.0"), 2, "law.kn = -1.0 is refused: give a number above 0"),
+        ("perturb", ("kn = 2e5", "kn = -1.0"), 2, "law.kn = -1.0 is refused: it should be greater than 0"),
         ("perturb", ("fy = 3.0", "fy = 300.0"), 2, "the packing is not in balance, a disk feels"),
         ("perturb", ("time = 0.5", "time = 0.5\ntime_step = 0.1"), 2, "over the limit 2/omega_max"),
         ("perturb", ("time = 0.5", "time = 1e-9"), 2, "shorter than one step"),

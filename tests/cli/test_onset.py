@@ -33,8 +33,8 @@ def test_results_go_to_standard_output_and_progress_to_standard_error(faultgouge
     law = 'law of friction: the paper\'s smoothed law (history = "total")'
     assert first.stdout.splitlines()[-1] == law
     assert first.stderr == ""
-    every = faultgouge_here("onset", "scene.toml", "--all", "--json")
-    windows, table = json.loads(every.stdout)["windows"], every.stderr.splitlines()  # JSON is what the user asked for
+    table = faultgouge_here("onset", "scene.toml", "--all", "-o", "onset.json").stdout.splitlines()
+    windows = json.loads((tmp_path / "onset.json").read_text())["windows"]
     assert [line.split()[:2] for line in table[:2]] == [["mu", "="], ["from", "F_x"]]
     assert len(table) == 2 + len(windows) + 1
     assert table[-1] == law
@@ -131,7 +131,6 @@ def test_the_undamped_onset_of_a_ramp_on_which_the_dissipation_stops_all_growth(
     assert (result["fx_c"], result["windows"]) == (None, [])
     assert result["undamped"]["fx_c"] == pytest.approx(0.01394557, abs=1e-7)
     assert result["undamped"]["error"] > 0
-    assert "mu = 0.3: without dissipation F_x^c = 0.01394" in done.stderr
     assert "Error: No motion grows up to F_x = 0.014: raise ramp.until." in done.stderr
 
 

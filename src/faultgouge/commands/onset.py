@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..pywrap import Scene
 
 
-@command(f"{LAYER} && faultgouge onset scene.toml --json", reads="onset", writes="file", as_json=True, aloud=True)
+@command(f"{LAYER} && faultgouge onset scene.toml --json", reads="onset", writes="file", as_json=True)
 def onset(
     scene: SceneFile,
     output: Annotated[
