@@ -20,8 +20,8 @@ the feature. A command reads only some sections, and requires some of those
 length^law.exponent, 3/2 by default. The units of the paper are the mass of a disk and the diameter of a small disk.
 Defaults are the values of the paper if it gives them; the docstrings say where it does not.
 
-`refuse_impossible` finds numbers that no packing can bear: overlaps beyond the contact law, forces near the rounding of
-the coordinates.
+Numbers that no packing can bear are refused: overlaps beyond the contact law, forces near the rounding of the
+coordinates.
 """
 
 from __future__ import annotations
@@ -130,42 +130,45 @@ class Scene(Section):
         return self
 
     def _cases(self) -> Iterator[tuple[str, object, str]]:
-        """Keys that do not agree with others, for `refuse_first`."""
-        mu, ramp, perturb, drive, damping = self.law.mus[0], self.ramp, self.perturb, self.drive, self.damping
+        """Keys that do not agree with others, or that no packing can bear, for `refuse_first`."""
+        packing, fy, mu, ramp, perturb = self.packing, self.load.fy, self.law.mus[0], self.ramp, self.perturb
+        repulsion = MindlinLaw(self.law.kn, kt=0.0, mu=0.0, exponent=self.law.exponent)
+        overlap = float(repulsion.overlap_of_force(fy))
+        stiffness = float(repulsion.normal_stiffness(overlap))
         if perturb is not None:
             missing = "is missing: give it, or a section [ramp] in which the onset is sought"
             yield "perturb.fx", perturb.fx is None and ramp is None, missing
-            lightest = min(1.0, self.inertia_factor) * (getattr(self.packing, "mass", None) or 1.0)
-            usual = 0.1 * math.sqrt(lightest / (6 * _overlap_and_stiffness(self)[1]))
-            steps = perturb.time / (perturb.time_step or usual)
+            lightest = min(1.0, self.inertia_factor) * (getattr(packing, "mass", None) or 1.0)
+            steps = perturb.time / (perturb.time_step or 0.1 * math.sqrt(lightest / (6 * stiffness)))
             says = f"= {perturb.time:g} takes {steps:.2g} time steps, a year and more: lower it, or raise the time_step"
             yield "perturb.time", steps > STEPS_OF_A_YEAR, says
             if ramp and perturb.fx is not None:
                 says = f"= {perturb.fx} lies beyond the last equilibrium, ramp.until = {ramp.first}: ramp further"
                 yield "perturb.fx", perturb.fx > max(0.0, ramp.first), says
             if isinstance(perturb.target, tuple):
-                disks, last = self.packing.disks, max(perturb.target)
-                yield "perturb.target", last >= disks, f"names disk {last}: name disks from 0 to {disks - 1}"
-        if (cannot := refuse_impossible(self)) is not None:
-            yield cannot[0], True, cannot[1]
-        needless = "has no mu to weaken: leave it out or give law.mu a value above 0"
-        yield "friction", self.friction and mu == 0, needless
-        if damping is not None:
-            overdamped = (
-                "acts in dynamics ([perturb]) and no equilibrium depends on it, so that an overdamped ramp has no use "
-                'for it: set ramp.method = "newton", or leave [damping] out'
-            )
-            yield "damping", ramp and ramp.method == "overdamped", overdamped
-            says = f"= {damping.ct:g} has no friction to damp: leave it out or give law.mu a value above 0"
-            yield "damping.ct", damping.ct > 0 and mu == 0, says
-        if drive is not None:
+                last = max(perturb.target)
+                says = f"names disk {last}: name disks from 0 to {packing.disks - 1}"
+                yield "perturb.target", last >= packing.disks, says
+        if isinstance(packing, GeneratedPacking):
+            smallest, rounding = min(packing.radii), DOUBLE_ROUNDING * packing.width * stiffness / fy
+            says = f"= {fy:g} presses two disks {overlap:.2g} into each other, deeper than the smallest radius "
+            says += f"{smallest:g}, where the contact law does not hold: lower it, or raise law.kn = {self.law.kn:g}"
+            yield "load.fy", not overlap < smallest, says
+            says = f"= {self.law.kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is "
+            says += f"{rounding:.1g} of F_y, and no packing comes to rest: lower it, or raise load.fy"
+            yield "law.kn", not rounding < ROUNDING_LIMIT, says
+        says = (
+            "acts in dynamics ([perturb]) and no equilibrium depends on it, so that an overdamped ramp has no use for "
+        )
+        says += 'it: set ramp.method = "newton", or leave [damping] out'
+        yield "damping", self.damping and ramp and ramp.method == "overdamped", says
+        if (drive := self.drive) is not None:
             yield "drive", mu == 0, "needs friction, which holds the layer: give law.mu a value above 0"
-            if drive.at is not None:
-                end = drive.length(mu * self.load.fy)
-                says = f"= {drive.at:g} is after the end of the run, {end:g}: let the signal begin before"
-                yield "drive.at", drive.at >= end, says
+            end = drive.length(mu * fy) if drive.at is not None else math.inf
+            says = f"= {drive.at} is after the end of the run, {end:g}: let the signal begin before"
+            yield "drive.at", (drive.at or 0.0) >= end, says
             slows = "would slow down a layer that is moved rigidly: leave it out, or give drive.spring a stiffness"
-            yield "damping.tau", drive.spring == "rigid" and damping and damping.tau is not None, slows
+            yield "damping.tau", drive.spring == "rigid" and self.damping and self.damping.tau is not None, slows
 
     @classmethod
     def from_toml(cls, path: str | Path, packing: Mapping[str, Any] | None = None, command: str | None = None) -> Scene:
@@ -216,7 +219,7 @@ class Scene(Section):
         if not isinstance(mapping, Mapping):
             raise SceneError(f"{name}: a scene maps the names of sections to their keys: give a dict.")
         wanted, context = command_of(command), dict[str, Any](folder=folder)
-        others = {key: model for key in mapping.keys() - cls.model_fields if (model := study_model(str(key)))}
+        others = {key: model for key in mapping if key not in SECTIONS and (model := study_model(str(key)))}
         sections = SECTIONS | {key: (model,) for key, model in others.items()}
         # keys of all sections are checked, and first: a misspelled name makes the right one missing, too
         if unknown := next(_unknown(mapping, sections), None):
@@ -298,30 +301,3 @@ def scene_of(scene: object, command: str) -> Scene:
     if isinstance(scene, (str, Path)):
         return Scene.from_toml(scene, command=command)
     raise SceneError(f"{command} takes a Scene, or the path of its .toml file, and no {type(scene).__name__}.")
-
-
-def refuse_impossible(scene: Scene) -> tuple[str, str] | None:
-    """The key whose number no packing can bear, and the rest of the sentence; None if there is no such key."""
-    packing, law, fy = scene.packing, scene.law, scene.load.fy
-    if not isinstance(packing, GeneratedPacking):
-        return None
-    (overlap, stiffness), smallest = _overlap_and_stiffness(scene), min(packing.radii)
-    if not overlap < smallest:
-        return "load.fy", (
-            f"= {fy:g} presses two disks {overlap:.2g} into each other, deeper than the smallest radius {smallest:g}, "
-            f"where the contact law does not hold: lower it, or raise law.kn = {law.kn:g}"
-        )
-    rounding = DOUBLE_ROUNDING * packing.width * stiffness / fy
-    if not rounding < ROUNDING_LIMIT:
-        return "law.kn", (
-            f"= {law.kn:g} is too stiff for load.fy = {fy:g}: the last digit of a coordinate is {rounding:.1g} of F_y, "
-            "and no packing comes to rest: lower it, or raise load.fy"
-        )
-    return None
-
-
-def _overlap_and_stiffness(scene: Scene) -> tuple[float, float]:
-    """Overlap and normal stiffness of a contact that carries F_y."""
-    law = MindlinLaw(scene.law.kn, kt=0.0, mu=0.0, exponent=scene.law.exponent)  # the repulsion alone
-    overlap = law.overlap_of_force(scene.load.fy)
-    return float(overlap), float(law.normal_stiffness(overlap))

@@ -234,47 +234,40 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
 
 
 def _packing(disks: Disks, given: dict[str, Any]) -> Packing:
-    """The packing under the law and the load of a scene, of the options, or of the file.
-
-    All that none of them says is told in one sentence, with the command that would do.
-    """
+    """The packing under the law and the load of a scene, of the options, or of the file; what none says is named."""
     from faultgouge.analysis import BadInputError
+    from faultgouge.analysis.files.atomic_write import telling
     from faultgouge.analysis.files.formats import packing_of, upper_layer
     from faultgouge.analysis.files.formats.disks import LAYER_WAYS
+    from faultgouge.analysis.files.runfile import law_of_parameters
     from faultgouge.pywrap.scenes.scene import Scene
     from faultgouge.pywrap.settling.settle import law_of, load_of
 
     options: dict[str, Any] = {key: given[key] for key in ("kn", "mu", "fy", "fx") if key in given}
     top, scene = given.get("top"), given.get("scene")
-    decided = [f"--{key}" for key in options if key != "fx"]
-    if scene is not None and decided:
+    if scene is not None and (decided := [f"--{key}" for key in options if key != "fx"]):
         raise typer.BadParameter(f"{decided[0]} cannot stand beside --scene, which decides it: leave one out")
     values = options if scene else {**disks.given, **options}
-    gaps = {
-        "--top 10": "which disks are the upper layer" if top is None and disks.top is None else "",
-        "--kn 2e5": "the normal stiffness" if scene is None and "kn" not in values else "",
-        "--fy 3": "the load on each disk of the upper layer" if scene is None and "fy" not in values else "",
-    }
-    if gaps := {option: what for option, what in gaps.items() if what}:
-        *others, last = gaps.values()
-        missing = f"{', '.join(others)} and {last}" if others else last
-        ways = f"; --top takes {LAYER_WAYS}" if "--top 10" in gaps else ""
-        names = " ".join(each.split()[0] for each in gaps)
-        example = f"faultgouge import ... {' '.join(gaps)}"
-        raise BadInputError(f"{disks.source} does not say {missing}: add {names}, as in `{example}`{ways}")
+    gaps = {"--top 10": "which disks are the upper layer"} if top is None and disks.top is None else {}
+    if scene is None:
+        ways = {"kn": ("--kn 2e5", "the normal stiffness"), "fy": ("--fy 3", "the load on each disk of the layer")}
+        gaps |= dict(way for key, way in ways.items() if key not in values)
+    if gaps:
+        names, example = " ".join(each.split()[0] for each in gaps), f"faultgouge import ... {' '.join(gaps)}"
+        takes = f"; --top takes {LAYER_WAYS}" if "--top 10" in gaps else ""
+        missing = " and ".join(gaps.values())
+        raise BadInputError(f"{disks.source} does not say {missing}: add {names}, as in `{example}`{takes}")
     layer = upper_layer(disks, top)
-    smallest = float(disks.radius.min())
-    packing = {"radii": [smallest], "width": 20 * smallest}  # of the scene that has law and load
     if scene is not None:
-        wanted = Scene.from_toml(scene, packing=packing, command="settle")
+        smallest = float(disks.radius.min())
+        wanted = Scene.from_toml(scene, packing={"radii": [smallest], "width": 20 * smallest}, command="settle")
+        law, load = law_of(wanted, wanted.law.mus[0]), load_of(wanted)
     else:
-        law: dict[str, Any] = {key: values[key] for key in ("kn", "kt", "mu", "exponent") if key in values}
-        law["history"] = next((name for name in ("rescaled", "coulomb") if values.get(name)), "total")
-        damping = {key: values[key] for key in ("cn", "ct", "tau") if key in values}
-        sections = {"packing": packing, "law": law, "load": {"fy": values["fy"]}}
-        wanted = Scene.from_mapping(sections | ({"damping": damping} if damping else {}))
-    load = load_of(wanted) | {"fx": 0.0} | {key: values[key] for key in ("fx", "inertia_factor") if key in values}
-    return packing_of(disks, law_of(wanted, wanted.law.mus[0]), layer, **load)
+        with telling(disks.source, "describes no possible packing", (ValueError,)):
+            law = law_of_parameters({"kt": 2 * values["kn"] / 7, "mu": 1.0} | values)
+        inertia = values.get("inertia_factor", 1.0)
+        load = {"fy": values["fy"], "drag_time": values.get("tau"), "inertia_factor": inertia}
+    return packing_of(disks, law, layer, **load, fx=values.get("fx", 0.0))
 
 
 @command(f"{RAMPED} && faultgouge export run.h5 --mode pair", alone=True)

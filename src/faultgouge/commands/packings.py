@@ -11,7 +11,7 @@ from typer import Argument, Option
 
 from ..analysis.counted import counted
 from ..signal_guard import is_root, keeps
-from .studies import TRIED, try_cases
+from .studies import TRIED, extremes
 from .terminal import (
     RAMPED,
     Frame,
@@ -84,7 +84,7 @@ def stability(
         say("faultgouge stability without a file is called faultgouge extremes now")
         with locked(output, kind="folder"):
             keeps(TRIED.format(output=output))
-            yield from try_cases(output, quick)
+            yield from extremes(output, quick)
         return
     if followed is not None and not 0 < followed < inf:
         raise typer.BadParameter(f"--time {followed:g}: the time that motion is followed is a positive number")

@@ -144,11 +144,6 @@ def extremes(
     quick: Annotated[bool, Option("--quick", help="About half of the cases, in a few seconds.")] = False,
 ) -> Results:
     """Test stiff and extreme cases: each holds within a stated bound, or is refused in one sentence."""
-    yield from try_cases(output, quick)
-
-
-def try_cases(output: Path, quick: bool) -> Results:
-    """What `extremes` does in a folder."""
     from faultgouge.assessment.extremes.run import check
     from faultgouge.assessment.extremes.run import extremes as try_all
 
