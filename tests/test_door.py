@@ -5,8 +5,6 @@ import doctest
 import importlib
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -31,13 +29,6 @@ def test_every_name_that_is_offered_is_there_for_type_checkers_and_a_star_too(pa
         assert name in dir(package)
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = package.nothing
-
-
-def test_driver_imports_what_is_used():
-    """The onset of a scene does without the packings of a live LAMMPS."""
-    code = "import sys; import faultgouge.pywrap.onset; print([name for name in sys.modules if '.granular' in name])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
 
 
 @pytest.mark.parametrize("name", ["onset", "pair", "settle", "ramp", "perturb", "drive"])
@@ -128,14 +119,6 @@ def test_pair_of_a_scene_is_a_curve_through_its_onset():
     near = (distance > 1e-6) & (distance < 2e-3)
     slope = np.polyfit(np.log(distance[near]), np.log(np.abs(half[near])), 1)[0]
     assert slope == pytest.approx(0.5, abs=0.01)
-
-
-def test_load_takes_files_of_all_kinds(tmp_path, cluster_file):
-    packing = faultgouge.load(cluster_file)
-    assert isinstance(packing, Packing)
-    faultgouge.draw(packing)
-    page = faultgouge.view(cluster_file, tmp_path / "page.html")
-    assert page.read_text().startswith("<!doctype html>")
 
 
 @pytest.mark.parametrize("name", ["packing.xyz", "packing.gsd"])
