@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from ... import registered
-from .validation import SceneError, Section, require_section
+from .validation import Section
 
 S = TypeVar("S", bound=Section)
 
@@ -82,14 +82,3 @@ def study_models() -> dict[str, tuple[type[Section], ...]]:
 def section_of(scene: Any, model: type[S]) -> S | None:
     """The section of a study in a scene; None of a scene without it."""
     return next((each for each in (scene.model_extra or {}).values() if isinstance(each, model)), None)
-
-
-def require_sections(scene: Any, needs: tuple[str, ...]) -> None:
-    """Raise SceneError if the scene lacks a section; the keys to add stand here, or the model of the study says."""
-    for name in needs:
-        model = study_model(name)
-        if model is None:
-            require_section(getattr(scene, name), name)
-        elif getattr(scene, name, None) is None:
-            keys = [field.description or key for key, field in model.model_fields.items() if field.is_required()]
-            raise SceneError(f"the scene has no section [{name}]: add it, with {', '.join(keys)}")

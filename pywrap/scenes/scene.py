@@ -43,11 +43,21 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from ...analysis import MindlinLaw
-from .command_sections import command_of, require_sections, study_model, study_models
+from .command_sections import command_of, study_model, study_models
 from .packing_section import GeneratedPacking, PackingSection
 from .sections import Damping, Drive, Friction, Inertia, Law, Load, Output, Perturb, Ramp, Relax, refuse_first
 from .units import Units, in_units, real_units
-from .validation import SceneError, Section, digest_of, files_named, read_toml, sections_in, sentence, unknown_key
+from .validation import (
+    SceneError,
+    Section,
+    digest_of,
+    files_named,
+    read_toml,
+    require_section,
+    sections_in,
+    sentence,
+    unknown_key,
+)
 
 DOUBLE_ROUNDING = 2.3e-16
 """Relative rounding of a double, rounded up."""
@@ -241,7 +251,8 @@ class Scene(Section):
         except ValidationError as error:
             first = min(error.errors(), key=lambda each: each["type"] != "extra_forbidden")
             raise SceneError(f"{name}: {sentence(first, sections)}.") from None
-        require_sections(scene, wanted.needs if wanted else ())
+        for need in wanted.needs if wanted else ():
+            require_section(getattr(scene, need, None), need)
         return scene
 
     @property

@@ -119,19 +119,6 @@ WAVE = _dimension((1, 1, -2), floor=(0, 1, -1))
 
 T = TypeVar("T")
 
-KEYS_TO_ADD = {
-    "ramp": "step and until",
-    "perturb": "time",
-    "damping": "cn, ct or tau",
-    "drive": "spring, velocity and until",
-    "friction": "v0, the velocity at which friction weakens",
-}
-"""Keys that a section must have."""
-
-
-MISSING_KEY_ADVICE = {"friction.v_ss": ', and the paper gives no value: give a velocity, or a multiple such as "10 v0"'}
-"""Advice for a missing key, where the advice is more than to add the key."""
-
 
 class SceneError(BadInputError):
     """The scene cannot be run; the text is one sentence: what is wrong, where, and what to do."""
@@ -219,7 +206,7 @@ def sentence(error: ErrorDetails, sections: Mapping[str, tuple[type[Section], ..
         return f"{place} {context['says']}"
     if kind == "missing":
         what = f"{path[1]} to [{path[0]}]" if len(path) > 1 else f"the section [{place}]"
-        return f"{place} is missing{MISSING_KEY_ADVICE.get(place, f': add {what}')}"
+        return f"{place} is missing: add {what}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         return f"{place} is not a section: write [{place}] and its keys below"
     advice = error["msg"].replace("Input", "it").replace("Tuple", "the list").replace("tuple", "list")
@@ -260,5 +247,5 @@ def is_number(value: object) -> TypeGuard[float]:
 def require_section(section: T | None, name: str) -> T:
     """A section of a scene that a task cannot do without."""
     if section is None:
-        raise SceneError(f"the scene has no section [{name}]: add it, with {KEYS_TO_ADD[name]}")
+        raise SceneError(f"the scene has no section [{name}]: add it; `faultgouge init` writes a scene with every key")
     return section
