@@ -85,15 +85,6 @@ class Law(Section):
             raise refusal_sentence("", f'= "{kt}" is no share of kn: give a number, or a share such as "2/7 kn"')
         return numerator * info.data["kn"] / denominator
 
-    @field_validator("mu")
-    @classmethod
-    def _each_once(cls, mu: float | tuple[float, ...]) -> float | tuple[float, ...]:
-        if isinstance(mu, tuple) and len(set(mu)) < len(mu):
-            raise refusal_sentence(
-                "", f"= [{', '.join(f'{each:g}' for each in mu)}] names one value twice: give each once"
-            )
-        return mu
-
     @field_validator("exponent")
     @classmethod
     def _known_exponent(cls, exponent: float) -> float:

@@ -1,10 +1,9 @@
 r"""Real units: the physical values of the numbers in a scene for grains of a given size and material.
 
 A scene has three units that its numbers do not fix. The grains fix them: the unit of length is the diameter
-:math:`2 R_1` of the smallest disks, and the unit of mass is the mass of a smallest grain, a sphere or (with a thickness
-h) a cylinder,
+:math:`2 R_1` of the smallest disks, and the unit of mass is the mass of a smallest grain, a sphere,
 
-.. math:: M = \tfrac43 \pi R_1^3 \rho \quad\text{or}\quad M = \pi R_1^2 h \rho ,
+.. math:: M = \tfrac43 \pi R_1^3 \rho ,
 
 and the unit of time follows from Hertz's contact of two such spheres (K. L. Johnson, *Contact Mechanics*, 1985, section
 4.2),
@@ -12,17 +11,17 @@ and the unit of time follows from Hertz's contact of two such spheres (K. L. Joh
 .. math:: F = \tfrac43 E^* \sqrt{R_1/2}\, \delta^{3/2}, \qquad E^* = \frac{E}{2 (1 - \nu^2)},
     \qquad\text{so}\qquad k = \frac{E \sqrt{2 R_1}}{3 (1 - \nu^2)} ,
 
-which is the scene's k_n: :math:`T^2 = k_n M / (k \sqrt{2 R_1})`. A cylinder has no contact law with the exponent 3/2;
-its thickness changes only the mass and the area.
+which is the scene's k_n: :math:`T^2 = k_n M / (k \sqrt{2 R_1})`.
 
-**Stress.** The upper layer has n disks above the area W h, W the width of the box and h the thickness, or :math:`2
-R_1`. The force F_y on each of them is the overburden :math:`n F_y / (W h)`, F_x the shear stress, and F_x/F_y their
-ratio. The ratio k_n/F_y of a scene therefore corresponds to a depth, and a given overburden must agree with that of the
-scene.
+**Stress.** The upper layer has n disks above the area :math:`2 W R_1`, W the width of the box: the layer is as thick as
+a smallest grain. The force F_y on each of them is the overburden :math:`n F_y / (2 W R_1)`, F_x the shear stress, and
+F_x/F_y their ratio. The ratio k_n/F_y of a scene therefore corresponds to a depth, and a given overburden must agree
+with that of the scene.
 
-**Waves.** A force a on each disk of the upper layer is a stress :math:`\sigma = n a/(W h)`. A plane shear wave in the
-rock, with the modulus :math:`G = E/2(1 + \nu)`, has this stress at the strain :math:`\sigma/G` and the ground velocity
-:math:`\sigma/\sqrt{G\rho}`. An acceleration A of the floor at the angular frequency omega is a ground velocity A/omega.
+**Waves.** A force a on each disk of the upper layer is a stress :math:`\sigma = n a/(2 W R_1)`. A plane shear wave in
+the rock, with the modulus :math:`G = E/2(1 + \nu)`, has this stress at the strain :math:`\sigma/G` and the ground
+velocity :math:`\sigma/\sqrt{G\rho}`. An acceleration A of the floor at the angular frequency omega is a ground
+velocity A/omega.
 
 **Dissipation.** The restitution e of two smallest grains that collide head on at a given velocity follows from
 :math:`\tfrac12 M \ddot\delta = -k \delta^{3/2} - C_N \delta^{1/2} \dot\delta`; the restitution falls as the velocity
@@ -64,7 +63,6 @@ SI = {
     "grain_diameter": "m",
     "density": "kg/m^3",
     "youngs_modulus": "Pa",
-    "thickness": "m",
     "overburden": "Pa",
     "impact_velocity": "m/s",
 }
@@ -83,8 +81,6 @@ class Units(Section):
         Of the grains' material, and of the rock about the layer.
     poisson_ratio : float
         Of both.
-    thickness : str or None
-        Of the layer of disks; None: the grains are spheres, and the layer as thick as one.
     overburden : str or None
         Normal stress on the layer; None: whatever the scene has.
     restitution : float or None
@@ -97,7 +93,6 @@ class Units(Section):
     density: str
     youngs_modulus: str
     poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5, allow_inf_nan=False)]
-    thickness: str | None = None
     overburden: str | None = None
     restitution: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] | None = None
     impact_velocity: str | None = None
@@ -120,11 +115,8 @@ class Units(Section):
 
     @property
     def grain_mass(self) -> float:
-        """Mass of a smallest grain, a sphere, or a cylinder with a thickness, kg."""
-        diameter = self.si("grain_diameter")
-        sphere = np.pi * diameter**3 / 6
-        volume = sphere if self.thickness is None else np.pi * diameter**2 / 4 * self.si("thickness")
-        return float(self.si("density") * volume)
+        """Mass of a smallest grain, kg."""
+        return float(self.si("density") * (np.pi * self.si("grain_diameter") ** 3 / 6))
 
     def si(self, key: str) -> float:
         """A quantity as a number of SI units."""
@@ -324,8 +316,7 @@ def units_of(units: Units, layer: Layer, kn: float, fy: float) -> RealUnits:
     length = diameter / layer.diameter
     mass = units.grain_mass / layer.mass
     time = math.sqrt(kn * mass / (hertz_stiffness(units) * math.sqrt(length)))
-    depth = diameter if units.thickness is None else units.si("thickness")
-    area = layer.width * length * depth / layer.top
+    area = layer.width * length * diameter / layer.top
     shear_modulus = modulus / (2 * (1 + units.poisson_ratio))
     return RealUnits(length, mass, time, area, shear_modulus, units.si("density"), fy)
 

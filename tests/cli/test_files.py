@@ -1,6 +1,7 @@
 """Files as users have them: pipes, names with blanks and quotes, links, files that others write, and read-only ones."""
 
 import errno
+import json
 import os
 import subprocess
 import sys
@@ -225,6 +226,15 @@ def test_what_the_program_has_written_is_replaced(faultgouge_here, stored, comma
         frames = imageio_ffmpeg.read_frames(str(path))
         assert next(frames)["duration"] > 1
         assert len(list(frames)) > 10
+
+
+@pytest.mark.slow
+def test_vibrations_go_into_their_folder_again(faultgouge_here, stored):
+    for _ in range(2):
+        faultgouge_here("vibrations", "run.h5", "--waves", "0", "-o", "out")
+    found = json.loads((stored / "out" / "vibrations.json").read_text())
+    assert len(found["modes"]["frequency"]) == found["counted"]
+    assert (stored / "out" / "density.csv").read_text().startswith("frequency,resolution,density,")
 
 
 def test_tables_of_the_program_are_known_by_their_first_line(tmp_path):
