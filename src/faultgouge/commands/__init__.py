@@ -50,18 +50,6 @@ def program() -> Callable[..., object]:
 
 QUESTION = "Does a packing of frictional grains move, and what happens when it does?"
 
-TO_TRY = f"""\
-{QUESTION} Two things to try:
-
-  faultgouge stability deck.in      runs a LAMMPS deck: does its packing rest, or which motion grows, and how fast?
-  faultgouge init -o scene.toml && faultgouge onset scene.toml
-                                    the shear force at which a layer of 100 disks becomes unstable
-
-A deck and a scene to try: faultgouge examples. All commands: faultgouge --help. Each has an example: faultgouge
-stability --help.
-"""
-
-
 def _options(
     context: typer.Context,
     version: Annotated[
@@ -69,7 +57,7 @@ def _options(
     ] = False,
 ) -> None:
     if context.invoked_subcommand is None:
-        print(TO_TRY, end="")
+        print(context.get_help())
 
 
 def _version(asked: bool) -> None:
