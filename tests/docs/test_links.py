@@ -80,24 +80,6 @@ def test_explanations_are_two_screens_with_a_picture_before_any_number():
         assert re.findall(r"\d\.\d|10\^|\b\d\d+", text[: text.index("![")]) == [], page
 
 
-def test_the_page_on_complex_pairs_names_what_there_is():
-    text = (ROOT / "docs" / "complex_pairs.md").read_text()
-    named = re.findall(r"`([\w/]+\.py)`:\s((?:`[\w.]+`(?:, )?)+)", text)
-    assert len(named) >= 6
-    for name, places in named:
-        source = (ROOT / "analysis" / "windows" / name).read_text()
-        for place in re.findall(r"[\w.]+", places):
-            assert all(re.search(rf"^ *(class|def) {part}\b", source, re.MULTILINE) for part in place.split(".")), place
-
-
-def test_a_wrong_page_is_found_out(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("```console\n$ echo mu = 1.01\nmu = 1.0\n$ echo mu = 1.0001\nmu = 1.0\n$ false\n```\n")
-    number, code = run(page, tmp_path)
-    assert "1.01" in number
-    assert "exit code 1" in code
-
-
 def with_blocks(language):
     """Pages with blocks of a language; two ranks that share their cores with others take ten times as long."""
     for path in PROSE:
