@@ -92,13 +92,13 @@ def study_command(name: str) -> CommandInfo | None:
 def explain(scene: SceneFile) -> Results:
     """Explain what a scene includes, what it leaves out, and why.
 
-    The command sets the run of the scene up in LAMMPS, takes no step, and compares
-    what LAMMPS has loaded with and without each part.
+    The command sets the run of the scene up in LAMMPS, takes no step, and says
+    which parts LAMMPS has loaded.
     """
     from faultgouge.assessment.explain import explain as explain_scene
     from faultgouge.assessment.explain import in_words
 
-    with status("setting up the run with and without each part"):
+    with status("setting up the run"):
         found = explain_scene(scene)
     yield from in_words(found)
     yield found
