@@ -20,7 +20,7 @@ import hashlib
 import json
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
@@ -127,27 +127,28 @@ class Sweep:
 
         Relative names of files count from `folder`.
         """
-        unknown = sorted(mapping.keys() - {"task", "sweep", "scene"})
-        if unknown:
+        task, axes, scene = (
+            mapping.get(key, default) for key, default in (("task", None), ("sweep", {}), ("scene", {}))
+        )
+        if unknown := sorted(mapping.keys() - {"task", "sweep", "scene"}):
             raise SceneError(f"{name}: {unknown[0]} is no key of a sweep: it has task, [sweep] and [scene.SECTION].")
-        task, code = mapping.get("task"), ""
-        if isinstance(task, str) and ":" in task:
-            code = user_function(locate(task, folder)).code
-        elif task not in registered.tasks():
+        own = isinstance(task, str) and ":" in task
+        if not own and task not in registered.tasks():
             raise SceneError(
                 f"{name}: task = {task!r} is refused: give one of {', '.join(registered.tasks())}, or a function of "
                 'yours as "file.py:function".'
             )
-        axes, scene = mapping.get("sweep", {}), mapping.get("scene", {})
         for section, given in (("sweep", axes), ("scene", scene)):
             if not isinstance(given, Mapping):
                 raise SceneError(f"{name}: {section} is not a section: write [{section}] and its keys below.")
-        sweep = cls(str(task), {key: _values(key, each, name) for key, each in axes.items()}, dict(scene), code, folder)
-        count = prod(map(len, sweep.axes.values()))
+        values = {key: _values(key, each, name) for key, each in axes.items()}
+        count = prod(map(len, values.values()))
         if count > MOST_POINTS:
             raise SceneError(f"{name}: {count} scenes are more than {MOST_POINTS}: make several sweeps of it.")
-        # what is wrong with every scene is refused before any work is done; the first good one is enough to know
-        if all(point.says is not None for point in sweep._each_point()):
+        code = user_function(locate(task, folder)).code if own else ""
+        sweep = cls(str(task), values, dict(scene), code, folder)
+        # what is wrong with every scene is refused before any work is done
+        if all(point.says is not None for point in sweep.points):
             raise SceneError(f"{name}: no point of the sweep is a scene that can be run: {sweep.points[0].says}")
         return sweep
 
@@ -164,12 +165,9 @@ class Sweep:
     @cached_property
     def points(self) -> tuple[SweepPoint, ...]:
         """Every point, in the order of the table."""
-        return tuple(self._each_point())
-
-    def _each_point(self) -> Iterator[SweepPoint]:
         # a user's function is known by its name and code, without its folder
         task = f"{self.task.rpartition(':')[2]} {self.code}" if self.code else self.task
-        known_as = task, version("faultgouge")
+        known_as, points = (task, version("faultgouge")), list[SweepPoint]()
         for number, chosen in enumerate(product(*self.axes.values())):
             values: dict[str, Any] = {}
             for key, value in zip(self.axes, chosen, strict=True):
@@ -179,13 +177,14 @@ class Sweep:
             for name, value in values.items():
                 section, _, key = name.rpartition(".")
                 (mapping.setdefault(section, {}) if section else mapping)[key] = value
+            scene = says = None
             try:
                 scene = Scene.from_mapping(mapping, self.folder, command=self.task)
+                mapping = with_contents(scene)
             except SceneError as error:
                 says = str(error).removeprefix("scene: ")
-                yield SweepPoint(number, values, None, says, digest([*known_as, mapping]))
-            else:
-                yield SweepPoint(number, values, scene, None, digest([*known_as, with_contents(scene)]))
+            points.append(SweepPoint(number, values, scene, says, digest([*known_as, mapping])))
+        return tuple(points)
 
     def as_dict(self) -> dict[str, Any]:
         """The sweep as JSON holds it."""

@@ -38,7 +38,7 @@ def normal_pairs(*epsilons):
 def test_amplitudes_carry_their_exponent():
     distance = np.array([1e-7, 1e-2, 0.5])
     found = Sensitivity(distance, normal_pairs(*distance), PowerLaw(-0.49989, 3e-5, 1.4))
-    _, fitted, points = amplitude_figure(found).axes[0].lines
+    fitted, points = amplitude_figure(found).axes[0].lines
     np.testing.assert_allclose(fitted.get_ydata(), 1.4 * np.array([1e-7, 0.5]) ** -0.49989)
     np.testing.assert_array_equal(points.get_ydata(), [pair.amplitude() for pair in found.pairs])
     # of a response of less than four times the start no damping takes half

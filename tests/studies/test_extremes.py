@@ -9,7 +9,8 @@ from faultgouge.analysis import stiffness_matrix
 from faultgouge.assessment.extremes import cases
 from faultgouge.assessment.extremes.cases import Case
 from faultgouge.assessment.extremes.packings import crystal, shear_packing
-from faultgouge.assessment.extremes.run import ExtremeCasesError, check, extremes, try_case
+from faultgouge.assessment.extremes.run import check, extremes, try_case
+from faultgouge.assessment.results import AssessmentError
 from faultgouge.pywrap import Equilibrium
 from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
 
@@ -66,7 +67,7 @@ def test_failures_are_told_and_the_others_go_on(tmp_path, monkeypatch):
     assert "11 cases: 2 hold, 1 are refused" in page
     assert "| too large | fails | 2 | 1 | twice |" in page
     assert "extremes.png was not drawn (RuntimeError: no font at all)" in told[-1]
-    with pytest.raises(ExtremeCasesError, match=r"8 of 11 cases failed: too large; no number; crash"):
+    with pytest.raises(AssessmentError, match=r"8 of 11 cases failed: too large; no number; crash"):
         check(result)
 
 

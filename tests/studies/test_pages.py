@@ -34,7 +34,7 @@ def test_the_page_of_the_protocol_counts_no_windows_that_were_not_counted(tmp_pa
     growth = growth_run(scene, run, tmp_path / "run.h5")
     first = replace(run, windows=run.windows[:1], complete=False)
     for each, cell in ((run, f"| {len(run.windows)} |"), (first, "| not counted, as the search ended with the")):
-        page = report(scene, [each], growth, None, None)
+        page = report(scene, [each], growth, "nothing", None)
         (row,) = (line for line in page.splitlines() if line.startswith("| 1 |"))
         assert cell in row
         assert summary_of(scene, [each], growth)["ramps"][0]["onset"]["complete"] is each.complete

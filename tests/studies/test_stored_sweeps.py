@@ -161,7 +161,10 @@ def test_rows_of_a_function_hold_its_numbers_or_say_why_not(folder):
     first, _ = run_sweep(sweep_of(folder, "contacts", "1:2"), folder / "contacts", say=id, workers=2)
     rest = settle(Scene.from_mapping(SMALL | {"packing": SMALL["packing"] | {"seed": 1}})).packing
     assert first["result"] == {"contacts": len(rest.contacts), "of": {"x": rest.position[:2, 0].tolist()}}
-    for function, says in (("ends", "scene 0: ends failed with SystemExit:  (ask.py, line 22)"), ("seed_of", "int: ")):
+    for function, says in (
+        ("ends", "scene 0: ends failed with SystemExit:  (ask.py, line 22)"),
+        ("seed_of", "returned 1: "),
+    ):
         first, second = run_sweep(sweep_of(folder, function, "1:2"), folder / function, say=id)
         assert says in first["says"]
         assert (second["says"] is None) is (function == "ends")
@@ -209,10 +212,10 @@ def test_merge_takes_the_keys_that_the_sweep_had_and_names_versions(folder, monk
     (folder / "ask.py").write_text(TASK)
     monkeypatch.setattr(import_module("faultgouge.studies.sweep.run_sweep"), "version", lambda _: "0.9")
     run_sweep(sweep_of(folder, "ends"), two, (2, 2), say=id)
-    with pytest.raises(SceneError, match=r"part2 is of version 0.9, and .*part1 of "):
+    with pytest.raises(SceneError, match=r"part2 is of another sweep than .*part1.* \(version differs\)"):
         merge([one, two], folder / "whole", id)
     (one / "sweep.json").write_text('{"task": "onset", "sweep": {}, "scene": {}, "shard": [1, 2]}')
-    with pytest.raises(SceneError, match=r"part1 is of version 1\.0\.0 or before"):
+    with pytest.raises(SceneError, match=r"part1 is no folder of a sweep, or of version 1\.0\.0 or before"):
         merge([one, two], folder / "whole", id)
 
 

@@ -11,7 +11,7 @@ from faultgouge.pywrap import NoEquilibriumError, Scene, settle
 from faultgouge.pywrap.onset import onset_run
 from faultgouge.studies import triggering
 from faultgouge.studies.reproduce import reproduce
-from faultgouge.studies.statistics import distribution, median_interval, quartiles, share, sign_test
+from faultgouge.studies.statistics import distribution, quartiles, share, sign_test
 from faultgouge.studies.triggering import in_words, summary_of_rows
 
 SCENE = SMALL | {
@@ -96,20 +96,8 @@ def test_quartiles_count_packings_without_onset():
     np.testing.assert_allclose(of_ends(distribution, early), [[0.01, 0.02], [0.25, 0.625]])
 
 
-def test_interval_of_a_median_covers_it_as_often_as_it_says():
-    generator = np.random.default_rng(1)
-    covered = 0
-    for trial in range(200):
-        sample = generator.exponential(size=40)
-        median, low, high = median_interval(np.minimum(sample, 2.0), sample < 2.0, draws=200, seed=trial)
-        assert low <= median <= high
-        covered += low <= np.log(2) <= high
-    # 190 of 200 are expected, and 180 is three standard deviations below
-    assert covered >= 180
-
-
 def test_first_onset_is_that_of_the_whole_ramp(scene):
-    found, path = triggering.first_onset(scene, 1.0, lambda mu: settle(scene, mu))
+    found, path = triggering.first_onset(scene, settle(scene, 1.0))
     whole = onset_run(scene, 1.0)
     assert (found["ends"], found["reach"]) == ("onset", pytest.approx(whole.fx_c, rel=1e-9))
     assert found["error"] < 1e-9
@@ -121,9 +109,9 @@ def test_what_was_found_before_a_failure_is_kept(scene, monkeypatch):
         raise NoEquilibriumError("no eruption today")
 
     found = {1.0: end("onset", 0.01), 0.8: end("onset", 0.008, 0.8)}
-    monkeypatch.setattr(triggering, "first_onset", lambda scene, mu, start: (found[mu], ()))
+    monkeypatch.setattr(triggering, "first_onset", lambda scene, rest: (rest, ()))
     monkeypatch.setattr(triggering, "eruption", fail)
-    result = triggering.triggering.row(scene, None)
+    result = triggering.triggering.row(scene, found.get)
     assert [each["reach"] for each in result["ramps"]] == [0.01, 0.008]
     assert result["lowered"] is True
     assert result["says"] == "no eruption today"
