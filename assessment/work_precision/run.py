@@ -24,14 +24,13 @@ from ...analysis.files.atomic_write import make_folder
 from ...figures.style import INK, report_failure, save, styled
 from ...pywrap import Scene, ramp
 from ..results import AssessmentError, reason_of, write_results
-from .dumps import dumps
 from .equilibria import onset, relaxation
 from .jacobian import jacobian
 from .study import COMPENSATED_SUFFIX, WORDS, Settings, Study
 from .time_steps import growth, trajectory
 
 STUDIES: dict[str, Callable[[Settings], Study]] = {
-    WORDS[study.__name__]["name"]: study for study in (trajectory, growth, relaxation, onset, jacobian, dumps)
+    WORDS[study.__name__]["name"]: study for study in (trajectory, growth, relaxation, onset, jacobian)
 }
 """By name, in the order of the report."""
 

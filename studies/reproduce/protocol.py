@@ -161,7 +161,7 @@ def reproduce(scene: Scene, output: Path, say: Say = print, triggered: Scene | N
     if isinstance(found, str):
         say(f"{found.rstrip('.')}: no figures 2, 5 and 6")
     else:
-        draw_all(triggering_figures(found.found, found.response, found.sensitive), output, say)
+        draw_all(triggering_figures(found.found), output, say)
     write_json(output / "summary.json", summary)
     write_text(output / "report.md", report(scene, runs, growth, found, another))
     return summary

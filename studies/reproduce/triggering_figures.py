@@ -20,13 +20,11 @@ from matplotlib.ticker import LogLocator
 from numpy.typing import ArrayLike
 
 from ...analysis.arrays import Floats
-from ...analysis.responses.response import Response
-from ...analysis.uncertain_digits import with_uncertainty
 from ...figures.series import draw_series, few_decades, positive
 from ...figures.style import INK, styled
 from ...pywrap.lammps.dynamics import Weakening
 from ..study import Figures
-from ..triggering import Sensitivity, Triggering
+from ..triggering import Triggering
 
 Curve = tuple[Floats, Floats]
 """Times, and D at these, length^2."""
@@ -38,8 +36,8 @@ FITTED = {
 public. With 0.74 the law is not continuous at v_0: B + mu_ss = 0.96."""
 
 
-def triggering_figures(found: Triggering, response: Response, sensitive: Sensitivity) -> Figures:
-    """The paper's figures 2, 5 and 6, and two of the response: in time, and over the distance from the onset."""
+def triggering_figures(found: Triggering) -> Figures:
+    """The paper's figures 2, 5 and 6."""
     weak, mu, erupting = found.weakening, found.start.packing.law.mu, found.runs["erupting"]
     runs = {name: (run["time"], run["msd"]) for name, run in found.runs.items()}
     three, speed = (runs["unperturbed"], runs["perturbed"], runs["erupting"]), np.abs(erupting["layer_velocity"])
@@ -49,8 +47,6 @@ def triggering_figures(found: Triggering, response: Response, sensitive: Sensiti
         "figure5a": partial(eruption_figure, *three, runs.get("control"), found.outcome.crossing),
         "figure5b": partial(weakening_figure, speed, erupting["friction"], weak, mu),
         "figure6": partial(friction_law_figure, FITTED, 1.0, 1.0, "$v/v_{ss}$"),
-        "response": partial(response_figure, runs["strong"], response.msd),
-        "amplitude": partial(amplitude_figure, sensitive),
     }
 
 
@@ -125,41 +121,4 @@ def weakening_figure(velocity: ArrayLike, mu: ArrayLike, law: Weakening, mu_0: f
             axes.text(1.1 * value, 0.03, name, transform=axes.get_xaxis_transform())
     axes.xaxis.set_major_locator(LogLocator(numticks=7))
     axes.legend(loc="upper right", bbox_to_anchor=(1, 0.9))
-    return figure
-
-
-@styled
-def amplitude_figure(found: Sensitivity) -> Figure:
-    """Response amplitude over the distance from the onset, with the fitted power law."""
-    figure = Figure(layout="constrained")
-    axes = figure.add_subplot(xscale="log", yscale="log", ylabel="largest response / start")
-    axes.set_xlabel("distance from the onset, $1 - F_x/F_x^c$")
-    fit, ends = found.fit, np.array([found.distance.min(), found.distance.max()])
-    axes.plot(ends, fit.factor * ends**fit.exponent, color="C0", linewidth=0.8)
-    label = f"slope ${with_uncertainty(fit.exponent, fit.error)}$"
-    axes.plot(found.distance, [pair.amplitude() for pair in found.pairs], "o", color="C0", label=label)
-    few_decades(axes)
-    figure.legend(loc="outside upper center", handletextpad=0.2)
-    return figure
-
-
-@styled
-def response_figure(run: Curve, linear: Floats) -> Figure:
-    """D of the linear response of a packing, from K, at the times of a run of LAMMPS, over D of the run.
-
-    Panel (a) both, panel (b) the difference in units of the largest D so far: D itself passes close to zero.
-    """
-    time, msd = run
-    figure = Figure(figsize=(3.4, 3.4), layout="constrained")
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    # a thin dark line upon a broad pale one: where the two agree both are seen
-    upper.plot(*positive(time, msd), color="C4", linewidth=3.0, alpha=0.6, label="LAMMPS")
-    upper.plot(*positive(time, linear), color=INK, linewidth=0.7, label="linear response, from $K$")
-    upper.set(ylabel="$D(t)$", yscale="log", ylim=(3e-5 * msd.max(), 3 * msd.max()))
-    figure.legend(loc="outside upper center", ncols=2)
-    lower.plot(*positive(time, np.abs(linear - msd) / np.maximum.accumulate(msd)), color=INK, linewidth=0.6)
-    lower.axhline(0.01, color="C0", linewidth=0.6, linestyle=":")
-    lower.set(xlabel="$t$", ylabel=r"$|\Delta D|/\max D$", yscale="log")
-    lower.set_ylim(top=1.0)
-    few_decades(lower, 5)
     return figure
