@@ -1,6 +1,6 @@
 """What a scene includes, what it leaves out, and why: the command `explain`, a dry run.
 
-The scene's undamped or driven run is set up in LAMMPS, and takes no step. `FEATURES` says what each feature brings:
+The scene's undamped or driven run is set up in LAMMPS, and takes no step. `features` says what each feature brings:
 deck parts, fixes, per-atom arrays and settings. A feature is in the scene if LAMMPS has all of this. Runs that differ
 in one feature alone differ by just this (`tests/studies/test_explain.py`); `benchmarks/parts.py` has these pairs of
 runs, and measures what each feature costs.
@@ -39,22 +39,6 @@ FALLS = Weakening(B=0.2, w=0.4, mu_ss=0.8, v0=1e6, v_ss=1.0)
 
 HEAVY = ("lammps", "mpi4py", "scipy", "matplotlib", "MDAnalysis", "threadpoolctl")
 """Packages that take longer to import than all of the command's own; h5py comes with every file of results."""
-
-SLIPS = ("part friction.in", "fix angle", "fix slips", "array f_slips", "array d_theta", "velocities of ghosts")
-
-FEATURES: dict[str, tuple[str, ...]] = {
-    "floor": ("fix floor", "array f_floor"),
-    "tangential history": SLIPS,
-    "periodicity": ("periodic x",),
-    "dynamic friction": ("part weaken.in", "fix weaken"),
-    "dashpots": ("part dashpots.in", "fix dashpots", "array f_dashpots"),
-    "drag": ("part drag.in",),
-    "perturbation": ("part push.in", "fix push"),
-    "signal": ("part signal.in", "fix force"),
-    "spring": ("part spring.in", "fix drive"),
-    "compensated coordinates": ("fix low", "array f_low"),
-}
-"""What each feature of a run brings, as in `everything`."""
 
 
 def contents(engine: Engine, log: Path) -> dict[str, tuple[str, ...]]:
@@ -125,57 +109,62 @@ def explain(scene: Scene) -> dict[str, Any]:
         start, step = engine.driven if "spring" in motion else engine.undamped, 1e-2 / np.sqrt(packing.law.kn)
         with start(time_step=float(step), **motion):
             loaded = contents(engine, log)
-    imported = [package for package in HEAVY if package in sys.modules]
     held = {each.partition(" (")[0] for each in everything(loaded)}
-    why, parts = reasons(packing, motion), list[dict[str, Any]]()
-    for name, brings in FEATURES.items():
-        parts.append({"name": name, "included": held.issuperset(brings), "reason": why[name], "adds": brings})
+    rows = [(name, held.issuperset(brings), why, brings) for name, (why, *brings) in features(packing, motion).items()]
     ranks, threads = MPI.COMM_WORLD.size, os.environ.get("OPENBLAS_NUM_THREADS", "as many threads as cores")
     dumped, film = (bool(getattr(scene.output, key, False)) for key in ("dumps", "trajectory"))
-    for name, included, reason, adds in (
+    rows += [
         ("dumps", dumped, f"{'' if dumped else 'no '}output.dumps", ["part write.in", "three files an equilibrium"]),
         ("trajectory", film, f"{'' if film else 'no '}output.trajectory", ["positions at each sample in run.h5"]),
         ("MPI", ranks > 1, f"{ranks} rank{'s' * (ranks > 1)}", ["messages between ranks"] * (ranks > 1)),
         ("threads", threads != "1", f"{threads} in BLAS, by OPENBLAS_NUM_THREADS; the plugin has none", []),
-    ):
-        parts.append({"name": name, "included": included, "reason": reason, "adds": adds})
-    found = {"disks": len(packing), "remark": remark, "loaded": loaded, "imported": imported, "parts": parts}
-    left_out = [package for package in HEAVY if package not in imported]
-    units = None if real is None else {"kn": scene.law.kn, "fy": scene.load.fy} | real.as_dict()
-    return found | {"left_out": left_out, "defaults": defaults, "units": units}
+    ]
+    return {
+        **{"disks": len(packing), "remark": remark, "loaded": loaded, "defaults": defaults},
+        "imported": [package for package in HEAVY if package in sys.modules],
+        "left_out": [package for package in HEAVY if package not in sys.modules],
+        "parts": [dict(zip(("name", "included", "reason", "adds"), row, strict=True)) for row in rows],
+        "units": None if real is None else {"kn": scene.law.kn, "fy": scene.load.fy} | real.as_dict(),
+    }
 
 
-def reasons(packing: Packing, motion: Mapping[str, Any]) -> dict[str, str]:
-    """Why each of `FEATURES` is in a run of a packing, or not."""
+def features(packing: Packing, motion: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+    """The features of a run of a packing: why each is in it or not, and what it brings, as in `everything`."""
     law, box, tau = packing.law, packing.box_length, packing.drag_time
     on_floor = len(np.unique(packing.contacts.i[packing.contacts.floor]))
-    signal = f"{len(motion.get('signal', ()))} rows, on the {motion.get('on')}"
+    precision = "compensated" if packing.compensated else "double"
+    smooth, signal = "" if law.frictional else ": no tangential force", motion.get("signal")
+    slips = ("part friction.in", "fix angle", "fix slips", "array f_slips", "array d_theta", "velocities of ghosts")
+    dashpots = f"cn = {law.cn:g}, ct = {law.ct:g}" if law.damped else "no cn or ct in [damping]"
+    push = f"amplitude {motion['amplitude']:g}" if "amplitude" in motion else "no amplitude in [perturb]"
+    rows = "no signal in [perturb]" if signal is None else f"{len(signal)} rows, on the {motion['on']}"
+    falls = "section [friction]" if "weakening" in motion else "no section [friction]"
+    spring = f"stiffness {motion['spring']}" if "spring" in motion else "no section [drive]"
     return {
-        "floor": f"{on_floor} of {len(packing)} disks rest on it, and nothing else bears the load",
-        "tangential history": f"mu = {law.mu:g}, kt = {law.kt:g}{'' if law.frictional else ': no tangential force'}",
-        "periodicity": "the sides are open" if box is None else f"x has the period {box:g}",
-        "dynamic friction": f"{'' if 'weakening' in motion else 'no '}section [friction]",
-        "dashpots": f"cn = {law.cn:g}, ct = {law.ct:g}" if law.damped else "no cn or ct in [damping]",
-        "drag": f"tau = {tau:g}" if tau else "no tau in [damping]",
-        "perturbation": f"amplitude {motion['amplitude']:g}" if "amplitude" in motion else "no amplitude in [perturb]",
-        "signal": signal if "signal" in motion else "no signal in [perturb]",
-        "spring": f"stiffness {motion['spring']}" if "spring" in motion else "no section [drive]",
-        "compensated coordinates": f'precision = "{"compensated" if packing.compensated else "double"}"',
+        "floor": (f"{on_floor} of {len(packing)} disks rest on it", "fix floor", "array f_floor"),
+        "tangential history": (f"mu = {law.mu:g}, kt = {law.kt:g}{smooth}", *slips),
+        "periodicity": ("the sides are open" if box is None else f"x has the period {box:g}", "periodic x"),
+        "dynamic friction": (falls, "part weaken.in", "fix weaken"),
+        "dashpots": (dashpots, "part dashpots.in", "fix dashpots", "array f_dashpots"),
+        "drag": (f"tau = {tau:g}" if tau else "no tau in [damping]", "part drag.in"),
+        "perturbation": (push, "part push.in", "fix push"),
+        "signal": (rows, "part signal.in", "fix force"),
+        "spring": (spring, "part spring.in", "fix drive"),
+        "compensated coordinates": (f'precision = "{precision}"', "fix low", "array f_low"),
     }
 
 
 def in_words(found: Mapping[str, Any]) -> list[str]:
     """Lines for a terminal: which parts are in and out, a table with the reasons, and what the run has loaded."""
     parts, loaded = found["parts"], found["loaded"]
-    names = {kind: [each["name"] for each in parts if each["included"] is kind] for kind in (True, False)}
-    inside, outside = (" and ".join(filter(None, [", ".join(each[:-1]), *each[-1:]])) for each in names.values())
+    inside, outside = ([each["name"] for each in parts if each["included"] is kind] for kind in (True, False))
     rows = [(each["name"], "in" if each["included"] else "out", each["reason"]) for each in parts]
     lists = {"deck parts": loaded["parts"], "fixes": loaded["fixes"], "computes": loaded["computes"]}
     lists |= {"per-atom arrays": loaded["arrays"], "imported": found["imported"], "not imported": found["left_out"]}
     lists |= {"by default": [f"{key} = {value}" for key, value in found["defaults"].items()]}
     return [
         *([] if found["units"] is None else [UNITS.format_map(found["units"])]),
-        f"In: {inside or 'nothing'}. Out: {outside or 'nothing'}.\n\n{found['remark']}",
+        f"In: {', '.join(inside)}. Out: {', '.join(outside)}.\n\n{found['remark']}",
         table_of(("feature", "", "because"), rows) + "\n",
         *(f"{each['name']} brings {', '.join(each['adds'])}" for each in parts if each["adds"]),
         "",

@@ -178,9 +178,7 @@ def draw_cycle_spectrum(
     force.margins(y=0.12)
     time = np.array([state["time"] for state in states])
     slipping = np.array([bool(state["slips"]) for state in states])
-    for axes, label, names in zip(
-        others, ("complex pairs", "growth rate of $D$", "lowest eigenvalue"), DRAWN, strict=True
-    ):
+    for axes, (label, names) in zip(others, DRAWN.items(), strict=True):
         for colour, (name, words) in zip(("C0", "C2", "C3"), names.items(), strict=False):
             value = np.array([state[name] for state in states], dtype=float)
             axes.plot(time, value, color=colour, linewidth=0.6, alpha=0.6)
@@ -198,11 +196,11 @@ def draw_cycle_spectrum(
     return figure
 
 
-DRAWN = (
-    {"pairs_sticking": "all sticking", "pairs_sliding": "all sliding"},
-    {"undamped_sticking": "without dissipation", "damped_sticking": "with", "damped_sliding": "with, all sliding"},
-    {"lowest_sticking": "all sticking", "lowest_sliding": "all sliding"},
-)
+DRAWN = {
+    "complex pairs": {"pairs_sticking": "all sticking", "pairs_sliding": "all sliding"},
+    "growth rate of $D$": {"undamped_sticking": "undamped", "damped_sticking": "damped", "damped_sliding": "sliding"},
+    "lowest eigenvalue": {"lowest_sticking": "all sticking", "lowest_sliding": "all sliding"},
+}
 """Numbers of states that the panels below the force show."""
 
 CYCLE_COLUMNS = (

@@ -117,14 +117,11 @@ class StartOfRun(NamedTuple):
         Its largest force on a disk: contacts that carry less do not count.
     time : float
         Length of the run at the most, time.
-    damped : bool
-        Whether the packing has dashpots or drag.
     """
 
     packing: Packing
     residual: float
     time: float
-    damped: bool = False
 
 
 def growth_rate(packing: Packing) -> float:
@@ -194,7 +191,7 @@ def erupt(start: StartOfRun) -> Row:
         ended, ends = float(time[place]), "opens" if opened else "slides" if slides else "law"
         ends = ends if over else "cut off"
     return {
-        **{"fx": packing.fx, "damped": start.damped, "rate": rate, "time": float(time[-1])},
+        **{"fx": packing.fx, "damped": packing.damped, "rate": rate, "time": float(time[-1])},
         **{name: float(np.abs(columns[name]).max()) for name in ("msd", "kinetic_energy", "slip")},
         **{name: int(columns[name].max()) for name in COUNTS},
         **{"ended": ended, "ends": "flows" if flows else ends, "noise": noise},
@@ -238,7 +235,7 @@ def _starts(scene: Scene, rest: Equilibrium, wanted: list[float], time: float) -
             free = replace(packing, law=replace(packing.law, cn=0.0, ct=0.0), drag_time=None)
             starts.append(StartOfRun(free, residual, time))
             if scene.damping is not None:
-                starts.append(StartOfRun(packing, residual, time, damped=True))
+                starts.append(StartOfRun(packing, residual, time))
     return starts, None
 
 
@@ -342,18 +339,20 @@ def eruptions(scene: Scene, work: Work) -> Result:
     With several ranks, one rank distributes the loads.
     """
     settings, rows = _section(scene), work.rows
-    wanted, time = sorted(settings.load), settings.time
+    wanted, time, flows_beyond = sorted(settings.load), settings.time, None
     kinds = (False,) if scene.damping is None else (False, True)
-    missing = [fx for fx in wanted if any(rows.find(fx=fx, longest=time, damped=kind) is None for kind in kinds)]
-    flows_beyond = None
+
+    def known(fx: float, damped: bool) -> bool:
+        return rows.find(fx=fx, longest=time, damped=damped) is not None
+
+    missing = [fx for fx in wanted if not all(known(fx, damped) for damped in kinds)]
     if missing:
-        work.say(f"{len(wanted) - len(missing)} of {len(wanted)} loads are known; ramp up to F_x = {missing[-1]:g}")
         # through the known loads as well, so that the path, and with it the last digits, is that of one run
-        rest, loads = work.start(scene.law.mus[0]), [fx for fx in wanted if fx <= missing[-1]]
-        starts, flows_beyond = _starts(scene, rest, loads, time)
-        starts = [each for each in starts if rows.find(fx=each.packing.fx, longest=time, damped=each.damped) is None]
+        loads = [fx for fx in wanted if fx <= missing[-1]]
+        starts, flows_beyond = _starts(scene, work.start(scene.law.mus[0]), loads, time)
         if flows_beyond is not None:
             work.say(f"no equilibrium beyond F_x = {flows_beyond:g}: the loads above are left out")
+        starts = [each for each in starts if not known(each.packing.fx, each.packing.damped)]
         for found in work.progress(work.map_rows(erupt, starts), len(starts)):
             rows.append(longest=time, **found)
             work.say(

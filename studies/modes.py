@@ -92,9 +92,6 @@ LABELS = {
 COLUMNS = ("disks", "seed", "fx", "fx_over_fy", "pairs", "share", "growth_rate", "omega", "least_q")
 """Of modes.csv."""
 
-PANELS = 4
-"""Loads whose frequencies are drawn side by side."""
-
 MediansOverLoad = Mapping[str, Any]
 """loads, and for each quantity a list of [median, low, high]."""
 
@@ -289,22 +286,8 @@ def draw_band(axes: Axes, loads: Sequence[float], values: Any, colour: str, labe
     axes.fill_between(loads, shown[:, 1], shown[:, 2], color=colour, alpha=0.2, linewidth=0)
 
 
-def _plane(loads: Sequence[Row]) -> Figure:
-    """Frequencies of the complex pairs in the plane of Re omega and Im omega, a panel for each of a few loads."""
-    from matplotlib.figure import Figure
-
-    figure = Figure((3.2 * len(loads), 3.2), layout="constrained")
-    for axes, load in zip(np.atleast_1d(figure.subplots(1, len(loads), sharex=True, sharey=True)), loads, strict=True):
-        axes.plot(*np.transpose(load["frequencies"]), ".", color="C3", markersize=4)
-        title = f"$F_x/F_y$ = {load['fx_over_fy']:g}: {100 * load['share']:.0f} % complex"
-        axes.set(xlabel=r"$\mathrm{Re}\,\omega$", yscale="log", title=title)
-        axes.grid(alpha=0.3)
-    figure.axes[0].set_ylabel(r"$\mathrm{Im}\,\omega$")
-    return figure
-
-
 def _gather(sweep: Sweep, rows: Sequence[Row], output: Path, say: Say) -> list[str]:
-    """modes.json, modes.csv and pictures in the folder of a sweep; the loads of the first packing in words."""
+    """modes.json, modes.csv and a picture in the folder of a sweep; the loads of the first packing in words."""
     scenes = {point.key: point.scene for point in sweep.points}
     good, lines, packings = [row for row in rows if row["says"] is None], list[Row](), list[Row]()
     for row in rows:
@@ -322,16 +305,10 @@ def _gather(sweep: Sweep, rows: Sequence[Row], output: Path, say: Say) -> list[s
         groups = {str(n): [row["result"] for row in good if row["values"].get("packing.disks") == n] for n in sizes}
         courses = {name: medians_over_load(group) for name, group in groups.items()}
         draw_all({"modes": lambda: over_load(courses)}, output, say)
-        shown = [load for load in good[0]["result"]["loads"] if load["pairs"]]
-        if shown:
-            draw_all({"plane": lambda: _plane(shown[:: -max(1, -(-len(shown) // PANELS))][::-1])}, output, say)
-        else:
-            say("the first packing has no complex pair at these loads: its plane of frequencies is not drawn")
-        first = lines[: len(good[0]["result"]["loads"])]
         formats = {"fx_over_fy": "g", "pairs": "d", "share": ".3f", "growth_rate": ".4g", "least_q": ".4g"}
+        first = lines[: len(good[0]["result"]["loads"])]
         table = [
-            ["" if line[key] is None else format(line[key], digits) for key, digits in formats.items()]
-            for line in first
+            ["" if line[k] is None else format(line[k], digits) for k, digits in formats.items()] for line in first
         ]
         says.append(table_of(("F_x/F_y", "complex pairs", "share", "growth rate of D", "least Q"), table))
     failed = [row["says"] for row in rows if row["says"] is not None]
@@ -361,8 +338,7 @@ def modes(scene: Scene, start: Start) -> Row:
     At each load of the section [modes] the command computes all eigenvalues: the
     share of complex modes, the largest growth rate, and the least Q, the quality
     factor below which dissipation stops all growth. It writes modes.json, modes.csv,
-    pictures over the load and of the plane of frequencies. For a sweep, the pictures
-    show medians over packings.
+    and a picture over the load, of a sweep with medians over packings.
 
     Of a drive.h5 the command computes the eigenvalues of each stored state, with the
     stiffness of the spring: complex pairs, growth with and without dissipation, and

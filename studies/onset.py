@@ -34,7 +34,6 @@ from ..pywrap.load_path import LoadPath
 from ..pywrap.runs.path_error import with_path_error
 from ..pywrap.runs.ramp_loads import ramp_loads
 from ..pywrap.scenes.command_sections import PATH
-from ..pywrap.scenes.validation import require_section
 from .packing_tools import Start, contact_pairs, path_from
 from .result_rows import Row
 from .study import task
@@ -48,21 +47,15 @@ about the root of this distance, so that both are accurate."""
 
 @task(reads=PATH, needs=("ramp",))
 def onset(scene: Scene, start: Start) -> Row:
-    """The first onset of a scene with one friction coefficient: `onset_row`."""
-    return onset_row(scene, start)
-
-
-def onset_row(scene: Scene, start: Start) -> Row:
     """The first onset of a scene with one friction coefficient, as a row of a table.
 
     Raises
     ------
     SceneError
-        If the scene has no section [ramp].
+        If the scene has several friction coefficients.
     NoEquilibriumError
         If the packing does not settle.
     """
-    require_section(scene.ramp, "ramp")
     if len(scene.law.mus) > 1:
         raise SceneError('a row has one friction coefficient: give the list as "law.mu" below [sweep]')
     rest = start(scene.law.mus[0])

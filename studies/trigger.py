@@ -41,8 +41,8 @@ from ..pywrap.scenes.validation import FREQUENCY, TIME, Positive, Section, requi
 from .eruptions import growth_rate
 from .onset import first_onset
 from .packing_tools import path_from
-from .result_rows import Row, Rows, row_columns
-from .study import Figures, Result, Work, study
+from .result_rows import Row, row_columns
+from .study import Result, Work, study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -223,27 +223,6 @@ def bisect_amplitude(wave: Wave) -> Row:
 WAVE = {"layer": "amplitude of the force $a$", "floor": "acceleration of the floor $a$"}
 
 
-def _map_figure(result: Result) -> Figure:
-    """The critical amplitude over frequency and distance from the onset; squares are from K, and there are circles
-    where LAMMPS was asked, in the colour of its own answer."""
-    from matplotlib.colors import LogNorm
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(3.4, 2.6), layout="constrained")
-    axes = figure.add_subplot(xscale="log", yscale="log", xlabel=r"frequency $\omega$", ylabel="$1 - F_x/F_x^c$")
-    norm = LogNorm(*np.quantile([row["predicted"] for row in result["map"]], (0, 1)))
-    runs = [row for row in result["map"] if row["measured"] is not None]
-    for rows, name, style in (
-        (result["map"], "predicted", {"marker": "s", "s": 60}),
-        (runs, "measured", {"marker": "o", "s": 22, "edgecolors": "white", "linewidths": 0.9}),
-    ):
-        across, up, amplitude = row_columns(rows, "omega", "distance", name)
-        drawn = axes.scatter(across, up, c=amplitude, norm=norm, cmap="viridis_r", **style)
-    axes.minorticks_off()
-    figure.colorbar(drawn, ax=axes).set_label(rf"{WAVE[result['on']]}$_c$ that triggers")
-    return figure
-
-
 def _threshold_figure(result: Result) -> Figure:
     """The critical amplitude over the frequency, a curve for each distance from the onset.
 
@@ -268,10 +247,6 @@ def _threshold_figure(result: Result) -> Figure:
     return figure
 
 
-def _figures(result: Result, _: Rows) -> Figures:
-    return {"map": lambda: _map_figure(result), "thresholds": lambda: _threshold_figure(result)}
-
-
 def _page(result: Result) -> Result:
     distances = []
     for distance, group in groupby(result["map"], key=lambda row: row["distance"]):
@@ -285,7 +260,7 @@ def _page(result: Result) -> Result:
     needs=("ramp", "friction"),
     section=Trigger,
     check=threshold,
-    figures=_figures,
+    figures=lambda result, rows: {"thresholds": lambda: _threshold_figure(result)},
     page=_page,
     row=True,
     counts="bisections",

@@ -25,12 +25,11 @@ from ...figures.style import INK, report_failure, save, styled
 from ...pywrap import Scene, ramp
 from ..results import AssessmentError, reason_of, write_results
 from .equilibria import onset, relaxation
-from .jacobian import jacobian
 from .study import COMPENSATED_SUFFIX, WORDS, Settings, Study
 from .time_steps import growth, trajectory
 
 STUDIES: dict[str, Callable[[Settings], Study]] = {
-    WORDS[study.__name__]["name"]: study for study in (trajectory, growth, relaxation, onset, jacobian)
+    WORDS[study.__name__]["name"]: study for study in (trajectory, growth, relaxation, onset)
 }
 """By name, in the order of the report."""
 
@@ -105,20 +104,19 @@ def machine() -> dict[str, Any]:
 def figure_of(study: Study) -> Figure:
     """Two panels that share the errors, doubly logarithmic: over wall time, and over work or the parameter.
 
-    A method in compensated arithmetic has the colour of the plain one, hollow and broken. Methods with a parameter are
-    lines through their points, where the error falls steadily; where the second panel is over the parameter, the
-    others are horizontal lines there. Theory is grey. Errors in the shade are below the reference's own error. Errors
-    of zero stand at the lower edge.
+    A method in compensated arithmetic has the colour of the plain one, hollow and broken. Methods are lines through
+    their points, where the error falls steadily. Theory is grey. Errors in the shade are below the reference's own
+    error.
     """
     figure = Figure(figsize=(6.8, 3.5), layout="constrained")
     left, right = panels = figure.subplots(1, 2, sharey=True)
-    bottom = 0.3 * min(point["error"] for point in study["points"] if point["error"] > 0)
+    bottom = 0.3 * min(point["error"] for point in study["points"])
     own, abscissa = study["reference_error"], study["abscissa"]
     methods = list(dict.fromkeys(point["method"] for point in study["points"]))
     families = list(dict.fromkeys(method.removesuffix(COMPENSATED_SUFFIX) for method in methods))
     for method in methods:
         points = [point for point in study["points"] if point["method"] == method]
-        error, careful = [max(point["error"], bottom) for point in points], method.endswith(COMPENSATED_SUFFIX)
+        error, careful = [point["error"] for point in points], method.endswith(COMPENSATED_SUFFIX)
         number = families.index(method.removesuffix(COMPENSATED_SUFFIX))
         # the first is the largest: markers that coincide are both seen
         style: dict[str, Any] = {"color": f"C{number}", "marker": "osD^vP"[number], "markersize": 6.5 - number}
@@ -126,11 +124,8 @@ def figure_of(study: Study) -> Figure:
         if len(set(np.sign(np.diff(error))) - {0.0}) > 1:
             style["linestyle"] = "none"
         left.plot([point["seconds"] for point in points], error, label=method, **style)
-        seen = [(x, e) for point, e in zip(points, error, strict=True) if (x := point[abscissa])]
-        if seen:
-            right.plot(*np.transpose(seen), **style)
-        elif abscissa == "parameter":
-            right.axhline(error[0], color=style["color"], linewidth=0.9)
+        seen = [(point[abscissa], e) for point, e in zip(points, error, strict=True) if point[abscissa]]
+        right.plot(*np.transpose(seen), **style)
     for line, dash in zip(study["theory"], ("--", ":", "-."), strict=False):
         grey: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": dash, "label": line["label"]}
         if line["parameter"]:

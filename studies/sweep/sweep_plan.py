@@ -19,7 +19,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -31,9 +30,7 @@ from typing import Any
 
 from ... import registered
 from ...pywrap import Scene, SceneError
-from ...pywrap.scenes.packing_section import GeneratedPacking
 from ...pywrap.scenes.validation import read_toml
-from ...pywrap.settling.settle import law_of, settling_units
 from .user_function import locate, user_function
 
 MOST_POINTS = 1_000_000
@@ -111,10 +108,7 @@ class Sweep:
     @classmethod
     def of_task(cls, path: Path, task: str) -> Sweep:
         """The sweep of a file that has a sweep of this task, or a scene, which is a sweep of one point."""
-        try:
-            asked = read_toml(path, "sweep").get("task")
-        except SceneError:
-            asked = None  # the reader of scenes says what is wrong
+        asked = read_toml(path, "sweep").get("task")
         if asked is None:
             return cls.from_mapping({"task": task, "scene": Scene.from_toml(path, command=task).resolved()})
         if asked != task:
@@ -127,9 +121,7 @@ class Sweep:
 
         Relative names of files count from `folder`.
         """
-        task, axes, scene = (
-            mapping.get(key, default) for key, default in (("task", None), ("sweep", {}), ("scene", {}))
-        )
+        task, axes, scene = mapping.get("task"), mapping.get("sweep", {}), mapping.get("scene", {})
         if unknown := sorted(mapping.keys() - {"task", "sweep", "scene"}):
             raise SceneError(f"{name}: {unknown[0]} is no key of a sweep: it has task, [sweep] and [scene.SECTION].")
         own = isinstance(task, str) and ":" in task
@@ -234,27 +226,23 @@ def _values(key: str, values: Any, name: str) -> list[Any]:
 
 
 def other_packings(sweep: Sweep) -> str | None:
-    """A sentence that names the swept keys by which a seed is another packing at each value; None without any.
+    """A sentence that names the swept keys by which a seed may be another packing at each value; None without any.
 
-    Settling is chaotic: it amplifies the last digit of its load and of its stiffness. A seed therefore stands for one
-    packing at one ratio of k_n to F_y alone (in any units, see
-    :func:`~faultgouge.pywrap.settling.settle.settling_units`), and a sweep over load.fy or law.kn compares packings
-    that have only their loose start in common; with `settle_friction`, so does a sweep over friction. Packings that
-    settle at a load of reference (`settle_at`) and are carried to other loads remain one packing. Stored packings have
-    no seed.
+    Settling is chaotic: it amplifies the last digit of its load and of its stiffness. A sweep over load.fy or law.kn
+    compares packings that have only their loose start in common; with `settle_friction`, so does a sweep over friction.
+    Packings that settle at a load of reference (`settle_at`) and are carried to other loads remain one packing. Stored
+    packings have no seed.
     """
-    settled = defaultdict(set)
-    keys = [name for name in sweep.names if name.split(".")[0] in ("load", "law", "units")]
-    for point in sweep.points if keys else ():
-        scene = point.scene
-        if scene is not None and isinstance(scene.packing, GeneratedPacking):
-            section, own, fy = settling_units(scene, law_of(scene, scene.law.mus[0]))
-            # without friction nothing of the law but k_n and its exponent has a part in settling
-            numbers = own if scene.packing.settle_friction else (own.kn, own.exponent)
-            settled[digest(section.model_dump())].add(digest([str(numbers), fy]))
-    if not any(len(each) > 1 for each in settled.values()):
+    packing = sweep.scene.get("packing", {})
+    at, frictional = packing.get("settle_at", {}), packing.get("settle_friction", False)
+    settles = {"load.fy": "fy" not in at, "units.overburden": "fy" not in at, "law.kn": "kn" not in at}
+    settles |= {"law.mu": frictional, "law.kt": frictional, "law.exponent": True}
+    others = "kn" not in at  # of [units], k_n follows from them
+    keys = [name for name in sweep.names if settles.get(name, name.startswith("units.") and others)]
+    if not keys or "file" in packing:
         return None
     return (
-        f"{', '.join(keys)}: settling is chaotic, so that a seed is another packing at each value, and differences "
-        "between values are those of packings, too: compare many seeds, or settle at one load with packing.settle_at"
+        f"{', '.join(keys)}: settling is chaotic, so that a seed may be another packing at each value, and "
+        "differences between values are those of packings, too: compare many seeds, or settle at one load with "
+        "packing.settle_at"
     )

@@ -8,17 +8,9 @@ import pytest
 from mpi4py import MPI
 from reference_layer import SMALL
 
-from benchmarks.parts import features, set_up
-from faultgouge.assessment.explain import (
-    FEATURES,
-    affordable,
-    contents,
-    everything,
-    explain,
-    in_words,
-    reasons,
-    run_of,
-)
+from benchmarks.parts import features as pairs_of
+from benchmarks.parts import set_up
+from faultgouge.assessment.explain import affordable, contents, everything, explain, features, in_words, run_of
 from faultgouge.pywrap import Scene, settle
 
 SCENES = files("faultgouge") / "scenes"
@@ -39,15 +31,16 @@ def test_what_is_in_and_what_is_out():
     always = {"floor", "periodicity"}
     assert inside[0] == always | {"tangential history", "dynamic friction", "perturbation"}
     assert inside[1] == always | {"signal", "dumps", "trajectory"}
-    assert {part["name"] for part in paper["parts"]} == {*FEATURES} | NOT_OF_A_RUN
-    for name in ("tangential history", "dynamic friction", "dashpots", "drag", "perturbation"):
-        assert kinds(frictionless["loaded"]).isdisjoint(FEATURES[name]), name
+    assert {part["name"] for part in paper["parts"]} >= NOT_OF_A_RUN
+    for part in frictionless["parts"]:
+        if part["name"] in ("tangential history", "dynamic friction", "dashpots", "drag", "perturbation"):
+            assert kinds(frictionless["loaded"]).isdisjoint(part["adds"]), part
     assert frictionless["loaded"]["parts"] == ("system.in", "undamped.in", "signal.in")
     assert (paper["defaults"]["friction.B"], paper["defaults"]["packing.periodic"]) == (0.2, True)
     assert not any(key == "packing.seed" or key.startswith("relax") for key in paper["defaults"])
     assert json.loads(json.dumps(paper))["loaded"]["fixes"] == list(paper["loaded"]["fixes"])
     said = "\n".join(in_words(paper))
-    assert said.startswith("In: floor, tangential history, periodicity, dynamic friction and perturbation. Out: dashp")
+    assert said.startswith("In: floor, tangential history, periodicity, dynamic friction, perturbation. Out: dashp")
     parts = "deck parts: system.in, friction.in, undamped.in, push.in, weaken.in\n"
     assert all(words in said for words in (parts, "tau in [damping]", "fix drive"))
 
@@ -67,24 +60,25 @@ def test_each_feature_brings_what_is_said_and_leaves_the_rest_to_the_bit(tmp_pat
     """Friction that could weaken and the output of contacts do not touch the motion; other features act on some disks,
     and the forces on the others are the same. Only the low parts of coordinates give other last digits."""
     packing = settle(Scene.from_toml(SCENES / "minimal.toml"), communicator=MPI.COMM_SELF).packing
+    brings = {name: set(words) for name, (_, *words) in features(packing, {}).items()}
     quiet, seen = ("dynamic friction", "dumps", "per-contact output"), set()
-    for name, without, with_it in features(packing, {}):
+    for name, without, with_it in pairs_of(packing, {}):
         logs = tmp_path / "without", tmp_path / "with"
         with (
             set_up(without[0], logs[0], **without[1]) as (one, plain),
             set_up(with_it[0], logs[1], **with_it[1]) as (two, switched),
         ):
             before, after = (kinds(contents(*each)) for each in ((one, logs[0]), (two, logs[1])))
-            if name in FEATURES:
+            if name in brings:
                 seen.add(name)
-                assert after - before == set(FEATURES[name]), name
+                assert after - before == brings[name], name
             same = one.net_force == two.net_force
             if name in quiet:
                 motion, other = plain.advance(200), switched.advance(200)
                 assert all(np.array_equal(getattr(motion, name), getattr(other, name)) for name in motion._fields)
         assert same.all() or name not in ("tangential history", "dashpots", "drag", *quiet), name
         assert same.mean() > 0.5 or name == "compensated coordinates", name
-    assert seen == set(FEATURES)
+    assert seen == set(brings)
 
 
 def test_a_driven_scene_has_its_spring(tmp_path):
@@ -92,7 +86,7 @@ def test_a_driven_scene_has_its_spring(tmp_path):
     packing = settle(scene, communicator=MPI.COMM_SELF).packing
     with set_up(packing, tmp_path / "log", **run_of(scene, packing)) as (engine, dynamics):
         still = dynamics.advance(1).position
-        assert kinds(contents(engine, tmp_path / "log")).issuperset(FEATURES["spring"])
+        why, *brings = features(packing, run_of(scene, packing))["spring"]
+        assert kinds(contents(engine, tmp_path / "log")).issuperset(brings)
     np.testing.assert_allclose(still, packing.position, atol=1e-9)  # in small steps, from rest
-    for own, why in ((run_of(scene, packing), "stiffness 10.0"), ({}, "no section [drive]")):
-        assert reasons(packing, own)["spring"] == why
+    assert (why, features(packing, {})["spring"][0]) == ("stiffness 10.0", "no section [drive]")

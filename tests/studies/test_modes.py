@@ -81,7 +81,7 @@ def test_the_command_leaves_rows_and_pictures(faultgouge, tmp_path):
     assert [row["pairs"] for row in rows] == [load["pairs"] for load in here["loads"]]
     with (tmp_path / "out/modes.csv").open() as file:
         assert [int(row["pairs"]) for row in csv.DictReader(file)] == [row["pairs"] for row in rows]
-    assert {"modes.png", "plane.png"} <= {path.name for path in (tmp_path / "out").iterdir()}
+    assert (tmp_path / "out" / "modes.png").stat().st_size > 10_000
     again = faultgouge("modes", "scene.toml", "-o", "out")
     assert "1 of 1 points are in out/results.jsonl already" in again.stderr
 

@@ -253,21 +253,19 @@ def test_an_overburden_that_varies_is_a_load_that_does():
 
 
 @pytest.mark.parametrize(
-    ("axes", "changes", "named"),
+    ("axes", "packing", "named"),
     [
         ({"load.fy": [3.0, 3.001], "packing.seed": "1:2"}, {}, "load.fy"),
         ({"law.kn": [1e5, 2e5]}, {}, "law.kn"),
         ({"law.mu": [0.5, 1.0]}, {}, None),
-        ({"law.mu": [0.5, 1.0]}, {"packing": {"settle_friction": True}}, "law.mu"),
-        ({"load.fy, packing.seed": [[3.0, 1], [4.0, 2]]}, {}, None),  # no seed has two loads
-        ({"law.kn, load.fy": [[2e5, 3.0], [4e5, 6.0]]}, {}, None),  # one packing in two units of force
+        ({"law.mu": [0.5, 1.0]}, {"settle_friction": True}, "law.mu"),
         ({"packing.seed": "1:3"}, {}, None),
-        ({"load.fy": [3.0, 3.001]}, {"packing": {"settle_at": {"fy": 3.0}}}, None),
-        ({"law.kn": [1e5, 2e5]}, {"packing": {"settle_at": {"fy": 3.0, "kn": 2e5}}}, None),
-        ({"law.kn": [1e5, 2e5]}, {"packing": {"settle_at": {"fy": 3.0}}}, "law.kn"),  # settled at each stiffness
+        ({"load.fy": [3.0, 3.001]}, {"settle_at": {"fy": 3.0}}, None),
+        ({"law.kn": [1e5, 2e5]}, {"settle_at": {"fy": 3.0, "kn": 2e5}}, None),
+        ({"law.kn": [1e5, 2e5]}, {"settle_at": {"fy": 3.0}}, "law.kn"),  # settled at each stiffness
     ],
 )
-def test_a_sweep_says_where_a_seed_is_several_packings(axes, changes, named):
-    scene = {section: values | changes.get(section, {}) for section, values in SMALL.items()}
+def test_a_sweep_says_where_a_seed_is_several_packings(axes, packing, named):
+    scene = SMALL | {"packing": SMALL["packing"] | packing}
     says = other_packings(Sweep.from_mapping({"task": "onset", "sweep": axes, "scene": scene}))
     assert says is None if named is None else says.startswith(f"{named}: settling is chaotic")

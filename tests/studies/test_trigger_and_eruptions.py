@@ -43,7 +43,7 @@ def test_prediction_is_what_lammps_bisects(tmp_path):
     assert trigger(scene, tmp_path / "out", say=id) == result
     assert (tmp_path / "out/trigger.jsonl").read_text() == lines  # nothing was computed again
     assert trigger(scene, cut_off(tmp_path, lines, "trigger.jsonl"), say=id) == result
-    assert {"map.png", "thresholds.png", "trigger.md"} <= {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"thresholds.png", "trigger.md"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 
 @pytest.mark.long

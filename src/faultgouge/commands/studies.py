@@ -140,7 +140,7 @@ def report(
     output: NewFolder = Path("report"),
     quick: Annotated[bool, Option("--quick", help="Fewer points: half a minute instead of two.")] = False,
 ) -> Results:
-    """Measure error against run time: which method to use when, for five tasks, with figures and numbers."""
+    """Measure error against run time: which method to use when, for four tasks, with figures and numbers."""
     from faultgouge.assessment.work_precision.run import report as run_studies
 
     run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
