@@ -21,11 +21,6 @@ def no_pictures(monkeypatch):
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", fails)
 
 
-@pytest.fixture
-def messages():
-    return []
-
-
 @pytest.mark.long
 def test_the_page_of_the_protocol_counts_no_windows_that_were_not_counted(tmp_path):
     """As of a packing of more than 300 disks, of which the first window alone is sought."""
@@ -57,7 +52,7 @@ def test_a_spectrum_keeps_its_eigenvalues_and_draw_its_words(
     assert "100 disks" in faultgouge_here("draw", "run.h5", code=1).stdout
 
 
-def test_a_sweep_keeps_its_rows(tmp_path, no_pictures, messages):
-    row = {"values": {"packing.seed": 1}, "result": {"ramps": [{"mu": 1.0, "reach": 0.01, "ends": "onset"}]}}
-    assert draw_sweep([row], tmp_path, messages.append) == ""
-    assert "results.png was not drawn (RuntimeError" in messages[0]
+def test_a_sweep_keeps_its_rows(tmp_path, no_pictures):
+    said, result = [], {"ramps": [{"mu": 1.0, "reach": 0.01, "ends": "onset"}]}
+    assert draw_sweep([{"values": {"packing.seed": 1}, "result": result}], tmp_path, said.append) == ""
+    assert "results.png was not drawn (RuntimeError" in said[0]

@@ -71,6 +71,13 @@ def test_a_map_is_the_same_on_two_ranks(faultgouge, tmp_path):
     assert json.loads(done.stdout) == {FORMAT_KEY: FORMAT, **one}
 
 
+def test_a_threshold_is_asked_for_before_work(tmp_path):
+    for friction, says in (({}, r"no section \[friction\]"), ({"friction": {"v_ss": 1e-6}}, "give a velocity above 0")):
+        with pytest.raises(SceneError, match=says):
+            trigger(Scene.from_mapping(SMALL | friction), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.slow
 def test_a_threshold_below_rounding_noise_gives_no_amplitude():
     """Bisected down to the noise, it was given as the wave that triggers: 3.6e-19 where linear theory had 2.3e-15."""
