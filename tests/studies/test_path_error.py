@@ -12,7 +12,7 @@ from scipy.linalg import LinAlgError
 from faultgouge.analysis import NoEquilibriumError, OnsetError, find_onset
 from faultgouge.pywrap import Engine, LoadPath, Scene, scene_path, settle
 from faultgouge.pywrap.onset import onset_run
-from faultgouge.pywrap.runs.path_error import PathError, PathErrors, squared_gap, with_path_error
+from faultgouge.pywrap.runs.path_error import PathErrors, squared_gap, with_path_error
 from faultgouge.studies.onset import onset
 from faultgouge.studies.packing_tools import contact_pairs
 
@@ -36,14 +36,6 @@ def path_of(scene, mu=None):
     start = settle(scene, mu)
     with Engine(start.packing) as engine:
         yield scene_path(engine, start, scene)
-
-
-@pytest.mark.parametrize(("coarser", "weight"), [(1.04, 3.0), (1.0025, -0.75)], ids=["doubled", "halved"])
-def test_the_correction_leads_to_the_limit_of_small_increments(coarser, weight):
-    """Onsets 1 + 0.01 (h'/h)^2 of increments h' on the ramp, with increments twice and half as large."""
-    error = PathError(coarser - 1.01, 0.0, (), weight, False, 1e-9, 1e-2)
-    assert 1.01 + error.correction == pytest.approx(1.0, abs=1e-12)
-    assert error.error >= 0.01
 
 
 @pytest.mark.long

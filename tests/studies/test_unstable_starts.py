@@ -39,7 +39,7 @@ def test_onset_counts_the_pairs_and_states_no_digits_of_zero(faultgouge_here, tm
 
 
 @pytest.mark.long
-def test_all_windows_of_each_friction_coefficient_are_where_its_ramp_has_complex_pairs(faultgouge_here, pairs):
+def test_all_windows_of_each_friction_coefficient_are_where_its_ramp_has_complex_pairs(faultgouge_here, tmp_path):
     """As many windows hold a load as LAPACK finds pairs in the equilibrium there; those of the start begin at zero."""
     pairs = pairs_at_rest()
     (tmp_path / "scene.toml").write_text(toml(UNSTABLE))
