@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats, derive_frozen
 from ..counted import counted
+from ..fields_by_name import FieldsByName
 from ..has_configuration import HasConfiguration
 from ..operators.asymmetry import asymmetry
 from ..operators.sliders import with_sticking_contacts
@@ -38,7 +39,7 @@ from .pushes import PUSHES, follow_creep, follow_pushes
 from .reach import change_of_growing, reach_of
 from .rising_load import NotFollowedError, motion_under_load, static_response
 from .spectrum import Spectrum, spectrum
-from .verdict import Stability, WithoutDissipation
+from .verdict import Stability
 
 LARGE = 6000
 """Coordinates beyond which one push and its opposite stand for several, and K's spectrum is not computed."""
@@ -119,7 +120,7 @@ def stability(
     return follow(found) if follow is not None and found.stable is False else found
 
 
-def _linear_motion(motion: Motion, known: Spectrum | None, time: float | None) -> tuple[WithoutDissipation, Linear]:
+def _linear_motion(motion: Motion, known: Spectrum | None, time: float | None) -> tuple[FieldsByName, Linear]:
     """Of sticking contacts: what grows without dissipation, and with it. K's spectrum decides where there is none."""
     c, damped = motion.configuration, motion.configuration.damped
     if known is None and c.coordinates <= (2000 if damped else LARGE):
@@ -127,9 +128,11 @@ def _linear_motion(motion: Motion, known: Spectrum | None, time: float | None) -
     if known is None:
         alone = Motion.of(c, dissipation=False) if damped else motion
         sticking = linear_verdict(alone, decides=not damped, time=time)
-        undamped = WithoutDissipation(max(sticking.growth_rate, 0.0), None, None, sticking.at_least)
+        counts = {"pairs": None, "negative": None, "at_least": sticking.at_least}
+        undamped = FieldsByName(growth_rate=max(sticking.growth_rate, 0.0), **counts)
     else:
-        undamped = WithoutDissipation(known.growth_rate(), len(known.pairs), len(known.negative))
+        counts = {"pairs": len(known.pairs), "negative": len(known.negative), "at_least": False}
+        undamped = FieldsByName(growth_rate=known.growth_rate(), **counts)
         roots = 1j * np.sqrt(known.unstable.astype(complex))
         s = complex(max(np.where(roots.real < 0, -roots, roots), key=np.real, default=0j))
         sticking = Linear(not len(roots), undamped.growth_rate, 0.0, known.free, s)

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from ..counted import counted
+from ..fields_by_name import FieldsByName
 from .eigenvalues import Linear, exponential
 from .one_sided import PUSH_OVER_RESIDUAL
-from .pushes import Creep, OneSidedOutcome
-from .rising_load import RisingMotion
+from .rising_load import HALVES_DIFFERENCE, VIBRATION_SHARE
 
 WORN = "contacts bear less after they have closed and parted, so that vibration carries particles on"
 """The sentence on contacts with two derivatives."""
@@ -20,26 +20,6 @@ ENDS = {"vibrates": "vibrates at", "creeps": "creeps on, at", "flows": "flows, a
 
 class NoVerdictError(ValueError):
     """Truth was asked of a verdict that is not known."""
-
-
-@dataclass(frozen=True)
-class WithoutDissipation:
-    """The motion without dissipation, of sticking contacts: the eigenvalues of K.
-
-    Attributes
-    ----------
-    growth_rate : float
-        Of D, 1 / time.
-    pairs, negative : int or None
-        Complex pairs, and negative eigenvalues; of large packings these are not counted.
-    at_least : bool
-        Whether the growth rate is only known to be no less.
-    """
-
-    growth_rate: float
-    pairs: int | None
-    negative: int | None
-    at_least: bool = False
 
 
 @dataclass(frozen=True)
@@ -55,8 +35,9 @@ class Stability:
         for rounding. Where contacts at the bound make the packing grow, the rate of the one-sided motion.
     at_least : bool
         Whether the growth rate is only known to be no less.
-    undamped : WithoutDissipation
-        Without dissipation.
+    undamped : FieldsByName
+        Without dissipation, of sticking contacts: `growth_rate` of D, 1 / time, `at_least` that or known; and how many
+        complex `pairs` and `negative` eigenvalues K has, None where these are not counted.
     at_bound : int
         Contacts at Coulomb's bound.
     rolling_at_bound : int
@@ -71,11 +52,12 @@ class Stability:
         Motions that no force opposes.
     contacts : int
         Number of contacts; where K is given, and walls hand out no contacts, of particles that feel something.
-    one_sided : OneSidedOutcome or None
-        What became of motion after pushes; None without contacts that slide on one side. Its fields have two spellings,
-        `one_sided.grows` and `one_sided["grows"]`, as JSON has them; those of `creep` and `rising` have, too.
-    creep : Creep or None
-        How far a push carries particles if contacts have two derivatives, and none is at the bound.
+    one_sided : FieldsByName or None
+        What became of motion after pushes (:func:`~faultgouge.analysis.motion.pushes.follow_pushes`); None without
+        contacts that slide on one side. Its numbers have two spellings, `one_sided.grows` and `one_sided["grows"]`.
+    creep : FieldsByName or None
+        How far a push carries particles if contacts have two derivatives, and none is at the bound
+        (:func:`~faultgouge.analysis.motion.pushes.follow_creep`).
     largest_energy, largest_push : float or None
         Where linear motion does not grow, and no contact slides on one side: energy of a push below which no contact
         changes, whatever the push; and the velocity of one particle, whichever it is, with that energy: that of the
@@ -89,8 +71,10 @@ class Stability:
     follow : dict or None
         Where motion grows, and LAMMPS went on: "displacement", the root of D where it ends, and "ends", "vibrates",
         "creeps" or "flows".
-    rising : RisingMotion or None
-        Drift and vibration over the rate of loading. None unless asked, and where the motion was `not_followed`.
+    rising : FieldsByName or None
+        Drift and vibration over the rate of loading
+        (:func:`~faultgouge.analysis.motion.rising_load.motion_under_load`). None unless asked, and where the motion was
+        `not_followed`.
     reasons : tuple of str
         Why the verdict is unknown.
     not_followed : str
@@ -103,7 +87,7 @@ class Stability:
     growth_rate: float
     error: float
     at_least: bool
-    undamped: WithoutDissipation
+    undamped: FieldsByName
     at_bound: int
     sticking: Linear
     sliding: Linear
@@ -111,8 +95,8 @@ class Stability:
     dissipative: bool
     free: int
     contacts: int
-    one_sided: OneSidedOutcome | None = None
-    creep: Creep | None = None
+    one_sided: FieldsByName | None = None
+    creep: FieldsByName | None = None
     rolling_at_bound: int = 0
     largest_energy: float | None = None
     largest_push: float | None = None
@@ -120,7 +104,7 @@ class Stability:
     residual_push: float = 0.0
     first_change: float | None = None
     follow: dict[str, Any] | None = None
-    rising: RisingMotion | None = None
+    rising: FieldsByName | None = None
     reasons: tuple[str, ...] = ()
     not_followed: str = ""
     remarks: tuple[str, ...] = ()
@@ -255,25 +239,29 @@ class Stability:
             yield f"LAMMPS goes on from there, and {ends} a displacement of {size:.2g}"
         if self.not_followed:
             yield f"under a load that rises: not followed, since {self.not_followed}"
-        if self.rising is not None:
-            other, least, change = self.rising.other_start, self.rising.least_rise, self.rising.next_change
-            differs = other is not None and not self.rising.vibrates_like(other)
-            says = f"{self.rising}, and from another start {other}" if differs else str(self.rising)
+        if (rising := self.rising) is not None:
+            other, least, change = rising.other_start, rising.least_rise, rising.next_change
+            says = _drift(rising)
+            if other is not None:
+                less, more = sorted((rising.vibration, other.vibration))
+                alike = more - less <= HALVES_DIFFERENCE * more or more <= VIBRATION_SHARE * rising.drift
+                if not alike or rising.steady is not other.steady:
+                    says += f", and from another start {_drift(other)}"
             slide = "all contacts at the bound have reached it and " if self.one_sided is not None else ""
             since = f"; from a rise of {least:.1g} on, where {slide}residual forces do not count" if least else ""
-            event = f" (a contact {self.rising.next_event})"
-            until = "" if change is None else f"; until the load has risen by {change:.2g}{event}"
+            until = f"; until the load has risen by {change:.2g} (a contact {rising.next_event})" if change else ""
             yield f"under a load that rises at the rate 1: {says}{since}{until}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
-        found = {name: value for name, value in vars(self).items() if name not in ("dissipative", "contacts")}
-        for name in ("one_sided", "creep", "rising"):
-            found[name] = None if found[name] is None else found[name].as_dict()
-        for name in ("sticking", "sliding"):
-            found[name] = {key: value for key, value in asdict(found[name]).items() if key != "s"}
+        found: dict[str, Any] = {}
+        for name, value in vars(self).items():
+            if isinstance(value, Linear):
+                found[name] = {key: each for key, each in asdict(value).items() if key != "s"}
+            elif name not in ("dissipative", "contacts"):
+                found[name] = value.as_dict() if isinstance(value, FieldsByName) else value
         found |= {name: list(found[name]) for name in ("reasons", "remarks")}
-        return found | {"undamped": vars(self.undamped), "searched": self.sticking.searched}
+        return found | {"searched": self.sticking.searched}
 
 
 def _neighbour(linear: Linear) -> str:
@@ -283,6 +271,13 @@ def _neighbour(linear: Linear) -> str:
     if linear.growth_rate == 0:
         return "D neither grows nor decays"
     return exponential(linear.growth_rate, 4, linear.at_least)
+
+
+def _drift(found: FieldsByName) -> str:
+    """Drift and vibration of one start."""
+    errors = [f" \u00b1 {error:.1g}" if error else "" for error in (found.drift_error, found.vibration_error)]
+    known = f"drift {found.drift:.3g}{errors[0]}, vibration {found.vibration:.3g}{errors[1]}"
+    return known + ("" if found.steady else ", not steady yet")
 
 
 def as_known(least: float, most: float) -> str:
