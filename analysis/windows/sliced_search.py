@@ -13,14 +13,12 @@ contacts open, close or slide. What is announced is then not there, or elsewhere
 finest parts that are still in doubt are named with the result. Strong dashpots couple more motions than a slice can
 hold: all loads before the window are then named.
 
-The eigenvectors of slices take most of the time, and one slice needs nothing of another: ranks and searches that name
-the same folder share them (:mod:`~faultgouge.analysis.windows.slices`).
+The eigenvectors of slices take most of the time, and one slice needs nothing of another: ranks share them
+(:mod:`~faultgouge.analysis.windows.slices`).
 """
 
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
-from itertools import pairwise
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import NoReturn
 
@@ -37,8 +35,18 @@ from .motions import Motions, System
 from .onset import Increments, Window
 from .quiet import Quiet
 from .search import Search
-from .slices import ALONE, LIMITS, Limits, Ranks, slices
-from .store import NEW_PASS, Candidate, SlicePass, SliceResult, pass_folder
+from .slices import (
+    ALONE,
+    LIMITS,
+    Candidate,
+    Limits,
+    Ranks,
+    SliceResult,
+    keep_result,
+    kept_results,
+    results_folder,
+    slices,
+)
 
 
 class LostPairError(FaultgougeError):
@@ -126,8 +134,6 @@ class SlicedSearch:
                 return window
         return None
 
-    # What the system itself has
-
     def _earliest(
         self, candidates: list[Candidate], here: System, there: System, finest: bool
     ) -> tuple[Window | None, bool]:
@@ -196,51 +202,40 @@ class SlicedSearch:
         *_, (_, found) = search.along(np.array([here.fx, *inside, there.fx]))
         return found
 
-    # What slices announce
-
     def _announced(self, places: Sequence[System]) -> list[Candidate]:
-        """The motions that slices announce, of all ranks and searches."""
-        first, stop = self._range(places[0])
-        while True:
-            stored = self.ranks.together(lambda: self._stored(places) if self.ranks.rank == 0 else NEW_PASS)[0]
-            fresh = self.ranks.together(partial(self._search_slices, places, stored))
-            every = (*stored.found, *(each for one in fresh for each in one))
-            found = sorted(every, key=lambda each: each.border.modes)
-            if stored.folder is None or sum(each.border.size for each in found) == stop - first:
-                break
-            if not any(fresh):
-                time.sleep(self.limits.wait_seconds)
-        self.crowded = self.crowded or any(each.crowded for each in found)
-        return [candidate for each in found for candidate in each.candidates]
-
-    def _stored(self, places: Sequence[System]) -> SlicePass:
-        """Results that other searches have left; none if bases are kept, since later increments need them."""
-        if self.folder is None or self._keeps(places[0]):
-            return NEW_PASS
-        return SlicePass.read(pass_folder(self.folder, places, self._range(places[0]), self.limits))
-
-    def _search_slices(self, places: Sequence[System], stored: SlicePass) -> list[SliceResult]:
-        """Results of this rank's slices, without the slices that are stored."""
-        found: list[SliceResult] = []
-        first, stop = self._range(places[0])
-        before = sum(each.size for each in stored.borders)
-        done, wanted = (-(-modes // self.ranks.size) for modes in (before, stop - first))
+        """The motions that slices announce, of all ranks, and those that a search that was cut off has left."""
+        first, stop = modes = self._range(places[0])
+        folder = None
+        if self.folder is not None and not self._keeps(places[0]):  # later increments need bases that are kept
+            folder = results_folder(self.folder, places, modes, self.limits)
+        root = self.ranks.rank == 0
+        stored = self.ranks.together(lambda: kept_results(folder) if folder is not None and root else [])[0]
+        before = sum(each.border.size for each in stored)
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
-        known = f"{before} of {stop - first} modes are known" if stored.shifts else "modes are counted"
-        report_progress(f"{where}: {known}")
-        failure: FaultgougeError | None = None
-        for basis in self._bases(places[0], stored):
-            done += basis.own.stop - basis.own.start
-            report_progress(f"{where}: {min(done, wanted)} of {wanted} modes")
-            try:
-                found.append(self._search_slice(basis, places))
-            except FaultgougeError as error:
-                failure = failure or error  # it waits: the ranks meet at the end of their bases
-                continue
-            stored.keep(found[-1])
-        if failure is not None:
-            raise failure
-        return found
+        report_progress(f"{where}: {before} of {stop - first} modes are known")
+
+        def search_slices() -> list[SliceResult]:
+            """Those of this rank."""
+            found: list[SliceResult] = []
+            done, wanted = (-(-count // self.ranks.size) for count in (before, stop - first))
+            failure: FaultgougeError | None = None
+            for basis in self._bases(places[0], stored):
+                done += basis.own.stop - basis.own.start
+                report_progress(f"{where}: {min(done, wanted)} of {wanted} modes")
+                try:
+                    found.append(self._search_slice(basis, places))
+                except FaultgougeError as error:
+                    failure = failure or error  # it waits: the ranks meet at the end of their bases
+                    continue
+                if folder is not None:
+                    keep_result(folder, found[-1])
+            if failure is not None:
+                raise failure
+            return found
+
+        every = sorted(chain(stored, *self.ranks.together(search_slices)), key=lambda each: each.border.modes)
+        self.crowded = self.crowded or any(each.crowded for each in every)
+        return [candidate for each in every for candidate in each.candidates]
 
     def _search_slice(self, basis: Slice, places: Sequence[System]) -> SliceResult:
         """The windows of the small families between the loads, of one slice's own motions."""
@@ -274,8 +269,6 @@ class SlicedSearch:
                     found.append(Candidate(k, window.fx_onset, inside, complex(state.values[j]), complex(slope)))
         return SliceResult(basis.border, found, quiet.crowded)
 
-    # Bases
-
     def _range(self, place: System) -> tuple[int, int]:
         """Numbers of the first mode that is looked at and of the first that is not; ValueError if there are none."""
         count = len(place.active)
@@ -290,27 +283,26 @@ class SlicedSearch:
         margins = 2 * self.limits.margin * max(1, round((stop - first) / self.limits.slice_size))
         return (stop - first + margins) * len(place.active) <= self.limits.largest_basis
 
-    def _bases(self, place: System, stored: SlicePass) -> Iterable[Slice]:
+    def _bases(self, place: System, stored: Sequence[SliceResult]) -> Iterator[Slice]:
         """The bases of this rank's slices; those of an earlier load as long as those of all ranks serve."""
         mine = [_mixing(each, place) for each in self._kept]
         mixing = [each for one in self.ranks.together(lambda: mine) for each in one]
         if mixing and max(mixing) < np.inf and np.median(mixing) < self.limits.mixing:
-            return self._kept
-        self._kept = []  # its memory is free before that for the next ones is taken
-        bases: Iterable[Slice] = self._new_bases(place, stored)
-        if self._keeps(place):
-            bases = self._kept = list(bases)
-        return bases
-
-    def _new_bases(self, place: System, stored: SlicePass) -> Iterator[Slice]:
-        """The bases of slices of the spectrum; a small operator has one, which the first rank makes."""
+            yield from self._kept
+            return
+        self._kept, keeps = [], self._keeps(place)  # its memory is free before that for the next ones is taken
         matrix = csr_array(place.inner[0])
         symmetric, wanted = csc_array(0.5 * (matrix + matrix.T)), self._range(place)
+        bases: Iterator[Slice] = iter(())
         if len(place.active) > self.limits.one_basis:
-            yield from slices(symmetric, self.limits.margin, wanted, self.limits, ranks=self.ranks, stored=stored)
-        elif self.ranks.rank == 0 and not stored.found:
+            borders = [each.border for each in stored]
+            bases = slices(symmetric, self.limits.margin, wanted, self.limits, ranks=self.ranks, known=borders)
+        elif self.ranks.rank == 0 and not stored:  # a small operator has one
             values, vectors = eigh(symmetric.toarray(), driver="evd", overwrite_a=True, check_finite=False)
-            yield Slice(0, values, vectors, slice(*wanted))
+            bases = iter([Slice(0, values, vectors, slice(*wanted))])
+        if keeps:
+            self._kept = list(bases)
+        yield from self._kept if keeps else bases
 
 
 def reduce_system(vectors: Floats, system: System, active: Indices) -> list[Floats]:

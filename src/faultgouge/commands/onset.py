@@ -17,10 +17,6 @@ if TYPE_CHECKING:
     from ..analysis import Onset
     from ..pywrap import Scene
 
-OF_SLICES = (
-    "Folder for the results of a long search, which continues from the results there. Jobs that name the same folder "
-    "share the search. By default -o FILE has its own folder until the search is done."
-)
 OF_MODES = (
     "Search only these modes, counted by frequency from 0, since all modes of 100,000 disks take hours. 0:600 are the "
     "600 lowest."
@@ -42,7 +38,6 @@ def onset(
         Option("-o", "--output", help="Also write the JSON to this file; a long interrupted search continues."),
     ] = None,
     modes: Annotated[str | None, Option(metavar="FIRST:STOP", help=OF_MODES)] = None,
-    slices: Annotated[Path | None, Option(metavar="FOLDER", help=OF_SLICES)] = None,
     every: Annotated[
         bool, Option("--all", help="All windows up to ramp.until, of up to 300 disks; takes longer.")
     ] = False,
@@ -56,15 +51,12 @@ def onset(
     are named; the exit code is 1 if none has one.
     """
     from faultgouge.analysis import NoEquilibriumError, OnsetError
-    from faultgouge.analysis.files.atomic_write import make_folder
-    from faultgouge.analysis.windows.store import remove_passes
+    from faultgouge.analysis.windows.slices import remove_results
     from faultgouge.pywrap.settling.settle import shared_bed
 
     part = _checked_modes(scene, modes, every)
     # a long search leaves what it finds beside its file, unless that is a device
     folder = Path(f"{output}.slices") if output and (output.is_file() or not output.exists()) else None
-    if slices:
-        make_folder(folder := slices)
     with working("settling"):
         bed = shared_bed(scene)
     found: list[dict[str, Any]] = []
@@ -89,8 +81,8 @@ def onset(
     if failed is None or any("undamped" in each for each in found):
         yield f'law of friction: {scene.law.in_words} (history = "{scene.law.history}")'
         yield _document(output, found)
-        if is_root() and folder is not None and not slices:
-            remove_passes(folder)  # the result is there
+        if is_root() and folder is not None:
+            remove_results(folder)  # the result is there
     if failed is not None:
         raise failed
 

@@ -12,7 +12,6 @@ from tiling import tile
 from faultgouge.analysis import FaultgougeError, NoEquilibriumError, OnsetError, complex_windows, find_onset
 from faultgouge.analysis.windows import LIMITS, Limits, System, full_operator
 from faultgouge.analysis.windows.sliced_search import SlicedSearch
-from faultgouge.analysis.windows.store import NEW_PASS
 
 
 def searched(operator, loads, limits=LIMITS):
@@ -124,7 +123,7 @@ def test_basis_is_given_up_where_modes_mix_or_disks_move_in(path):
     search = SlicedSearch(lambda fx: None)
 
     def basis(operator):
-        (part,) = search._bases(System(0.0, operator), NEW_PASS)
+        (part,) = search._bases(System(0.0, operator), [])
         return part
 
     first = basis(matrix)
