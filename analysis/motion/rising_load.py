@@ -131,7 +131,7 @@ def motion_under_load(
     velocity = _steady_velocity(system, load, free) if decays and not len(system.missing) else None
     if velocity is None:
         span, found = _followed(system, load, time)
-        velocity, paths, slid = (each[:, :1] / span[0] for each in span[1:4])
+        velocity, paths, slid = (np.asarray(each)[:, :1] / span[0] for each in span[1:4])
     else:
         paths, slid = np.abs(system.rates @ velocity), np.zeros((0, 1))
         found = {"drift": float(np.sqrt(np.mean(system.displacement(velocity) ** 2))), "drift_error": 0.0}

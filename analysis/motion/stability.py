@@ -128,14 +128,13 @@ def _linear_motion(motion: Motion, known: Spectrum | None, time: float | None) -
     if known is None:
         alone = Motion.of(c, dissipation=False) if damped else motion
         sticking = linear_verdict(alone, decides=not damped, time=time)
-        counts = {"pairs": None, "negative": None, "at_least": sticking.at_least}
-        undamped = FieldsByName(growth_rate=max(sticking.growth_rate, 0.0), **counts)
+        rate, pairs, negative, at_least = max(sticking.growth_rate, 0.0), None, None, sticking.at_least
     else:
-        counts = {"pairs": len(known.pairs), "negative": len(known.negative), "at_least": False}
-        undamped = FieldsByName(growth_rate=known.growth_rate(), **counts)
+        rate, pairs, negative, at_least = known.growth_rate(), len(known.pairs), len(known.negative), False
         roots = 1j * np.sqrt(known.unstable.astype(complex))
         s = complex(max(np.where(roots.real < 0, -roots, roots), key=np.real, default=0j))
-        sticking = Linear(not len(roots), undamped.growth_rate, 0.0, known.free, s)
+        sticking = Linear(not len(roots), rate, 0.0, known.free, s)
+    undamped = FieldsByName(growth_rate=rate, pairs=pairs, negative=negative, at_least=at_least)
     return undamped, linear_verdict(motion, time=time) if damped else sticking
 
 

@@ -18,6 +18,7 @@ The eigenvectors of slices take most of the time, and one slice needs nothing of
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import NoReturn
@@ -65,13 +66,9 @@ class SlicedSearch:
     """
 
     def __init__(
-        self,
-        at: Callable[[float], System],
-        modes: tuple[int, int] | None = None,
-        ranks: Ranks = ALONE,
-        folder: Path | None = None,
-        limits: Limits = LIMITS,
-    ) -> None:
+        self, at: Callable[[float], System], modes: tuple[int, int] | None = None, ranks: Ranks = ALONE,
+        folder: Path | None = None, limits: Limits = LIMITS,
+    ) -> None:  # fmt: skip
         self.at, self.modes, self.ranks, self.folder, self.limits = at, modes, ranks, folder, limits
         self.doubtful: list[tuple[float, float]] = []
         self.passed: list[System] = []
@@ -122,10 +119,8 @@ class SlicedSearch:
             parts: list[System] = []
             if doubt and depth < self.limits.depth:
                 inside = here.fx + (there.fx - here.fx) * np.arange(1, self.limits.parts) / self.limits.parts
-                try:
+                with suppress(NoEquilibriumError):  # one of the parts has no equilibrium at its end
                     parts = [self.at(float(load)) for load in inside]
-                except NoEquilibriumError:  # one of the parts has no equilibrium at its end
-                    parts = []
             if parts:
                 window = self._walk([here, *parts, there], depth + 1) or window
             elif doubt:
@@ -177,12 +172,15 @@ class SlicedSearch:
         """The windows of the few motions next to an announced one."""
         known = {each.fx: each for each in (here, there)}
 
-        def motions(system: System) -> Motions:
-            value = candidate.value + candidate.slope * (system.fx - candidate.inside)
+        def few(*systems: System) -> tuple[Motions, Motions]:
+            values = [candidate.value + candidate.slope * (each.fx - candidate.inside) for each in systems]
+            if here.damping is None:
+                values = [each.real for each in values]
             try:
-                return Motions.near(system, [(value.real if system.damping is None else value, 10)])
+                below, above = (Motions.near(*each) for each in zip(systems, [[(v, 10)] for v in values], strict=True))
             except LinAlgError:
                 raise DoubtError from None
+            return below, above
 
         def lost(system: System) -> NoReturn:
             pair = f"the pair of eigenvalues about {candidate.value.real:.6g}"
@@ -193,10 +191,6 @@ class SlicedSearch:
             )
 
         narrowest = 1e-7 * max(abs(here.fx), abs(there.fx))
-
-        def few(below: System, above: System) -> tuple[Motions, Motions]:
-            return motions(below), motions(above)
-
         search = Search(lambda fx: known.get(fx) or self.at(fx), narrowest, few, decompose=lost)
         inside = [candidate.inside] if here.fx < candidate.inside < there.fx else []
         *_, (_, found) = search.along(np.array([here.fx, *inside, there.fx]))
