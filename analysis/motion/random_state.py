@@ -191,12 +191,7 @@ def fastest_growing(
 
 
 def follow_decay(
-    motion: Motion,
-    kept: csr_array,
-    why: str,
-    time: float | None = None,
-    searched: float = np.inf,
-    work: float = 2e11,
+    motion: Motion, kept: csr_array, why: str, time: float | None = None, searched: float = np.inf, work: float = 2e11
 ) -> Linear:
     """Follow the motion from a random state until it has decayed, or grows.
 

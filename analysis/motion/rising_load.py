@@ -212,8 +212,13 @@ def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple
         report_progress(f"under the rising load: t = {now:.4g}, vibration {seen:.3g}")
         if not seen < 1e12 * means_of_windows(system, windows[:1]).max():
             raise NotFollowedError(f"the motion grows without end: within t = {now:.4g} by 1e12")
-        if time is None and 2 * len(windows) >= most and all(map(_vibrates, _of_starts(system, windows)[1])):
-            break
+        if time is None and 2 * len(windows) >= most:
+            known = [
+                each.steady and each.vibration > VIBRATION_SHARE * each.drift and each.vibration_error is not None
+                and each.vibration_error <= 0.1 * each.vibration for each in _of_starts(system, windows)[1]
+            ]  # fmt: skip
+            if all(known):
+                break
     after = windows[FADE_WINDOWS:] or windows
     quarters = _in_parts(system, after)[0, 3:, 0]
     # the middles of two quarters; of particles whose dashpots alone bear the load the mean velocity rises as the time,
@@ -228,12 +233,6 @@ def _followed(system: OneSidedSystem, load: Floats, time: float | None) -> tuple
     span, (one, *others) = _of_starts(system, windows)
     whole: Window = tuple(sum(each) for each in zip(*span, strict=True))
     return whole, {**one, "time": now, "span": whole[0], "other_start": others[0] if others else None}
-
-
-def _vibrates(found: FieldsByName) -> bool:
-    """Whether a motion vibrates steadily, with a vibration that is known to a tenth."""
-    precise = found.vibration_error is not None and found.vibration_error <= 0.1 * found.vibration
-    return bool(found.steady and found.vibration > VIBRATION_SHARE * found.drift and precise)
 
 
 def windows_under_load(system: OneSidedSystem, load: Floats, length: float) -> Iterator[Window]:
@@ -258,20 +257,18 @@ def windows_under_load(system: OneSidedSystem, load: Floats, length: float) -> I
         drag = np.hstack([drag, ~spins])
     starts = drag.shape[1]
     state, load = system.start(np.zeros((c.coordinates, starts))), np.repeat(load, starts, axis=1)
+    samples, velocities = 400, np.zeros((2, len(c), c.dimension, starts))
     for number in count():
         begin = [each.copy() for each in (state.z, state.r, state.p)]
-        velocities, squares = np.zeros((2, *system.displacement(state.z).shape))
-        samples = 400
-        for sample in range(samples):
-            now = number + (sample + 1) / samples
+        velocities[:] = 0.0
+        for sample in range(1, samples + 1):
+            now = number + sample / samples
             system.advance(state, length * now, LOAD_STEP, load)
             state.v *= np.exp(-DRAG / samples * max(0.0, 1 - now / FADE_WINDOWS) ** 2 * drag)
             velocity = system.displacement(state.v)
-            velocities += velocity
-            squares += velocity**2
-        share = length / samples
+            velocities += np.array([velocity, velocity**2])
         moved = [after - before for after, before in zip((state.z, state.r, state.p), begin, strict=True)]
-        yield (length, *moved, share * velocities, share * squares)
+        yield (length, *moved, *(length / samples * velocities))
 
 
 def means_of_windows(system: OneSidedSystem, windows: list[Window]) -> Floats:
@@ -297,11 +294,12 @@ def _of_starts(system: OneSidedSystem, windows: list[Window]) -> tuple[list[Wind
                 and vibration <= 2 * VIBRATION_SHARE * drift
             )
             # of the mean of four, doubled, since quarters of a slow cycle are not independent
-            spread = np.hypot(parts[3:].std(axis=0, ddof=1), 0.02 * parts[0]).tolist()  # and of time steps
-            errors = spread if np.all(np.isfinite(parts)) else [None, None]
-            numbers = {"drift": float(drift), "drift_error": errors[0]}
-            numbers |= {"vibration": float(vibration), "vibration_error": errors[1]}
-            found.append(FieldsByName(**numbers, steady=bool(alike or vanishes)))
+            spread = np.hypot(parts[3:].std(axis=0, ddof=1), 0.02 * parts[0])  # and of time steps
+            drift_error, vibration_error = spread.tolist() if np.all(np.isfinite(parts)) else (None, None)
+            found.append(FieldsByName(
+                drift=float(drift), drift_error=drift_error, vibration=float(vibration),
+                vibration_error=vibration_error, steady=bool(alike or vanishes),
+            ))  # fmt: skip
         if all(each.steady for each in found):
             break
     return span, found
@@ -309,11 +307,8 @@ def _of_starts(system: OneSidedSystem, windows: list[Window]) -> tuple[list[Wind
 
 def _in_parts(system: OneSidedSystem, span: list[Window]) -> Floats:
     """Drift and vibration of a span, its two halves and its four quarters, shape (S, 7, 2); nan of too few windows."""
-    size = len(span)
-    edges = [0, size // 4, size // 2, 3 * size // 4, size]
-    slices = [(0, 4), (0, 2), (2, 4), *((k, k + 1) for k in range(4))]
-    if size < 8:  # too few to compare parts
-        slices = slices[:1]
+    edges = [k * len(span) // 4 for k in range(5)]
+    slices = [(0, 4), (0, 2), (2, 4), *((k, k + 1) for k in range(4))][: 7 if len(span) >= 8 else 1]
     parts = np.array([means_of_windows(system, span[edges[a] : edges[b]]) for a, b in slices])
     return np.pad(parts, ((0, 7 - len(parts)), (0, 0), (0, 0)), constant_values=np.nan).transpose(2, 0, 1)
 

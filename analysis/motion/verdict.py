@@ -123,11 +123,10 @@ class Stability:
     @property
     def sentences(self) -> tuple[str, ...]:
         """The verdict, what holds without dissipation, what contacts at the bound do, and remarks on the origin."""
-        parts = self._at_rest(), self._range(), self._beyond()
-        return (self._verdict(), *(each for part in parts for each in part), *self.remarks)
+        return (self._verdict(), *self._at_rest(), *self._range(), *self._beyond(), *self.remarks)
 
     def _verdict(self) -> str:
-        outcome = self.one_sided
+        outcome, said = self.one_sided, self.sticking.said
         free = f", except for {counted(self.free, 'motion')} that no force opposes" if self.free else ""
         rate = exponential(self.growth_rate, _digits(self.growth_rate, self.error), self.at_least)
         if not self.contacts:
@@ -139,13 +138,14 @@ class Stability:
         if outcome is not None:
             left = f", where {outcome.slip_left:.1%} of their slip is left" if outcome.slip_left else ""
             ends = "comes to rest" if self.growth_rate < 0 else "ends in vibration that goes on, but does not grow"
-            known = f"; with sticking contacts, {self.sticking.said}" if self.sticking.said else ""
             size = as_known(outcome.least_amplification, outcome.amplification)
-            while_sliding = f"while contacts slide (followed for t = {outcome.time:.4g}{left})"
-            reaches = f"D reaches {size} times the mean square velocity of the push {while_sliding}"
-            return f"stable: each of {outcome.pushes} pushes {ends}{free}; {reaches}{known}"
-        if self.sticking.said:
-            return f"stable: {self.sticking.said}{free}"
+            return (
+                f"stable: each of {outcome.pushes} pushes {ends}{free}; D reaches {size} times the mean square "
+                f"velocity of the push while contacts slide (followed for t = {outcome.time:.4g}{left})"
+                + (f"; with sticking contacts, {said}" if said else "")
+            )
+        if said:
+            return f"stable: {said}{free}"
         if self.dissipative and self.growth_rate < 0:
             return f"stable: every {'vibration' if self.creep else 'motion'} decays, the slowest with {rate}{free}"
         if self.creep and not self.dissipative:
@@ -154,15 +154,15 @@ class Stability:
 
     def _at_rest(self) -> Iterator[str]:
         """Without dissipation, with contacts at the bound, and with those that vibration wears down."""
-        u, sided = self.undamped, self.one_sided is not None or self.sliding != self.sticking
+        u, creep, sided = self.undamped, self.creep, self.one_sided is not None or self.sliding != self.sticking
         if self.dissipative and u.growth_rate > 0:
             counts = {"complex pair": u.pairs, "negative eigenvalue": u.negative}
             what = " and ".join(counted(count, name) for name, count in counts.items() if count)
             yield f"without dissipation: {what or 'small motion grows'}, {exponential(u.growth_rate, 6, u.at_least)}"
         if self.at_bound or self.rolling_at_bound:
-            lone = self.at_bound + self.rolling_at_bound == 1
             rolls = f", and the rolling friction of {self.rolling_at_bound} at its own" if self.rolling_at_bound else ""
-            slide = ": each slides on ahead and sticks on the way back" if sided else f" and slide{'s' * lone}"
+            slide = f" and slide{'s' * (self.at_bound + self.rolling_at_bound == 1)}"
+            slide = ": each slides on ahead and sticks on the way back" if sided else slide
             count = f"{self.at_bound} of {counted(self.contacts, 'contact')} {'is' if self.at_bound == 1 else 'are'}"
             yield f"{count} at Coulomb's bound{rolls}{slide}"
             if sided:
@@ -172,12 +172,9 @@ class Stability:
                     f"neither of two linear motions decides: if all of them stuck, {_neighbour(self.sticking)}; if all "
                     f"slid on, {ever}{_neighbour(self.sliding)}"
                 )
-        if not self.stable:
-            return
-        creep = self.creep
-        if self.one_sided is not None and self.one_sided.wears:
+        if self.stable and self.one_sided is not None and self.one_sided.wears:
             yield WORN + ": as long as vibration lasts, contacts may slide again, and D may rise further"
-        if creep is not None and self.dissipative:
+        if self.stable and creep is not None and self.dissipative:
             later = "" if creep.settled else ", and farther later"
             if not creep.settled and creep.limit is not None:
                 later = f"; D may reach {creep.limit:.2g} times before the slowest motion has decayed"
@@ -185,7 +182,7 @@ class Stability:
                 f"{WORN}, and they stay displaced, by D up to {creep.amplification:.2g} times the mean square velocity "
                 f"of the push within t = {creep.time:.4g}{later}"
             )
-        elif creep is not None:
+        elif self.stable and creep is not None:
             known = as_known(creep.least_velocity, creep.velocity)
             yield f"{WORN}: D as ({known} t)^2 times the mean square velocity of the push"
 
@@ -205,22 +202,12 @@ class Stability:
                     "contacts that count as at the bound reach it and residual forces do not count, up to "
                     f"{most:.1g}, where another contact changes or one of these turns; other pushes may differ"
                 )
-        elif not self.stable:
-            return
-        elif most is None and not self.asymmetry:
-            above = f" from {least:.1g} on (velocity of one particle), below which residual forces count"
-            says = "which push changes a contact, K by differences of forces does not say"
-            yield f"holds for small pushes{above if least else ''}: {says}"
-        elif most is None and not least:
-            yield "which push changes a contact is not known, since K's symmetric part is not positive"
-        elif most is None:
-            return
-        elif least >= most:
+        elif self.stable and most is not None and least >= most:
             yield (
                 f"holds for no push: below {least:.1g} (velocity of one particle) residual forces count, and above "
                 f"{most:.1g} a contact may open, close or slide"
             )
-        else:
+        elif self.stable and most is not None:
             below = f"; below a velocity of {least:.1g} residual forces count" if least else ""
             worn = ", but for what vibration wears down" if self.creep else ""
             within = f", until t = {self.push_time:.3g}" if self.push_time else ""
@@ -228,9 +215,16 @@ class Stability:
                 f"holds for every push of an energy up to {self.largest_energy:.2g}, as of one particle at {most:.2g}"
                 f"{within}: no contact opens, closes or slides{worn}{below}"
             )
+        elif self.stable and not self.asymmetry:
+            above = f" from {least:.1g} on (velocity of one particle), below which residual forces count"
+            says = "which push changes a contact, K by differences of forces does not say"
+            yield f"holds for small pushes{above if least else ''}: {says}"
+        elif self.stable and not least:
+            yield "which push changes a contact is not known, since K's symmetric part is not positive"
 
     def _beyond(self) -> Iterator[str]:
         """Where a motion that grows ends, and under a load that rises."""
+        rising = self.rising
         if self.stable is False and self.first_change is not None:
             size = self.first_change**0.5
             yield f"as it grows, the first contact changes at a displacement of {size:.2g} (root of D)"
@@ -239,18 +233,19 @@ class Stability:
             yield f"LAMMPS goes on from there, and {ends} a displacement of {size:.2g}"
         if self.not_followed:
             yield f"under a load that rises: not followed, since {self.not_followed}"
-        if (rising := self.rising) is not None:
-            other, least, change = rising.other_start, rising.least_rise, rising.next_change
-            says = _drift(rising)
+        if rising is not None:
+            other, least, says = rising.other_start, rising.least_rise, _drift(rising)
             if other is not None:
                 less, more = sorted((rising.vibration, other.vibration))
                 alike = more - less <= HALVES_DIFFERENCE * more or more <= VIBRATION_SHARE * rising.drift
                 if not alike or rising.steady is not other.steady:
                     says += f", and from another start {_drift(other)}"
-            slide = "all contacts at the bound have reached it and " if self.one_sided is not None else ""
-            since = f"; from a rise of {least:.1g} on, where {slide}residual forces do not count" if least else ""
-            until = f"; until the load has risen by {change:.2g} (a contact {rising.next_event})" if change else ""
-            yield f"under a load that rises at the rate 1: {says}{since}{until}"
+            if least:
+                slide = "all contacts at the bound have reached it and " if self.one_sided is not None else ""
+                says += f"; from a rise of {least:.1g} on, where {slide}residual forces do not count"
+            if rising.next_change:
+                says += f"; until the load has risen by {rising.next_change:.2g} (a contact {rising.next_event})"
+            yield f"under a load that rises at the rate 1: {says}"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers for JSON."""
@@ -260,8 +255,8 @@ class Stability:
                 found[name] = {key: each for key, each in asdict(value).items() if key != "s"}
             elif name not in ("dissipative", "contacts"):
                 found[name] = value.as_dict() if isinstance(value, FieldsByName) else value
-        found |= {name: list(found[name]) for name in ("reasons", "remarks")}
-        return found | {"searched": self.sticking.searched}
+        lists = {name: list(found[name]) for name in ("reasons", "remarks")}
+        return found | lists | {"searched": self.sticking.searched}
 
 
 def _neighbour(linear: Linear) -> str:

@@ -34,9 +34,9 @@ def path(ramp):
 def search(path):
     """The search of the reference packing, from a little before its onset on."""
 
-    def make(kind, limits=FEW):
+    def make(kind, limits=FEW, first=21):
         damped = with_dissipation(path, **KINDS[kind])
-        loads = np.array(path.grid[21:])
+        loads = np.array(path.grid[first:])
 
         def search(watch=None, **how):
             with show_progress(watch):
@@ -73,8 +73,9 @@ def test_a_search_goes_on_to_the_bit_on_two_ranks(search, tmp_path):
 
 @pytest.mark.slow
 def test_ranks_find_the_same_with_bases_that_are_kept(search):
-    expected = search("medium")()
-    for each in on_ranks(2, lambda mine: search("medium")(ranks=mine)):
+    """Up to the window of drag, in the third of three increments."""
+    expected = search("drag", first=FIRST)()
+    for each in on_ranks(2, lambda mine: search("drag", first=FIRST)(ranks=mine)):
         assert each.result() == expected
 
 

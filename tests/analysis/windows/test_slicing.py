@@ -49,7 +49,7 @@ def test_slices_are_the_whole_spectrum(workers):
     np.testing.assert_allclose(np.concatenate(values), expected, atol=1e-4 * 8 / 1156)
 
 
-@pytest.mark.parametrize("modes", [(0, 100), (500, 760), (1100, 1156), (700, 701)])
+@pytest.mark.parametrize("modes", [(500, 760), (1100, 1156)])
 @pytest.mark.slow
 def test_part_of_the_spectrum(modes):
     """The eigenvalues of these numbers, with shifts about them alone."""
