@@ -120,9 +120,9 @@ def complex_windows(
     return find_windows(lambda fx: System(fx, csr_array(operator(fx))), forces, narrowest=narrowest)
 
 
-def takes_all_modes(packing: HasConfiguration, modes: tuple[int, int] | None = None, limits: Limits = LIMITS) -> bool:
+def takes_all_modes(packing: HasConfiguration, limits: Limits = LIMITS) -> bool:
     """Whether a packing is small enough for all of its modes to be searched, and for all windows to be found."""
-    return modes is None and packing.coordinates <= 3 * limits.all_windows
+    return packing.coordinates <= 3 * limits.all_windows
 
 
 def find_onset(
@@ -130,9 +130,7 @@ def find_onset(
     forces: ArrayLike,
     *,
     dissipation: bool = False,
-    modes: tuple[int, int] | None = None,
     first: bool = False,
-    known: Callable[[Onset, float], None] = lambda onset, fx: None,
     watch: Watch | None = None,
     ranks: Ranks = ALONE,
     folder: Path | None = None,
@@ -157,23 +155,16 @@ def find_onset(
     dissipation : bool
         Whether the packing's own dashpots and drag count. The onset without dissipation is then also found:
         `Onset.undamped`.
-    modes : tuple of (int, int), optional
-        Search only these modes, and only for their first window. The two numbers are those of the first mode and of the
-        first mode beyond, by frequency from 0, of the symmetric part at the load of the search. Searches of several
-        parts, on several machines, together find the first window of all modes.
     first : bool
         Seek only the first window. No equilibrium beyond the increment in which it begins is then asked for. The end of
         the window is None if it lies beyond this increment.
-    known : callable, optional
-        Of a search with dissipation: called with the onset so far, and the load up to which it is complete, as soon as
-        there is a window, and after each increment from there on.
     watch : callable, optional
         Told in words which part of a large packing is being searched.
     ranks : Ranks, optional
         The processes that search a large packing together. Each makes the same call, and gets the same equilibria.
     folder : Path, optional
         Folder in which a search stores its results, slice by slice, if its bases are too large for memory. A search of
-        the same loads, operators and modes continues from there, to the bit. All ranks write to the folder.
+        the same loads and operators continues from there, to the bit. All ranks write to the folder.
 
     Returns
     -------
@@ -190,16 +181,14 @@ def find_onset(
     OutputError, DamagedSliceError
         If a file in the folder cannot be written, or read.
     ValueError
-        If the loads are not at least two increasing numbers, if the packing has none of the modes, or if it has no
-        dissipation although `dissipation` is set.
+        If the loads are not at least two increasing numbers, or if the packing has no dissipation although
+        `dissipation` is set.
     """
     loads = check_increasing(forces)
     start = equilibrium(float(loads[0]))
     if dissipation and not start.damped:
         raise ValueError("The packing has no dissipation: call find_onset without dissipation=True.")
-    takes_all, alone = takes_all_modes(start, modes, limits), modes is None
-    kept: dict[float, Motions] = {}
-    ends: list[float] = []
+    takes_all, ends, kept = takes_all_modes(start, limits), list[float](), dict[float, Motions]()
 
     def decompose(system: System) -> Motions:
         """All motions; those without dissipation are kept for the search with it, which begins with them."""
@@ -210,19 +199,14 @@ def find_onset(
             kept[system.fx] = found
         return found
 
-    def windows_of(
-        system: SystemOfLoad, look: Look = lambda below, above: (), beside: Onset | None = None, tell: bool = False
-    ) -> tuple[tuple[Window, ...], Increments]:
+    def windows_of(system: SystemOfLoad, look: Look = lambda below, above: ()) -> tuple[tuple[Window, ...], Increments]:
         """The windows of a family of systems, and increments in doubt."""
         if takes_all:
-            windows: tuple[Window, ...] = ()
-            for fx, windows in windows_up_to(system, loads, look=look, first=first, decompose=decompose):
-                if tell and windows and not first:
-                    known(Onset(windows, undamped=beside), fx)
+            windows = find_windows(system, loads, look=look, first=first, decompose=decompose)
             return windows[:1] if first else windows, ()
         from .sliced_search import SlicedSearch  # with libraries that nothing else needs
 
-        window, doubtful = SlicedSearch(system, modes, ranks, folder, limits).first_window(loads)
+        window, doubtful = SlicedSearch(system, ranks, folder, limits).first_window(loads)
         return (window,) if window else (), doubtful
 
     def at(fx: float) -> HasConfiguration:
@@ -251,16 +235,16 @@ def find_onset(
             ends.append(start.fx)
             opened = float(negative[0]), 1.0
         # packings of LAMMPS's own laws have complex pairs at rest as a rule, and no further load is then needed
-        elif alone and (first or not takes_all) and not isinstance(start, Packing):
+        elif (first or not takes_all) and not isinstance(start, Packing):
             at_start = _complex_at_start(start)
         if opened is None and at_start is None:
             try:
                 windows, doubtful = windows_of(undamped)
             except NoEquilibriumError:  # beyond the first increment, which the search asks for in any case
-                at_start = _complex_at_start(start) if alone else None
+                at_start = _complex_at_start(start)
                 if at_start is None:
                     raise
-        if at_start is None and alone and (opened or (windows and windows[0].kind == "start")):
+        if at_start is None and (opened or (windows and windows[0].kind == "start")):
             at_start = spectrum(force_bearing(start)) if takes_all else _complex_at_start(start)
         if opened is None and at_start is not None and not (takes_all and windows):
             fastest = max(at_start.pairs, key=lambda each: each.growth_rate)
@@ -268,9 +252,9 @@ def find_onset(
         if opened is not None:
             windows = (Window(Edge(start.fx, 0.0, *opened, "start"), None),)
         if not windows:
-            raise OnsetError.among(modes, float(loads[-1]), doubtful)
+            raise OnsetError.of_search(float(loads[-1]), doubtful)
         complete = takes_all and not first and not windows[0].eigenvalue < 0
-        return Onset(windows, complete, doubtful, modes, at_start, min(ends, default=None))
+        return Onset(windows, complete, doubtful, at_start, min(ends, default=None))
 
     def undamped_onset_or_none() -> Onset | None:
         with suppress(OnsetError, NoEquilibriumError):
@@ -287,18 +271,16 @@ def find_onset(
             report_progress(f"pairs that become complex without dissipation, up to F_x = {loads[-1]:.6g}")
             beside = undamped_onset_or_none()
             look = _inside(lambda fx: System.of(equilibrium(fx)), loads, beside)
-            windows, doubtful = windows_of(damped, look, beside, tell=True)
+            windows, doubtful = windows_of(damped, look)
         else:
             with show_progress(what="with dissipation, "):
                 windows, doubtful = windows_of(damped)
-            if windows:
-                known(Onset(windows, False, doubtful), windows[0].fx_onset)
             with show_progress(what="without dissipation, "):
                 beside = undamped_onset_or_none()
         if not windows:
             finding = f"No motion grows up to F_x = {loads[-1]:.10g}"
             raise NoGrowthError(finding, "raise the largest load", undamped=beside)
-        return Onset(windows, takes_all and not first, doubtful, modes, undamped=beside)
+        return Onset(windows, takes_all and not first, doubtful, undamped=beside)
 
 
 def _inside(undamped: SystemOfLoad, loads: Floats, known: Onset | None) -> Look:

@@ -61,15 +61,14 @@ class SlicedSearch:
     ----------
     at : callable
         Load -> System.
-    modes, ranks, folder, limits
+    ranks, folder, limits
         As of :func:`~faultgouge.analysis.find_onset`.
     """
 
     def __init__(
-        self, at: Callable[[float], System], modes: tuple[int, int] | None = None, ranks: Ranks = ALONE,
-        folder: Path | None = None, limits: Limits = LIMITS,
-    ) -> None:  # fmt: skip
-        self.at, self.modes, self.ranks, self.folder, self.limits = at, modes, ranks, folder, limits
+        self, at: Callable[[float], System], ranks: Ranks = ALONE, folder: Path | None = None, limits: Limits = LIMITS
+    ) -> None:
+        self.at, self.ranks, self.folder, self.limits = at, ranks, folder, limits
         self.doubtful: list[tuple[float, float]] = []
         self.passed: list[System] = []
         self.crowded = False
@@ -198,20 +197,19 @@ class SlicedSearch:
 
     def _announced(self, places: Sequence[System]) -> list[Candidate]:
         """The motions that slices announce, of all ranks, and those that a search that was cut off has left."""
-        first, stop = modes = self._range(places[0])
-        folder = None
+        count, folder = len(places[0].active), None
         if self.folder is not None and not self._keeps(places[0]):  # later increments need bases that are kept
-            folder = results_folder(self.folder, places, modes, self.limits)
+            folder = results_folder(self.folder, places, self.limits)
         root = self.ranks.rank == 0
         stored = self.ranks.together(lambda: kept_results(folder) if folder is not None and root else [])[0]
         before = sum(each.border.size for each in stored)
         where = f"F_x from {places[0].fx:.6g} to {places[-1].fx:.6g}"
-        report_progress(f"{where}: {before} of {stop - first} modes are known")
+        report_progress(f"{where}: {before} of {count} modes are known")
 
         def search_slices() -> list[SliceResult]:
             """Those of this rank."""
             found: list[SliceResult] = []
-            done, wanted = (-(-count // self.ranks.size) for count in (before, stop - first))
+            done, wanted = (-(-modes // self.ranks.size) for modes in (before, count))
             failure: FaultgougeError | None = None
             for basis in self._bases(places[0], stored):
                 done += basis.own.stop - basis.own.start
@@ -263,19 +261,11 @@ class SlicedSearch:
                     found.append(Candidate(k, window.fx_onset, inside, complex(state.values[j]), complex(slope)))
         return SliceResult(basis.border, found, quiet.crowded)
 
-    def _range(self, place: System) -> tuple[int, int]:
-        """Numbers of the first mode that is looked at and of the first that is not; ValueError if there are none."""
-        count = len(place.active)
-        first, stop = self.modes or (0, count)
-        if not 0 <= first < min(stop, count):
-            raise ValueError(f"modes {first}:{stop} is no part of the {count} modes of this packing, 0:{count}")
-        return first, min(stop, count)
-
     def _keeps(self, place: System) -> bool:
-        """Whether there is memory for the bases of all modes that are looked at."""
-        first, stop = self._range(place)
-        margins = 2 * self.limits.margin * max(1, round((stop - first) / self.limits.slice_size))
-        return (stop - first + margins) * len(place.active) <= self.limits.largest_basis
+        """Whether there is memory for the bases of all modes."""
+        count = len(place.active)
+        margins = 2 * self.limits.margin * max(1, round(count / self.limits.slice_size))
+        return (count + margins) * count <= self.limits.largest_basis
 
     def _bases(self, place: System, stored: Sequence[SliceResult]) -> Iterator[Slice]:
         """The bases of this rank's slices; those of an earlier load as long as those of all ranks serve."""
@@ -286,14 +276,14 @@ class SlicedSearch:
             return
         self._kept, keeps = [], self._keeps(place)  # its memory is free before that for the next ones is taken
         matrix = csr_array(place.inner[0])
-        symmetric, wanted = csc_array(0.5 * (matrix + matrix.T)), self._range(place)
+        symmetric, count = csc_array(0.5 * (matrix + matrix.T)), len(place.active)
         bases: Iterator[Slice] = iter(())
-        if len(place.active) > self.limits.one_basis:
+        if count > self.limits.one_basis:
             borders = [each.border for each in stored]
-            bases = slices(symmetric, self.limits.margin, wanted, self.limits, ranks=self.ranks, known=borders)
+            bases = slices(symmetric, self.limits.margin, self.limits, ranks=self.ranks, known=borders)
         elif self.ranks.rank == 0 and not stored:  # a small operator has one
             values, vectors = eigh(symmetric.toarray(), driver="evd", overwrite_a=True, check_finite=False)
-            bases = iter([Slice(0, values, vectors, slice(*wanted))])
+            bases = iter([Slice(0, values, vectors, slice(0, count))])
         if keeps:
             self._kept = list(bases)
         yield from self._kept if keeps else bases

@@ -8,7 +8,7 @@ step. No rank has the vectors of another, and the result is that of one process 
 A slice of 100,000 disks takes 13 s, and its result is small: the motions that may grow, and the eigenvalues that
 neighbouring slices must agree on. So the rank that has searched a slice writes one file for it, in one step, and a
 search that was cut off goes on from these files. The name of their folder is a checksum of the loads, the operators
-there, the modes, the limits, and the version of this program, so that results of another packing are never used. A
+there, the limits, and the version of this program, so that results of another packing are never used. A
 damaged file is that of a slice that is searched again.
 """
 
@@ -135,7 +135,6 @@ LIMITS = Limits()
 def slices(
     matrix: csc_array,
     margin: int,
-    modes: tuple[int, int] | None = None,
     limits: Limits = LIMITS,
     factorise: Callable[[csc_array, float], Factorization] = factor_shifted,
     ranks: Ranks = ALONE,
@@ -149,8 +148,6 @@ def slices(
         Symmetric.
     margin : int
         Further modes wanted on either side of a slice.
-    modes : tuple of (int, int), optional
-        Numbers of the first eigenvalue that is wanted and of the first that is not, the lowest being 0; all by default.
     limits, factorise
         Sizes, and how to factorise S - shift.
     ranks : Ranks
@@ -166,8 +163,7 @@ def slices(
     """
     from threadpoolctl import threadpool_limits  # nothing else needs it
 
-    spectrum = SlicedSpectrum(matrix, limits, factorise)
-    first, stop = modes or (0, matrix.shape[0])
+    spectrum, size = SlicedSpectrum(matrix, limits, factorise), matrix.shape[0]
     mine: list[Border] = []
     failure: FaultgougeError | None = None
     with threadpool_limits(1, "blas"), ThreadPoolExecutor(ranks.workers) as pool:
@@ -176,9 +172,9 @@ def slices(
             own = places[ranks.part(len(places))]
             return [each for one in ranks.together(lambda: list(pool.map(spectrum.below, own))) for each in one]
 
-        places, numbers = count_places(spectrum.matrix, count_below, (first, stop), limits.count_spacing)
-        pieces = max(1, round((stop - first) / limits.slice_size))
-        ends = first + np.arange(pieces + 1) * (stop - first) // pieces
+        places, numbers = count_places(spectrum.matrix, count_below, (0, size), limits.count_spacing)
+        pieces = max(1, round(size / limits.slice_size))
+        ends = np.arange(pieces + 1) * size // pieces
         borders, found = places_of_numbers(places, numbers, ends), {each.modes for each in known}
         middles = 0.5 * (borders[:-1] + borders[1:])
         wanted = [(float(at), (int(a), int(b))) for at, (a, b) in zip(middles, pairwise(ends), strict=True)]
@@ -266,9 +262,9 @@ def kept_results(folder: Path) -> list[SliceResult]:
     return sorted(found, key=lambda each: each.border.modes)
 
 
-def results_folder(parent: Path, places: Sequence[System], modes: tuple[int, int], limits: Limits) -> Path:
+def results_folder(parent: Path, places: Sequence[System], limits: Limits) -> Path:
     """Make the folder of the results on the increments between some loads; OutputError if that cannot be."""
-    digest = hashlib.sha256(repr((version("faultgouge"), modes, limits)).encode())
+    digest = hashlib.sha256(repr((version("faultgouge"), limits)).encode())
     for place in places:
         digest.update(repr(place.fx).encode())
         for matrix in [each for each in (place.stiffness, place.damping) if each is not None]:

@@ -223,7 +223,6 @@ def test_off_a_terminal_progress_is_a_line_a_minute_until_it_is_left(monkeypatch
         ("onset", ("", ""), 1, "No pair of eigenvalues is complex up to F_x = 0.004"),
         ("onset", ("[ramp]", "[damping]\ncn = 1.0\n[ramp]"), 1, "No motion grows up to F_x = 0.004"),
         ("onset", ("[ramp]", "[damping]\n[ramp]"), 2, "damping"),
-        ("onset --modes 0:10", ("[ramp]", "[damping]\nct = 1.0\n[ramp]"), 2, "--modes goes without [damping]"),
     ],
 )
 @pytest.mark.slow

@@ -370,16 +370,9 @@ def failing(monkeypatch):
     return state
 
 
-SEARCHES = pytest.mark.parametrize(
-    "search",
-    [pytest.param([], id="all_windows"), pytest.param(["--modes", "0:39"], marks=pytest.mark.long, id="slices")],
-)
-
-
-@SEARCHES
 @pytest.mark.slow
-def test_no_call_is_taken_for_a_missing_onset(settled, failing, faultgouge_here_in, search):
-    command = "onset", "scene.toml", *search
+def test_no_call_is_taken_for_a_missing_onset(settled, failing, faultgouge_here_in):
+    command = "onset", "scene.toml"
     faultgouge_here_in(settled, *command)
     calls = failing.calls
     assert calls > 20
@@ -389,12 +382,11 @@ def test_no_call_is_taken_for_a_missing_onset(settled, failing, faultgouge_here_
         assert said.splitlines()[-1] == f"Error: LAMMPS stopped: it was told to at call {wanted}."
 
 
-@SEARCHES
 @pytest.mark.ranks
 @pytest.mark.parametrize(("ranks", "stride"), [(1, 1), (2, 6)])
 @pytest.mark.long
-def test_no_call_of_a_rank_is_taken_for_a_missing_onset(settled, ranks, stride, search):
+def test_no_call_of_a_rank_is_taken_for_a_missing_onset(settled, ranks, stride):
     """At every call on one rank; two ranks call the same, and every sixth call shows that both hear of it."""
-    done = with_failing_engine(settled, ranks, EVERY_CALL, stride, *search)
+    done = with_failing_engine(settled, ranks, EVERY_CALL, stride)
     assert done.returncode == 0, done.stderr[-500:]
     assert int(done.stdout.splitlines()[-1]) > 20

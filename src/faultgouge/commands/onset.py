@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
 from typer import Option
 
 from ..analysis.counted import counted
@@ -16,11 +15,6 @@ from .terminal import Results, SceneFile, command, report_fallback, say, status,
 if TYPE_CHECKING:
     from ..analysis import Onset
     from ..pywrap import Scene
-
-OF_MODES = (
-    "Search only these modes, counted by frequency from 0, since all modes of 100,000 disks take hours. 0:600 are the "
-    "600 lowest."
-)
 
 
 @command(
@@ -37,7 +31,6 @@ def onset(
         Path | None,
         Option("-o", "--output", help="Also write the JSON to this file; a long interrupted search continues."),
     ] = None,
-    modes: Annotated[str | None, Option(metavar="FIRST:STOP", help=OF_MODES)] = None,
     every: Annotated[
         bool, Option("--all", help="All windows up to ramp.until, of up to 300 disks; takes longer.")
     ] = False,
@@ -50,11 +43,16 @@ def onset(
     to the end of the ramp. Of several friction coefficients those without an onset
     are named; the exit code is 1 if none has one.
     """
-    from faultgouge.analysis import NoEquilibriumError, OnsetError
+    from faultgouge.analysis import BadInputError, NoEquilibriumError, OnsetError
+    from faultgouge.analysis.windows import LIMITS
     from faultgouge.analysis.windows.slices import remove_results
     from faultgouge.pywrap.settling.settle import shared_bed
 
-    part = _checked_modes(scene, modes, every)
+    if every and (disks := scene.packing.disks) > LIMITS.all_windows:
+        raise BadInputError(
+            f"--all finds all windows of up to {LIMITS.all_windows} disks, and the packing has {disks}: leave --all "
+            "out for the first window, or take a smaller packing"
+        )
     # a long search leaves what it finds beside its file, unless that is a device
     folder = Path(f"{output}.slices") if output and (output.is_file() or not output.exists()) else None
     with working("settling"):
@@ -63,8 +61,8 @@ def onset(
     failed: Exception | None = None
     for mu in scene.law.mus:
         try:
-            onset = _search(scene, mu, part, not every, bed, output, folder, found)
-            yield from _in_words(scene, onset, part)
+            onset = _search(scene, mu, not every, bed, folder)
+            yield from _in_words(scene, onset)
             found.append({"mu": mu} | onset.as_dict() | {"flows_beyond": onset.flows_beyond} | _in_si(scene, onset))
         except (OnsetError, NoEquilibriumError) as error:
             failed = error
@@ -87,69 +85,19 @@ def onset(
         raise failed
 
 
-def _checked_modes(scene: Scene, modes: str | None, every: bool) -> tuple[int, int] | None:
-    """FIRST:STOP as numbers; options that do not go together are refused, and a packing too large for all windows."""
-    from faultgouge.analysis import BadInputError
-    from faultgouge.analysis.windows import LIMITS
-
-    if every and modes is not None:
-        raise BadInputError("--all goes without --modes: among some modes the first window is sought; leave one out")
-    if every and (disks := scene.packing.disks) > LIMITS.all_windows:
-        raise BadInputError(
-            f"--all finds all windows of up to {LIMITS.all_windows} disks, and the packing has {disks}: leave --all "
-            "out for the first window, or take a smaller packing"
-        )
-    if modes is None:
-        return None
-    if scene.damping is not None:
-        raise typer.BadParameter("--modes goes without [damping]: with it, all modes are searched; leave one out")
-    first, _, stop = modes.partition(":")
-    if not (first.isdecimal() and stop.isdecimal() and int(first) < int(stop)):
-        raise typer.BadParameter(
-            f"--modes {modes}: give the first mode and the first one beyond, as in --modes 0:600 for the 600 lowest"
-        )
-    return int(first), int(stop)
-
-
-def _search(
-    scene: Scene, mu: float, part: tuple[int, int] | None, first: bool, bed: Any, output: Path | None,
-    folder: Path | None, before: list[dict[str, Any]],
-) -> Onset:  # fmt: skip
-    """Search for one friction coefficient.
-
-    With dissipation the windows are written as they come, beside what is known `before`, with the load up to which they
-    are all as the key `searched_to`.
-    """
+def _search(scene: Scene, mu: float, first: bool, bed: Any, folder: Path | None) -> Onset:
+    """Search for one friction coefficient, and say what is doubtful."""
     from faultgouge.pywrap.onset import onset_run
 
     dissipation = scene.damping is not None
-
-    def known(so_far: Onset, fx: float) -> None:
-        if output is not None:
-            _document(output, [*before, {"mu": mu, "searched_to": fx} | so_far.as_dict()])
-            reached = f"{output} has the windows with dissipation up to F_x = {fx:.6g}, without the errors of the path"
-            keeps(reached, output)
-
     with status(f"mu = {mu:g}") as show:
 
         def watch(now: str) -> None:
             show(f"mu = {mu:g}: {now}")
             if folder is not None and folder.is_dir():
                 keeps(f"{folder} has what was found so far; the same command continues from there", folder)
-            if dissipation and output is None:
-                keeps(f"no file was written. mu = {mu:g}: {now}")
 
-        found = onset_run(
-            scene,
-            mu,
-            dissipation=dissipation,
-            first=first,
-            modes=part,
-            known=known,
-            bed=bed,
-            watch=watch,
-            folder=folder,
-        )
+        found = onset_run(scene, mu, dissipation=dissipation, first=first, bed=bed, watch=watch, folder=folder)
     for equilibrium in found.equilibria:
         report_fallback(equilibrium)
     expected = "a motion was expected to grow" if dissipation else "a pair was expected to become complex"
@@ -192,7 +140,7 @@ def _undamped_in_words(mu: float, undamped: Onset | None) -> str:
     return f"mu = {mu:g}: without dissipation {'none on this ramp' if undamped is None else undamped.describe()}"
 
 
-def _in_words(scene: Scene, found: Onset, part: tuple[int, int] | None) -> Results:
+def _in_words(scene: Scene, found: Onset) -> Results:
     """The onset of a friction coefficient: F_x^c, how it begins, all windows as a table; in SI as well."""
     from faultgouge.analysis.uncertain_digits import with_uncertainty
 
@@ -209,7 +157,7 @@ def _in_words(scene: Scene, found: Onset, part: tuple[int, int] | None) -> Resul
         yield _undamped_in_words(found.mu, found.undamped)
         yield from first_in_si
         return
-    yield f"{mu}: {found.describe()}{'' if part is None else f' among the modes {part[0]}:{part[1]}'}"
+    yield f"{mu}: {found.describe()}"
     if found.complete:
         headings = ["in Pa", "F_x/F_y", "in Hz"] if si else ["eigenvalue"]
         rows = []

@@ -34,9 +34,9 @@ def path(ramp):
 def search(path):
     """The search of the reference packing, from a little before its onset on."""
 
-    def make(kind, limits=FEW, first=21):
+    def make(kind, limits=FEW):
         damped = with_dissipation(path, **KINDS[kind])
-        loads = np.array(path.grid[first:])
+        loads = np.array(path.grid[21:])
 
         def search(watch=None, **how):
             with show_progress(watch):
@@ -74,8 +74,8 @@ def test_a_search_goes_on_to_the_bit_on_two_ranks(search, tmp_path):
 @pytest.mark.slow
 def test_ranks_find_the_same_with_bases_that_are_kept(search):
     """Up to the window of drag, in the third of three increments."""
-    expected = search("drag", first=FIRST)()
-    for each in on_ranks(2, lambda mine: search("drag", first=FIRST)(ranks=mine)):
+    expected = search("drag")()
+    for each in on_ranks(2, lambda mine: search("drag")(ranks=mine)):
         assert each.result() == expected
 
 

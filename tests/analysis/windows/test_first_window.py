@@ -18,26 +18,6 @@ def searched(operator, loads, limits=LIMITS):
     return SlicedSearch(lambda fx: System(fx, csr_array(operator(fx))), limits=limits).first_window(np.array(loads))
 
 
-@pytest.mark.slow
-def test_parts_of_the_spectrum_have_together_the_windows_of_all(path):
-    every = find_onset(path, path.grid[18:])
-    found = []
-    for modes in ((0, 100), (100, 200), (200, 285)):
-        try:
-            onset = find_onset(path, path.grid[18:], modes=modes)
-        except OnsetError as error:
-            assert f"among the modes {modes[0]}:{modes[1]}" in str(error)  # noqa: PT017, some have none
-        else:
-            assert onset.as_dict()["modes"] == list(modes)
-            found.append(onset)
-    first = min(found, key=lambda onset: onset.fx_c)
-    assert abs(first.fx_c - every.fx_c) < first.error + every.error
-    for onset in found:
-        assert min(abs(onset.fx_c - window.fx_onset) for window in every.windows) < onset.error + every.error
-    with pytest.raises(ValueError, match="modes 285:300 is no part of the 285 modes of this packing"):
-        find_onset(path, path.grid[18:], modes=(285, 300))
-
-
 def bent(f):
     """Levels that cross at 0.906 of an increment, and at 0.5 of the straight line between its ends."""
     return crossing(0.0, -0.0025)(2 * f**7 - 1)
@@ -109,7 +89,7 @@ def test_pair_that_is_announced_and_not_found_is_told_of():
     assert window is None
     assert doubtful == ((7 / 16, 8 / 16),)
     with pytest.raises(OnsetError, match=r"expected between 0\.4375 and 0\.5: take smaller increments"):
-        raise OnsetError.among(None, 1.0, doubtful)
+        raise OnsetError.of_search(1.0, doubtful)
 
 
 @pytest.mark.slow
