@@ -77,7 +77,7 @@ class SlicedSearch:
     def first_window(self, loads: Floats) -> tuple[Window | None, Increments]:
         """The first window along a ramp, if there is one, and the increments before it that are in doubt.
 
-        Loads beyond the one above the onset are not asked for, except those of `Limits.increments_ahead` increments.
+        Loads beyond the one above the onset are not asked for.
         The window's end is None where its motion grows at the next load.
 
         Raises
@@ -87,21 +87,13 @@ class SlicedSearch:
         SliceError
             If a part of the spectrum is not found.
         """
-        here, done = self.at(float(loads[0])), 1
-        first: Window | None = None
-        while done < len(loads) and first is None:
-            ahead = 1 if self._keeps(here) else self.limits.increments_ahead
-            places = [here]
-            for load in loads[done : done + ahead]:
-                try:
-                    places.append(self.at(float(load)))
-                except NoEquilibriumError:
-                    if len(places) == 1:
-                        raise
-                    break
-            first = self._walk(places, 0)
-            here = places[-1]
-            done += len(places) - 1
+        here, first = self.at(float(loads[0])), None
+        for load in loads[1:]:
+            there = self.at(float(load))
+            first = self._walk([here, there], 0)
+            here = there
+            if first is not None:
+                break
         last = here.fx if first is None else first.fx_onset
         if self.crowded and last > loads[0]:
             self.doubtful = [(float(loads[0]), max(each.fx for each in self.passed))]

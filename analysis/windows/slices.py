@@ -124,8 +124,6 @@ class Limits(SliceSizes):
     """How often parts are divided again; the finest are a sixteenth."""
     largest_basis: float = 3e8
     """Numbers of a basis that is kept from increment to increment, 2.4 GB."""
-    increments_ahead: int = 2
-    """Increments that are looked at while a basis that is not kept passes by: each costs a twentieth of the basis."""
 
 
 LIMITS = Limits()

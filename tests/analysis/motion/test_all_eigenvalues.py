@@ -120,7 +120,7 @@ def test_forty_equal_pairs_and_forty_equal_negative_ones_are_counted(coupled, sl
     """As of forty copies of a packing side by side: rounding makes pairs of some of the negative ones, too."""
     rng = np.random.default_rng(1)
     cells = [block for _ in range(40) for block in (complex_block(7.0, 0.5), np.array([[-0.5]]))]
-    others = [np.array([[value]]) for value in rng.uniform(1, 50, 60)]
+    others = [np.array([[value]]) for value in rng.uniform(1, 50, 120)]
     whole = turned([*cells, *others], rng) if coupled else csr_array(block_diag([*cells, turned(others, rng)]))
     if sliced:
         monkeypatch.setattr(spectrum_module, "SLICED", 0)

@@ -24,13 +24,12 @@ def network(size, seed):
     return csc_array(stretches.T @ diags_array(stiffness) @ stretches)
 
 
-@pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.long), 2])
 @pytest.mark.slow
-def test_slices_are_the_whole_spectrum(workers):
+def test_slices_are_the_whole_spectrum():
     matrix = network(34, 1)
     expected, basis = np.linalg.eigh(matrix.toarray())
     values, count = [], 0
-    for part in slices(matrix, 20, ranks=Ranks(workers=workers)):
+    for part in slices(matrix, 20, ranks=Ranks(workers=2)):
         own = part.values[part.own]
         assert part.first + part.own.start == count
         count += len(own)
@@ -108,19 +107,16 @@ def next_to_an_eigenvalue(distance):
     raise AssertionError
 
 
-@pytest.mark.parametrize("distance", [1e-6, -1e-8, 1e-10])
+@pytest.mark.parametrize("distance", [1e-6, -1e-8])
 def test_shift_next_to_an_eigenvalue(distance):
     """Such an eigenvector grows back from rounding at once; blocks that stray with it are made anew."""
     values = next_to_an_eigenvalue(distance)
     matrix = csc_array(np.diag(values))
 
-    def found(limits):
-        parts = list(slices(matrix, 10, limits=limits))
-        worst = max(np.abs(each.vectors.T @ each.vectors - np.eye(len(each.values))).max() for each in parts)
-        return worst, np.concatenate([each.values[each.own] for each in parts])
-
-    worst, eigenvalues = found(FEW)
+    parts = list(slices(matrix, 10, limits=FEW))
+    worst = max(np.abs(each.vectors.T @ each.vectors - np.eye(len(each.values))).max() for each in parts)
     assert worst < 1e-10  # ten vectors that stray together, each by 3e-6 at the most
+    eigenvalues = np.concatenate([each.values[each.own] for each in parts])
     np.testing.assert_allclose(eigenvalues, np.sort(values), rtol=0, atol=1e-4 / 300)
 
 
