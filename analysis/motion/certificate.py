@@ -110,13 +110,13 @@ def prove(stiffness: csr_array, damping: csr_array, zero: float) -> Linear:
         f"certificate: no motion faster than {w:.3g} grows; {count} slower ones to look at, about "
         f"{work / 1.8e11:.2g} min and {needed / 1e9:.2g} GB"
     )
-    decay = FREE_MARGIN * 0.5 * w**2 * ratio
-    for _ in range(5):
-        if _is_positive((s, n, g, h), w, beta, decay, factors=factors):
-            break
+    decay, last = FREE_MARGIN * 0.5 * w**2 * ratio, 1.04**5 * w
+    while not _is_positive((s, n, g, h), w, beta, decay, factors=factors):
         w *= 1.04
-    else:
-        raise NoProofError(f"no frequency was found beyond which the dashpots hold growth, up to {w:.3g} of {top:.3g}")
+        if w > 0.999 * last:
+            raise NoProofError(
+                f"no frequency was found beyond which the dashpots hold growth up to {w:.3g} of {top:.3g}"
+            )
     del factored
     spectrum = SlicedSpectrum(csc_array(s))
     count, free, best, done, low = spectrum.below(w**2), 0, -np.inf, 0, 0.0

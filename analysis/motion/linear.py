@@ -30,7 +30,6 @@ from .certificate import NoProofError, prove
 from .eigenvalues import (
     SAFETY,
     Linear,
-    growing,
     growing_undamped,
     is_zero,
     operator_rounding,
@@ -189,7 +188,7 @@ def _damped_rates(motion: Motion, rounding: float) -> tuple[Complexes, NDArray[n
     grows = values.real > np.sqrt(SAFETY * of_z * np.abs(values).max(initial=0.0))  # no double one is as uncertain
     if np.any(~grows & (values.real > 0)):  # vectors take three times as long as eigenvalues
         values, left, right = eig(z, left=True, check_finite=False)
-        grows = growing(values, np.abs(np.sum(left.conj() * right, axis=0)), of_z)
+        grows = values.real * np.abs(np.sum(left.conj() * right, axis=0)) > SAFETY * of_z
     counts = values.imag >= 0
     counts[np.argsort(np.abs(values))[:count]] = False  # of motions that dashpots alone oppose one s is zero, once
     return values[counts], grows[counts], free.shape[1], SAFETY * of_z

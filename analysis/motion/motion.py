@@ -112,11 +112,6 @@ class Motion:
             k = csr_array(k + sliders.force @ sliders.excess)
             if c.nnz:
                 c = csr_array(c + sliders.force @ sliders.viscous_excess)
-        return cls.of_matrices(configuration, k, c)
-
-    @classmethod
-    def of_matrices(cls, configuration: Configuration, k: csr_array, c: csr_array) -> "Motion":
-        """Of K and C of all coordinates, which are assembled already."""
         a, g = (mass_weighted(matrix, configuration) for matrix in (k, c))
         active = active_coordinates(a)
         active = active[np.argsort(active % len(configuration), kind="stable")]
