@@ -243,12 +243,7 @@ def fastest_growing(
 
 
 def follow_decay(
-    motion: Motion,
-    kept: csr_array,
-    why: str,
-    time: float | None = None,
-    searched: float = np.inf,
-    work: float = WORK,
+    motion: Motion, kept: csr_array, why: str, time: float | None = None, searched: float = np.inf, work: float = WORK
 ) -> Linear:
     """Follow the motion from a random state until it has decayed, or grows.
 
