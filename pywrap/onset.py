@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -15,9 +14,8 @@ from mpi4py import MPI
 from ..analysis import NoEquilibriumError, Onset, OnsetError, Packing, find_onset
 from ..analysis.arrays import Floats
 from ..analysis.errors import TurningPointError
-from ..analysis.motion.eigenvalues import active_coordinates
 from ..analysis.progress import Watch, report_progress, show_progress
-from ..analysis.windows import NoGrowthError, Ranks, full_operator, takes_all_modes
+from ..analysis.windows import NoGrowthError, Ranks, takes_all_modes
 from .equilibria.quasistatic import Equilibrium
 from .lammps.engine import Engine
 from .runs.path_error import with_path_error
@@ -26,9 +24,6 @@ from .runs.scene_path import scene_path
 from .scenes.scene import Scene, scene_of
 from .scenes.validation import SceneError, require_section
 from .settling.settle import settle
-
-OnsetSoFar = Callable[[Onset, float], None]
-"""Takes what is known, without the errors of the path, and the load up to which that is all."""
 
 _BELOW = -np.geomspace(3e-2, 1e-3, 7)[:-1], -np.geomspace(1e-3, 1e-7, 13), [0.0]
 ONSET_DISTANCES = np.concatenate([*_BELOW, np.geomspace(1e-6, 1e-3, 9), np.linspace(0.0, 0.3, 76)[1:]])
@@ -83,10 +78,8 @@ def onset_run(
     *,
     dissipation: bool = False,
     first: bool = False,
-    modes: tuple[int, int] | None = None,
     reached: Callable[[Equilibrium], None] | None = None,
     near_onset: Floats | None = None,
-    known: OnsetSoFar = lambda found, fx: None,
     bed: Packing | None = None,
     watch: Watch | None = None,
     folder: Path | None = None,
@@ -107,14 +100,10 @@ def onset_run(
         Whether the dashpots and the drag of the section [damping] count; the onset without them is found as well.
     first : bool
         Seek the first window alone, as of a large packing.
-    modes : tuple of (int, int), optional
-        Search these modes alone, see :func:`~faultgouge.analysis.find_onset`.
     reached : callable, optional
         Called with each equilibrium of the ramp.
     near_onset : ndarray, optional
         Distances from F_x^c, force, at which equilibria are also computed: `between` of the result.
-    known : callable, optional
-        Of a search with dissipation: called as soon as there is a window, and after each increment from there on.
     bed : Packing, optional
         As in :func:`~faultgouge.pywrap.settle`.
     watch : callable, optional
@@ -126,7 +115,7 @@ def onset_run(
     Raises
     ------
     SceneError
-        If the scene has no section [ramp], or the packing has none of the modes.
+        If the scene has no section [ramp].
     OnsetError
         If no motion grows up to the ramp's end; a NoGrowthError, if there is an onset without dissipation.
     NoEquilibriumError
@@ -137,9 +126,6 @@ def onset_run(
     scene = scene.model_copy(update={"damping": None})
     with show_progress(watch, "settling: "):
         start = settle(scene, mu, bed=bed)
-    count = len(active_coordinates(full_operator(start.packing)))
-    if modes is not None and modes[0] >= count:
-        raise SceneError(f"modes {modes[0]}:{modes[1]} are no part of the {count} modes of the packing, 0:{count}")
     if reached is not None:
         reached(start)
 
@@ -148,16 +134,16 @@ def onset_run(
 
     with show_progress(watch), Engine(start.packing) as engine:
         path, forces = scene_path(engine, start, scene, onward=True), wanted
-        if reached is not None or (takes_all_modes(start.packing, modes) and not first):
+        if reached is not None or (takes_all_modes(start.packing) and not first):
             report_progress(f"ramp up to F_x = {wanted[-1]:g}")
             for equilibrium in path.climb(wanted[1:]):
                 if reached is not None:
                     reached(equilibrium)
             forces = np.array([each.fx for each in path.equilibria])
         flows = len(forces) < len(wanted)
-        options: dict[str, Any] = {"dissipation": dissipation, "modes": modes, "first": first, "folder": folder}
+        search = partial(find_onset, dissipation=dissipation, first=first, folder=folder)
         try:
-            found = find_onset(lambda fx: with_dashpots(path(fx)), forces, known=known, ranks=search_ranks(), **options)
+            found = search(lambda fx: with_dashpots(path(fx)), forces, ranks=search_ranks())
         except TurningPointError:
             raise
         except (OnsetError, NoEquilibriumError) as error:  # as the user of a scene reads it
