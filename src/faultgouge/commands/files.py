@@ -78,9 +78,6 @@ def import_(
     columns: Annotated[
         str | None, Option(metavar="NAME,...", help="Names of the columns of --contacts, with --material.")
     ] = None,
-    slides: Annotated[
-        bool, Option("--slides", help="For a deck: contacts at Coulomb's bound slide; by default they stick.")
-    ] = False,
     balance: Annotated[float | None, Option(min=0.0, help=OF_BALANCE)] = None,
 ) -> Results:
     """Run a LAMMPS deck and give the verdict on its last state, or convert a packing of another code, to a run.h5.
@@ -114,20 +111,20 @@ def import_(
     if file.suffix == ".in" or file.name.startswith("in."):
         if not is_bare:
             raise typer.BadParameter(
-                f"{file} is a deck, which says all by itself: leave all options but -o, --relax, --slides and --balance"
+                f"{file} is a deck, which says all by itself: leave all options but -o, --relax and --balance"
             )
         keeps(f"nothing has been written to {output} yet")
         text = file.read_text(errors="replace") if file.is_file() else ""  # a deck may move its own file
         allowed = BALANCE if balance is None else balance
         with status(f"{file}: LAMMPS runs") as show:
-            found = run_deck(file, slides=slides, balance=allowed, relaxes=relax, keep=output, notice=say, show=show)
+            found = run_deck(file, balance=allowed, relaxes=relax, keep=output, show=show)
         keeps(f"{output} has been written; whether the packing is stable says `faultgouge stability {output}`", output)
         if is_root():
             write_configuration(output, found, {"deck": text})
             yield from _deck_in_words(found, output)
         return
-    if slides or balance is not None:
-        raise typer.BadParameter("--slides and --balance are for a LAMMPS deck (.in): leave them out")
+    if balance is not None:
+        raise typer.BadParameter("--balance is for a LAMMPS deck (.in): leave it out")
     given = {"kn": kn, "kt": _number(kt), "mu": mu, "exponent": exponent, "fy": fy, "fx": fx, "inertia_factor": inertia}
     try:
         disks = _disks(file, frame, floor, width, contacts)
