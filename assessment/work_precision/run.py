@@ -128,10 +128,7 @@ def figure_of(study: Study) -> Figure:
         right.plot(*np.transpose(seen), **style)
     for line, dash in zip(study["theory"], ("--", ":", "-."), strict=False):
         grey: dict[str, Any] = {"color": "0.35", "linewidth": 0.9, "linestyle": dash, "label": line["label"]}
-        if line["parameter"]:
-            right.plot(line["parameter"], line["error"], **grey)
-        else:
-            right.axhline(line["error"][0], **grey)
+        right.plot(line["parameter"], line["error"], **grey)
     left.set(xscale="log", yscale="log", xlabel="wall time, s", ylabel=_label(study["error"]))
     left.set_ylim(bottom=bottom)
     right.set(xscale="log", xlabel=_label(study[abscissa]))

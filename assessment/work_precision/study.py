@@ -36,7 +36,7 @@ Run = tuple[str, float | None, Callable[[], tuple[T, int | None]]]
 what does not depend on the machine."""
 
 Theory = Sequence[tuple[str, Any, Any]]
-"""Labels, errors, and where a curve goes through them; nothing there for a floor."""
+"""Labels, errors, and where a curve goes through them."""
 
 Study = dict[str, Any]
 """What report.json has of a study, see `study_of`."""

@@ -161,7 +161,7 @@ def growth(settings: Settings) -> Study:
     noise = float(np.median([point.error for point in points if point.method == RUN_CORRECTED]))
     curve = np.geomspace(steps[-1], steps[0], 60)
     predicted = [off(complex(discrete_frequency(omega**2, dt))) for dt in curve.tolist()]
-    theory = [("velocity Verlet on a frozen K", predicted, curve), ("rounding of K", resolution, ())]
+    theory = [("velocity Verlet on a frozen K", predicted, curve)]
     order = fit_order(points, RUN, 2, least=10 * noise, most=0.01)
     numbers = {"packing": packing, "rate": exact, "length": time, "noise": noise, "amplitude": AMPLITUDE}
     numbers |= {"slower": 2 / limit / abs(omega), "resolution": resolution}

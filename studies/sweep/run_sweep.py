@@ -84,9 +84,9 @@ def sweep(
     >>> [round(row["result"]["fx_c"], 6) for row in rows]
     [1.935965, 1.672051]
     """
-    if not isinstance(request, (str, Path, Mapping)):
+    if not isinstance(request, str | Path | Mapping):
         raise SceneError(
-            f"sweep takes the path of a SWEEP.toml, or a mapping of its contents, and no {type(request).__name__}."
+            f"sweep takes the path of a SWEEP.toml, or a mapping as in it, and no {type(request).__name__}."
         )
     wanted = Sweep.from_mapping(request) if isinstance(request, Mapping) else Sweep.from_toml(request)
     return run_sweep(wanted, Path(output), workers=workers, executor=executor, say=say)

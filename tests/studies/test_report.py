@@ -22,7 +22,7 @@ def test_runs_show_velocity_verlets_growth_rate(settings):
     """As the dispersion of a frozen K foretells at each time step; taken out, the rate is that of K."""
     study = time_steps.growth(settings)
     errors = {(point["method"], point["parameter"]): point["error"] for point in study["points"]}
-    foreseen, _ = study["theory"]
+    (foreseen,) = study["theory"]
     steps = sorted(step for method, step in errors if method == time_steps.RUN)
     across = np.exp(np.interp(np.log(steps), np.log(foreseen["parameter"]), np.log(foreseen["error"])))
     for step, expected in list(zip(steps, across, strict=True))[-3:]:

@@ -71,7 +71,7 @@ def test_what_settles_alike(axes, packing, shared):
 BAD_SWEEPS = [
     ('task = "onest"', "give one of"),
     ('task = "onset"\nseeds = 3', "seeds is no key of a sweep"),
-    ('task = "onset"\n[sweep]\n"packing.seed" = "5:1"', "is no range"),
+    ('task = "onset"\n[sweep]\n"packing.seed" = "5:1"', "give a list of values"),
     ('task = "onset"\n[sweep]\n"packing.seed" = []', "give a list of values"),
     ('task = "onset"\n[sweep]\n"packing.seed" = "0:999999"\n"law.mu" = [1.0, 0.5]', "are more than 1000000"),
     ('task = "onset"\n[sweep]\n"law.kn, law.mu" = [1.0]', "names 2 keys"),
