@@ -80,7 +80,7 @@ def relaxation(settings: Settings) -> Study:
         # both increments of the compensated arithmetic end at the same packing
         points, _ = timed(runs, settings, lambda packing: distance(packing, end.packing) or reference_error)
     numbers = {"packing": end.packing, "start": start, "slowest": slowest, "fastest": fastest}
-    return study_of("relaxation", points, reference_error, numbers, ())
+    return study_of("relaxation", points, reference_error, numbers)
 
 
 def scan(path: Path, increment: float) -> tuple[float, int]:
@@ -126,6 +126,4 @@ def onset(settings: Settings) -> Study:
         points, _ = timed(runs, settings, lambda fx: max(abs(fx - exact), resolution))
     numbers = {"exact": exact, "packing": start.packing, "finest": finest, "check": check, "resolution": resolution}
     numbers |= {"residual": max(each.residual for each in settings.ramp)}
-    counts = np.array([3.0, 300.0])
-    theory = [("half an increment", 0.5 * exact / counts, counts)]
-    return study_of("onset", points, found.error + abs(rough.fx_c - exact), numbers, theory)
+    return study_of("onset", points, found.error + abs(rough.fx_c - exact), numbers)

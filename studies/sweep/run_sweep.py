@@ -177,12 +177,10 @@ def remaining_work(points: Sequence[SweepPoint], known: Iterable[Row] = ()) -> l
     scenes = [point for point in points if point.scene is not None]
     settlings = {point.settling_key for point in scenes}
     seconds = [row["cpu_seconds"] for row in known if row["says"] is None]
-    time = "how long a scene takes is not known before the first of them: begin, and ask again"
-    if seconds:
-        one, hours = median(seconds), median(seconds) * len(scenes) / 3600
-        time = f"about {hours:.2g} h of one core, if a scene takes {one:.2g} s as in the {len(seconds)} rows there"
+    one = median(seconds or [0.0])
+    time = f"about {one * len(scenes) / 3600:.2g} h of one core, if a scene takes {one:.2g} s as in the rows there"
     refused = [f"{len(points) - len(scenes)} points make no scene, and will say why"] * (len(scenes) < len(points))
-    return [f"{len(scenes)} scenes to compute, {len(settlings)} packings to settle", *refused, time]
+    return [f"{len(scenes)} scenes to compute, {len(settlings)} packings to settle", *refused, *[time] * bool(seconds)]
 
 
 def require_result(rows: Sequence[Row]) -> None:
