@@ -166,15 +166,6 @@ def test_the_picture_has_a_curve_for_each_value(tmp_path, monkeypatch):
         assert level[-1] == pytest.approx(np.mean(found < 0.03))
 
 
-@pytest.mark.slow
-def test_the_dry_run_counts_and_computes_nothing(faultgouge_here, tmp_path):
-    (tmp_path / "sweep.toml").write_text(TOML)
-    done = faultgouge_here("sweep", "sweep.toml", "-o", "out", "--dry-run")
-    assert "8 scenes to compute, 4 packings to settle" in done.stdout
-    assert "4 points make no scene" in done.stdout
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.ranks
 @pytest.mark.long
 def test_one_table_after_kills_on_workers_and_in_shards(faultgouge, tmp_path):
