@@ -203,7 +203,7 @@ def check_drive(scene: Scene, start: Packing, communicator: MPI.Comm | None = No
     shortest = math.inf if signal is None else signal.shortest
     steps, period = settings.length(strength(start)) / dt, 2 * math.pi / omega if omega else math.inf
     own = float(stable_timestep(start))
-    limit = own if rigid else float(stable_timestep(replace(start, spring=spring)))
+    limit = own if rigid else float(stable_timestep(replace(start, spring=float(spring))))
     follows = f"and the time step is {dt:.3g}: the run would not follow it, so give a slower signal"
     refusals = {
         f"the run would take {steps:.1g} time steps of {dt:.3g}, which no machine does: give a shorter drive.until, "
