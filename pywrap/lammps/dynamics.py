@@ -5,8 +5,7 @@ Friction may fall with velocity (weaken.in).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import NamedTuple
 
@@ -112,7 +111,7 @@ class Dynamics:
         return MotionState(position, low, velocity[:, :2], spin, float(friction))
 
     def work(self, steps: int) -> tuple[MotionState, float]:
-        """Go on by so many steps, and the work of all forces meanwhile by the trapezoidal rule (deck part work.in)."""
+        """The last steps of a run, and the work of all forces meanwhile by the trapezoidal rule (deck part work.in)."""
         engine = self._engine
         # windows of fix ave/time end at multiples of their length
         engine.command(f"reset_timestep {(self.steps + steps - 1) // steps * steps}")
@@ -121,19 +120,12 @@ class Dynamics:
         first = engine.number("power_now")
         motion = self.advance(steps)
         mean, last = float(self._lammps.extract_fix("power", 0, 0)), engine.number("power_now")
-        spin = ["uncompute work_spin"] * self._packing.law.frictional
-        for command in ("unfix power", "uncompute power", "variable power delete", *spin):
-            engine.command(command)
         return motion, (mean * steps + 0.5 * (first - last)) * self.time_step
 
-    @contextmanager
-    def halt_above(self, velocity: float) -> Iterator[None]:
-        """End the run once the upper layer is faster than this, length / time (deck part halt.in)."""
+    def halt_above(self, velocity: float) -> None:
+        """End every run from here on once the upper layer is faster than this, length / time (deck part halt.in)."""
         self._engine.include("halt.in", halt_velocity=float(velocity))
         self._engine.command("run 0 post no")
-        yield
-        self._engine.command("unfix halt")
-        self._engine.command("uncompute halt_velocity")
 
     def state(self) -> dict[str, Floats]:
         """All that the run has at this moment, by LAMMPS's names, for `resume`."""
