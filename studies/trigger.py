@@ -185,8 +185,8 @@ def bisect_amplitude(wave: Wave) -> Row:
         with (
             Engine(wave.packing, MPI.COMM_SELF) as engine,
             engine.undamped(dt, amplitude, omega, target) as dynamics,
-            dynamics.halt_above(v0),
         ):
+            dynamics.halt_above(v0)
             dynamics.advance(steps)
             return dynamics.steps * dt if dynamics.steps < steps else None
 
