@@ -108,11 +108,10 @@ class GeneratedPacking(Section):
             says = f"= {self.width:g} is {self.width / row:.2g} times the length of all disks in a row: narrow the box"
             raise refusal_sentence("width", says)
         if not self.periodic and (self.top < self.disks or row > self.width):
-            raise refusal_sentence(
-                "periodic",
-                "= false leaves the sides open, where the upper layer spreads the disks below until they are lost: "
-                "leave it out, or give a pile that stands by itself as packing.file",
+            says = (
+                "= false leaves the sides open, and nothing holds the disks there: leave it out, or give packing.file"
             )
+            raise refusal_sentence("periodic", says)
         return self
 
     def start(self, draw: int = 0) -> Disks:

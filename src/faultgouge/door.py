@@ -104,10 +104,8 @@ def load(
         law = law_of_parameters(given)
     missing = [name for name, known in (("law", law is not None), ("fy", "fy" in given)) if not known]
     if law is None or missing:
-        raise BadInputError(
-            f"{path} does not say {' and '.join(missing)}: load({path.name!r}, law=MindlinLaw(kn, kt, mu), fy=3.0, "
-            "top=10) takes the disks as they stand, and `faultgouge import` brings them to rest."
-        )
+        way = f"load({path.name!r}, law=MindlinLaw(kn, kt, mu), fy=3.0, top=10)"
+        raise BadInputError(f"{path} does not say {' and '.join(missing)}: {way} takes the disks as they stand.")
     disks = disks if width is None else replace(disks, box_length=width)
     if top == 0:
         layer = np.zeros(len(disks), dtype=np.bool_)
@@ -183,9 +181,9 @@ def takes_file(
             packing = load(packing)
         elif not hasattr(packing, "configuration"):
             advice = ": give its .packing" if hasattr(packing, "packing") else ""
+            given = f"{type(packing).__name__}{advice}"
             raise BadInputError(
-                f"{name} takes a Packing, a Configuration, or the path of a stored one, and no "
-                f"{type(packing).__name__}{advice}."
+                f"{name} takes a Packing, a Configuration, or the path of a stored one, and no {given}."
             )
         return function(packing, *args, **options)
 

@@ -50,6 +50,7 @@ def program() -> Callable[..., object]:
 
 QUESTION = "Does a packing of frictional grains move, and what happens when it does?"
 
+
 def _options(
     context: typer.Context,
     version: Annotated[

@@ -32,23 +32,11 @@ if TYPE_CHECKING:
     from faultgouge.analysis import Packing
     from faultgouge.analysis.files.formats import Disks
 
-OF_SOURCE = (
-    "A LAMMPS deck (.in), or a restart that was kept with its deck (NAME.restart beside NAME.restart.in); or LAMMPS "
-    "data, dump or restart (atom style sphere), NAME.disks, CSV, extended XYZ, GSD, packing.json, or a file that "
-    "MDAnalysis reads with radii."
-)
-OF_LAYER = (
-    "The upper layer: a number of highest disks that touch something, type:2 or type:NAME, ids:1,4,7-9, ids:@FILE, "
-    "group:NAME of a restart, or a region such as 'y>10 and x<5'. By default the upper layer of the file."
-)
-OF_CONTACTS = (
-    "A table of contacts: slips (CSV with id1, id2, 0 being the floor, slip; or a LAMMPS dump local); with --material "
-    "forces, of YADE, MercuryDPM (.fstat), LIGGGHTS or LAMMPS, or measured ones (RigidLibrary)."
-)
+OF_SOURCE = "A deck (.in); LAMMPS data, dump or restart; NAME.disks, CSV, XYZ, GSD, JSON, YADE; what MDAnalysis reads."
+OF_LAYER = "The upper layer: a number of highest disks, type:2, ids:1,4,7-9, group:NAME, or a region such as 'y>10'."
+OF_CONTACTS = "A table of contacts: slips (id1, id2, slip; 0 is the floor); with --material forces, of many codes."
 OF_MATERIAL = "For spheres of a table: young, poisson, density, friction, restitution; or kn, kt and exponent."
-OF_BALANCE = (
-    "For a deck: force on a particle that may be out of balance, as a share of the mean contact force; 1e-4 by default."
-)
+OF_BALANCE = "Of a deck: force that may be out of balance, as a share of the mean contact force; 1e-4 by default."
 OF_FLOOR = "y of the floor in the file; the packing is shifted so that the floor is at 0."
 OF_FRAMES = "Frames of the undamped run if the file has its trajectory, else of the ramp; .xyz, .gsd or .pvd."
 
@@ -64,18 +52,14 @@ def import_(
     fy: Annotated[float | None, Option(help="Load on each disk of the layer.")] = None,
     fx: Annotated[float | None, Option(help="Shear force on each disk of the layer; 0 by default.")] = None,
     floor: Annotated[float | None, Option(help=OF_FLOOR)] = None,
-    width: Annotated[
-        str | None, Option(metavar="L|open", help="Period along x, or open sides; by default as in the file.")
-    ] = None,
+    width: Annotated[str | None, Option(metavar="L|open", help="Period along x; that of the file by default.")] = None,
     contacts: Annotated[Path | None, Option(help=OF_CONTACTS)] = None,
     frame: Annotated[int | None, Option(help="Number of the frame; negative numbers count from the last.")] = None,
     relax: Annotated[bool, Option("--relax", help="Bring a packing out of balance to rest.")] = False,
     material: Annotated[str | None, Option(metavar="KEY=VALUE,...", help=OF_MATERIAL)] = None,
-    columns: Annotated[
-        str | None, Option(metavar="NAME,...", help="Names of the columns of --contacts, with --material.")
-    ] = None,
+    columns: Annotated[str | None, Option(metavar="NAME,...", help="Columns of --contacts, with --material.")] = None,
     slides: Annotated[
-        bool, Option("--slides", help="For a deck: contacts at Coulomb's bound slide; by default they stick.")
+        bool, Option("--slides", help="Of a deck: contacts at the bound slide, and do not stick.")
     ] = False,
     balance: Annotated[float | None, Option(min=0.0, help=OF_BALANCE)] = None,
 ) -> Results:
@@ -109,9 +93,7 @@ def import_(
             raise typer.BadParameter("--slides and --balance are for a LAMMPS deck (.in): leave them out")
         yield from _disks(file, output, relax, given)
     elif given:
-        raise typer.BadParameter(
-            f"{file} is a deck, which says all by itself: leave all options but -o, --relax, --slides and --balance"
-        )
+        raise typer.BadParameter(f"{file} is a deck: only -o, --relax, --slides and --balance go with it")
     else:
         yield from _deck(file, output, relax, slides, balance)
 
@@ -212,8 +194,7 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
         if not relax:
             feels = f"a disk feels {packing.residual:.3g}" if len(packing.contacts) else "no disk touches another"
             raise PackingFileError(
-                f"{file} is not in balance under fy = {packing.fy:g}: {feels}; check law and load, or let it come to "
-                "rest with --relax."
+                f"{file} is not in balance under fy = {packing.fy:g}: {feels}; --relax brings it to rest."
             )
         with status("coming to rest") as show:
             resting, words = bring_to_rest(packing, watch=lambda what: show(f"coming to rest: {what}"))
@@ -274,9 +255,7 @@ def _packing(disks: Disks, given: dict[str, Any]) -> Packing:
 def export(
     file: PackingFile,
     frame: Frame = -1,
-    mode: Annotated[
-        str | None, Option("--mode", metavar="pair|N", help="Also a mode as vectors, as in `faultgouge draw`.")
-    ] = None,
+    mode: Annotated[str | None, Option("--mode", metavar="pair|N", help="Also a mode, as of `draw`.")] = None,
     frames: Annotated[str | None, Option("--frames", metavar="all|START:STOP[:STEP]", help=OF_FRAMES)] = None,
     output: Annotated[Path, Option("-o", "--output", help="A .vtp, .pvd, .xyz, .data, .gsd or .csv.")] = Path(
         "packing.vtp"

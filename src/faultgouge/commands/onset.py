@@ -20,13 +20,8 @@ if TYPE_CHECKING:
 @command(f"{LAYER} && faultgouge onset scene.toml --json", reads="onset", writes="file", as_json=True)
 def onset(
     scene: SceneFile,
-    output: Annotated[
-        Path | None,
-        Option("-o", "--output", help="Also write the JSON to this file; a long interrupted search continues."),
-    ] = None,
-    every: Annotated[
-        bool, Option("--all", help="All windows up to ramp.until, of up to 300 disks; takes longer.")
-    ] = False,
+    output: Annotated[Path | None, Option("-o", "--output", help="Also write the JSON; continues a search.")] = None,
+    every: Annotated[bool, Option("--all", help="All windows up to ramp.until, of up to 300 disks.")] = False,
 ) -> Results:
     """Compute the onset F_x^c for each friction coefficient of the scene. The ramp ends there.
 
@@ -43,10 +38,8 @@ def onset(
     from faultgouge.pywrap.settling.settle import shared_bed
 
     if every and (disks := scene.packing.disks) > LIMITS.all_windows:
-        raise BadInputError(
-            f"--all finds all windows of up to {LIMITS.all_windows} disks, and the packing has {disks}: leave --all "
-            "out for the first window, or take a smaller packing"
-        )
+        takes = f"--all finds all windows of up to {LIMITS.all_windows} disks"
+        raise BadInputError(f"{takes}, and the packing has {disks}: leave --all out for the first window")
     # a long search leaves what it finds beside its file, unless that is a device
     folder = Path(f"{output}.slices") if output and (output.is_file() or not output.exists()) else None
     with working("settling"):
@@ -98,16 +91,11 @@ def _search(scene: Scene, mu: float, first: bool, bed: Any, folder: Path | None)
         report_fallback(equilibrium)
     expected = "a motion was expected to grow" if dissipation else "a pair was expected to become complex"
     for below, above in found.doubtful:
-        say(
-            f"{expected} between F_x = {below:.6g} and {above:.6g}, and was not found: an earlier onset may hide "
-            "there; take smaller increments to be sure"
-        )
+        hides = "was not found: an earlier onset may hide there; take smaller increments to be sure"
+        say(f"{expected} between F_x = {below:.6g} and {above:.6g}, and {hides}")
     if alone := [each for each in found.windows if each.path_error is None and each.kind != "start"]:
-        say(
-            f"the error of {len(alone)} of {counted(len(found.windows), 'onset')}, the first at F_x = "
-            f"{alone[0].fx_onset:.6g}, is that of rounding alone: no equilibrium was found there a second time, so "
-            "that the error of the path is not known; other increments may find one"
-        )
+        which = f"{len(alone)} of {counted(len(found.windows), 'onset')}, the first at F_x = {alone[0].fx_onset:.6g}"
+        say(f"the error of {which}, is that of rounding alone: other increments may find that of the path, too")
     return found
 
 

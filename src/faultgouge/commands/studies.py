@@ -101,9 +101,7 @@ def explain(scene: SceneFile) -> Results:
     writes="folder",
 )
 def reproduce(
-    scene: Annotated[
-        Path | None, Argument(metavar="[SCENE]", help="A scene of your own, in place of that of the package.")
-    ] = None,
+    scene: Annotated[Path | None, Argument(metavar="[SCENE]", help="A scene of your own.")] = None,
     output: NewFolder = Path("results"),
 ) -> Results:
     """Run the paper's protocol on one packing: figures, numbers and a report.
@@ -159,9 +157,7 @@ def extremes(
 
 @command("faultgouge examples sweep && faultgouge sweep sweep.toml -o sweep")
 def sweep(
-    file: Annotated[
-        Path, Argument(metavar="SWEEP", help="The sweep, a TOML file; `faultgouge examples sweep` has one.")
-    ],
+    file: Annotated[Path, Argument(metavar="SWEEP", help="A TOML file; `faultgouge examples sweep` has one.")],
     output: Folder = Path("sweep"),
     shard: Shard = "1/1",
     workers: Workers = None,
