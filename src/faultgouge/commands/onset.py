@@ -34,7 +34,7 @@ def onset(
     from faultgouge.analysis import BadInputError, NoEquilibriumError, OnsetError
     from faultgouge.analysis.files.atomic_write import write_json
     from faultgouge.analysis.windows import LIMITS
-    from faultgouge.analysis.windows.store import remove_passes
+    from faultgouge.analysis.windows.slices import remove_results
     from faultgouge.pywrap.settling.settle import shared_bed
 
     if every and (disks := scene.packing.disks) > LIMITS.all_windows:
@@ -69,7 +69,7 @@ def onset(
             write_json(output, result)
         yield result
         if is_root() and folder is not None:
-            remove_passes(folder)  # the result is there
+            remove_results(folder)  # the result is there
     if first is None and failed is not None:
         raise failed
 

@@ -83,13 +83,13 @@ def study_command(name: str) -> CommandInfo | None:
 def explain(scene: SceneFile) -> Results:
     """Explain what a scene includes, what it leaves out, and why.
 
-    The command sets the run of the scene up in LAMMPS, takes no step, and compares
-    what LAMMPS has loaded with and without each part.
+    The command sets the run of the scene up in LAMMPS, takes no step, and says
+    which parts LAMMPS has loaded.
     """
     from faultgouge.assessment.explain import explain as explain_scene
     from faultgouge.assessment.explain import in_words
 
-    with status("setting up the run with and without each part"):
+    with status("setting up the run"):
         found = explain_scene(scene)
     yield from in_words(found)
     yield found
@@ -129,7 +129,7 @@ def report(
     output: NewFolder = Path("report"),
     quick: Annotated[bool, Option("--quick", help="Fewer points: half a minute instead of two.")] = False,
 ) -> Results:
-    """Measure error against run time: which method to use when, for seven tasks, with figures and numbers."""
+    """Measure error against run time: which method to use when, for four tasks, with figures and numbers."""
     from faultgouge.assessment.work_precision.run import report as run_studies
 
     run_studies(output, quick, say, lambda name, runs: progress(runs, name, len(runs)))
