@@ -182,21 +182,13 @@ class RealUnits:
 
     def onset(self, fx: float, omega: float) -> dict[str, float]:
         """For JSON: the shear stress of F_x, its share of the overburden, and the frequency of the growing motion."""
-        return {
-            "shear_stress_Pa": self.stress(fx),
-            "stress_ratio": fx / self.fy,
-            "frequency_Hz": self.frequency(omega),
-        }
+        stress, hertz = self.stress(fx), self.frequency(omega)
+        return {"shear_stress_Pa": stress, "stress_ratio": fx / self.fy, "frequency_Hz": hertz}
 
     def as_dict(self) -> dict[str, float]:
         """For JSON: one unit of the scene in SI, and the overburden."""
-        return {
-            "length_m": self.length,
-            "mass_kg": self.mass,
-            "time_s": self.time,
-            "force_N": self.force,
-            "overburden_Pa": self.overburden,
-        }
+        own = {"length_m": self.length, "mass_kg": self.mass, "time_s": self.time}
+        return own | {"force_N": self.force, "overburden_Pa": self.overburden}
 
 
 class Layer(NamedTuple):

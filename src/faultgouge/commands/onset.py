@@ -49,7 +49,7 @@ def onset(
     for mu in scene.law.mus:
         try:
             each = _search(scene, mu, not every, bed, folder)
-            yield from _in_words(scene, each)
+            yield from _in_words(each)
             found.append({"mu": mu} | each.as_dict() | {"flows_beyond": each.flows_beyond} | _in_si(scene, each))
         except (OnsetError, NoEquilibriumError) as error:
             failed = error
@@ -109,13 +109,11 @@ def _in_si(scene: Scene, found: Onset) -> dict[str, list[dict[str, float]]]:
     return {"si": [real.onset(each.fx_onset, omega[k]) for k, each in enumerate(found.windows)]}
 
 
-def _in_words(scene: Scene, found: Onset) -> Results:
-    """The onset of a friction coefficient: F_x^c, how it begins, all windows as a table; in SI as well."""
+def _in_words(found: Onset) -> Results:
+    """The onset of a friction coefficient: F_x^c, how it begins, and all windows as a table."""
     from faultgouge.analysis.uncertain_digits import with_uncertainty
 
     mu, opening = f"mu = {found.mu:g}", found.windows[0]
-    si = [[f"{number:.4g}" for number in each.values()] for each in _in_si(scene, found).get("si", [])]
-    first_in_si = [f"{mu}: in SI a shear stress of {s} Pa, {r} of the overburden, at {f} Hz" for s, r, f in si[:1]]
     if opening.dissipative:
         omega = f"omega = {opening.frequency:.6g}"
         if opening.kind == "start":
@@ -125,20 +123,17 @@ def _in_words(scene: Scene, found: Onset) -> Results:
             yield f"{mu}: with dissipation {found.describe()} ({opening.kind}, {omega})"
         undamped = "none on this ramp" if found.undamped is None else found.undamped.describe()
         yield f"{mu}: without dissipation {undamped}"
-        yield from first_in_si
         return
     yield f"{mu}: {found.describe()}"
     if found.complete:
-        headings = ["in Pa", "F_x/F_y", "in Hz"] if si else ["eigenvalue"]
-        rows = []
-        for k, each in enumerate(found.windows):
-            until = "the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}"
-            numbers = si[k] if si else [f"{each.eigenvalue:.6g}"]
-            rows.append([with_uncertainty(each.fx_onset, each.error), until, *numbers, each.kind])
-        yield table_of(("from F_x", "to F_x", *headings, "begins with"), rows)
+        ends = ["the end of the ramp" if each.fx_end is None else f"{each.fx_end:.8g}" for each in found.windows]
+        rows = [
+            (with_uncertainty(each.fx_onset, each.error), end, f"{each.eigenvalue:.6g}", each.kind)
+            for each, end in zip(found.windows, ends, strict=True)
+        ]
+        yield table_of(("from F_x", "to F_x", "eigenvalue", "begins with"), rows)
     elif opening.kind != "start":
         how = "two eigenvalues merge" if opening.kind == "coalescence" else "contacts change"
         yield f"{mu}: {how} there, and become complex about {opening.eigenvalue:.6g} ({opening.kind})"
-        yield from first_in_si
     if found.ends is not None and found.complete:
         yield f"{mu}: the branch of equilibria ends before F_x = {found.ends:g}, where an eigenvalue is negative"
