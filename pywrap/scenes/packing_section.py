@@ -36,12 +36,6 @@ class SettlingLoad(Section):
     fy: Annotated[Positive | None, FORCE] = None
     kn: Annotated[Positive | None, STIFFNESS] = None
 
-    @model_validator(mode="after")
-    def _not_empty(self) -> "SettlingLoad":
-        if self.fy is None and self.kn is None:
-            raise refusal_sentence("", "has nothing in it: give fy, or kn, or both, as in {fy = 3.0, kn = 2e5}")
-        return self
-
 
 class GeneratedPacking(Section):
     """[packing] from a seed: a loose start of disks of several sizes in equal shares, settled under the load.

@@ -37,6 +37,9 @@ from .validation import (
 NUMBER_PATTERN = r"\d+(?:\.\d*)?(?:[eE][-+]?\d+)?"
 """A number without a sign, in text."""
 
+LIST = Field(min_length=1, strict=False)
+"""Of a key that is a list in TOML."""
+
 EQUILIBRIA = 10_000_000
 """Increments of a ramp: half a day and 150 GB for 100 disks."""
 
@@ -65,10 +68,7 @@ class Law(Section):
     kn: Annotated[Positive, STIFFNESS]
     # the default is of the form that a scene gives, and becomes a number in the validator
     kt: Annotated[NotNegative, STIFFNESS] = Field("2/7 kn")  # type: ignore[assignment]
-    mu: Annotated[
-        NotNegative | Annotated[tuple[NotNegative, ...], Field(min_length=1, strict=False)],
-        rule("give a number of at least 0, or a list of such numbers"),
-    ] = 1.0
+    mu: Annotated[NotNegative | Annotated[tuple[NotNegative, ...], LIST], rule("give one or more, of at least 0")] = 1.0
     exponent: float = 1.5
     history: Literal["total", "rescaled", "coulomb"] = "total"
 
@@ -85,15 +85,10 @@ class Law(Section):
             raise refusal_sentence("", f'= "{kt}" is no share of kn: give a number, or a share such as "2/7 kn"')
         return numerator * info.data["kn"] / denominator
 
-    @field_validator("exponent")
-    @classmethod
-    def _known_exponent(cls, exponent: float) -> float:
-        if exponent not in EXPONENTS:
-            raise refusal_sentence("", f"= {exponent:g} is refused: give {known_exponents()}")
-        return exponent
-
     @model_validator(mode="after")
-    def _something_to_rescale(self) -> "Law":
+    def _known(self) -> "Law":
+        if self.exponent not in EXPONENTS:
+            raise refusal_sentence("exponent", f"= {self.exponent:g} is refused: give {known_exponents()}")
         if self.history == "rescaled" and self.exponent < LEAST_RESCALED:
             raise refusal_sentence("history", f'= "rescaled" needs a law.exponent of {LEAST_RESCALED} or more')
         return self
@@ -181,11 +176,7 @@ class Ramp(Section):
     """
 
     step: Annotated[Positive, FORCE]
-    until: Annotated[
-        Number | Annotated[tuple[Number, ...], Field(min_length=1, strict=False)],
-        rule("give a force, or a list of forces between which F_x goes"),
-        FORCE,
-    ]
+    until: Annotated[Number | Annotated[tuple[Number, ...], LIST], rule("give a force, or a list of forces"), FORCE]
     method: Literal["newton", "overdamped"] = "newton"
     force_tolerance: Annotated[Positive | None, FORCE] = None
 
@@ -331,7 +322,7 @@ class Perturb(WithSignal, Inertia):
     time: Annotated[Positive, TIME]
     time_step: Annotated[Positive | None, TIME] = None
     target: Annotated[
-        Literal["top", "all"] | Annotated[tuple[Annotated[int, Field(ge=0)], ...], Field(min_length=1, strict=False)],
+        Literal["top", "all"] | Annotated[tuple[Annotated[int, Field(ge=0)], ...], LIST],
         rule('give "top", "all" or a list of disks, counted from 0'),
     ] = "top"
     on: Literal["layer", "floor"] | None = None
@@ -377,11 +368,11 @@ class Perturb(WithSignal, Inertia):
         """
         signal = None if self.signal == "pulse" else self.forcing()
         if signal is not None and signal.shortest < dt:
-            raise SignalError(
-                f"perturb.signal has rows that are {signal.shortest:.3g} apart, and the time step is {dt:.3g}: a run "
-                f"with too few samples would not follow it, so lower perturb.time_step or raise perturb.stretch to "
-                f"{(self.stretch or 1) * dt / signal.shortest:.3g}"
+            stretch = (
+                f"lower perturb.time_step, or raise perturb.stretch to {(self.stretch or 1) * dt / signal.shortest:.3g}"
             )
+            rows = f"perturb.signal has rows that are {signal.shortest:.3g} apart"
+            raise SignalError(f"{rows}, and the time step is {dt:.3g}, too long to follow it: {stretch}")
 
 
 class Friction(Section):
@@ -402,9 +393,9 @@ class Friction(Section):
     B: NotNegative = 0.2
     w: Positive = 0.4
     mu_ss: NotNegative = 0.8
-    v0: Annotated[
-        NotNegative | Literal["calibrated"], rule('give a velocity of at least 0, or "calibrated"'), VELOCITY
-    ] = "calibrated"
+    v0: Annotated[NotNegative | Literal["calibrated"], rule('give a velocity, or "calibrated"'), VELOCITY] = (
+        "calibrated"
+    )
     v_ss: Annotated[Positive | str, rule('give a velocity above 0, or a multiple of v0 such as "10 v0"'), VELOCITY]
 
     @field_validator("v_ss")
@@ -453,7 +444,7 @@ PROBE_SCALE = 1e-12
 and far below every force."""
 
 
-Stage: TypeAlias = tuple[Annotated[Number, VELOCITY], Annotated[Positive, TIME]]
+Stage: TypeAlias = Annotated[tuple[Annotated[Number, VELOCITY], Annotated[Positive, TIME]], Field(strict=False)]
 
 
 class Drive(WithSignal):
@@ -499,7 +490,7 @@ class Drive(WithSignal):
     spring: Annotated[Positive | Literal["rigid"], rule('give a stiffness above 0, or "rigid"'), SPRING]
     velocity: Annotated[Number | None, VELOCITY] = None
     protocol: Annotated[
-        Annotated[tuple[Annotated[Stage, Field(strict=False)], ...], Field(min_length=1, strict=False)] | None,
+        Annotated[tuple[Stage, ...], LIST] | None,
         rule("give pairs of a velocity and a time above 0, as in [[1e-3, 100], [0, 50]]"),
     ] = None
     until: Annotated[Positive | None, TIME] = None
