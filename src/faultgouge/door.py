@@ -154,9 +154,6 @@ class frames(Sequence["Packing | Configuration"]):  # noqa: N801  # a function t
         chosen = range(self._count)[number]
         return [load(self.path, each) for each in chosen] if isinstance(number, slice) else load(self.path, chosen)
 
-    def __repr__(self) -> str:
-        return f"<frames of {self.path}: {self._count}>"
-
 
 def path_of(file: object, caller: str) -> Path:
     """The path that a function is given; a BadInputError if it is none."""
@@ -181,10 +178,8 @@ def takes_file(
             packing = load(packing)
         elif not hasattr(packing, "configuration"):
             advice = ": give its .packing" if hasattr(packing, "packing") else ""
-            given = f"{type(packing).__name__}{advice}"
-            raise BadInputError(
-                f"{name} takes a Packing, a Configuration, or the path of a stored one, and no {given}."
-            )
+            takes = f"{name} takes a Packing, a Configuration, or the path of a stored one"
+            raise BadInputError(f"{takes}, and no {type(packing).__name__}{advice}.")
         return function(packing, *args, **options)
 
     return opens

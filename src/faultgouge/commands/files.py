@@ -58,9 +58,7 @@ def import_(
     relax: Annotated[bool, Option("--relax", help="Bring a packing out of balance to rest.")] = False,
     material: Annotated[str | None, Option(metavar="KEY=VALUE,...", help=OF_MATERIAL)] = None,
     columns: Annotated[str | None, Option(metavar="NAME,...", help="Columns of --contacts, with --material.")] = None,
-    slides: Annotated[
-        bool, Option("--slides", help="Of a deck: contacts at the bound slide, and do not stick.")
-    ] = False,
+    slides: Annotated[bool, Option("--slides", help="Of a deck: contacts at the bound slide.")] = False,
     balance: Annotated[float | None, Option(min=0.0, help=OF_BALANCE)] = None,
 ) -> Results:
     """Run a LAMMPS deck and give the verdict on its last state, or convert a packing of another code, to a run.h5.
@@ -137,27 +135,24 @@ def _spheres(
 
     if not is_root():
         return
-    law = material_of(material)
-    if contacts is not None and is_measured(contacts):
-        with working("draws of the forces"):
-            found, counts = measured_forces(file, contacts, law, frame)
-        write_configuration(output, found, {"deck": ""})
-        yield "\n".join([f"written to {output}", *counts])
-        return
-    spheres = read_spheres(file, frame)
+    law, says = material_of(material), list[str]()
     if contacts is None:
-        found = spheres.of_material(law)
+        found = read_spheres(file, frame).of_material(law)
+        says = [*found.remarks]
+    elif is_measured(contacts):
+        with working("draws of the forces"):
+            found, says = measured_forces(file, contacts, law, frame)
     else:
-        found = read_contacts(spheres, contacts, law, None if columns is None else columns.split(","), frame)
+        names = None if columns is None else columns.split(",")
+        found = read_contacts(read_spheres(file, frame), contacts, law, names, frame)
     write_configuration(output, found, {"deck": ""})
     keeps(f"{output} has been written")
     yield f"{repr(found).removeprefix('<Configuration: ').removesuffix('>')}; written to {output}"
-    if contacts is None:
-        yield "\n".join(found.remarks)
-        return
-    with working("stability"):
-        verdict, says = verdict_within_digits(found)
-    yield f"{verdict}\n{says}"
+    if contacts is not None and not says:
+        with working("stability"):
+            verdict, within = verdict_within_digits(found)
+        says = [f"{verdict}", within]
+    yield "\n".join(says)
 
 
 def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Results:
@@ -193,9 +188,7 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
     if not len(packing.contacts) or packing.residual > LARGEST_IMBALANCE * packing.fy:
         if not relax:
             feels = f"a disk feels {packing.residual:.3g}" if len(packing.contacts) else "no disk touches another"
-            raise PackingFileError(
-                f"{file} is not in balance under fy = {packing.fy:g}: {feels}; --relax brings it to rest."
-            )
+            raise PackingFileError(f"{file} is not in balance under fy = {packing.fy:g}: {feels}; --relax mends it.")
         with status("coming to rest") as show:
             resting, words = bring_to_rest(packing, watch=lambda what: show(f"coming to rest: {what}"))
         yield words
@@ -207,11 +200,9 @@ def _disks(file: Path, output: Path, relax: bool, given: dict[str, Any]) -> Resu
                 run.complete = True
     if not packing.slips_known:
         say(f"{file} gives no tangential forces: they are taken as zero, and nothing can be said of the stability")
+    disks_of = f"{counted(len(packing), 'disk')}, {int(packing.top.sum())} of them the upper layer"
     contacts_of = f"{counted(len(packing.contacts), 'contact')}, {counted(len(packing.rattlers), 'rattler')}"
-    yield (
-        f"{counted(len(packing), 'disk')}, {int(packing.top.sum())} of them the upper layer, {contacts_of}; residual "
-        f"{packing.residual:.2g}; written to {output}"
-    )
+    yield f"{disks_of}, {contacts_of}; residual {packing.residual:.2g}; written to {output}"
 
 
 def _packing(disks: Disks, given: dict[str, Any]) -> Packing:
@@ -257,9 +248,7 @@ def export(
     frame: Frame = -1,
     mode: Annotated[str | None, Option("--mode", metavar="pair|N", help="Also a mode, as of `draw`.")] = None,
     frames: Annotated[str | None, Option("--frames", metavar="all|START:STOP[:STEP]", help=OF_FRAMES)] = None,
-    output: Annotated[Path, Option("-o", "--output", help="A .vtp, .pvd, .xyz, .data, .gsd or .csv.")] = Path(
-        "packing.vtp"
-    ),
+    output: Annotated[Path, Option("-o", "--output", help=".vtp, .pvd, .xyz, .data, .gsd, .csv")] = Path("packing.vtp"),
 ) -> Results:
     """Write a stored packing for ParaView (.vtp), OVITO and ASE (.xyz), LAMMPS (.data) or HOOMD (.gsd).
 
