@@ -339,8 +339,6 @@ class Perturb(WithSignal, Inertia):
         yield "quantity", self.quantity and self.on != "floor", of_floor
         forced = self.amplitude > 0 and self.omega is None
         yield "omega", forced, "is missing: an amplitude needs the frequency of its forcing"
-        short = self.time_step is not None and self.time < self.time_step
-        yield "time", short, f"= {self.time} is shorter than one step, {self.time_step}: run longer"
 
     @property
     def cosine(self) -> tuple[float, float]:
