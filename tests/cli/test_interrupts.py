@@ -112,7 +112,7 @@ def simulates(folder):
         ("onset scene.toml -o onset.json", "nothing was written: give the same command again"),
         (
             "reproduce scene.toml -o out",
-            "what is in out so far is kept; the same command starts from the beginning and replaces it",
+            "out has the parts that were finished; the same command starts from the beginning and replaces",
         ),
         (
             "stability --quick -o out",
