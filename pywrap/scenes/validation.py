@@ -51,6 +51,9 @@ Number: TypeAlias = Annotated[float, Field(allow_inf_nan=False), AfterValidator(
 Positive: TypeAlias = Annotated[float, Field(gt=0, allow_inf_nan=False), AfterValidator(check_number)]
 NotNegative: TypeAlias = Annotated[float, Field(ge=0, allow_inf_nan=False), AfterValidator(check_number)]
 
+LIST = Field(min_length=1, strict=False)
+"""Of a key that is a list in TOML."""
+
 HERTZ_EXPONENT = 1.5
 """Exponent of Hertz's contact."""
 
