@@ -41,18 +41,12 @@ def ends(scene):
 def contacts(scene, settled):
     return {"contacts": np.int64(len(settled.packing.contacts)), "of": {"x": settled.packing.position[:2, 0]}}
 
-def seed_of(scene):
-    return scene.packing.seed
-
 def imports(scene):
     from tools.numbers import number
-    return {"number": number}
 
-def nothing(scene):
-    return {"number": float("nan")}
-
-def fails(scene):
-    return {"number": 1 / 0}
+def seed_of(scene): return scene.packing.seed
+def nothing(scene): return {"number": float("nan")}
+def fails(scene): return {"number": 1 / 0}
 """
 
 
