@@ -23,10 +23,7 @@ def test_onset_states_no_digits_of_zero(faultgouge_here, tmp_path):
     said = faultgouge_here("onset", "scene.toml", "-o", "onset.json").stdout
     found = json.loads((tmp_path / "onset.json").read_text())
     pairs = found["unstable_at_start"]["pairs"]
-    assert (
-        f"mu = 0.5: unstable at F_x = 0, before any shear is added: {pairs} complex pairs; in the fastest motion D grows as exp("
-        in said
-    )
+    assert f"mu = 0.5: unstable at F_x = 0, before any shear is added: {pairs} complex pairs; in the fastest " in said
     assert len(said.splitlines()) == 2  # the last one names the law
     assert (found["fx_c"], found["error"]) == (0.0, 0.0)
 
