@@ -51,8 +51,8 @@ TRIES = 3
 """How often a point is tried again whose worker was killed."""
 
 FINAL_ERRORS = (NoEquilibriumError, OnsetError, SceneError)
-"""Errors that the same scene has again, to the bit: it has no equilibrium or no onset, or it is refused. Others may have
-passed, as a lack of memory or a full disk does, and a sweep that goes on tries such scenes again."""
+"""Errors that the same scene has again, to the bit: it has no equilibrium or no onset, or it is refused. Others may
+have passed, as a lack of memory or a full disk does, and a sweep that goes on tries such scenes again."""
 
 FAILURES = (FaultgougeError, ValueError, ArithmeticError, ArpackError, MemoryError)
 """Errors of a single scene: those of the package, of LAPACK, of ARPACK, and of a packing that is too large."""
