@@ -64,13 +64,12 @@ def test_a_packing_that_buckles_ends_its_branch_and_counts():
 
 @pytest.mark.slow
 def test_the_command_leaves_rows_and_pictures_up_to_the_last_equilibrium(faultgouge_here, tmp_path):
-    packing, ramp = {"disks": 30, "width": 6.0, "seed": 76}, {"step": 0.03, "until": 20.0}
-    scene = SMALL | {"packing": packing, "ramp": ramp, "modes": {"fx_over_fy": [0.1, 0.2, 5.0]}}
+    scene = SCENE | {"modes": {"fx_over_fy": [0.1, 0.2, 5.0]}, "ramp": {"step": 0.03, "until": 20.0}}
     (tmp_path / "scene.toml").write_text(toml(scene))
     said = faultgouge_here("modes", "scene.toml", "-o", "out", "--workers", "1").stdout
     assert "there is no equilibrium at the next load" in said
     rows = json.loads((tmp_path / "out/modes.json").read_text())["rows"]
-    assert [(row["fx_over_fy"], row["disks"], row["seed"]) for row in rows] == [(0.1, 30, 76), (0.2, 30, 76)]
+    assert [(row["fx_over_fy"], row["disks"], row["seed"]) for row in rows] == [(0.1, 60, 77), (0.2, 60, 77)]
     with (tmp_path / "out/modes.csv").open() as file:
         assert [int(row["pairs"]) for row in csv.DictReader(file)] == [row["pairs"] for row in rows]
     assert (tmp_path / "out" / "modes.png").stat().st_size > 10_000
