@@ -180,7 +180,7 @@ def disks(places: list[tuple[float, float]], slip: float | None = None, **change
 
 def deck(places: list[tuple[float, float]], *commands: str) -> None:
     """LAMMPS with disks of diameter one at given places, and commands; every rank has an instance of its own."""
-    decks = Decks(lammps_instance(MPI.COMM_SELF, None))
+    instance = lammps_instance(MPI.COMM_SELF, None)
     try:
         for line in (
             *("units lj", "dimension 2", "boundary p f p", "atom_style sphere", "comm_modify vel yes"),
@@ -190,9 +190,9 @@ def deck(places: list[tuple[float, float]], *commands: str) -> None:
             *("pair_style mindlin/smooth 2e5 5e4 1.0", "pair_coeff * *"),
             *("fix floor all wall/mindlin/smooth 2e5 5e4 1.0 ylo 0.0", "fix move all nve/disc 1.0", *commands),
         ):
-            decks.command(line)
+            Decks(instance).command(line)
     finally:
-        decks.lammps.close()
+        instance.close()
 
 
 def geometry() -> Iterator[Case]:
