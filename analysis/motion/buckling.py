@@ -11,6 +11,8 @@ Otherwise the factors of :math:`S + c` give a bound :math:`-c` below all real pa
 eigenvalues lie within c/2 of -c/2, where Arnoldi's iteration with that shift finds every eigenvalue.
 """
 
+from functools import partial
+
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import LinearOperator, eigs
@@ -20,7 +22,6 @@ from ..has_configuration import HasConfiguration
 from ..packing.packing import Floats
 from .eigenvalues import (
     SAFETY,
-    Complexes,
     active_coordinates,
     imbalance,
     is_negative,
@@ -48,8 +49,7 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
     """
     matrix, active = dynamical_matrix(packing)
     size, rounding = matrix.shape[0], operator_rounding(packing, matrix.data)
-    particle = active % len(packing.configuration)
-    symmetric = csc_array(0.5 * (matrix + matrix.T))
+    particle, symmetric = active % len(packing.configuration), csc_array(0.5 * (matrix + matrix.T))
     shifts = SAFETY * rounding + imbalance(packing)[particle]
     if _is_positive(symmetric, shifts):
         return np.zeros(0)
@@ -58,13 +58,10 @@ def negative_eigenvalues(packing: HasConfiguration) -> Floats:
     bound = max(float(shifts.max()), np.finfo(float).eps ** 0.5 * float(np.abs(matrix.data).max()))
     while not _is_positive(symmetric, bound):
         bound *= 4  # each costs factors, and a loose one more eigenvalues
-    count = 16
-    while True:
-        count = min(count, size - 2)
+    count, found = 8, None
+    while found is None or (count < size - 2 and np.abs(found.values + 0.5 * bound).max() <= 0.5 * bound):
+        count = min(2 * count, size - 2)
         found = nearest_modes(packing, -0.5 * bound, count)
-        if count == size - 2 or np.abs(found.values + 0.5 * bound).max() > 0.5 * bound:
-            break
-        count *= 2
     zero = zero_uncertainties(packing, rounding, particle, found.left[active], found.right[active])
     return np.sort(found.values[is_negative(found.values, found.overlap, rounding, zero)].real)
 
@@ -78,8 +75,7 @@ def surely_positive(matrix: csr_array) -> bool:
         Zero rows are left out.
     """
     active = active_coordinates(matrix)
-    inner = matrix[active][:, active]
-    return _is_positive(csc_array(0.5 * (inner + inner.T)), 0.0)
+    return _is_positive(csc_array(0.5 * (matrix + matrix.T))[active][:, active], 0.0)
 
 
 def _is_positive(symmetric: csc_array, shift: Floats | float) -> bool:
@@ -88,7 +84,7 @@ def _is_positive(symmetric: csc_array, shift: Floats | float) -> bool:
     return not symmetric.shape[0] or negative_pivots(csc_array(symmetric + shifts)) == 0
 
 
-def nearest_modes(packing: HasConfiguration, near: complex, count: int, tolerance: float = 0.0) -> Modes:
+def nearest_modes(packing: HasConfiguration, near: complex, count: int) -> Modes:
     """Compute the eigenvalues nearest to a shift, with left and right vectors, by shift-invert Arnoldi (ARPACK).
 
     One sparse LU factorisation of :math:`A - \\sigma` serves the right vectors and, transposed, the left
@@ -102,9 +98,6 @@ def nearest_modes(packing: HasConfiguration, near: complex, count: int, toleranc
         The shift sigma, 1 / time^2. It must not be exactly an eigenvalue.
     count : int
         Number of eigenvalues, from 1 to E - 2, with E the number of coordinates on which a force acts.
-    tolerance : float
-        Relative error of the eigenvalues of the inverted operator at which the iteration may end; 0 for the precision
-        of doubles.
 
     Returns
     -------
@@ -131,21 +124,13 @@ def nearest_modes(packing: HasConfiguration, near: complex, count: int, toleranc
     factor = symmetric_lu(shifted, pivoting=DIAGONAL_PIVOT)  # the shift may be next to an eigenvalue
     # A fixed start vector makes ARPACK, and with it every result, reproducible.
     start = np.ones(size, dtype=number)
-    solves = 0
-
-    def solve(vector: Complexes, trans: str) -> Complexes:
-        nonlocal solves
-        solves += 1
-        return factor.solve(vector, trans=trans)
-
-    inverse = LinearOperator(shifted.shape, lambda v: solve(v, "N"), dtype=number)
-    values, right = eigs(matrix, count, sigma=shift, OPinv=inverse, v0=start, tol=tolerance)
-    adjoint = LinearOperator(shifted.shape, lambda v: solve(v, "H"), dtype=number)
-    mirrored, left = eigs(matrix.T, count, sigma=np.conj(shift), OPinv=adjoint, v0=start, tol=tolerance)
+    inverse, adjoint = (LinearOperator(shifted.shape, partial(factor.solve, trans=side), dtype=number) for side in "NH")
+    values, right = eigs(matrix, count, sigma=shift, OPinv=inverse, v0=start)
+    mirrored, left = eigs(matrix.T, count, sigma=np.conj(shift), OPinv=adjoint, v0=start)
     order = np.lexsort((values.imag, values.real))
     values, right = values[order], right[:, order]
     # left vectors beside the right vectors of the same eigenvalue
     _, partner = linear_sum_assignment(np.abs(values[:, None] - mirrored.conj()[None, :]))
     spread = np.zeros((2, packing.coordinates, len(values)), dtype=np.complex128)
     spread[0, active], spread[1, active] = right, left[:, partner]
-    return Modes(values, spread[0], spread[1], axes=packing.axes, solves=solves)
+    return Modes(values, spread[0], spread[1], axes=packing.axes)
