@@ -19,7 +19,7 @@ dense blocks.
 
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,13 +41,6 @@ before."""
 
 GMRES_ITERATIONS = 30
 """Iterations of GMRES that are worth while: a factorisation takes as long as fifty."""
-
-
-class Solver(Protocol):
-    """A matrix K on some of the 3N coordinates (x.., y.., R theta..), to be solved with many forces."""
-
-    def solve(self, force: Floats) -> Floats | None:
-        """The solution of K dq = F, zero on coordinates that K does not know, shape (3N,); None if K is singular."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,6 +213,10 @@ class SparseSolver:
         step = np.zeros_like(force)
         step[active] = apply_preconditioner(found)
         return None if failed else step
+
+
+Solver: TypeAlias = BandSolver | SparseSolver
+"""A matrix K on some of the 3N coordinates (x.., y.., R theta..), to be solved with many forces."""
 
 
 def elimination_order(i: Indices, j: Indices, disks: int, coordinates: Indices) -> Indices:

@@ -134,18 +134,15 @@ class TransientGain:
     linear: bool = True
 
     @property
-    def _translations(self) -> Floats:
-        return self.start.reshape(3 if self.dimension == 2 else 6, -1)[: self.dimension]
-
-    @property
     def disk(self) -> int:
         """The worst disk to push: the disk with the largest initial displacement."""
-        return int(np.argmax(np.linalg.norm(self._translations, axis=0)))
+        translations = self.start.reshape(3 if self.dimension == 2 else 6, -1)[: self.dimension]
+        return int(np.argmax(np.linalg.norm(translations, axis=0)))
 
     @property
     def direction(self) -> Floats:
         """Direction of the displacement of this disk, a unit vector (x, y) or (x, y, z)."""
-        push = self._translations[:, self.disk]
+        push = self.start.reshape(3 if self.dimension == 2 else 6, -1)[: self.dimension, self.disk]
         return np.asarray(push / np.linalg.norm(push))
 
 
