@@ -6,7 +6,7 @@ triggers for amplitudes above
 
 .. math:: a_c(\omega, F_x) = \frac{v_0}{\max_{0 \le t \le T} |v(t)|}, \qquad v(t)\ \text{for}\ a = 1,
 
-where T is the duration of the wave. v(t) follows from K, C and M alone (:mod:`~faultgouge.analysis.responses.forcing`),
+where T is the duration of the wave. v(t) follows from K, C and M alone (:mod:`~faultgouge.analysis.responses.response`),
 transient included: without dissipation the motion excited by the beginning of the wave never decays, and for a slow
 wave nearly all of v is such free motion.
 
@@ -30,8 +30,7 @@ from threadpoolctl import threadpool_limits
 
 from ..analysis import Packing, find_onset, spectrum
 from ..analysis.arrays import Floats
-from ..analysis.responses.forcing import floor_force, impulse_response
-from ..analysis.responses.response import layer_force
+from ..analysis.responses.response import floor_force, impulse_response, layer_force
 from ..pywrap import Engine, Equilibrium, Scene, SceneError
 from ..pywrap.runs.path_error import with_path_error
 from ..pywrap.runs.ramp_loads import ramp_loads
