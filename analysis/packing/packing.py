@@ -368,11 +368,8 @@ class Packing:
         kept = self.normal_force > least
         if np.all(kept):
             return self
-        low = self.contacts.slip_low
-        contacts = Contacts(
-            self.contacts.i[kept], self.contacts.j[kept], self.contacts.slip[kept], None if low is None else low[kept]
-        )
-        return replace(self, contacts=contacts)
+        c, low = self.contacts, self.contacts.slip_low
+        return replace(self, contacts=Contacts(c.i[kept], c.j[kept], c.slip[kept], None if low is None else low[kept]))
 
     @property
     def smallest_overlap(self) -> float:
