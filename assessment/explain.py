@@ -184,10 +184,8 @@ UNITS = (
 def affordable(scene: Scene) -> tuple[Scene, str]:
     """The scene, or a strip of the layer that settles fast; with a description."""
     section = scene.packing
-    if not isinstance(section, GeneratedPacking):
-        return scene, f"the packing of {section.file.name}"
-    if section.disks <= SETTLED_DISKS:
-        return scene, f"the packing that the scene settles to, {section.disks} disks"
+    if not isinstance(section, GeneratedPacking) or section.disks <= SETTLED_DISKS:
+        return scene, "the packing of the scene"
     share = SETTLED_DISKS / section.disks
     width = max(section.width * share, 4 * max(section.radii))  # at least the narrowest periodic box
     strip = {"disks": SETTLED_DISKS, "top": max(1, round(section.top * share)), "width": width}

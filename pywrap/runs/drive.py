@@ -37,8 +37,8 @@ from ...analysis.responses.slips import Slip, SlipDetector, find_slips
 from ..lammps.engine import Engine
 from ..lammps.instance import EngineError
 from ..scenes.packing_section import GeneratedPacking
+from ..scenes.run_sections import Drive
 from ..scenes.scene import Scene, scene_of
-from ..scenes.sections import Drive
 from ..scenes.validation import SceneError, require_section
 from ..settling.settle import law_of, settle, settle_bed
 from .undamped import Checkpoint

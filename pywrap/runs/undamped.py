@@ -18,8 +18,9 @@ from ...analysis.arrays import Floats, Indices
 from ..equilibria.quasistatic import Equilibrium
 from ..lammps.dynamics import MotionState, Weakening
 from ..lammps.engine import Engine
+from ..scenes.run_sections import Perturb
 from ..scenes.scene import Scene, scene_of
-from ..scenes.sections import Friction, Perturb
+from ..scenes.sections import Friction
 from ..scenes.validation import SceneError, require_section
 from .ramp import reach
 

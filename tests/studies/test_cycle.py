@@ -79,7 +79,7 @@ def test_a_stored_configuration_keeps_its_spring(slow, tmp_path):
     assert read_configuration(tmp_path / "run.h5") == configuration != with_spring(configuration, 0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_states_of_a_run_go_on_where_they_were_cut_off(slow, tmp_path):
     def states(folder, **options):
         cycle(slow, folder, **options)

@@ -291,14 +291,10 @@ def _slips(scene: Scene, output: Path, table: Path, others: list[Path]) -> Resul
     with RunFile(output) as file:
         (slips, under_way), series, times = all_slips_in(file), file.series(SERIES), file.observable("time")
         out = np.flatnonzero(strays(file.packing(-1), file.packing(0))).tolist()
-    rows = [
-        asdict(slip)
-        | {
-            "frame_before": int(np.searchsorted(times, slip.begins, side="right") - 1),
-            "frame_after": int(np.searchsorted(times, slip.ends)),
-        }
-        for slip in slips
-    ]
+    before = (np.searchsorted(times, [slip.begins for slip in slips], side="right") - 1).tolist()
+    after = np.searchsorted(times, [slip.ends for slip in slips]).tolist()
+    ends = [{"frame_before": begin, "frame_after": end} for begin, end in zip(before, after, strict=True)]
+    rows = [asdict(slip) | frames for slip, frames in zip(slips, ends, strict=True)]
     write_csv(table, SLIP_COLUMNS, rows)
     friction = friction_of(series["time"], series["force"], slips, scene.load.fy)
     result = {
