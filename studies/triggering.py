@@ -38,7 +38,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -53,12 +53,13 @@ from ..analysis.responses.response import LinearMotion
 from ..analysis.windows.pair_over_load import normal_forms
 from ..pywrap import Engine, Equilibrium, Sample, Scene
 from ..pywrap.lammps.dynamics import Weakening
+from ..pywrap.runs.path_error import with_path_error
 from ..pywrap.runs.scene_path import next_equilibrium
 from ..pywrap.runs.undamped import perturb, weakening_of
 from ..pywrap.scenes.command_sections import UNDAMPED_SECTIONS
 from ..pywrap.scenes.validation import require_section
-from .onset import first_onset
-from .packing_tools import Start
+from .onset import first_window
+from .packing_tools import Start, path_from
 from .result_rows import Row
 from .statistics import quartiles, share, sign_test
 from .study import Say, task
@@ -87,8 +88,6 @@ RISES_IN_DECADES = (5, 10)
 
 Series = dict[str, Floats]
 """The samples of a run, with one array of shape (T,) for each field of `Sample`."""
-
-Verdict = Literal["does not weaken", "too short", "jump alone", "grows", "unexplained"]
 
 
 class Forecast(NamedTuple):
@@ -131,7 +130,7 @@ class TriggeringOutcome(NamedTuple):
         Of D from ten times the jump to a tenth of its largest value, where there is a decade between.
     """
 
-    verdict: Verdict
+    verdict: str
     crossing: float | None = None
     jump: float | None = None
     growth: float | None = None
@@ -280,7 +279,7 @@ def judge(run: Series, v0: float, foreseen: Forecast) -> TriggeringOutcome:
         fitted = fit_growth(time[later], msd[later], 10 * jump, 0.1 * top)
     except ValueError:
         fitted = None
-    verdict: Verdict = "unexplained"
+    verdict = "unexplained"
     if top < GROWTH_FACTOR * max(jump, foreseen.jump):
         verdict = "jump alone"
     elif fitted is not None and foreseen.rate > 0:
@@ -340,6 +339,24 @@ def frictions(scene: Scene) -> tuple[float, ...]:
     weak = scene.friction.mu_ss * scene.law.mus[0]
     # 0.8 * 0.7 is not 0.56 to the last bit
     return (*(mu for mu in scene.law.mus if not np.isclose(mu, weak, rtol=1e-12, atol=0.0)), weak)
+
+
+def first_onset(scene: Scene, rest: Equilibrium) -> tuple[Row, tuple[Equilibrium, ...]]:
+    """How the ramp of a scene ends from a settled packing on, with its equilibria up to there.
+
+    Returns
+    -------
+    row : dict
+        ends : "onset", a window of complex eigenvalues, "until", the last F_x of the scene, or "flows", no equilibrium
+        beyond `reach`; reach : the largest F_x up to which there is no window, force per disk of the upper layer: the
+        onset, if there is one; error : uncertainty of the onset, or None.
+    path : tuple of Equilibrium
+    """
+    with path_from(rest, scene) as path:
+        ends, reach, found = first_window(path, scene)
+        whole = None if found is None else with_path_error(found, path)
+        reach, error = (reach, None) if whole is None else (whole.fx_c, whole.error)
+        return {"ends": ends, "reach": reach, "error": error}, tuple(path.equilibria)
 
 
 def eruption(scene: Scene, path: tuple[Equilibrium, ...], window: tuple[float, float]) -> Row:

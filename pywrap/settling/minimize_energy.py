@@ -97,23 +97,28 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
         steps ran out.
     """
     if loose.law.frictional or len(loose) <= DYNAMICS_DISKS:
-        finest = finest_tolerance(loose)
         if bed:
-            engine.settle(finest)
+            engine.settle(finest_tolerance(loose))
         else:
-            engine.damp(loose, finest, STAGE_STEPS, LIGHT_VISCOSITY * float(np.sqrt(_stiffest(loose))))
+            viscosity = LIGHT_VISCOSITY * float(np.sqrt(_stiffest(loose)))
+            engine.settle(finest_tolerance(loose), loose, viscosity=viscosity, steps=STAGE_STEPS)
         packing = engine.packing
         try:
             return equilibrate(engine, Equilibrium.of(packing), 0.0).packing
         except NoEquilibriumError:
             return packing if loose.law.frictional else minimize_energy(packing)[0]
+    # damping that is critical for the slowest shear wave across the height, mass / time: 2 m omega. Its omega is
+    # pi c / (2 height), with c = SHEAR_SPEED d (k / m)^(1/2) and the stiffness k of a contact under the pressure
+    diameter, height = (
+        2 * float(loose.radius.mean()),
+        float(np.pi * np.sum(loose.radius**2) / (_width(loose) * DENSITY)),
+    )
+    carried = loose.fy * loose.top.sum() * diameter / _width(loose)
+    stiffness = float(loose.law.normal_stiffness(loose.law.overlap_of_force(carried)))
+    viscosity = float(np.pi * SHEAR_SPEED * diameter * np.sqrt(loose.mass.mean() * stiffness) / height)
     report_progress(f"dynamics down to {TOLERANCES[0]:.0e} F_y on a disk")
-    if bed:
-        engine.settle(
-            TOLERANCES[0] * loose.fy, _height(loose) / loose.position[:, 1].max(), _viscosity(loose), STAGE_STEPS
-        )
-    else:
-        engine.damp(loose, TOLERANCES[0] * loose.fy, STAGE_STEPS, _viscosity(loose))
+    start, gather = (None, height / loose.position[:, 1].max()) if bed else (loose, 1.0)
+    engine.settle(TOLERANCES[0] * loose.fy, start, gather, viscosity, STAGE_STEPS)
     for tolerance, finer in pairwise(TOLERANCES):
         packing = engine.packing
         if largest_force(packing) > (1 + 1e-6) * tolerance * loose.fy:  # but for the rounding of forces
@@ -123,7 +128,7 @@ def settle_loose(engine: Engine, loose: Packing, bed: bool = True) -> Packing:
         if found:
             return packing
         report_progress(f"dynamics down to {finer:.0e} F_y on a disk")
-        engine.damp(packing, finer * loose.fy, STAGE_STEPS)
+        engine.settle(finer * loose.fy, packing, steps=STAGE_STEPS)
     return minimize_energy(engine.packing)[0]
 
 
@@ -144,10 +149,8 @@ def minimize_energy(packing: Packing, iterations: int = MINIMIZER_ITERATIONS) ->
     bool
         Whether the force is down at the rounding floor.
     """
-    best, least = packing, largest_force(packing)
-    sigma = _stiffest(packing) * min(1.0, least / packing.fy) * 1e-2
-    sigma = max(sigma, 1e-12 * _stiffest(packing))
-    here = packing
+    here, best, least = packing, packing, largest_force(packing)
+    sigma = max(_stiffest(packing) * min(1.0, least / packing.fy) * 1e-2, 1e-12 * _stiffest(packing))
     for _ in range(iterations):
         factors = _positive(here, sigma)
         if factors is None:
@@ -219,20 +222,3 @@ def finest_tolerance(packing: Packing) -> float:
 
 def _width(packing: Packing) -> float:
     return float(np.ptp(packing.position[:, 0])) if packing.box_length is None else packing.box_length
-
-
-def _height(packing: Packing) -> float:
-    """Height of the disks at the area fraction to which they are gathered."""
-    return float(np.pi * np.sum(packing.radius**2) / (_width(packing) * DENSITY))
-
-
-def _viscosity(packing: Packing) -> float:
-    """Damping that is critical for the slowest shear wave across the height, mass / time: 2 m omega.
-
-    Its omega is pi c / (2 height), with c = SHEAR_SPEED d (k / m)^(1/2) and the stiffness k of a contact under the
-    pressure.
-    """
-    diameter = 2 * float(packing.radius.mean())
-    carried = packing.fy * packing.top.sum() * diameter / _width(packing)
-    stiffness = float(packing.law.normal_stiffness(packing.law.overlap_of_force(carried)))
-    return float(np.pi * SHEAR_SPEED * diameter * np.sqrt(packing.mass.mean() * stiffness) / _height(packing))

@@ -33,7 +33,7 @@ from ...figures.series import draw_growth
 from ...pywrap import Equilibrium, Record, Sample, Scene, SceneError, reach
 from ...pywrap.onset import ONSET_DISTANCES, load_at_onset, onset_run
 from ...pywrap.runs.undamped import ACCURATE_SHARE, perturb, time_step
-from ...pywrap.scenes.sections import Perturb
+from ...pywrap.scenes.run_sections import Perturb
 from ...pywrap.scenes.units import dashpot, real_units
 from ...pywrap.scenes.validation import require_section
 from ...pywrap.settling.settle import settle_bed

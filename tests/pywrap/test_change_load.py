@@ -94,7 +94,6 @@ def test_a_packing_settled_with_friction_keeps_its_slips_on_the_way():
 @pytest.mark.parametrize(
     ("at", "says"),
     [
-        ({}, "packing.settle_at has nothing in it: give fy, or kn, or both"),
         ({"fy": -1.0}, "packing.settle_at.fy = -1.0 is refused: it should be greater than 0"),
         ({"fx": 1.0}, "fx is no key"),
     ],
