@@ -53,12 +53,13 @@ from ..analysis.responses.response import LinearMotion
 from ..analysis.windows.pair_over_load import normal_forms
 from ..pywrap import Engine, Equilibrium, Sample, Scene
 from ..pywrap.lammps.dynamics import Weakening
+from ..pywrap.runs.path_error import with_path_error
 from ..pywrap.runs.scene_path import next_equilibrium
 from ..pywrap.runs.undamped import perturb, weakening_of
 from ..pywrap.scenes.command_sections import UNDAMPED_SECTIONS
 from ..pywrap.scenes.validation import require_section
-from .onset import first_onset
-from .packing_tools import Start
+from .onset import first_window
+from .packing_tools import Start, path_from
 from .result_rows import Row
 from .statistics import quartiles, share, sign_test
 from .study import Say, task
@@ -338,6 +339,24 @@ def frictions(scene: Scene) -> tuple[float, ...]:
     weak = scene.friction.mu_ss * scene.law.mus[0]
     # 0.8 * 0.7 is not 0.56 to the last bit
     return (*(mu for mu in scene.law.mus if not np.isclose(mu, weak, rtol=1e-12, atol=0.0)), weak)
+
+
+def first_onset(scene: Scene, rest: Equilibrium) -> tuple[Row, tuple[Equilibrium, ...]]:
+    """How the ramp of a scene ends from a settled packing on, with its equilibria up to there.
+
+    Returns
+    -------
+    row : dict
+        ends : "onset", a window of complex eigenvalues, "until", the last F_x of the scene, or "flows", no equilibrium
+        beyond `reach`; reach : the largest F_x up to which there is no window, force per disk of the upper layer: the
+        onset, if there is one; error : uncertainty of the onset, or None.
+    path : tuple of Equilibrium
+    """
+    with path_from(rest, scene) as path:
+        ends, reach, found = first_window(path, scene)
+        whole = None if found is None else with_path_error(found, path)
+        reach, error = (reach, None) if whole is None else (whole.fx_c, whole.error)
+        return {"ends": ends, "reach": reach, "error": error}, tuple(path.equilibria)
 
 
 def eruption(scene: Scene, path: tuple[Equilibrium, ...], window: tuple[float, float]) -> Row:

@@ -176,8 +176,7 @@ def perturb(
         *_, start = reach(scene, settings.fx, communicator)
     packing = start.packing
     dt, steps = sample_steps(settings, packing, samples, early)
-    everyone = range(len(packing)) if settings.target == "all" else settings.target
-    target = None if everyone == "top" else [int(disk) for disk in everyone]
+    target = {"top": None, "all": range(len(packing))}.get(settings.target, settings.target)
     forces = *settings.cosine, target, weakening, settings.forcing(), settings.on or "layer"
 
     part = max(SHORTEST_PART, -(-int(settings.time / dt) // MOST_PARTS))  # by the length of the run alone

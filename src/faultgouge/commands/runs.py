@@ -88,8 +88,6 @@ def _settle_or_read(scene: Scene, record: Record) -> Equilibrium:
     """The last equilibrium of a file; in a new one the settled packing, which is then in it."""
     from faultgouge.pywrap import settle
 
-    if record.remark:
-        say(record.remark)
     if record.last is None:
         with status("settling") as show:
             record.append(settle(scene, watch=lambda what: show(f"settling: {what}")))
@@ -170,8 +168,6 @@ def perturb(scene: SceneFile, output: Out = Path("perturb.h5")) -> Results:
     if len(mus) > 1:
         say(f"the run uses mu = {mus[0]:g}, the first of the {len(mus)} friction coefficients of the scene")
     with Record(output, scene, task="perturb", saved=_keeps) as record:
-        if record.remark:
-            say(record.remark)
         if (start := record.last) is None:
             if (fx := settings.fx) is None:
                 fx = load_at_onset(scene)
@@ -265,8 +261,6 @@ def _drive(output: Path, scene: Scene, what: str, start: Packing | None = None, 
     from faultgouge.pywrap.runs.drive import check_drive, settle_for_drive
 
     with Record(output, scene, task="drive", saved=_keeps) as record:
-        if record.remark:
-            say(record.remark)
         if record.last is None:
             if start is None:
                 with status("settling") as show:
