@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 
 from ..configuration import Configuration
 from ..contacts import PER_CONTACT, LinearisedContacts
-from .atomic_write import SEAL, new_sealed, open_plain, open_sealed, telling, write_sealed
+from .atomic_write import SEAL, begins_with, new_sealed, open_sealed, telling, write_sealed
 from .runfile import CHECKSUM, write_h5md
 
 SCALARS = ("dimension", "fx", "load_error", "drag_rate", "spring", "operator_error", "slips_known")
@@ -45,25 +45,24 @@ def write_configuration(
     OutputError
         If the file cannot be written.
     """
+    c = configuration
     with new_sealed() as file:
         write_h5md(file)
         particles, group = file.create_group("particles/particles"), file.create_group("snapshot")
-        position = np.pad(configuration.position, ((0, 0), (0, 3 - configuration.dimension)))
+        position = np.pad(c.position, ((0, 0), (0, 3 - c.dimension)))
         for name, value in (("value", position[None]), ("step", np.zeros(1, int)), ("time", np.zeros(1))):
             particles[f"position/{name}"] = value
-        sides = ["periodic" if each else "none" for each in configuration.periodic]
-        particles["box/edges"] = np.linalg.norm(configuration.box, axis=1)
+        particles["box/edges"] = np.linalg.norm(c.box, axis=1)
+        sides = ["periodic" if each else "none" for each in c.periodic]
         particles["box"].attrs.update({"dimension": 3, "boundary": sides})
-        group.attrs.update({name: getattr(configuration, name) for name in SCALARS})
-        if configuration.proof is not None:
-            group.attrs["proof"] = configuration.proof
-        if configuration.remarks:
-            group.attrs["remarks"] = list(configuration.remarks)
+        more = {"proof": c.proof, "remarks": list(c.remarks) or None}
+        numbers = {name: getattr(c, name) for name in SCALARS} | more
+        group.attrs.update({name: value for name, value in numbers.items() if value is not None})
         for name in ARRAYS:
-            group[name] = getattr(configuration, name)
-        given = {name: matrix for name in MATRICES if (matrix := getattr(configuration, name)) is not None}
+            group[name] = getattr(c, name)
+        given = {name: matrix for name in MATRICES if (matrix := getattr(c, name)) is not None}
         parts = {f"{name}/{each}": getattr(matrix, each) for name, matrix in given.items() for each in MATRIX_PARTS}
-        parts |= {f"contacts/{name}": getattr(configuration.contacts, name) for name in PER_CONTACT}
+        parts |= {f"contacts/{name}": getattr(c.contacts, name) for name in PER_CONTACT}
         for name, values in parts.items():
             group.create_dataset(name, data=values, **(CHECKSUM if len(values) else {}), chunks=len(values) > 0 or None)
         file.attrs.update(attributes or {})
@@ -75,11 +74,7 @@ def holds_configuration(path: Path) -> bool:
 
     Raises PackingFileError if the file has changed since it was sealed.
     """
-    try:
-        with open_plain(path) as stream:
-            if stream.read(len(SEAL)) != SEAL:
-                return False
-    except OSError:
+    if not path.is_file() or not begins_with(path, SEAL):
         return False
     with open_sealed(path) as file:
         return "snapshot" in file

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from ...analysis import PackingFileError
 from ...analysis.files import formats
+from ...analysis.files.atomic_write import begins_with
 from ...analysis.files.formats import Disks
-from ...analysis.files.formats.disks import ParticleTable, disks_of
+from ...analysis.files.formats.disks import in_plane, particles_of
 from .instance import lammps_instance
 from .plain_file_names import plain_name
 
@@ -34,7 +35,7 @@ def read_disks(path: Path, frame: int | None = None) -> Disks:
 
 def read_restart(path: Path) -> Disks:
     """Disks of a restart."""
-    if not formats.begins_with(path, formats.RESTART_BEGINNING):
+    if not begins_with(path, formats.RESTART_BEGINNING):
         raise PackingFileError(f"{path} is no LAMMPS restart file, or cannot be read.")
     lammps = lammps_instance(MPI.COMM_SELF, None)
     try:
@@ -56,7 +57,8 @@ def read_restart(path: Path) -> Disks:
         columns |= dict(zip("xyz", place.T, strict=True))
         low, high, _, _, _, periodic, _ = lammps.extract_box()
         box, groups = np.diag(np.subtract(high, low)), _groups(lammps, np.argsort(columns["id"]))
-        return disks_of(ParticleTable(str(path), columns, box, np.array(low), [*map(bool, periodic)], groups=groups))
+        sides: dict[str, Any] = {"origin": np.array(low), "periodic": [*map(bool, periodic)]}
+        return in_plane(particles_of(path, columns, box, groups=groups, **sides))
     finally:
         lammps.close()
 

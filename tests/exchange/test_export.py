@@ -292,10 +292,10 @@ def test_ase_reads_extended_xyz(tmp_path, ramp, configuration):
 LATER = "format 2 of faultgouge's files, and this version knows 1: a later version wrote it, so update faultgouge"
 
 
-@pytest.mark.parametrize("kind", ["formats.xyz", "formats.lammps_data", "formats.libraries", "run", "configuration"])
+@pytest.mark.parametrize("kind", ["formats.xyz", "formats.lammps_data", "formats.gsd_file", "run", "configuration"])
 def test_a_file_of_a_later_format_is_refused(tmp_path, sheared, configuration, monkeypatch, kind):
     """And one without a number, of an older version, is read."""
-    suffixes = {"formats.xyz": "xyz", "formats.lammps_data": "data", "formats.libraries": "gsd"}
+    suffixes = {"formats.xyz": "xyz", "formats.lammps_data": "data", "formats.gsd_file": "gsd"}
     path = tmp_path / f"a.{suffixes.get(kind, 'h5')}"
     place = f"faultgouge.analysis.files.{kind if kind in suffixes else 'atomic_write'}"
 

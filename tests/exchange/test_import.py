@@ -173,17 +173,6 @@ def test_lammps_reads_its_data_and_a_restart_has_all_of_it_and_groups(lmp, tmp_p
     assert disks.box_length == sheared.box_length
 
 
-def test_what_mdanalysis_reads_with_radii(tmp_path, sheared):
-    rows = zip(sheared.position.tolist(), sheared.radius.tolist(), strict=True)
-    line = "ATOM {n:6d}  C   DSK A{n:4d}    {x:9.4f} {y:9.4f}   0.000  0.0000 {r:.4f}"
-    text = "\n".join(line.format(n=n, x=x, y=y, r=r) for n, ((x, y), r) in enumerate(rows, 1))
-    (tmp_path / "packing.pqr").write_text(text + "\n")
-    disks = read_disks(tmp_path / "packing.pqr")
-    np.testing.assert_allclose(disks.position, sheared.position, atol=1e-4)
-    np.testing.assert_allclose(disks.radius, sheared.radius, rtol=1e-6)
-    assert "float32" in disks.remark
-
-
 @pytest.mark.ranks
 @pytest.mark.parametrize("slips", [False, pytest.param(True, marks=pytest.mark.long)])
 @pytest.mark.slow

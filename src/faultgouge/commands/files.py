@@ -35,8 +35,7 @@ if TYPE_CHECKING:
 
 OF_SOURCE = (
     "A LAMMPS deck (.in), or a restart that was kept with its deck (NAME.restart beside NAME.restart.in); or LAMMPS "
-    "data, dump or restart (atom style sphere), NAME.disks, CSV, extended XYZ, GSD, packing.json, or a file that "
-    "MDAnalysis reads with radii."
+    "data, dump or restart (atom style sphere), NAME.disks, CSV, extended XYZ, GSD, or packing.json."
 )
 OF_LAYER = (
     "The upper layer: a number of highest disks that touch something, type:2 or type:NAME, ids:1,4,7-9, ids:@FILE, "
@@ -136,7 +135,7 @@ def import_(
         if lines := _deck_around(file) if is_bare else "":
             raise type(error)(f"{error}\n{lines}") from error
         raise
-    yield from _import_disks(file, output, disks, top, packing, relax)
+    yield from _import_disks(file, output, disks, packing, relax)
 
 
 def _in_words(found: object, output: Path) -> str:
@@ -162,6 +161,7 @@ def _spheres(
     from faultgouge.analysis.files.configuration_file import write_configuration
     from faultgouge.analysis.files.contact_tables import (
         material_of,
+        of_material,
         read_contacts,
         read_spheres,
         verdict_within_digits,
@@ -178,7 +178,7 @@ def _spheres(
         return
     spheres = read_spheres(file, frame)
     if contacts is None:
-        found = spheres.of_material(law)
+        found = of_material(spheres, law)
     else:
         found = read_contacts(spheres, contacts, law, None if columns is None else columns.split(","), frame)
     if not is_root():
@@ -265,16 +265,15 @@ def _scene(scene: Path | None, values: dict[str, Any], smallest: float) -> Scene
     return Scene.from_mapping(sections | {"law": sections["law"] | {"history": history}})
 
 
-def _import_disks(file: Path, output: Path, disks: Disks, top: str | None, packing: Packing, relax: bool) -> Results:
+def _import_disks(file: Path, output: Path, disks: Disks, packing: Packing, relax: bool) -> Results:
     """Store a packing in balance, or brought to rest if that is wanted, and say what it is."""
     from faultgouge.analysis import PackingFileError, RunFile
-    from faultgouge.analysis.files.formats.disks import layer_remark
     from faultgouge.pywrap.equilibria.quasistatic import rounding_floor
     from faultgouge.pywrap.settling.relax import bring_to_rest
     from faultgouge.pywrap.settling.settle import LARGEST_IMBALANCE
 
-    for remark in filter(None, (disks.remark, layer_remark(disks, top, packing.top))):
-        say(f"{file}: {remark}")
+    if disks.remark:
+        say(f"{file}: {disks.remark}")
     keeps(f"nothing has been written to {output} yet")
     if not len(packing.contacts) or packing.residual > LARGEST_IMBALANCE * packing.fy:
         if not relax:

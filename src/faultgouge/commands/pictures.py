@@ -51,7 +51,7 @@ class Colour(str, Enum):
 OF_MODE = (
     "The unstable pair, or before the onset the two modes closest to merging; or mode N, counted by eigenvalue from 0."
 )
-OF_FILM = "The film: .mp4 or .gif; of spheres .xyz or .pvd. By default film.mp4, or film.gif without imageio-ffmpeg."
+OF_FILM = "The film: .mp4 or .gif. By default film.mp4, or film.gif without imageio-ffmpeg."
 OF_LOADS = "Number of equilibria on the page, equally spaced; 60 by default, and fewer for more than 380 disks."
 WhichMode = Annotated[str | None, Option("--mode", metavar="pair|N", help=OF_MODE)]
 WhichColour = Annotated[
@@ -157,30 +157,20 @@ def movie(
     and falls in steps. With --mode: the motion of a mode without its growth. From
     run.h5: the ramp, and F_x over the displacement of the upper layer. From drive.h5:
     its states, to scale, and the force over time. An .mp4 needs
-    pip install 'faultgouge[movie]'. A mode of spheres is written as frames for OVITO
-    (.xyz) or ParaView (.pvd).
+    pip install 'faultgouge[movie]'. Modes of spheres move on the page of `faultgouge view`.
     """
-    from faultgouge.analysis import BadInputError, Configuration
-    from faultgouge.analysis.files.formats import ModeVectors, write_mode_frames
+    from faultgouge.analysis import BadInputError
     from faultgouge.figures.film import DOTS, check_name, film_of_modes, usual_suffix, write_film
 
     output = output or Path("film").with_suffix(usual_suffix())
     dots = DOTS if dots is None and output.suffix.lower() == ".gif" else dots
     count, periods = max(2, round(seconds * rate)), max(1, round(seconds / 2))
     packing = None if mode is None else stored_packing(file, frame)
-    if isinstance(packing, Configuration) and packing.dimension == 3:
-        if output.suffix not in (".xyz", ".pvd"):
-            raise BadInputError(
-                f"-o {output}: a mode of spheres moves in OVITO (.xyz) or ParaView (.pvd); give one of these."
-            )
-        with locked(output, file):
-            (first, *others), _ = modes_of(packing, str(mode))
-            if others:
-                raise BadInputError("--mode pair: the packing has no complex pair; give the number of a mode, from 0")
-            vectors = ModeVectors(f"mode_{first.number}", first.eigenvalue, first.displacement)
-            write_mode_frames(output, packing, vectors, count, periods)
-        yield f"{counted(count, 'frame')} of {first.plain}; written to {output}"
-        return
+    if packing is not None and packing.dimension == 3:
+        raise BadInputError(
+            f"{file} has spheres, and a film shows disks: `faultgouge view` shows their modes in motion, and "
+            "`faultgouge export --mode` has the vectors for ParaView (.vtp) and OVITO (.xyz)."
+        )
     check_name(output)
     with locked(output, file):
         if packing is None:

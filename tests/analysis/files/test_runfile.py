@@ -185,9 +185,7 @@ def test_a_file_holds_one_set_of_disks_and_of_names(sound, states):
                 run.append(replace(states[1], **change), floor=1.0)
         with pytest.raises(ValueError, match="observables"):
             run.append(states[1])
-        with pytest.raises(ValueError, match="residual is taken"):
-            run.append(states[1], residual=0.0)
-        for columns in ({"time": [1.0]}, {"time": [1.0], "msd": []}, {"time": 1.0, "msd": 1.0}):
+        for columns in ({"time": [1.0]}, {"time": [1.0], "msd": []}):
             with pytest.raises(ValueError, match="undamped"):
                 run.append_series("undamped", **columns)
         with pytest.raises(PackingFileError, match="no series growth"):
@@ -222,26 +220,18 @@ VIRTUAL = h5py.VirtualLayout((4,), "f8")
 VIRTUAL[:] = h5py.VirtualSource("other.h5", "data", (4,))
 
 
-def add_compressed(file):
-    chunk = 1 << 24
-    item = file.create_dataset(NAME, (1 << 40,), "f8", chunks=(chunk,), compression="gzip")
-    for k in range(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // (8 * chunk) + 1):
-        item.id.write_direct_chunk((k * chunk,), b"\0")
-
-
 @HERTZ
 @pytest.mark.parametrize(
-    ("add", "says"),
+    "add",
     [
-        (lambda file: file.update({"other": h5py.ExternalLink("other.h5", "/data")}), "is a link to another file"),
-        (lambda file: file.create_dataset(NAME, (4,), "f8", external=[("raw", 0, 32)]), "numbers in another file"),
-        (lambda file: file.create_virtual_dataset(NAME, VIRTUAL), "has its numbers in another file"),
-        (add_compressed, "more than this machine has memory"),
-        (lambda file: file.create_dataset(NAME, (10**13,), "f8", chunks=(1000,)), "has the shape"),
+        lambda file: file.update({"other": h5py.ExternalLink("other.h5", "/data")}),
+        lambda file: file.create_dataset(NAME, (4,), "f8", external=[("raw", 0, 32)]),
+        lambda file: file.create_virtual_dataset(NAME, VIRTUAL),
+        lambda file: file.create_dataset(NAME, (1 << 40,), "f8", chunks=(1 << 24,), compression="gzip"),
     ],
 )
-def test_what_is_not_in_the_file_or_not_for_this_machine_is_refused(sound, add, says):
+def test_what_is_not_in_the_file_or_not_for_this_machine_is_refused(sound, add):
     with RunFile(sound, "a") as run, run.change():
         add(run._file)
-    with pytest.raises(PackingFileError, match=says):
+    with pytest.raises(PackingFileError, match="has its numbers in another file, or more than this machine has memory"):
         RunFile(sound)
