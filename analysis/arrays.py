@@ -29,7 +29,9 @@ Data = TypeVar("Data", bound="DataclassInstance")
 
 
 def same_bits(one: Any, other: Any) -> bool:
-    """Whether two instances of a dataclass have the same bits in every compared field; -0.0 differs from 0.0."""
+    """`==` of a dataclass: whether every compared field has the same bits; -0.0 differs from 0.0."""
+    if type(one) is not type(other):
+        return NotImplemented
     for name in (field.name for field in one.__dataclass_fields__.values() if field.compare):
         a, b = getattr(one, name), getattr(other, name)
         if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):

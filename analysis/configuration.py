@@ -44,6 +44,7 @@ from .arrays import (
 from .assembly import ContactBlocks, as_springs, spring_of_layer
 from .contacts import UNIT_ERROR, LinearisedContacts, refuse_first
 from .counted import counted
+from .errors import BadInputError
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -230,7 +231,7 @@ class Configuration:
 
     def __eq__(self, other: object) -> bool:
         """Whether every array and number is the same to the bit."""
-        return same_bits(self, other) if isinstance(other, Configuration) else NotImplemented
+        return same_bits(self, other)
 
     def __hash__(self) -> int:
         return hash((len(self), self.fx, self.position.tobytes()))
@@ -255,6 +256,36 @@ class Configuration:
 
     def __len__(self) -> int:
         return len(self.radius)
+
+    law = None
+    fy = 0.0
+    """A :class:`Packing` has a law and a load F_y."""
+
+    @property
+    def in_words(self) -> str:
+        """How many of which particles."""
+        return f"{counted(len(self), 'disk' if self.dimension == 2 else 'sphere')} as LAMMPS left them"
+
+    @property
+    def box_length(self) -> float | None:
+        """Period along x, length; None without."""
+        return float(self.box[0, 0]) if self.periodic[0] else None
+
+    @property
+    def planes(self) -> tuple[tuple[int, float, float], ...]:
+        """Planes along the axes that particles touch: the axis, the sign along it of its inner side, and its place."""
+        c, d = self.contacts, self.dimension
+        flat = np.flatnonzero(c.wall & (np.abs(c.normal[:, :d]).max(axis=1) > 1 - 1e-9))
+        axis = np.argmax(np.abs(c.normal[flat]), axis=1)
+        sign = np.sign(c.normal[flat, axis])
+        place = self.position[c.i[flat], axis] - sign * (self.radius[c.i[flat]] - c.overlap[flat])
+        sides = sorted({*zip(axis.tolist(), sign.tolist(), strict=True)})
+        return tuple((a, s, float(np.mean(place[(axis == a) & (sign == s)]))) for a, s in sides)
+
+    @property
+    def slip_share(self) -> Floats:
+        """Not known of a Configuration: a BadInputError."""
+        raise BadInputError("A packing of LAMMPS has forces and no slips: let colours show mobilised, force or none.")
 
     @property
     def axes(self) -> int:

@@ -61,7 +61,7 @@ class Contacts:
 
     def __eq__(self, other: object) -> bool:
         """Whether partners and slips are the same to the bit."""
-        return same_bits(self, other) if isinstance(other, Contacts) else NotImplemented
+        return same_bits(self, other)
 
     def __hash__(self) -> int:
         return hash((len(self), self.slip.tobytes()))

@@ -155,7 +155,7 @@ class Packing:
 
     def __eq__(self, other: object) -> bool:
         """Whether every array and number is the same to the bit, low parts included."""
-        return same_bits(self, other) if isinstance(other, Packing) else NotImplemented
+        return same_bits(self, other)
 
     def __hash__(self) -> int:
         return hash((len(self), self.fx, self.position.tobytes()))
@@ -173,6 +173,20 @@ class Packing:
     dimension = 2
     axes = 3
     """Coordinates of each disk: x, y and R theta."""
+
+    planes = ((1, 1.0, 0.0),)
+    """The floor: its axis, the sign along it of its inner side, and its place; as of a Configuration."""
+
+    @property
+    def in_words(self) -> str:
+        """Load, and how many disks."""
+        return f"F_x = {self.fx:g}, F_y = {self.fy:g}: {counted(len(self), 'disk')}"
+
+    @property
+    def slip_share(self) -> Floats:
+        """|s|/t* of each contact, shape (C,); zero without friction."""
+        limit = self.law.slip_limit(self.geometry.overlap)
+        return np.divide(np.abs(self.contacts.slip), limit, out=np.zeros_like(limit), where=limit > 0)
 
     @property
     def coordinates(self) -> int:
