@@ -8,7 +8,6 @@ complex, the two real modes of the last load that are closest to merging are fol
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -20,13 +19,12 @@ from faultgouge.analysis import (
     closest_to_meeting,
     stability,
 )
+from faultgouge.analysis.arrays import Complexes
 from faultgouge.analysis.counted import counted
 from faultgouge.analysis.has_configuration import HasConfiguration
 from faultgouge.analysis.motion.eigenvalues import is_negative, is_zero, zero_uncertainties, zero_uncertainty
 from faultgouge.analysis.windows import Motions, System, force_bearing
 from faultgouge.analysis.windows.pair_over_load import Plane
-
-from .mode import Complexes, displacement
 
 Progress = Callable[[Sequence[HasConfiguration]], Iterable[HasConfiguration]]
 
@@ -55,19 +53,6 @@ class FollowedPair:
     eigenvalues: Complexes
     planes: Mapping[int, Plane]
     packings: Sequence[HasConfiguration]
-
-    @cached_property
-    def modes(self) -> Complexes:
-        """Displacements of both members, see :func:`~faultgouge.figures.mode.displacement`, shape (S, 2, axes, N).
-
-        They are zero where the pair is unknown.
-        """
-        last = self.packings[-1]
-        modes = np.zeros((len(self.packings), 2, last.axes, len(last)), dtype=np.complex128)
-        for k, pair in self.planes.items():
-            vectors = pair.right @ _members_of(pair)[1]
-            modes[k] = [displacement(self.packings[k], vector) for vector in vectors.T]
-        return modes
 
     @property
     def growth(self) -> np.ndarray:
@@ -143,7 +128,7 @@ def follow_eigenvalues(packings: Sequence[HasConfiguration], progress: Progress 
     for known in pairs:
         eigenvalues = np.full((len(packings), 2), complex(np.nan, np.nan))
         for k, plane in known.items():
-            eigenvalues[k] = _members_of(plane)[0]
+            eigenvalues[k] = members_of(plane)[0]
         found.append(FollowedPair(eigenvalues, known, packings))
     return RampEigenvalues(values, verdicts, sorted(found, key=lambda pair: -np.nanmax(pair.growth)))
 
@@ -202,7 +187,7 @@ def _about_to_meet(modes: Motions) -> list[Plane]:
     return [Plane.of(modes, (first, second))]
 
 
-def _members_of(pair: Plane) -> tuple[Complexes, Complexes]:
+def members_of(pair: Plane) -> tuple[Complexes, Complexes]:
     """Eigenvalues of both members, and their eigenvectors on the plane in columns."""
     own, vectors = np.linalg.eig(pair.block)
     order = np.lexsort((-own.imag, own.real))

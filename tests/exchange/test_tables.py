@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from table_rows import rows_of
 
 from faultgouge.analysis import BadInputError, MindlinLaw, PackingFileError
 from faultgouge.analysis.files.formats import packing_of, read_disks, upper_layer
@@ -77,20 +78,9 @@ def test_slips_are_in_the_unit_of_the_disks(read, tmp_path):
     assert found[0, 3] == -0.25e-3
 
 
-BAD_SLIPS = [
-    ("id1;id2;slip [µm]\n1;2;0,5\n2;3;1\n", "1 slip of disks that do not touch, such as those of 2 and 3: leave such"),
-    ("id1;id2;slip [µm]\n2;3;1\n4;0;2\n", "2 slips of disks that do not touch"),
-    ("id1;id2;slip [µm]\n4;0;2\n", "4 and the floor"),
-    ("id1;id2;slip\n1;2;0,5\n", "the disks are in mm, and slip has no unit"),
-    ("id1;id2;slip [kg]\n1;2;0,5\n", "the unit of slip, 'kg', does not convert to mm"),
-    ("id1;id2;other [mm]\n1;2;0,5\n", "has no column slip"),
-    ("id1;id2;slip [mm]\n1;9;0,5\n", "a contact names disk 9, which is not there"),
-]
-
-
-@pytest.mark.parametrize(("table", "says"), BAD_SLIPS)
+@pytest.mark.parametrize(("table", "says"), rows_of("exchange/refused_slips.txt"))
 def test_slips_that_fit_no_contact_are_refused(read, tmp_path, table, says):
-    head, rows = table.split("\n", 1)
+    head, rows = table.replace("\\n", "\n").split("\n", 1)
     with pytest.raises(PackingFileError, match=says):
         packing_of(disks := with_slips(read, tmp_path, rows, head), LAW, upper_layer(disks, 1), fy=1.0)
 

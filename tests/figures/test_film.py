@@ -7,17 +7,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from faultgouge.analysis import Packing
-from faultgouge.figures.film import (
-    COLOUR_DIFFERENCE,
-    LARGEST_SHOWN,
-    RunMotion,
-    faces_by_way,
-    film_of_ramp,
-    film_of_run,
-    usual_suffix,
-    write_film,
-)
+from faultgouge.analysis import Packing, PackingFileError, RunFile
+from faultgouge.figures.film import COLOUR_DIFFERENCE, usual_suffix, write_film
+from faultgouge.figures.motion_films import LARGEST_SHOWN, RunMotion, faces_by_way, film_of_ramp, film_of_run
 
 
 @pytest.fixture(scope="module")
@@ -45,16 +37,16 @@ def test_magnification_is_a_power_of_ten_that_only_falls(motion):
     assert np.all(shown[1:] > 0.1 * most * (1 - 1e-12))
 
 
-def test_displacements_are_those_of_the_nearest_image(packing):
+def test_displacements_of_a_file_are_those_of_the_nearest_image_and_a_part_of_the_run_is_its_times(packing, tmp_path):
     position = np.stack([packing.position, packing.position + np.array([packing.box_length + 1e-3, 0.0])])
-    moved = RunMotion.of(packing, np.array([0.5, 1.0]), position).displacement
-    np.testing.assert_allclose(moved[2], np.tile([1e-3, 0.0], (100, 1)), atol=1e-13)
-
-
-def test_a_part_of_a_run(motion):
-    part = motion.between(2.0, 3.0)
-    assert part.time[0] >= 2.0
-    assert part.time[-1] <= 3.0
+    with RunFile.create(tmp_path / "run.h5", packing) as run:
+        run.append(packing)
+        run.append_trajectory([0.5, 1.0], position)
+        motion = RunMotion.read(run)
+    np.testing.assert_allclose(motion.displacement[2], np.tile([1e-3, 0.0], (100, 1)), atol=1e-13)
+    assert motion.between(0.4, 1.5).time.tolist() == [0.5, 1.0]
+    with pytest.raises(PackingFileError, match=r"1 samples from t = 0\.4 to 0\.6, and two are needed"):
+        motion.between(0.4, 0.6)
 
 
 @pytest.mark.slow

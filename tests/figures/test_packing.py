@@ -201,7 +201,7 @@ def test_a_complex_mode_is_drawn_at_two_moments_with_arrows_and_the_colour_of_ro
     assert says in figure.axes[1].get_title()
 
 
-def test_the_pair_over_the_load_has_both_members_and_an_inset_about_its_onset():
+def test_the_pair_over_the_load_has_both_members_which_meet_at_the_onset():
     """The normal form: eigenvalues 1 -+ sqrt(fx_c - fx). Its discriminant is linear, so that curves between a few loads
     are exact, and both branches meet at the onset."""
     fx, fx_c = np.linspace(0, 0.03, 8), 0.02
@@ -215,11 +215,7 @@ def test_the_pair_over_the_load_has_both_members_and_an_inset_about_its_onset():
                 wanted = np.sort([part(1 + s * np.sqrt(fx_c - at + 0j)) for s in (-1, 1)], axis=0)[(sign + 1) // 2]
                 np.testing.assert_allclose(value, wanted, atol=1e-8)  # the root of what rounding leaves of D
             np.testing.assert_array_equal(dots.get_xdata(), fx)
-            assert fx_c in line.get_xdata()
-    upper = imaginary.child_axes[0].lines[1]
-    beyond = (upper.get_xdata() > 1e-9) & np.isfinite(upper.get_ydata())
-    np.testing.assert_allclose(upper.get_ydata()[beyond], np.sqrt(1e-2 * upper.get_xdata()[beyond]), rtol=1e-9)
-    assert draw_pair([replace(curve, fx_c=None)]).axes[1].child_axes == []
+            assert np.abs(line.get_xdata() - fx_c).min() < 1e-12
 
 
 def test_a_pair_that_is_lost_has_no_imaginary_part():

@@ -160,7 +160,8 @@ def movie(
     pip install 'faultgouge[movie]'. Modes of spheres move on the page of `faultgouge view`.
     """
     from faultgouge.analysis import BadInputError
-    from faultgouge.figures.film import DOTS, check_name, film_of_modes, usual_suffix, write_film
+    from faultgouge.figures.film import DOTS, check_name, usual_suffix, write_film
+    from faultgouge.figures.motion_films import film_of_modes
 
     output = output or Path("film").with_suffix(usual_suffix())
     dots = DOTS if dots is None and output.suffix.lower() == ".gif" else dots
@@ -185,7 +186,7 @@ def _film_of_file(file: Path, count: int, color: str, span: tuple[float, float] 
     """The run if the file has its trajectory, else its drive or its ramp."""
     from faultgouge.analysis import PackingFileError, RunFile
     from faultgouge.analysis.files.configuration_file import holds_configuration
-    from faultgouge.figures.film import Course, RunMotion, film_of_ramp, film_of_run
+    from faultgouge.figures.motion_films import Course, RunMotion, film_of_ramp, film_of_run
     from faultgouge.pywrap.runs.drive import series_and_slips
 
     if file.suffix == ".disks" or holds_configuration(file):
