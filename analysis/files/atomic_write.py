@@ -73,9 +73,7 @@ LONGEST_NAME = 200
 
 
 @contextmanager
-def telling(
-    path: object, says: str, errors: type[Exception] | tuple[type[Exception], ...] = Exception
-) -> Iterator[None]:
+def telling(path: object, says: str, errors: type[Exception] = Exception) -> Iterator[None]:
     """Tell in one sentence, a PackingFileError, what fails within, unless a sentence tells it already.
 
     Parameters

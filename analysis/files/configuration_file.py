@@ -11,7 +11,9 @@ The file is sealed like every run.h5 (:mod:`.atomic_write`), and is H5MD 1.1::
 """
 
 from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -19,7 +21,14 @@ from scipy.sparse import csr_array
 from ..configuration import Configuration
 from ..contacts import PER_CONTACT, LinearisedContacts
 from .atomic_write import SEAL, begins_with, new_sealed, open_sealed, telling, write_sealed
-from .runfile import CHECKSUM, write_h5md
+
+if TYPE_CHECKING:
+    import h5py
+
+CREATOR = "faultgouge"
+
+CHECKSUM: dict[str, Any] = {"fletcher32": True}
+"""A checksum for every chunk, for readers other than this one."""
 
 SCALARS = ("dimension", "fx", "load_error", "drag_rate", "spring", "operator_error", "slips_known")
 ARRAYS = (
@@ -94,3 +103,14 @@ def read_configuration(path: Path) -> Configuration:
             given[name].check_format()
         given["remarks"] = [str(each) for each in group.attrs.get("remarks", ())]
         return Configuration(contacts=LinearisedContacts(**contacts), **given)
+
+
+def write_h5md(file: "h5py.File") -> None:
+    """The version of H5MD, and what has written the file; no version where it is not installed."""
+    try:
+        program = version(CREATOR)
+    except PackageNotFoundError:
+        program = ""
+    file.create_group("h5md").attrs["version"] = np.array([1, 1])
+    file.create_group("h5md/author").attrs["name"] = CREATOR
+    file.create_group("h5md/creator").attrs.update({"name": CREATOR, "version": program})

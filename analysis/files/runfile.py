@@ -20,16 +20,12 @@ Every element with a T is a group of ``value`` and of links to one common ``step
 it.
 
 The trajectory of an undamped run follows after its initial equilibrium, as further frames of position with the time of
-the run: readers of H5MD step through both. fx and fy are those of the equilibrium; all other observables of such a
-frame are nan, or 0 for integers. ``/faultgouge/trajectory`` has its times, so that it counts these frames, and low
-parts of its positions.
+the run, and with fx and fy of the equilibrium; all other observables are nan there, or 0. ``/faultgouge/trajectory``
+has its times, so that it counts these frames, and low parts of its positions.
 
-The stored file is complete at any moment and has a checksum over all its bytes (:mod:`.atomic_write`). The
-attribute ``complete`` of the root is false until the run has ended; until then, an undamped run continues from the
-state in ``/checkpoint``.
-
-Datasets depend on the scene alone. The circumstances of the run (resolved scene, versions, seed, ranks) are attributes
-of the root. One file contains one set of disks and one law.
+The stored file is complete at any moment and has a checksum over all its bytes (:mod:`.atomic_write`). The attribute
+``complete`` of the root is false until the run has ended; until then, it continues from the state in ``/checkpoint``.
+Datasets depend on the scene alone; scene, versions, seed and ranks are attributes of the root.
 """
 
 from __future__ import annotations
@@ -38,7 +34,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from functools import cached_property
-from importlib.metadata import PackageNotFoundError, version
 from os import PathLike
 from pathlib import Path
 from time import monotonic
@@ -53,6 +48,7 @@ from ..packing.contacts import Contacts
 from ..packing.law import MindlinLaw
 from ..packing.packing import Packing
 from .atomic_write import new_sealed, open_sealed, telling, write_sealed
+from .configuration_file import CHECKSUM, write_h5md
 
 if TYPE_CHECKING:
     import h5py
@@ -60,13 +56,8 @@ if TYPE_CHECKING:
 NONE_GIVEN = "none were given"
 """The attribute tangential_forces of older files, where slips are not known."""
 
-CREATOR = "faultgouge"
-
 SHARE_OF_SAVING = 0.05
 """Share of the time that saving takes, at the most: a frame or a part of a series waits that long to be saved."""
-
-CHECKSUM: dict[str, Any] = {"fletcher32": True}
-"""A checksum for every chunk, for readers other than this one."""
 
 COMPACT: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": 1, **CHECKSUM}
 """Filters of what is stored for every disk or contact: half the size, mostly from indices and equal leading bytes, at a
@@ -84,17 +75,7 @@ class RunFile:
     A file that is open for appending is kept in memory. When it is saved, all of it replaces the stored file; saving
     takes at most a fixed share of the time, so that a file that grows for a long time is not written too often.
 
-    Parameters
-    ----------
-    path : path
-        The file.
-    mode : {"r", "a"}
-        Read, or read and append. :meth:`create` makes a new one.
-
-    Raises
-    ------
-    PackingFileError
-        If the file is missing, broken, or not written by this class.
+    Raises PackingFileError if the file is missing, broken, or not written by this class.
     """
 
     def __init__(self, path: str | PathLike[str], mode: Literal["r", "a"] = "r") -> None:
@@ -114,8 +95,6 @@ class RunFile:
 
         Parameters
         ----------
-        path : path
-            The file.
         packing : Packing
             Its radii, masses, upper layer, law, inertia factor and box are those of every frame. It is not
             appended.
@@ -125,12 +104,7 @@ class RunFile:
         Returns
         -------
         RunFile
-            Open for appending, without frames, and not `complete`.
-
-        Raises
-        ------
-        OutputError
-            If the file cannot be written.
+            Open for appending, without frames, and not `complete`. Raises OutputError if it cannot be written.
         """
         with new_sealed() as file:
             write_h5md(file)
@@ -241,15 +215,12 @@ class RunFile:
         return self._file["observables"][name]["value"][: len(self)]
 
     def append(self, packing: Packing, **scalars: float) -> None:
-        """Add a frame; it is stored with the next saving, which takes at most `SHARE_OF_SAVING` of the time.
+        """Add an equilibrium; it is stored with the next saving, which takes at most `SHARE_OF_SAVING` of the time.
 
         Parameters
         ----------
-        packing : Packing
-            An equilibrium of the disks that the file was created for.
         **scalars : float or int
-            Further observables, such as the force floor or the number of evaluations: the same names in every
-            frame.
+            Further observables, such as the number of evaluations: the same names in every frame.
 
         Raises
         ------
@@ -306,17 +277,9 @@ class RunFile:
                 data.resize(count, axis=0)
 
     def packing(self, frame: int = -1) -> Packing:
-        """The packing of a frame, bitwise as it was stored.
+        """The packing of a frame, bitwise as it was stored; negative numbers count from the end.
 
-        Parameters
-        ----------
-        frame : int
-            Number of the frame; negative ones count from the end.
-
-        Raises
-        ------
-        PackingFileError
-            If there is no such frame.
+        Raises PackingFileError if there is no such frame.
         """
         count = len(self)
         if not -count <= frame < count:
@@ -347,10 +310,8 @@ class RunFile:
         ----------
         time : array_like, shape (S,)
             Since the beginning of the run.
-        position : array_like, shape (S, N, 2)
-            Centres, length.
-        position_low : array_like, shape (S, N, 2), optional
-            Their low parts.
+        position, position_low : array_like, shape (S, N, 2)
+            Centres, length, and their low parts if there are any.
         """
         begin, place = len(self._file[f"{POSITION}/step"]), np.pad(position, ((0, 0), (0, 0), (0, 1)))
         steps = np.arange(begin, begin + len(place))
@@ -370,15 +331,8 @@ class RunFile:
 
         Parameters
         ----------
-        name : str
-            Name of the series.
         **columns : array_like, shape (R, ...)
-            Columns by name, all of the same length; each call must give the same names.
-
-        Raises
-        ------
-        ValueError
-            If the columns differ in length, or in name from earlier calls.
+            Columns by name, all of the same length; each call must give the same names, or a ValueError says so.
         """
         group = self._file.require_group(f"faultgouge/{name}")
         arrays = {column: np.atleast_1d(value) for column, value in columns.items()}
@@ -445,14 +399,3 @@ def parameters_of(packing: Packing) -> dict[str, Any]:
     values |= law_parameters(packing.law) | ({} if packing.slips_known else {"slips_known": 0.0})
     more = {name: getattr(packing, name) for name in ("drag_time", "spring", "box_length")}
     return values | {name: value for name, value in more.items() if value}
-
-
-def write_h5md(file: h5py.File) -> None:
-    """The version of H5MD, and what has written the file; no version where it is not installed."""
-    try:
-        program = version(CREATOR)
-    except PackageNotFoundError:
-        program = ""
-    file.create_group("h5md").attrs["version"] = np.array([1, 1])
-    file.create_group("h5md/author").attrs["name"] = CREATOR
-    file.create_group("h5md/creator").attrs.update({"name": CREATOR, "version": program})

@@ -22,11 +22,11 @@ from ...counted import counted
 from ...errors import BadInputError, PackingFileError
 from ...packing.packing import Packing
 from ..atomic_write import HDF5, SEAL, begins_with, open_text, telling
-from .disks import Disks, Slips, UpperLayerError, in_plane, packing_of, upper_layer
+from .disks import Disks, Slips, in_plane, packing_of, upper_layer
 from .exported import Exported, ModeVectors, choose_frames, exported, frames_of
 
 __all__ = [
-    "Disks", "ModeVectors", "Slips", "UpperLayerError", "choose_frames", "format_of",
+    "Disks", "ModeVectors", "Slips", "choose_frames", "format_of",
     "frames_of", "is_hdf5", "packing_of", "read_disks", "upper_layer", "write_frames", "write_packing",
 ]  # fmt: skip
 

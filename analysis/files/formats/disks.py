@@ -68,10 +68,8 @@ class Slips:
     ----------
     first, second : ndarray of int, shape (C,)
         IDs; a second ID of 0 is the floor.
-    slip : ndarray, shape (C,)
-        Along tau, length.
-    low : ndarray, shape (C,), or None
-        Their low parts.
+    slip, low : ndarray, shape (C,)
+        Along tau, length; and low parts if there are any.
     complete : bool
         Whether these are all contacts. Otherwise all touching disks are in contact; contacts not listed have no slip.
     """
@@ -98,7 +96,7 @@ class Disks:
     id : ndarray of int, shape (N,)
         IDs of the file, or from 1.
     mass, angle, kind, top, position_low : ndarray or None
-        Mass, orientation, type, whether a disk belongs to the upper layer, low parts of the centres; None if absent.
+        Mass, orientation, type, whether in the upper layer, low parts of the centres; None if absent.
     box_length : float or None
         Period along x; None if the sides are open.
     types, groups : mapping
@@ -255,8 +253,8 @@ def sphere_volume(radius: Floats) -> Floats:
 def mass_of_density(density: Floats, radius: Floats) -> Floats:
     """Masses of spheres, as they were before LAMMPS wrote their densities with 16 digits.
 
-    A mass of one may come back as 0.9999999999999999. A mass is therefore the number of twelve digits, if there is one
-    within the rounding of its density; else it is that which LAMMPS reads, to the bit.
+    A mass is the number of twelve digits, if there is one within the rounding of its density; else that which LAMMPS
+    reads, to the bit: a mass of one may come back as 0.9999999999999999.
     """
     volume = sphere_volume(radius)
     mass = density * volume
@@ -270,10 +268,6 @@ def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: fl
 
     Parameters
     ----------
-    disks : Disks
-        From a reader.
-    law : MindlinLaw
-        Of all contacts.
     top : ndarray of bool, shape (N,)
         The upper layer.
     **load : float
@@ -282,7 +276,7 @@ def packing_of(disks: Disks, law: MindlinLaw, top: NDArray[np.bool_], **load: fl
     Returns
     -------
     Packing
-        With slips that are not known, if there are contacts with friction, and the file does not give their slips.
+        With slips that are not known, if there is friction, and the file does not give the slips of the contacts.
 
     Raises
     ------
@@ -333,17 +327,11 @@ def _slipped(near: Contacts, disks: Disks, slips: Slips) -> Contacts:
     return near.slipped(slip)
 
 
-class UpperLayerError(BadInputError):
-    """The upper layer is not given, or its text is not understood, or names what a file does not have."""
-
-
 def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> NDArray[np.bool_]:
     """Select the disks of the upper layer.
 
     Parameters
     ----------
-    disks : Disks
-        From a reader.
     says : str or int, optional
         A number of highest disks that touch something, ``type:K`` or ``type:NAME``, ``ids:1,4,7-9``, ``ids:@FILE``
         (numbers in a file), ``group:NAME``, or conditions on x, y and radius joined by "and". By default the upper
@@ -358,22 +346,22 @@ def upper_layer(disks: Disks, says: str | int | None, key: str = "--top ") -> ND
 
     Raises
     ------
-    UpperLayerError
+    BadInputError
         If no upper layer is given, the text is not understood, or it selects no disk.
     """
     text = "" if says is None else str(says).strip()
     if says is None and disks.top is None:
         unsaid = f"{disks.source} does not say which disks are the upper layer"
-        raise UpperLayerError(f"{unsaid}: add {key.rstrip(' =')}, {LAYER_WAYS}.")
+        raise BadInputError(f"{unsaid}: add {key.rstrip(' =')}, {LAYER_WAYS}.")
     try:
         chosen = disks.top if says is None else _layer_of(disks, text)
     except (OSError, ValueError) as error:
-        raise UpperLayerError(f"{key}{text}: {error}.") from None
+        raise BadInputError(f"{key}{text}: {error}.") from None
     if chosen is None or not chosen.any():
         kinds = list(disks.types) or ([] if disks.kind is None else np.unique(disks.kind).tolist())
         y, types = disks.position[:, 1], ", ".join(map(str, kinds)) or "none"
         layer = f"{disks.source}: its own column top" if says is None else f"{key}{text}: this layer of {disks.source}"
-        raise UpperLayerError(f"{layer} holds no disk: they go from y = {y.min():g} to {y.max():g}, types: {types}.")
+        raise BadInputError(f"{layer} holds no disk: they go from y = {y.min():g} to {y.max():g}, types: {types}.")
     return chosen
 
 
